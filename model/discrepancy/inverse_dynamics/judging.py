@@ -11,7 +11,6 @@ from model.discrepancy.grounds import Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.comparison import Comparison, compare
 from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
@@ -29,9 +28,6 @@ SUSPECTED = 10.0
 and still short of what naming it takes."""
 MOST_OF_IT = 0.6
 """Share of a residual far above noise with which an effect that takes it is named on less evidence."""
-LEAD = 4.0
-"""Lead with which an effect is named alone where all evidence, its own and the rival's, comes from priors: that of the
-other method."""
 
 
 @dataclass(frozen=True)
@@ -71,25 +67,12 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
 
 
 def needed_evidence(standing: Standing, chosen: Fitted, *, takes_most: bool) -> float:
-    """Evidence from which a candidate is named. takes_most: whether it takes most of what is left.
-
-    How far numbers are from what a file states does not depend on what a residual is made of, against which the larger
-    least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough.
-    """
+    """Evidence from which a candidate is named. takes_most: whether it takes most of what is left."""
     options = standing.case.options
     least = options.least_evidence
     if takes_most:
         least = min(least, SUSPECTED)
-    least -= chosen.relief * max(least - SUSPECTED, 0.0)
     return least + options.echo * _collected(standing, chosen.joints)
-
-
-def needed_lead(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> float:
-    """Lead in evidence over a rival with which a candidate is named alone: as `needed_evidence`, less where the
-    evidence of both comes from priors. What one of them takes off a residual counts no more for being compared with a
-    prior."""
-    least = options.least_margin
-    return least - min(chosen.relief, rival.relief) * max(least - LEAD, 0.0)
 
 
 def _collected(standing: Standing, joints: tuple[int, ...]) -> float:

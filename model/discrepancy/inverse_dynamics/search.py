@@ -63,8 +63,6 @@ class Fitted:
     """Cost of its parameters and of the places searched, which the evidence has paid."""
     stated: tuple[Parameter, ...] = ()
     """Those of its parameters that the file states, as it states them; their priors are lifted."""
-    relief: float = 0.0
-    """Share of the fall of −2 log posterior that is of priors: numbers that no longer have to be off."""
     told: float = 0.0
     """What held-out records say for it, as evidence; 0 where there are none."""
     told_compared: float = 0.0
@@ -263,7 +261,6 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
             f,
             evidence=evidence(now, f.fit, memory, len(f.parameters), places),
             cost=cost_of(now, memory, len(f.parameters), places),
-            relief=_relief(now, f.fit, memory),
         )
         for f in found
     ]
@@ -314,13 +311,6 @@ def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: 
 def _fell(before: BalanceFit, after: BalanceFit, memory: Floats) -> float:
     """Fall of −2 log likelihood, with the independent samples of both counted by one memory (n,)."""
     return float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
-
-
-def _relief(before: BalanceFit, after: BalanceFit, memory: Floats) -> float:
-    """Share of the fall of −2 log posterior that is of priors, between 0 and 1."""
-    relieved = max(before.prior - after.prior, 0.0)
-    fell = max(_fell(before, after, memory), 0.0)
-    return relieved / (relieved + fell) if relieved > 0.0 else 0.0
 
 
 def cost_of(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:

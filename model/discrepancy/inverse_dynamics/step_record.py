@@ -18,7 +18,6 @@ from model.discrepancy.inverse_dynamics.judging import (
     Judgement,
     explains_most,
     needed_evidence,
-    needed_lead,
 )
 from model.discrepancy.inverse_dynamics.localisation import locate
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
@@ -135,7 +134,7 @@ def _cannot_be_told(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> bo
     taken off. Such a rival has to be one that would be suspected by itself. Held-out records make a lead larger and not
     smaller: a rival that leaves more of the fitted records may still take something else off others.
     """
-    needed = needed_lead(options, chosen, rival)
+    needed = options.least_margin
     lead = chosen.log_odds - rival.log_odds
     lead = max(lead, lead - (chosen.told_compared - rival.told_compared))
     if lead < needed:
