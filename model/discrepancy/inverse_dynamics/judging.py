@@ -10,7 +10,6 @@ import numpy as np
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.comparison import Comparison, compare
-from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
 from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
@@ -26,8 +25,6 @@ CHANCES = 3
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
-MOST_OF_IT = 0.6
-"""Share of a residual far above noise with which an effect that takes it is named on less evidence."""
 
 
 @dataclass(frozen=True)
@@ -55,24 +52,20 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     """
     if chosen.evidence <= 0:
         return None
-    most = explains_most(standing, chosen)
-    if chosen.evidence + chosen.told < needed_evidence(standing, chosen, takes_most=most):
+    if chosen.evidence + chosen.told < needed_evidence(standing, chosen):
         return None
     if any(chosen.rivals(one) and chosen.evidence < BESIDE_REFUSED * one.evidence for one in refused):
         return None
     comparison = compare(standing, chosen)
     if comparison is None:
         return None
-    return Judgement(comparison, _refusal(standing, comparison, takes_most=most))
+    return Judgement(comparison, _refusal(standing, comparison))
 
 
-def needed_evidence(standing: Standing, chosen: Fitted, *, takes_most: bool) -> float:
-    """Evidence from which a candidate is named. takes_most: whether it takes most of what is left."""
+def needed_evidence(standing: Standing, chosen: Fitted) -> float:
+    """Evidence from which a candidate is named."""
     options = standing.case.options
-    least = options.least_evidence
-    if takes_most:
-        least = min(least, SUSPECTED)
-    return least + options.echo * _collected(standing, chosen.joints)
+    return options.least_evidence + options.echo * _collected(standing, chosen.joints)
 
 
 def _collected(standing: Standing, joints: tuple[int, ...]) -> float:
@@ -81,36 +74,15 @@ def _collected(standing: Standing, joints: tuple[int, ...]) -> float:
     return sum(max(0.0, s.evidence + (s.evidence_held_out or 0.0)) for s in near)
 
 
-def explains_most(standing: Standing, chosen: Fitted) -> bool:
-    """Whether an effect takes most of a residual far above noise, on the records fitted to and on held-out ones.
-
-    A slow residual has few independent samples, so that evidence alone would ask for a longer record of what is plain
-    to see: a square wave, of which a sine takes four fifths, or a spring that gets stiffer.
-    """
-    case = standing.case
-    if not case.held_out or not chosen.joints:
-        return False
-    fits = (standing.now, chosen.fit)
-    fitted = [holdout.mean_squares(case.stretches, f.residual) for f in fits]
-    other = [holdout.held_out_squares(f.balance.model, f.values, case.held_out) for f in fits]
-    own = np.array([j in chosen.joints for j in standing.model.machine.modelled_joints])
-    far = (FAR_ABOVE_NOISE * case.noise[own]) ** 2
-    return all(
-        bool((before[own] > far).all() and (after[own] < (1 - MOST_OF_IT) * before[own]).all())
-        for before, after in (fitted, other)
-    )
-
-
-def _refusal(standing: Standing, comparison: Comparison, *, takes_most: bool) -> Refusal | None:
+def _refusal(standing: Standing, comparison: Comparison) -> Refusal | None:
     """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to, or asks
-    for another machine than the file describes. An effect that is there brings stated numbers back; one that explains
-    most of what is left is there, whatever it does to them."""
+    for another machine than the file describes. An effect that is there brings stated numbers back."""
     chosen = comparison.chosen
     if comparison.removed < standing.case.options.least_share:
         return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
     if grown := _grown_held_out(standing, chosen):
         return Refusal(kind="worse-than-given", numbers={"share": grown})
-    if tolerances(standing.model)[1] != "stated" or takes_most:
+    if tolerances(standing.model)[1] != "stated":
         return None
     farthest = _farthest_newly_off(standing, chosen)
     return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None

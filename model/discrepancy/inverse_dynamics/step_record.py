@@ -16,7 +16,6 @@ from model.discrepancy.inverse_dynamics.estimates import found_values, signal_er
 from model.discrepancy.inverse_dynamics.judging import (
     SUSPECTED,
     Judgement,
-    explains_most,
     needed_evidence,
 )
 from model.discrepancy.inverse_dynamics.localisation import locate
@@ -86,7 +85,7 @@ def list_tried(standing: Standing, found: Findings) -> tuple[Candidate, ...]:
         return listed
     best = max(range(min(len(found.fitted), SHOWN)), key=lambda k: listed[k].total)
     chosen = found.fitted[best]
-    needed = needed_evidence(standing, chosen, takes_most=explains_most(standing, chosen))
+    needed = needed_evidence(standing, chosen)
     told = {"evidence_held_out": chosen.told} if standing.case.held_out else {}
     return (*listed[:best], listed[best].model_copy(update={"needed": needed, **told}), *listed[best + 1 :])
 

@@ -41,17 +41,6 @@ def test_an_effect_that_leaves_more_held_out_than_the_model_as_given_is_refused(
     assert found.model_after.effects == found.model_before.effects
 
 
-def test_most_of_a_residual_far_above_noise_is_named_on_less_evidence() -> None:
-    """So much evidence is asked for that no record of this length could bring it."""
-    asked = TorqueOptions(effects=FRICTION, least_evidence=1e6)
-    large, small = traces(coulomb=8.0), traces(coulomb=0.5)
-    found = slide(*large, asked)
-    assert [(s.effect, s.adopted) for s in found.steps] == [("coulomb_friction", True)], found.summary
-    assert found.steps[0].evidence < 1e6
-    assert slide(*small, asked).steps == (), "a residual near noise is explained as well, and is not plain to see"
-    assert slide(large[0], None, asked).steps == (), "on no other record has it been seen"
-
-
 @pytest.mark.parametrize(("coulomb", "suspected"), [(0.002, False), (0.014, True)])
 def test_a_suspicion_needs_a_twentieth_of_what_is_left(coulomb: float, suspected: bool) -> None:
     """Both have more evidence than a suspicion asks for: a force so small explains little of what noise leaves."""
