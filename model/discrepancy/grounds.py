@@ -89,7 +89,6 @@ RefusalKind = Literal[
     "falls-too-little",
     "only-resembles",
     "superfluous",
-    "worse-than-given",
 ]
 
 

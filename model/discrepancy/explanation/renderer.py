@@ -180,11 +180,6 @@ def refusal_words(refusal: Refusal) -> str:
             )
         case "superfluous":
             words = "a later effect explains what it explained"
-        case "worse-than-given":
-            words = (
-                f"with it, the mean square on the held-out traces is {n['share']:.0%} larger than with the model as "
-                "given: the fit has followed something that these traces do not have"
-            )
     return words
 
 

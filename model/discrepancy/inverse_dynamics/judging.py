@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from model.discrepancy.grounds import Refusal
-from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.comparison import Comparison, compare
 from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.tolerances import tolerances
-from model.inverse_dynamics.drive_timing import expected_timing
 from model.machine_model.record_verdict import FAR_OFF
 
 BESIDE_REFUSED = 0.5
@@ -80,8 +76,6 @@ def _refusal(standing: Standing, comparison: Comparison) -> Refusal | None:
     chosen = comparison.chosen
     if comparison.removed < standing.case.options.least_share:
         return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
-    if grown := _grown_held_out(standing, chosen):
-        return Refusal(kind="worse-than-given", numbers={"share": grown})
     if tolerances(standing.model)[1] != "stated":
         return None
     farthest = _farthest_newly_off(standing, chosen)
@@ -96,17 +90,3 @@ def _farthest_newly_off(standing: Standing, chosen: Fitted) -> float:
     own = [u.as_stated for u in chosen.fit.unknowns if u.parameter.effect is None]
     stated = [u for u in own if before.get(u.name, FAR_OFF) < FAR_OFF]
     return max((abs(prior_distance(u, chosen.fit.values[u.name])[0]) for u in stated), default=0.0)
-
-
-def _grown_held_out(standing: Standing, chosen: Fitted) -> float:
-    """By which share the held-out variance is larger with an effect than with the model as given, on every joint of the
-    effect; 0 where it is not. What the fit of the stated numbers has followed is then nothing that the machine does
-    again, and an effect that only makes up for a part of that is none."""
-    held = standing.case.held_out
-    if not held:
-        return 0.0
-    given = holdout.held_out_squares(standing.given, expected_timing(standing.given), held)
-    after = holdout.held_out_squares(chosen.model, chosen.fit.values, held)
-    own = [j in chosen.joints or not chosen.joints for j in standing.model.machine.modelled_joints]
-    growth = after[own] / np.maximum(given[own], 1e-300) - 1.0
-    return max(0.0, float(np.min(growth))) if np.isfinite(growth).all() else 0.0

@@ -7,7 +7,6 @@ import pytest
 
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
-from model.discrepancy.explanation.renderer import refusal_words
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.inverse_dynamics import repeats
@@ -25,20 +24,6 @@ def slide(training: Trace, held_out: Trace | None = None, options: TorqueOptions
 
 def traces(**hidden: float) -> tuple[Trace, Trace]:
     return rigs.slide_trace(1, hidden), rigs.slide_trace(2, hidden)
-
-
-def test_an_effect_that_leaves_more_held_out_than_the_model_as_given_is_refused() -> None:
-    """The axis carried a kilogram in the training record alone. The fit of its stated mass follows that, and friction,
-    which both records have, makes up for a part of what the mass then costs held out."""
-    training, held_out = rigs.slide_trace(1, {"mass": 13.0, "coulomb": 3.0}), rigs.slide_trace(2, {"coulomb": 3.0})
-    found = slide(training, held_out, TorqueOptions(effects=FRICTION))
-    (step,) = found.steps
-    assert (step.effect, step.adopted) == ("coulomb_friction", False), found.summary
-    assert step.refusal is not None
-    assert step.refusal.kind == "worse-than-given"
-    assert step.refusal.numbers["share"] > 0.0
-    assert "larger than with the model as given" in refusal_words(step.refusal)
-    assert found.model_after.effects == found.model_before.effects
 
 
 @pytest.mark.parametrize(("coulomb", "suspected"), [(0.002, False), (0.014, True)])
