@@ -82,7 +82,6 @@ Measurement = Literal[
 ]
 """A measurement beside the arm's own readings."""
 RefusalKind = Literal[
-    "contradicts-file",
     "diverges",
     "error-grows",
     "error-rises",

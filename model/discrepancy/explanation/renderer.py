@@ -153,11 +153,6 @@ def refusal_words(refusal: Refusal) -> str:
     """Why an effect was not taken into the model, as a clause."""
     n = refusal.numbers
     match refusal.kind:
-        case "contradicts-file":
-            words = (
-                f"with it, a number of the machine comes out {n['deviations']:.1f} stated deviations from what "
-                "its file says, which it did not without"
-            )
         case "diverges":
             words = "with it, the simulation of the held-out traces does not stay finite"
         case "error-grows":

@@ -7,11 +7,8 @@ from dataclasses import dataclass
 
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.inverse_dynamics.comparison import Comparison, compare
-from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
-from model.discrepancy.inverse_dynamics.tolerances import tolerances
-from model.machine_model.record_verdict import FAR_OFF
 
 BESIDE_REFUSED = 0.5
 """Least evidence of an effect beside that of a rival which was refused before it: with less, it takes a small part of
@@ -71,22 +68,7 @@ def _collected(standing: Standing, joints: tuple[int, ...]) -> float:
 
 
 def _refusal(standing: Standing, comparison: Comparison) -> Refusal | None:
-    """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to, or asks
-    for another machine than the file describes. An effect that is there brings stated numbers back."""
-    chosen = comparison.chosen
+    """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to."""
     if comparison.removed < standing.case.options.least_share:
         return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
-    if tolerances(standing.model)[1] != "stated":
-        return None
-    farthest = _farthest_newly_off(standing, chosen)
-    return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None
-
-
-def _farthest_newly_off(standing: Standing, chosen: Fitted) -> float:
-    """Distance of the farthest of the numbers that the file states, in stated deviations, with a candidate: of those
-    that were not far off without it; 0 where there are none."""
-    now = standing.now
-    before = {u.name: abs(prior_distance(u.as_stated, now.values[u.name])[0]) for u in now.unknowns}
-    own = [u.as_stated for u in chosen.fit.unknowns if u.parameter.effect is None]
-    stated = [u for u in own if before.get(u.name, FAR_OFF) < FAR_OFF]
-    return max((abs(prior_distance(u, chosen.fit.values[u.name])[0]) for u in stated), default=0.0)
+    return None
