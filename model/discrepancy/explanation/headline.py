@@ -12,7 +12,6 @@ from model.discrepancy.explanation.renderer import (
     not_examined_words,
     size_words,
     suspicion_words,
-    was_found_one_way,
     was_taken_back,
 )
 from model.effects.machine_numbers import MACHINE_NUMBERS
@@ -56,8 +55,6 @@ def _nothing(found: Diagnosis) -> str:
 def _why_nothing(found: Diagnosis, doubts: Sequence[str]) -> str:
     if any(map(was_taken_back, found.steps)):
         return "none of the known effects, and what is left has no shape of one"
-    if any(map(was_found_one_way, found.steps)):
-        return "nothing that all traces show"
     if any(s.effect is not None for s in found.steps):
         return "nothing that the held-out traces confirm"
     if doubts:

@@ -9,7 +9,7 @@ from model.discrepancy.diagnosis import Inseparable
 from model.discrepancy.explanation.class_words import class_words, within
 from model.discrepancy.grounds import Note, NoteKind
 from model.discrepancy.numbers import plain
-from model.effects.names import effect_name, effect_on
+from model.effects.names import effect_name
 
 Values = Mapping[str, Any]
 
@@ -62,23 +62,9 @@ def _larger_noise(v: Values) -> str:
     )
 
 
-def _names_excluded(_: Values) -> str:
-    return (
-        "a group has fewer names than the fitted traces leave: the held-out ones, fitted to in turn, exclude the others"
-    )
-
-
 def _no_experiment_left(v: Values) -> str:
     return (
         f"no experiment within the limits{within(v['budget'])} is left that could tell {' from '.join(v['candidates'])}"
-    )
-
-
-def _not_exchanged(v: Values) -> str:
-    why = v.get("why", "they are too short for the cutoff that they bear")
-    return (
-        "held-out traces were a check alone, and were not fitted to in turn, which would show whether they lead to the "
-        f"same answer: {why}"
     )
 
 
@@ -119,14 +105,6 @@ def _shakes_above_cutoff(v: Values) -> str:
     )
 
 
-def _size_at_bound(v: Values) -> str:
-    return (
-        f"{effect_on(v['effect'], v['joints'])} would explain more (evidence {v['evidence']:.0f}), but only with "
-        f"{v['name']} at the end of what it may be, {_rounded(v['value'], v['unit'])}: no machine has that, so that it "
-        "is not named, and something like it may be missing"
-    )
-
-
 def _stated_numbers_moved(v: Values) -> str:
     numbers = v["numbers"]
     listed = ", ".join(
@@ -153,13 +131,6 @@ def _times(value: float, stated: float) -> str:
     if stated <= 0.0:
         return ""
     return ", next to nothing" if value < 0.005 * stated else f", {value / stated:.2g} times as much"
-
-
-def _suspicion_dropped(v: Values) -> str:
-    return (
-        f"{effect_on(v['effect'], v['joints'])} has evidence of {v['evidence']:.0f}, but the held-out traces, fitted "
-        "to in turn, neither show it nor raise a suspicion: it is not suspected"
-    )
 
 
 def _taken_out_again(v: Values) -> str:
@@ -196,21 +167,6 @@ def _torque_left(v: Values) -> str:
     )
 
 
-def _traces_contradict(v: Values) -> str:
-    effects = " and ".join(effect_on(one["effect"], one["joints"]) for one in v["effects"])
-    return (
-        f"{effects} would explain the traces that were given to be fitted to, but not those held out, which are fitted "
-        "to here: what is missing is something else, which none of the effects that were tried describes"
-    )
-
-
-def _traces_exchanged(_: Values) -> str:
-    return (
-        "the traces that were given to be fitted to show nothing plain that has a name: this is what those held out "
-        "show, which are fitted to here, while the others are held out in turn"
-    )
-
-
 def _unfinished_record(v: Values) -> str:
     called = v.get("file") or f"trace {v['trace']}"
     return f"{called} was not recorded to its end ({v['outcome']}); the {v['seconds']:.1f} s that there are were used"
@@ -226,9 +182,7 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "drive-timing": _drive_timing,
     "errors-follow-record": _errors_follow_record,
     "larger-noise": _larger_noise,
-    "names-excluded": _names_excluded,
     "no-experiment-left": _no_experiment_left,
-    "not-exchanged": _not_exchanged,
     "not-looked-for": _not_looked_for,
     "not-separable": _not_separable,
     "nothing-held-out": _nothing_held_out,
@@ -236,14 +190,10 @@ WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "positions-of-links": _positions_of_links,
     "resting-left-out": _resting_left_out,
     "shakes-above-cutoff": _shakes_above_cutoff,
-    "size-at-bound": _size_at_bound,
     "stated-numbers-moved": _stated_numbers_moved,
-    "suspicion-dropped": _suspicion_dropped,
     "taken-out-again": _taken_out_again,
     "tolerances-fitted-first": _tolerances_fitted_first,
     "tolerance-source": _tolerance_source,
     "torque-left": _torque_left,
-    "traces-contradict": _traces_contradict,
-    "traces-exchanged": _traces_exchanged,
     "unfinished-record": _unfinished_record,
 }

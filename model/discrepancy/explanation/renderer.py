@@ -153,11 +153,6 @@ def refusal_words(refusal: Refusal) -> str:
     """Why an effect was not taken into the model, as a clause."""
     n = refusal.numbers
     match refusal.kind:
-        case "contradicts-file":
-            words = (
-                f"with it, a number of the machine comes out {n['deviations']:.1f} stated deviations from what "
-                "its file says, which it did not without"
-            )
         case "diverges":
             words = "with it, the simulation of the held-out traces does not stay finite"
         case "error-grows":
@@ -172,13 +167,6 @@ def refusal_words(refusal: Refusal) -> str:
             if abs(n["share"]) >= LEAST_SHOWN:
                 change = f"falls by only {n['share']:.1%}" if n["share"] > 0.0 else f"grows by {-n['share']:.1%}"
             words = f"on records not fitted to, the mean square {change}"
-        case "found-one-way":
-            words = "a search in the held-out traces, which are fitted to in turn, does not find it"
-        case "leaves-more-than-noise":
-            words = (
-                f"it takes {n['share']:.0%} of the mean square on records not fitted to, and leaves "
-                f"{n['noises']:.0f} times the noise: of what something else makes, any law takes a part"
-            )
         case "only-resembles":
             words = (
                 "it only resembles what is missing: with all that was found, "
@@ -187,11 +175,6 @@ def refusal_words(refusal: Refusal) -> str:
             )
         case "superfluous":
             words = "a later effect explains what it explained"
-        case "worse-than-given":
-            words = (
-                f"with it, the mean square on the held-out traces is {n['share']:.0%} larger than with the model as "
-                "given: the fit has followed something that these traces do not have"
-            )
     return words
 
 
@@ -219,7 +202,6 @@ def _summary_of(answer: Diagnosis) -> str:
         case "nothing-significant":
             rejected = [s for s in answer.steps if not s.adopted]
             first = rejected[0] if rejected else None
-            first = next(filter(was_found_one_way, rejected), first)
             return _nothing(next(filter(was_taken_back, rejected), first), doubts_of(answer))
         case "suspected":
             return _suspected(answer)
@@ -238,11 +220,6 @@ def _summary_of(answer: Diagnosis) -> str:
 def was_taken_back(step: Step) -> bool:
     """Whether an effect was in the model for a while, and did not explain what it was to explain."""
     return step.refusal is not None and step.refusal.kind == "only-resembles"
-
-
-def was_found_one_way(step: Step) -> bool:
-    """Whether the fitted traces show an effect, and the held-out ones, fitted to in turn, do not."""
-    return step.refusal is not None and step.refusal.kind == "found-one-way"
 
 
 def _suspected(answer: Diagnosis) -> str:
@@ -337,11 +314,6 @@ def _nothing(rejected: Step | None, doubts: Sequence[str]) -> str:
             f"{rejected.evidence:.0f}, and taken back, because {rejected.rejected_because}. What is left without it "
             "has no shape of an effect."
         )
-    if was_found_one_way(rejected):
-        return (
-            f"Nothing is named: {_called(rejected.effect, rejected.joints)} explains more of the fitted traces, with "
-            f"evidence of {rejected.evidence:.0f}, but {rejected.rejected_because}."
-        )
     because = rejected.rejected_because or "records that were not fitted to do not confirm it"
     return (
         f"No effect holds on records that were not fitted to: {_called(rejected.effect, rejected.joints)} explains "
@@ -365,8 +337,7 @@ def _unknown(answer: Diagnosis) -> str:
     """Why none of the known effects is named, and what a torque that would explain it goes with."""
     where, joints = answer.where, answer.unexplained_joints
     places = [] if where is None else [_left_on(joints, where) if joints and where.joint is None else where.summary]
-    known = "no known effect that all traces show" if any(map(was_found_one_way, answer.steps)) else "no known effect"
-    parts = [*places, sentence(f"{known} explains it; {what_is_left(answer.remaining)}")]
+    parts = [*places, sentence(f"no known effect explains it; {what_is_left(answer.remaining)}")]
     if answer.worse_held_out:
         parts.append(
             "The fit of the tolerance parameters does not hold on held-out traces, where the error of "

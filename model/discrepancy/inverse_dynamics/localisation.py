@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -142,27 +141,6 @@ def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape,
                 )
             )
     return tuple(found)
-
-
-def bends_with_speed(shapes: Sequence[RemainingShape], joint: int) -> bool:
-    """Whether much of what is left on a joint (`ANOTHER_LAW`) is a torque against the motion that bends with speed.
-
-    Such a torque is odd in speed, as that of viscous friction; one that is even belongs to viscous friction of another
-    coefficient in each direction.
-    """
-    for shape in shapes:
-        if shape.joint != joint or shape.against != "speed" or shape.explained < ANOTHER_LAW:
-            continue
-        known = [(v, t) for v, t in zip(shape.centres, shape.torque, strict=True) if t is not None]
-        speed, torque = np.array(known).T
-        span = min(-speed.min(), speed.max())
-        if span <= 0.0:
-            continue
-        grid = np.linspace(0.0, span, len(speed))
-        forwards, backwards = np.interp(grid, speed, torque), np.interp(-grid, speed, torque)
-        if np.sum((forwards - backwards) ** 2) > np.sum((forwards + backwards) ** 2):
-            return True
-    return False
 
 
 def _time(record: RecordedMotion, row: int) -> float:
