@@ -9,11 +9,10 @@ import numpy as np
 
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.diagnosis import RemainingShape, SignalError, Where
+from model.discrepancy.diagnosis import SignalError, Where
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
-from model.discrepancy.localisation.unexplained_torque import remaining_shapes
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.holdout import HeldOut
@@ -121,10 +120,6 @@ class Case:
         time, which takes longest."""
         driven = tuple(t for t in self.traces if moving and t.drive is not None)
         return locate(self.residuals_of(point), driven)
-
-    def remaining(self, point: Point) -> tuple[RemainingShape, ...]:
-        """What the point leaves of the fitted traces, as torques."""
-        return remaining_shapes(self.residuals_of(point))
 
     def residuals_of(self, point: Point) -> Residuals:
         """Residuals of the fitted traces as errors are reported."""

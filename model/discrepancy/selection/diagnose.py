@@ -273,7 +273,6 @@ def _answer(
     steps = with_slight_joints(steps, case.model, current.point.fitted_model)
     found, end = replace(found, current=current, steps=steps), current.point
     where = case.where(end, moving=False) if looked is None else looked  # nothing was added: it is the same point
-    remaining = case.remaining(end) if answered == "unknown-effect" else ()
     asked = Asked(None) if chooser is None else chooser.after(answered, end, found.rivals, case.traces, cancel)
     notes = (
         *on_stated_numbers(_stated(end), end.by_name),
@@ -295,7 +294,6 @@ def _answer(
         steps=(*proved, *found.steps),
         where=where,
         candidates=_candidates(found),
-        remaining=remaining,
         model_before=case.model,
         model_after=_with_lineage(case, end),
         traces=case.names,

@@ -351,14 +351,6 @@ def test_the_answer_survives_json(answer: tuple[Diagnosis, Comparison]) -> None:
     assert diagnosis_page(again) == diagnosis_page(found)
 
 
-def test_a_torque_that_was_left_comes_back_in_its_size(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
-    against = {(s.joint, s.against): s for s in found.remaining}
-    back, forth = (against[2, "direction"].torque[k] for k in (0, 2))
-    assert back == pytest.approx(8.0, rel=0.3)
-    assert forth == pytest.approx(-8.0, rel=0.3)
-
-
 @pytest.mark.usefixtures("undrawn")
 def test_warnings_come_first_and_are_not_told_again(answer: tuple[Diagnosis, Comparison]) -> None:
     found = answer[0]
