@@ -173,15 +173,6 @@ class Dependence(FrozenRecord):
     significance: float
 
 
-class MovingParameter(FrozenRecord):
-    """The distortion method's α(t): a parameter that would have to move, how much, and with what it moves."""
-
-    parameter: str
-    relative_range: float
-    moves_with: AgainstWhat | None
-    correlation: float
-
-
 class WorstPlace(FrozenRecord):
     """The joint and phase of motion with the largest residual, `ratio` times its noise. `rms`, `floor`: of the residual
     and of the noise, in `unit`, in that phase or over the `whole_record`."""
@@ -207,7 +198,6 @@ class Where(FrozenRecord):
     summary: str
     cells: tuple[PhaseCell, ...]
     dependences: tuple[Dependence, ...]
-    moving: tuple[MovingParameter, ...] = ()
     worst: WorstPlace | None = None
     largest: WorstPlace | None = None
 

@@ -115,11 +115,9 @@ class Case:
             return Refusal(kind="error-rises", numbers={"rise": rise, "deviation": deviation})
         return None
 
-    def where(self, point: Point, *, moving: bool = True) -> Where:
-        """Where the point disagrees with the fitted traces. moving: also find which parameters would have to vary with
-        time, which takes longest."""
-        driven = tuple(t for t in self.traces if moving and t.drive is not None)
-        return locate(self.residuals_of(point), driven)
+    def where(self, point: Point) -> Where:
+        """Where the point disagrees with the fitted traces."""
+        return locate(self.residuals_of(point))
 
     def residuals_of(self, point: Point) -> Residuals:
         """Residuals of the fitted traces as errors are reported."""

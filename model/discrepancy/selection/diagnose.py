@@ -272,7 +272,7 @@ def _answer(
     current, steps = update_to_last_fit(found.current, found.steps)
     steps = with_slight_joints(steps, case.model, current.point.fitted_model)
     found, end = replace(found, current=current, steps=steps), current.point
-    where = case.where(end, moving=False) if looked is None else looked  # nothing was added: it is the same point
+    where = case.where(end) if looked is None else looked  # nothing was added: it is the same point
     asked = Asked(None) if chooser is None else chooser.after(answered, end, found.rivals, case.traces, cancel)
     notes = (
         *on_stated_numbers(_stated(end), end.by_name),

@@ -4452,20 +4452,6 @@ export interface components {
             message: string;
         };
         /**
-         * MovingParameter
-         * @description The distortion method's α(t): a parameter that would have to move, how much, and with what it moves.
-         */
-        MovingParameter: {
-            /** Parameter */
-            parameter: string;
-            /** Relative Range */
-            relative_range: number;
-            /** Moves With */
-            moves_with: ("time" | "position" | "speed" | "direction" | "drive") | null;
-            /** Correlation */
-            correlation: number;
-        };
-        /**
          * Multisine
          * @description Sum of `tones` sines between two frequencies with seeded phases, scaled to the amplitude, faded in and out.
          */
@@ -6844,11 +6830,6 @@ export interface components {
             cells: components["schemas"]["PhaseCell"][];
             /** Dependences */
             dependences: components["schemas"]["Dependence"][];
-            /**
-             * Moving
-             * @default []
-             */
-            moving?: components["schemas"]["MovingParameter"][];
             worst?: components["schemas"]["WorstPlace"] | null;
             largest?: components["schemas"]["WorstPlace"] | null;
         };
