@@ -253,8 +253,6 @@ class Step(FrozenRecord):
     improved on the fitted traces."""
     evidence_held_out: float | None = None
     """2 ln of the ratio of the likelihoods of held-out traces with and without the effect; in torques alone."""
-    sum_lambda2_before: float | None = None
-    sum_lambda2_after: float | None = None
     where: Where
     reason: str
     adopted: bool

@@ -68,8 +68,6 @@ def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
         rmse_fit=_errors(comparison, "in_sample"),
         rmse_holdout=_errors(comparison, "held_out"),
         excess_removed_holdout=0.982,
-        sum_lambda2_before=0.31,
-        sum_lambda2_after=1.42,
         where=locate(left),
         reason_data=speaks,
     )

@@ -217,7 +217,6 @@ def test_what_the_controllers_numbers_prove_has_no_candidates_and_no_errors(
             "rmse_fit": zero,
             "rmse_holdout": (),
             "candidates": (proof,),
-            "sum_lambda2_before": None,
             "proof": ControllerProof(samples=40, of=50),
         }
     )

@@ -2568,10 +2568,6 @@ export interface components {
             excess_removed_holdout?: number | null;
             /** Evidence Held Out */
             evidence_held_out?: number | null;
-            /** Sum Lambda2 Before */
-            sum_lambda2_before?: number | null;
-            /** Sum Lambda2 After */
-            sum_lambda2_after?: number | null;
             where: components["schemas"]["Where"];
             /** Reason */
             reason: string;
