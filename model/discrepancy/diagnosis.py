@@ -261,13 +261,6 @@ class Step(FrozenRecord):
     proof: ControllerProof | None = None
     """Where the controller's own recorded numbers prove the effect: nothing was fitted for it."""
     refusal: Refusal | None = None
-    slight_joints: tuple[int, ...] = ()
-    """Of `joints`, those on which the effect is so slight that it may be what its law leaves of the others."""
-
-    @property
-    def main_joints(self) -> tuple[int, ...]:
-        """The joints of the effect, without those on which it is slight."""
-        return tuple(j for j in self.joints if j not in self.slight_joints)
 
 
 class DifferencePlace(FrozenRecord):

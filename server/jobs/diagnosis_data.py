@@ -82,7 +82,7 @@ def where_given(model: Model, traces: Sequence[Trace]) -> Where | None:
 
 def _step(found: Diagnosis, step: Step) -> DiagnosisStep:
     tried = {"candidates": tuple(map(_tried, step.candidates)), "group": tuple(map(_tried, step.group))}
-    called = "nothing" if step.effect is None else placed(step.effect, step.main_joints or step.joints)
+    called = "nothing" if step.effect is None else placed(step.effect, step.joints)
     return DiagnosisStep(**{**dict(step), **tried, "called": called, **_beside_map(found, step.where)})
 
 

@@ -44,7 +44,6 @@ from model.discrepancy.output_error.shown_noise import note_on_noise, shown_nois
 from model.discrepancy.output_error.thinning import thinned
 from model.discrepancy.selection.last_fit import update_to_last_fit
 from model.discrepancy.selection.step import LAST_STEPS, make_step
-from model.discrepancy.slight_joints import with_slight_joints
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
 from model.fitting.unknowns import Unknown
@@ -270,7 +269,6 @@ def _answer(
             joints, noisy = _joints_left(case, found, looked)
             answered = verdict(found.steps, unexplained=bool(joints))
     current, steps = update_to_last_fit(found.current, found.steps)
-    steps = with_slight_joints(steps, case.model, current.point.fitted_model)
     found, end = replace(found, current=current, steps=steps), current.point
     where = case.where(end) if looked is None else looked  # nothing was added: it is the same point
     asked = Asked(None) if chooser is None else chooser.after(answered, end, found.rivals, case.traces, cancel)

@@ -2578,11 +2578,6 @@ export interface components {
             reason_data?: components["schemas"]["Reason"] | null;
             proof?: components["schemas"]["ControllerProof"] | null;
             refusal?: components["schemas"]["Refusal"] | null;
-            /**
-             * Slight Joints
-             * @default []
-             */
-            slight_joints?: number[];
             /** Called */
             called: string;
             /** Chance */
