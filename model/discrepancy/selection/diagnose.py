@@ -37,7 +37,6 @@ from model.discrepancy.output_error.controller_evidence import (
 from model.discrepancy.output_error.gap import closed_loop_gap, within_file
 from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.observation import Observation, observe
-from model.discrepancy.output_error.recorded_power import with_power
 from model.discrepancy.output_error.sampled_controller import with_errors
 from model.discrepancy.output_error.search import STRAINED, Point, converge, descend, point_at
 from model.discrepancy.output_error.shown_noise import note_on_noise, shown_noise, with_noise
@@ -75,7 +74,7 @@ def diagnose_by_simulation(
     begun = time.perf_counter()
     progress(0.0, "checking the controller's own numbers")
     traces, holdout = (with_errors(some, model.machine) for some in (traces, holdout))
-    findings = check_controller(with_power(traces, model.machine), model.machine, model)
+    findings = check_controller(traces, model.machine, model)
     excluded = settled_by_records(traces, model.machine)
     if any(f.effect is ControllerEffect.LOST_SET_POINTS for f in findings):
         # The set points that were used are known to the count.
