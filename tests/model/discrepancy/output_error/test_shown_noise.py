@@ -81,15 +81,6 @@ def test_noise_as_stated_and_what_has_a_shape_change_nothing(given: Point) -> No
     assert shown_noise(leaving(given, white + drift)) is None
 
 
-@pytest.mark.parametrize("variance", [0.5, 2.0, 8.0])
-def test_a_tone_is_not_taken_for_noise(given: Point, variance: float) -> None:
-    """An autoregression describes it as it does noise, and would filter it away."""
-    samples, joints = given.residuals[0].shape
-    tone = np.sin(2 * np.pi * 1.37 * given.observation.records[0].inputs.period * np.arange(samples) + 0.3)
-    white = np.random.default_rng(7).standard_normal((samples, joints))
-    assert shown_noise(leaving(given, white + np.sqrt(2.0 * variance) * tone[:, None])) is None
-
-
 def test_readings_that_are_far_off_are_left_out_and_no_others(given: Point) -> None:
     point = with_far_readings(given)
     (apart,) = readings_apart(point.observation, point.residuals)
