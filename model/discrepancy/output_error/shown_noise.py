@@ -21,7 +21,7 @@ from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.structure import GAUSSIAN, joints_with_structure
 from model.discrepancy.output_error.observation import Observation, ShownNoise, Signals
 from model.discrepancy.output_error.search import Point
-from model.fitting.whitening import fitted_whitener, white
+from model.fitting.whitening import fitted_whitener
 from model.machine_model.model import Model
 
 LARGER = 1.15
@@ -34,8 +34,6 @@ FOUR_NEIGHBOURS = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0
 """Weights with which a reading follows from two on either side, exactly for a motion of constant jerk."""
 GAIN = float(np.sqrt(1.0 + FOUR_NEIGHBOURS @ FOUR_NEIGHBOURS))
 """Standard deviation of a reading less that, in deviations of white noise."""
-FASTEST = 0.0025
-"""Period, s, up to which tones are sought in means of several samples; the colour of samples means nothing there."""
 
 
 def shown_noise(point: Point) -> ShownNoise | None:
@@ -46,11 +44,10 @@ def shown_noise(point: Point) -> ShownNoise | None:
     if stated < LARGER or joints_with_structure(residuals_of(point.fitted_model, observation, point.residuals)):
         return None
     known = replace(observation, noise=None, apart=readings_apart(observation, point.residuals))
-    fast = min(r.inputs.period for r in observation.records) <= FASTEST
     whiteners, sizes = [], []
     for runs in known.by_joint(known.in_deviations(point.residuals)):
         size = max(1.0, float(np.sqrt(np.mean(np.concatenate(runs) ** 2))))
-        whiteners.append(white(size) if fast else fitted_whitener(runs, LONGEST_MEMORY, 1.0))
+        whiteners.append(fitted_whitener(runs, LONGEST_MEMORY, 1.0))
         sizes.append(size)
     return ShownNoise(tuple(whiteners), np.array(sizes))
 

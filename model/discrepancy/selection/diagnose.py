@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import SampledPid
 from daq.contracts.progress import Cancel, Progress
 from daq.contracts.trace import Trace
 from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, improved_baseline, judge
@@ -40,7 +39,6 @@ from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.sampled_controller import with_errors
 from model.discrepancy.output_error.search import STRAINED, Point, converge, descend, point_at
 from model.discrepancy.output_error.shown_noise import note_on_noise, shown_noise, with_noise
-from model.discrepancy.output_error.thinning import thinned
 from model.discrepancy.selection.last_fit import update_to_last_fit
 from model.discrepancy.selection.step import LAST_STEPS, make_step
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
@@ -79,8 +77,6 @@ def diagnose_by_simulation(
     if any(f.effect is ControllerEffect.LOST_SET_POINTS for f in findings):
         # The set points that were used are known to the count.
         traces, holdout = (tuple(map(with_used_set_points, some)) for some in (traces, holdout))
-    if isinstance(model.machine.controller, SampledPid):
-        traces, holdout = (tuple(map(thinned, some)) for some in (traces, holdout))
     progress(0.02, "fitting the tolerance parameters")
     known = with_findings(model, findings)
     given = _given_point(*observe(known, traces, held_out=[t.record.trace_id for t in holdout]))
