@@ -19,7 +19,7 @@ from model.discrepancy.output_error.holdout import HeldOut
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.discrepancy.output_error.search import STRAINED, Point
-from model.discrepancy.output_error.shown_noise import residuals_of, with_noise
+from model.discrepancy.output_error.shown_noise import residuals_of
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS, THRESHOLDS, Thresholds
 from model.discrepancy.verdict import excess_removed, rises_too_much
 from model.machine_model.model import Model
@@ -161,11 +161,11 @@ def build_case(
 
 
 def _held_with_noise(held: HeldOut | None, point: Point) -> HeldOut | None:
-    """Held-out traces with the noise that a point is weighed with, without readings of theirs that lie apart."""
+    """Held-out traces with the noise that a point is weighed with."""
     noise = point.observation.noise
     if held is None or noise is None:
         return held
-    return replace(held, observation=with_noise(held.observation, noise, held.residuals(point)))
+    return replace(held, observation=replace(held.observation, noise=noise))
 
 
 def errors_of_fit(point: Point) -> tuple[SignalError, ...]:

@@ -38,7 +38,7 @@ from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.sampled_controller import with_errors
 from model.discrepancy.output_error.search import STRAINED, Point, converge, descend, point_at
-from model.discrepancy.output_error.shown_noise import note_on_noise, shown_noise, with_noise
+from model.discrepancy.output_error.shown_noise import note_on_noise, shown_noise
 from model.discrepancy.selection.last_fit import update_to_last_fit
 from model.discrepancy.selection.step import LAST_STEPS, make_step
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
@@ -194,7 +194,7 @@ def _weighed_with_shown_noise(fitted: Point) -> Point:
         noise = shown_noise(fitted)
         if noise is None:
             break
-        observation = with_noise(fitted.observation, noise, fitted.residuals)
+        observation = replace(fitted.observation, noise=noise)
         try:
             fitted = converge(fitted.on(observation), LAST_STEPS)
             if fitted.strain >= STRAINED:
