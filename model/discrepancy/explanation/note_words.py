@@ -56,7 +56,7 @@ def _larger_noise(v: Values) -> str:
     return (
         "the noise of readings is larger than what the machine file states of noise and rounding: "
         f"{'; '.join(map(of, v['joints']))}; no dependence of it on time, position, speed, direction or drive was "
-        "found, and no tone"
+        "found"
     )
 
 
