@@ -22,7 +22,6 @@ from model.discrepancy.candidates.candidate_fit import (
     same_answer,
 )
 from model.discrepancy.candidates.library import Hypothesis, hypotheses
-from model.discrepancy.candidates.limits import without_limits
 from model.discrepancy.candidates.multi_joint_fit import fit_several_joints
 from model.discrepancy.candidates.probing import Probe, keep_promising, probe
 from model.discrepancy.candidates.recorded_trials import with_recorded_trials
@@ -79,7 +78,7 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     head = _restart_unexplained(current, head, case.thresholds.close)
     head = _finish_close(current, head, case.thresholds)
     rest = [r for r in fits if not any(r is a for a in answers)]
-    return Ranking(_one_law_per_name(without_limits(current, [*head, *rest])), tuple(probes))
+    return Ranking(_one_law_per_name(sorted([*head, *rest], key=lambda f: -f.evidence)), tuple(probes))
 
 
 def _probe_all(case: Case, current: Fit, cancel: Cancel, earlier: Sequence[Probe]) -> list[Probe]:

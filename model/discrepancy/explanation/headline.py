@@ -35,7 +35,7 @@ def _finding_of(found: Diagnosis) -> str:
         return f"perhaps {suspicion_words(found.suspicion)}"
     if found.verdict == "nothing-significant":
         return _nothing(found)
-    shown = [s for s in found.steps if s.adopted and (s.main_joints or not s.joints)]
+    shown = [s for s in found.steps if s.adopted]
     findings = [_group(s, found.inseparable) if s.group else _finding(s) for s in shown]
     if found.verdict == "unknown-effect":
         findings.append("none of the known effects explains what is left")
@@ -75,9 +75,5 @@ def _group(step: Step, classes: Sequence[Inseparable]) -> str:
 def _finding(step: Step) -> str:
     effect = step.effect or ""
     part = words_of(effect).size
-    sizes = [
-        size_words(v)
-        for v in step.parameters.values()
-        if (v.part == part or effect in MACHINE_NUMBERS) and not (v.joints and set(v.joints) <= set(step.slight_joints))
-    ]
-    return ", ".join((effect_on(effect, step.main_joints), *sizes))
+    sizes = [size_words(v) for v in step.parameters.values() if v.part == part or effect in MACHINE_NUMBERS]
+    return ", ".join((effect_on(effect, step.joints), *sizes))

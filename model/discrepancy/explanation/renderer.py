@@ -135,7 +135,7 @@ def reason_text(step: Step) -> str:
         return step.reason
     if reason.pattern is None or reason.units is None:
         return sentence(_torque_reason(step, reason))
-    others = [j for j in step.main_joints if j != reason.joint]
+    others = [j for j in step.joints if j != reason.joint]
     alike = f" (and likewise {joints_in_words(others)})" if others else ""
     called = words_of(step.effect or "").called + _size(step.effect or "", step.parameters, reason.joint or 0)
     seen = f"joint {reason.joint} {pattern_words(reason.pattern, reason.units)}{alike}"
@@ -144,8 +144,6 @@ def reason_text(step: Step) -> str:
         sentences.append(sentence(_beaten(reason.rival, step)))
     if step.where.joint is None or (step.joints and step.where.joint not in step.joints):
         sentences.append("What shows it is the pattern over the whole record, not one place.")
-    if step.slight_joints:
-        sentences.append(sentence(_slight(step)))
     return " ".join(sentences)
 
 
@@ -410,18 +408,6 @@ def _torque_size(value: FoundValue, *, several: bool, slides: bool) -> str:
     if value.part == "cycles":  # rad of phase per rad (m): cycles a turn, or 2π times those a metre
         unit = f" rad/m, {plain(value.value / (2 * math.pi), 3)} a metre" if slides else " a turn"
     return f"{value.part}{on} {plain(value.value, 3)}{unit}"
-
-
-def _slight(step: Step) -> str:
-    """Where the effect of a step is slight, and what that may be."""
-    effect = step.effect or ""
-    sizes = [size_of(effect, step.parameters, j) for j in step.slight_joints]
-    size = ", ".join(size_words(v) for v in sizes if v is not None)
-    shown = f" ({size})" if size else ""
-    return (
-        f"on {joints_in_words(step.slight_joints)} it is slight{shown}, which may be what the law leaves of the same "
-        "effect on another joint"
-    )
 
 
 def _taken_off(reason: Reason) -> str:
