@@ -38,7 +38,6 @@ PatternKind = Literal[
 NoteKind = Literal[
     "cutoff",
     "drive-at-limit",
-    "drive-timing",
     "errors-follow-record",
     "larger-noise",
     "no-experiment-left",

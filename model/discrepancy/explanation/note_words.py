@@ -32,14 +32,6 @@ def _drive_at_limit(v: Values) -> str:
     ) + (f"; a record tells nothing of joint {unknown}, which is not examined there" if unknown else "")
 
 
-def _drive_timing(v: Values) -> str:
-    late = ", ".join(f"{samples:.2g}" for samples in v["late"])
-    return (
-        f"drives are taken to act {late} samples of their record late: up to {v['samples']:g} samples are how a drive "
-        "is formed and held, which no record tells, and are not named as a delay"
-    )
-
-
 def _errors_follow_record(v: Values) -> str:
     return (
         "the gap and the sizes in reasons are of the closed loop; the map, and the errors by which held-out traces "
@@ -177,7 +169,6 @@ def _rounded(value: float, unit: str) -> str:
 WORDS: dict[NoteKind, Callable[[Values], str]] = {
     "cutoff": _cutoff,
     "drive-at-limit": _drive_at_limit,
-    "drive-timing": _drive_timing,
     "errors-follow-record": _errors_follow_record,
     "larger-noise": _larger_noise,
     "no-experiment-left": _no_experiment_left,
