@@ -1,12 +1,13 @@
-"""What is left over where a diagnosis ends: joints with more than noise."""
+"""What is left over where a diagnosis ends: joints with more than noise, and laws that are of another form."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from model.arrays import Floats
+from model.discrepancy.diagnosis import Step
 from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.localisation import ANOTHER_LAW, remaining_shapes
+from model.discrepancy.inverse_dynamics.localisation import ANOTHER_LAW, is_function_of, remaining_shapes
 from model.discrepancy.inverse_dynamics.standing import Standing
 
 FAR_ABOVE_NOISE = 10.0
@@ -39,6 +40,24 @@ def joints_left_over(standing: Standing) -> tuple[int, ...]:
     slow = (least > FAR_ABOVE_NOISE) & (now.noise.memory > LONG_MEMORY)
     shapes = (least > SHAPED_ABOVE_NOISE) & np.array([j in shaped for j in joints])
     return tuple(j for j, left in zip(joints, slow | shapes, strict=True) if left)
+
+
+def has_another_form(standing: Standing, step: Step) -> tuple[int, ...]:
+    """Joints on which what is left is a function of a step's own torque.
+
+    The numbers of a law are fitted. What is left as a function of the law's own torque is then something that the form
+    of the law has not: it is another law of the same quantity, as drag that grows with the square of speed is beside
+    viscous friction.
+    """
+    now, case = standing.now, standing.case
+    absent = {p.name: p.null for n in step.parameters if (p := now.balance.model.by_name[n]).null is not None}
+    left = set(joints_left_over(standing)) & set(step.joints)
+    if not left or not absent:
+        return ()
+    without = now.balance.residual({**now.values, **absent})
+    own = [less - all_of_it for less, all_of_it in zip(without, now.residual, strict=True)]
+    joints = standing.model.machine.modelled_joints
+    return tuple(j for k, j in enumerate(joints) if j in left and is_function_of(own, now, case, k))
 
 
 def _noises_left(standing: Standing) -> Floats:

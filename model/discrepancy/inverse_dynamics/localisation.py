@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -143,6 +144,12 @@ def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape,
     return tuple(found)
 
 
+def is_function_of(torque: Sequence[Floats], now: BalanceFit, case: TorqueCase, j: int) -> bool:
+    """Whether much of what is left on a joint (index) is a function of a torque (m, n) of every record."""
+    bins = _Signals(now, case, j).against(np.concatenate(list(torque)))
+    return bins is not None and bins.significance > SHAPE_SIGNIFICANCE and bins.explained >= ANOTHER_LAW
+
+
 def _time(record: RecordedMotion, row: int) -> float:
     return round(float(record.time[record.edge] + row * record.every * record.period - record.time[0]), 4)
 
@@ -183,6 +190,11 @@ class _Signals:
         """The residual against the motion in bins of position, positive where it opposes that: friction of a tight spot
         changes its sign with the motion, so that its mean over both directions shows nothing."""
         return self._dependence(-self.signal * self.quantities["direction"][0][:, self.joint], "position")
+
+    def against(self, torque: Floats) -> Bins | None:
+        """The residual in bins of another torque (m, n)."""
+        known = Quantities({"drive": torque}, {}, self.stretches)
+        return dependence(self.signal, self.joint, "drive", known, self.floor)
 
     def _dependence(self, signal: Floats, against: AgainstWhat) -> Bins | None:
         count = self.quantities["time"][0].shape[1]

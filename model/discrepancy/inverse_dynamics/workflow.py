@@ -14,6 +14,7 @@ from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
 from model.discrepancy.inverse_dynamics.judging import CHANCES, judge
+from model.discrepancy.inverse_dynamics.left_over import has_another_form
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.search import (
     Findings,
@@ -27,6 +28,7 @@ from model.discrepancy.inverse_dynamics.search import (
 from model.discrepancy.inverse_dynamics.step_record import list_tried, record_step
 from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
+from model.discrepancy.verdict import withdrawn
 from model.machine_model.model import Model
 
 SUPERFLUOUS: RefusalKind = "superfluous"
@@ -57,6 +59,7 @@ class TorqueWorkflow:
     def run(self) -> None:
         """Take steps until nothing more is significant or holds."""
         self._take_steps()
+        self._withdraw_wrong_laws()
         self.notes += [
             Note(kind="taken-out-again", values={"effect": step.effect, "step": number})
             for number, step in enumerate(self.found.steps, start=1)
@@ -153,6 +156,19 @@ class TorqueWorkflow:
             less = evidence(without.now, now, now.noise.memory, len(step.parameters), 1)
             if less < 0:
                 self.found = self._refuse(without, self.found, step, SUPERFLUOUS)
+
+    def _withdraw_wrong_laws(self) -> None:
+        """Take back the first effect whose law is of another form than what is there, and all effects after it."""
+        standing, steps = self.refitter.standing(self.found), self.found.steps
+        forms = ((k, has_another_form(standing, step)) for k, step in enumerate(steps) if step.adopted)
+        first, wrong = next((found for found in forms if found[1]), (len(steps), ()))
+        if not wrong:
+            return
+        for step in steps[first:]:
+            if step.adopted:
+                now = tuple(withdrawn(s, wrong) if s is step else s for s in self.found.steps)
+                self.found = replace(self.refitter.remove(self.found, step), steps=now)
+        self.suspicion, self.tried = None, ()  # they were of the model with these effects
 
     def _refuse(self, without: Found, found: Found, step: Step, kind: RefusalKind) -> Found:
         """Takes an effect out and tells why its step does not hold."""
