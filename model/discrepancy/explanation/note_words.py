@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from model.discrepancy.diagnosis import Inseparable
 from model.discrepancy.explanation.class_words import class_words, within
 from model.discrepancy.grounds import Note, NoteKind
 from model.discrepancy.numbers import plain
-from model.effects.names import effect_name, effect_on
+from model.effects.names import effect_name
 
 Values = Mapping[str, Any]
 
@@ -57,14 +57,6 @@ def _shakes_above_cutoff(v: Values) -> str:
         f"joints shake faster than torques are compared: {joints}, in brackets their acceleration above "
         f"{v['cutoff']:g} Hz over that below. What makes them shake is not looked for: a gear that gives or has play, "
         "a delay, or gains that are too high for these; a record with lower gains would tell"
-    )
-
-
-def _size_at_bound(v: Values) -> str:
-    return (
-        f"{effect_on(v['effect'], v['joints'])} would explain more (evidence {v['evidence']:.0f}), but only with "
-        f"{v['name']} at the end of what it may be, {_rounded(v['value'], v['unit'])}: no machine has that, so that it "
-        "is not named, and something like it may be missing"
     )
 
 
@@ -119,10 +111,6 @@ def _torque_left(v: Values) -> str:
     )
 
 
-def _on_joints(effects: Sequence[Values]) -> str:
-    return " and ".join(effect_on(one["effect"], one["joints"]) for one in effects)
-
-
 def _rounded(value: float, unit: str) -> str:
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
@@ -130,23 +118,12 @@ def _rounded(value: float, unit: str) -> str:
 WORDS: dict[NoteKind, str | Callable[[Values], str]] = {
     "cutoff": "torques are compared below {cutoff:g} Hz; faster effects are not seen",
     "drive-at-limit": _drive_at_limit,
-    "drive-timing": lambda v: (
-        f"drives are taken to act {', '.join(f'{samples:.2g}' for samples in v['late'])} samples of their record late: "
-        f"up to {v['samples']:g} samples are how a drive is formed and held, which no record tells, and are not named "
-        "as a delay"
-    ),
     "errors-follow-record": "the gap and the sizes in reasons are of the closed loop; the map, and the errors by which "
     "held-out traces decide, are of a simulation whose controller is given the simulated reading moved {share:g} of "
     "the way to the recorded one",
     "larger-noise": _larger_noise,
-    "names-excluded": "a group has fewer names than the fitted traces leave: the held-out ones, fitted to in turn, "
-    "exclude the others",
     "no-experiment-left": lambda v: (
         f"no experiment within the limits{within(v['budget'])} is left that could tell {' from '.join(v['candidates'])}"
-    ),
-    "not-exchanged": lambda v: (
-        "held-out traces were a check alone, and were not fitted to in turn, which would show whether they lead to the "
-        f"same answer: {v.get('why', 'they are too short for the cutoff that they bear')}"
     ),
     "not-looked-for": lambda v: (
         "not looked for: " + "; ".join(f"{effect_name(name)} ({why})" for name, why in v["effects"].items())
@@ -160,12 +137,7 @@ WORDS: dict[NoteKind, str | Callable[[Values], str]] = {
     "resting-left-out": "samples at which a joint rests are left out: friction holds it with whatever torque that "
     "takes",
     "shakes-above-cutoff": _shakes_above_cutoff,
-    "size-at-bound": _size_at_bound,
     "stated-numbers-moved": _stated_numbers_moved,
-    "suspicion-dropped": lambda v: (
-        f"{effect_on(v['effect'], v['joints'])} has evidence of {v['evidence']:.0f}, but the held-out traces, fitted "
-        "to in turn, neither show it nor raise a suspicion: it is not suspected"
-    ),
     "taken-out-again": lambda v: (
         f"{effect_name(v['effect'])}, step {v['step']}, was taken out again: the others explain it"
     ),
@@ -175,13 +147,6 @@ WORDS: dict[NoteKind, str | Callable[[Values], str]] = {
     ),
     "tolerance-source": _tolerance_source,
     "torque-left": _torque_left,
-    "traces-contradict": lambda v: (
-        f"{_on_joints(v['effects'])} would explain the traces that were given to be fitted to, but not those held out, "
-        "which are fitted to here: what is missing is something else, which none of the effects that were tried "
-        "describes"
-    ),
-    "traces-exchanged": "the traces that were given to be fitted to show nothing plain that has a name: this is what "
-    "those held out show, which are fitted to here, while the others are held out in turn",
     "unfinished-record": lambda v: (
         f"{v.get('file') or 'trace ' + v['trace']} was not recorded to its end ({v['outcome']}); the "
         f"{v['seconds']:.1f} s that there are were used"
