@@ -31,15 +31,13 @@ def _drive_at_limit(v: Values) -> str:
 
 def _larger_noise(v: Values) -> str:
     def of(joint: Values) -> str:
-        apart = joint["apart"]
-        left_out = "" if not apart else f" beside {apart} reading{'' if apart == 1 else 's'} far off, left out"
         unit = " counts" if joint["unit"] == "count" else f" {joint['unit']}"
-        return f"joint {joint['joint']} {joint['size']:.2g}{unit} for {joint['stated']:.2g}{left_out}"
+        return f"joint {joint['joint']} {joint['size']:.2g}{unit} for {joint['stated']:.2g}"
 
     return (
         "the noise of readings is larger than what the machine file states of noise and rounding: "
         f"{'; '.join(map(of, v['joints']))}; no dependence of it on time, position, speed, direction or drive was "
-        "found, and no tone"
+        "found"
     )
 
 

@@ -46,7 +46,7 @@ def test_effects_of_which_each_takes_a_third_are_named_together() -> None:
     assert adopted(found) == {(n, (1,)) for n in ("coulomb_friction", "periodic_disturbance", "spring_torque")}
 
 
-def test_the_gap_shrinks_with_every_step_though_steps_were_looked_for_again() -> None:
+def test_the_gap_shrinks_with_every_step() -> None:
     found = slide(("coulomb_friction", "periodic_disturbance"), coulomb=6.0, hum=8.5)
     gap = found.gap
     assert gap is not None
@@ -59,8 +59,6 @@ def test_the_gap_shrinks_with_every_step_though_steps_were_looked_for_again() ->
         assert noisier * second > whole > 0.0, "the numbers as the file states them leave hardly more"
         assert alone > 1.2 * first, "numbers alone do not do it"
     assert "Without the effect, fitted numbers alone leave" in gap.without.text
-    earlier, later = (s for s in found.steps if s.adopted)
-    assert later.rmse_fit[0].before == pytest.approx(earlier.rmse_fit[0].after)
 
 
 def candidate(effect: str, flow: TorqueWorkflow, evidence: float, told: float = 0.0) -> Fitted:
