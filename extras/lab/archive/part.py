@@ -16,7 +16,8 @@ from extras.lab.archive.settings import ArchiveSettings
 from server.catalogue.room import of_robots
 from server.parts import Attention, Part
 from server.problems import conflict
-from server.services import RobotServices, Services
+from server.robot_services import RobotServices
+from server.services import Services
 
 
 class Archives(Part, Collector):
@@ -30,11 +31,9 @@ class Archives(Part, Collector):
         self._archived = ArchivedStore(services.store)
         services.traces.archived = self._archived  # also where there is no bucket any more: what it has is known
         self._of: dict[str, ArchiveService] = {}
-        registry = services.metrics.registry
         moved = "Traces sent to the archive or fetched from it, and attempts that failed."
-        self._moved = Counter("daq_archive_transfers", moved, ("robot", "direction", "result"), registry=registry)
-        self._size = Counter("daq_archive_bytes", "Sizes of these traces.", ("robot", "direction"), registry=registry)
-        registry.register(self)
+        self._moved = Counter("daq_archive_transfers", moved, ("robot", "direction", "result"), registry=None)
+        self._size = Counter("daq_archive_bytes", "Sizes of these traces.", ("robot", "direction"), registry=None)
 
     def of(self, robot: str) -> ArchiveService:
         """Returns the archive of a robot. Raises a 409 where there is none."""
@@ -93,7 +92,7 @@ class Archives(Part, Collector):
             waiting.add_metric((name, "send"), status.waiting)
             waiting.add_metric((name, "fetch"), status.fetching)
             local.add_metric((name,), status.local_bytes)
-        yield from (reached, traces, waiting, local)
+        yield from (reached, traces, waiting, local, *self._moved.collect(), *self._size.collect())
 
     def _lines(self, robot: str) -> list[str]:
         return self._of[robot].warnings(self._services.settings.traces.warn_at)
@@ -108,7 +107,7 @@ class Archives(Part, Collector):
                 catalogue=rig.catalogue,
                 archived=self._archived,
                 clock=self._services.clock,
-                tell=partial(self._services.record_event, name, "archive"),
+                tell=partial(self._services.event_log.record, name, "archive"),
                 fetched=rig.jobs.look,
                 count=partial(self._count, name),
             )
