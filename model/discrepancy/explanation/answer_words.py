@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from daq.contracts.errors import SpecError
 from model.discrepancy.diagnosis import (
@@ -20,8 +20,8 @@ from model.discrepancy.diagnosis import (
 )
 from model.discrepancy.explanation.class_words import class_headline, class_of_group, class_words
 from model.discrepancy.explanation.effect_words import called, size_words, sizes_of
+from model.discrepancy.explanation.phrases import METHODS, NOTHING, NOTHING_AT_LENGTH
 from model.discrepancy.explanation.step_words import NOISE_UNKNOWN, reason_text, sentence
-from model.discrepancy.grounds import Method
 from model.discrepancy.numbers import plain
 from model.effects.names import effect_on, joints_in_words, placed
 from model.record_check.finding import doubts_headline, doubts_in, lines_of
@@ -32,26 +32,6 @@ SHOWN = 3
 WITHIN_NOISE = 3.0
 """Error of a joint, in deviations of its readings' noise, up to which a model is said to explain it within that: sound
 rigs of other worlds leave up to 2.6, where friction turns."""
-METHODS: Mapping[Method, str] = {
-    "output-error": "simulation of the closed loop (output error)",
-    "inverse-dynamics": "balance of torques along the recorded motion (inverse dynamics)",
-}
-NOTHING = {
-    "only-resembles": "none of the known effects, and what is left has no shape of one",
-    "refused": "nothing that the held-out traces confirm",
-    "doubted": "no known effect has the evidence to be named",
-    "explained": "the model explains these traces within their noise and its tolerances",
-}
-"""Why nothing is named, in a headline."""
-NOTHING_AT_LENGTH = {
-    "only-resembles": "Nothing is named: {effect} was added, with evidence of {evidence:.0f}, and taken back, because "
-    "{because}. What is left without it has no shape of an effect.",
-    "refused": "No effect holds on records that were not fitted to: {effect} explains more of the fitted ones, with "
-    "evidence of {evidence:.0f}, but {because}.",
-    "doubted": "No known effect has the evidence to be named, though {doubts}.",
-    "explained": "Nothing significant: the model explains the traces within noise and stated tolerances.",
-}
-"""The same in a summary."""
 
 
 def headline(found: Diagnosis) -> str:

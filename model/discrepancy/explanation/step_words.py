@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
 
-from model.discrepancy.diagnosis import UNWRITTEN, FoundValue, Phase, Step, Where
+from model.discrepancy.diagnosis import UNWRITTEN, FoundValue, Step, Where
 from model.discrepancy.explanation.effect_words import called, shape_in_torques, size_on, size_words
 from model.discrepancy.explanation.pattern_words import pattern_words
-from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal, RefusalKind
+from model.discrepancy.explanation.phrases import PHASES, REFUSALS
+from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal
 from model.discrepancy.numbers import from_to, plain
 from model.effects.names import capitalised, joints_in_words
 
@@ -21,13 +21,6 @@ ALL = 0.95
 """Share of the evidence; with a margin above it, the next best candidate has next to no evidence."""
 LEAST_SHOWN = 5e-4
 """Least share of a mean square that is not shown as 0.0 %."""
-PHASES: Mapping[Phase, str] = {
-    "ramp_start": "as motion starts",
-    "steady_ramp": "in steady motion",
-    "reversal": "after reversals",
-    "creep": "in slow motion",
-    "hold": "at rest",
-}
 
 
 def sentence(words: str) -> str:
@@ -149,33 +142,14 @@ def _beaten(rival: NamedEffect, step: Step) -> str:
     return f"the next best, {name}, has evidence of {rival.evidence:.0f}, and this has {step.evidence:.0f}"
 
 
-def _falls_too_little(share: float) -> str:
+def refusal_words(refusal: Refusal) -> str:
+    """Why an effect was not taken into the model, as a clause."""
+    share, joints = refusal.numbers.get("share", 0.0), refusal.joints
     change = "does not fall"
     if abs(share) >= LEAST_SHOWN:
         change = f"falls by only {share:.1%}" if share > 0.0 else f"grows by {-share:.1%}"
-    return f"on records not fitted to, the mean square {change}"
-
-
-def _only_resembles(joints: Sequence[int]) -> str:
-    disagree = f"{joints_in_words(joints)} still {'disagrees' if len(joints) == 1 else 'disagree'} beyond noise"
-    return f"it only resembles what is missing: with all that was found, {disagree}"
-
-
-REFUSALS: Mapping[RefusalKind, str | Callable[[Refusal], str]] = {
-    "diverges": "with it, the simulation of the held-out traces does not stay finite",
-    "error-grows": "the error on the held-out traces grows, by {share:.0%} of what is beyond noise there",
-    "error-rises": "the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} "
-    "variances of a reading",
-    "falls-too-little": lambda refusal: _falls_too_little(refusal.numbers["share"]),
-    "only-resembles": lambda refusal: _only_resembles(refusal.joints),
-    "superfluous": "a later effect explains what it explained",
-}
-
-
-def refusal_words(refusal: Refusal) -> str:
-    """Why an effect was not taken into the model, as a clause."""
-    words = REFUSALS[refusal.kind]
-    return words.format(**refusal.numbers) if isinstance(words, str) else words(refusal)
+    disagree = f"{joints_in_words(joints)} still disagree{'s' if len(joints) == 1 else ''}" if joints else ""
+    return REFUSALS[refusal.kind].format(**refusal.numbers, change=change, disagree=disagree)
 
 
 def removed_words(share: float) -> str:
