@@ -1,4 +1,4 @@
-"""Completes the OpenAPI description, with an example of every body and of every problem."""
+"""Completes the OpenAPI description, with an example of every problem."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ from html import escape
 from typing import Any
 
 from daq.contracts.service.problems import ProblemDetails
-from server.api.examples import examples, untyped
 from server.api.problem_examples import PROBLEM_EXAMPLES
 from server.problems import MEDIA_TYPE, SCHEMA
 
-JSON = "application/json"
-FIRST_ERROR = 400
 IN_COMPONENTS = "#/components/schemas/{model}"
 Document = dict[str, Any]
 
@@ -33,7 +30,7 @@ def problems_page() -> str:
 
 
 def completed(document: Document) -> Document:
-    """Adds the schema of problems and the examples to `document`, in place, and returns it. The addresses in it begin
+    """Adds the schema of problems and their examples to `document`, in place, and returns it. The addresses in it begin
     two levels above its own: a proxy may serve all this below a path."""
     document["servers"] = [{"url": "../.."}]
     document["components"]["schemas"] = dict(sorted((document["components"]["schemas"] | _problem_schemas()).items()))
@@ -44,17 +41,10 @@ def completed(document: Document) -> Document:
 
 
 def _complete_operation(operation: Document, name: str) -> None:
-    bodies = [operation.get("requestBody", {})]
     for status, answer in operation["responses"].items():
         content = answer.get("content", {})
         if content.get(MEDIA_TYPE) == {"schema": SCHEMA}:
             answer["content"] = {MEDIA_TYPE: {"schema": SCHEMA, "examples": _problems(int(status), name)}}
-        elif int(status) < FIRST_ERROR or JSON in content:
-            bodies.append(answer)
-    for body in bodies:
-        content = body.get("content", {}).get(JSON)
-        if content is not None:
-            content["examples"] = _examples(content.get("schema", {}), operation["operationId"])
 
 
 def _problem_schemas() -> Document:
@@ -70,24 +60,3 @@ def _problems(status: int, operation: str) -> Document:
         for met in PROBLEM_EXAMPLES
         if met.problem.status == status and met.where.match(operation)
     }
-
-
-def _examples(schema: Document, operation: str) -> Document:
-    """Examples of a body, by the name of their schema."""
-    if operation in untyped() and "$ref" not in schema:
-        return {operation: {"value": untyped()[operation]}}
-    if schema.get("type") == "array":
-        return {f"{name}s": {"value": [one["value"]]} for name, one in _examples(schema["items"], operation).items()}
-    refs = [schema, *schema.get("oneOf", ())]
-    names = [one["$ref"].rpartition("/")[2] for one in refs if "$ref" in one]
-    return {name.removeprefix("Page_").rstrip("_"): {"value": _example(name)} for name in names if _has_example(name)}
-
-
-def _has_example(schema: str) -> bool:
-    return schema.removeprefix("Page_").rstrip("_") in examples()
-
-
-def _example(schema: str) -> Any:
-    if schema.startswith("Page_"):
-        return {"items": [examples()[schema.removeprefix("Page_").rstrip("_")]], "next": None}
-    return examples()[schema]

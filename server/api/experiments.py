@@ -78,7 +78,7 @@ def submit_experiment(
 
 
 @router.get("")
-async def list_experiments(
+def list_experiments(
     rig: RobotDep,
     experiments: Experiments,
     _: Viewer,
@@ -89,7 +89,7 @@ async def list_experiments(
     cursor: CursorOf = None,
 ) -> Page[Experiment]:
     """Lists experiments, the last submitted or the last ended first."""
-    page = await experiments.page.fetch(rig.robot.name, tuple(state or ()), schedule, cursor, limit, order)
+    page = experiments.page(rig.robot.name, tuple(state or ()), schedule, cursor, limit, order)
     return page.model_copy(update={"items": tuple(rig.queue.with_progress(item) for item in page.items)})
 
 

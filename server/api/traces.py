@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from fastapi import Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
@@ -67,10 +68,10 @@ async def list_traces(
     """Lists traces, the newest first."""
     search = TraceSearch(q, tag, source, outcome, kind, since, until)
     if q is None:
-        return await traces.page.fetch(rig.robot.name, search, cursor, limit)
+        return await run_in_threadpool(traces.page, rig.robot.name, search, cursor, limit)
     let_others_ask(connection)
     async with lanes.turn(caller.name):
-        return await traces.page.fetch(rig.robot.name, search, cursor, limit)
+        return await run_in_threadpool(traces.page, rig.robot.name, search, cursor, limit)
 
 
 @router.post(

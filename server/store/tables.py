@@ -7,7 +7,6 @@ from typing import Any
 
 from sqlalchemy import (
     JSON,
-    BigInteger,
     DateTime,
     Dialect,
     ForeignKey,
@@ -224,26 +223,6 @@ class TraceUseRow(Table):
     trace: Mapped[str] = mapped_column(String(64), primary_key=True, index=True)
     used_by: Mapped[str] = mapped_column(String(80), primary_key=True)
     """`job ID` or `model ID`."""
-
-
-class ArchivedRow(Table):
-    """A trace that the archive has, whole, as it was read back. The row stays until the object is deleted, also if the
-    trace is deleted before that."""
-
-    __tablename__ = "archived_traces"
-    __table_args__ = (Index("archived_traces_by_robot", "robot", "deleting"),)
-
-    trace: Mapped[str] = mapped_column(String(64), primary_key=True)
-    robot: Mapped[str] = mapped_column(String(32))
-    object: Mapped[str] = mapped_column(String(400))
-    """The object's name in the bucket."""
-    size: Mapped[int] = mapped_column(BigInteger)
-    sha256: Mapped[str] = mapped_column(String(64))
-    archived: Mapped[datetime]
-    checked: Mapped[datetime]
-    """When the object was last read back and was what had been sent."""
-    fetched: Mapped[datetime | None]
-    deleting: Mapped[bool] = mapped_column(default=False)
 
 
 class EventRow(Table):

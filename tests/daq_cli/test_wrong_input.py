@@ -36,7 +36,6 @@ from tests.daq_cli.invoke import CommandLine
         ("run ramp --duration soon", ("--duration", "number")),
         ("run nonsense", ("nonsense", "`daq run --help`")),
         ("nonsense", ("nonsense", "`daq --help`")),
-        ("audit --outcome maybe", ("'--outcome': 'maybe' is not one of 'done', 'refused', 'failed' (see",)),
         ("fit x.mcap --method maybe", ("'--method': 'maybe' is not one of 'least_squares', 'nelder_mead' (see",)),
         ("run spec missing.json", ("experiment missing.json", "cannot be read")),
         ("--config missing.toml run ramp", ("missing.toml", "no such file")),

@@ -9,6 +9,7 @@ from prometheus_client import Counter
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from extras.lab.archive.archived import ArchivedStore
 from extras.lab.archive.bucket import Bucket, open_bucket
 from extras.lab.archive.service import ArchiveContext, ArchiveService
 from extras.lab.archive.settings import ArchiveSettings
@@ -17,7 +18,6 @@ from server.parts import Attention, Part
 from server.problems import conflict
 from server.robot_services import RobotServices
 from server.services import Services
-from server.store.archived import ArchivedStore
 
 
 class Archives(Part, Collector):
@@ -28,6 +28,8 @@ class Archives(Part, Collector):
         self._services = services
         self._settings = services.settings.section(ArchiveSettings)
         self._bucket = open_bucket(self._settings)
+        self._archived = ArchivedStore(services.store)
+        services.traces.archived = self._archived  # also where there is no bucket any more: what it has is known
         self._of: dict[str, ArchiveService] = {}
         registry = services.metrics.registry
         moved = "Traces sent to the archive or fetched from it, and attempts that failed."
@@ -105,7 +107,7 @@ class Archives(Part, Collector):
                 settings=self._settings,
                 bucket=bucket,
                 catalogue=rig.catalogue,
-                archived=ArchivedStore(self._services.store),
+                archived=self._archived,
                 clock=self._services.clock,
                 tell=partial(self._services.event_log.record, name, "archive"),
                 fetched=rig.jobs.look,

@@ -72,12 +72,6 @@ def test_a_jog_with_samples_far_apart_goes_to_the_limit_and_no_further(every: in
     assert len(told) == 1
 
 
-def test_several_joints_are_jogged_at_once() -> None:
-    arm = StandIn()
-    driven(arm, {1: 0.2, 3: -0.1}, held_until=100, periods=100)
-    assert arm.position[2] - REST[2] == pytest.approx(-0.1 * 100 * PERIOD, abs=0.02)
-
-
 def test_it_stops_when_the_key_is_no_longer_refreshed() -> None:
     arm = StandIn()
     driven(arm, {1: 0.2}, held_until=50, periods=200)

@@ -93,14 +93,6 @@ def test_marks_are_in_order_and_within_the_plan(spec: ExperimentSpec) -> None:
 
 @settings(max_examples=100)
 @given(specs())
-def test_the_same_experiment_gives_the_same_plan_to_the_bit(spec: ExperimentSpec) -> None:
-    one, other = (plan(spec, MA2000, start_angles(spec, MA2000)) for _ in range(2))
-    assert np.array_equal(one.angles, other.angles)
-    assert one.marks == other.marks
-
-
-@settings(max_examples=100)
-@given(specs())
 def test_repeats_are_alike_and_each_starts_where_the_first_did(spec: ExperimentSpec) -> None:
     once = plan(spec.model_copy(update={"repeats": 1}), MA2000, start_angles(spec, MA2000))
     made = plan(spec, MA2000, start_angles(spec, MA2000))

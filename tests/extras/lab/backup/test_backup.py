@@ -19,6 +19,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ExperimentRequest
 from daq.teaching.program import Absolute, Program
+from extras.lab.archive.archived import Archived, ArchivedStore
 from extras.lab.backup.database import copy_database, head_of_audit, revision_of
 from extras.lab.backup.manifest import MANIFEST, verify
 from extras.lab.backup.places import DATABASE, BackupError, Places, places_of
@@ -27,7 +28,6 @@ from extras.lab.backup.write import back_up
 from extras.lab.notifications.tables import OutboxRow
 from server.access.sessions import Person, SessionStore
 from server.experiments.review import Given, Review
-from server.store.archived import Archived, ArchivedStore
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.lock import InUseError, sole_use

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime
 
 from sqlalchemy import delete, exists, func, select, update
 from sqlalchemy.orm import Session
 
+from extras.lab.archive.tables import ArchivedRow
 from server.store.engine import Store
-from server.store.tables import ArchivedRow, JobRow, TraceRow, TraceUseRow
+from server.store.tables import JobRow, TraceRow, TraceUseRow
 
 PART = 500
 """Number of rows that are read at once."""
@@ -50,6 +52,15 @@ class ArchivedStore:
         with self._store.reading() as session:
             row = session.get(ArchivedRow, trace)
             return None if row is None or row.deleting else _archived(row)
+
+    def among(self, session: Session, traces: Collection[str]) -> set[str]:
+        """Returns those of these traces that the archive has."""
+        query = select(ArchivedRow.trace).where(ArchivedRow.trace.in_(traces), ArchivedRow.deleting.is_(False))
+        return set(session.scalars(query))
+
+    def delete_later(self, session: Session, trace: str) -> None:
+        """Notes that a trace is deleted: its object goes when the archive can be reached."""
+        session.execute(update(ArchivedRow).filter_by(trace=trace).values(deleting=True))
 
     def add(self, made: Archived) -> None:
         """Records a trace that the archive has now. If the trace has been deleted meanwhile, its object is to be
