@@ -50,6 +50,6 @@ def _line(module: str, *arguments: str) -> dict[str, Any]:
     try:
         line: dict[str, Any] = json.loads(done.stdout)
     except json.JSONDecodeError:
-        line = f"{module} ended with code {done.returncode}: {last_words(done.stderr)}"
-        raise TrialStageError(line) from None
+        told = f"{module} ended with code {done.returncode}: {last_words(done.stderr)}"
+        raise TrialStageError(told) from None
     return line

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection
 from pathlib import Path
 
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, EffectInModel, ModelDetails, ModelParameter
+from daq.contracts.whole_file import replacing
 from model.effects.names import placed
 from model.machine_model.model import EffectUse, Model, base_model
 from model.machine_model.model_file import ModelFile, file_of, load_model
@@ -56,12 +56,8 @@ class Models:
             if _is_kept(path, made):
                 return
             self.folder.mkdir(parents=True, exist_ok=True)
-            part = path.with_name(f"{new.file}.part")
-            with part.open("w", encoding="utf-8") as stream:
-                stream.write(made.text)
-                stream.flush()
-                os.fsync(stream.fileno())
-            part.replace(path)
+            with replacing(path) as part:
+                part.write_text(made.text, "utf-8")
 
         return self.store.insert(new, write, robots)
 
