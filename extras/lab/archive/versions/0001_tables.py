@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from alembic import op
+from sqlalchemy import Connection
 
 from extras.lab.archive.tables import ArchiveTable
 
-revision = "0001"
-down_revision = None
-branch_labels = None
-depends_on = None
 
-
-def upgrade() -> None:
+def upgrade(connection: Connection) -> None:
     """Makes the table."""
-    ArchiveTable.metadata.create_all(op.get_bind(), checkfirst=False)
+    ArchiveTable.metadata.create_all(connection, checkfirst=False)
