@@ -26,7 +26,7 @@ from extras.lab.backup.places import DATABASE, BackupError, Places, places_of
 from extras.lab.backup.restore import restore
 from extras.lab.backup.write import back_up
 from extras.lab.notifications.tables import OutboxRow
-from server.access.sessions import Person, SessionStore
+from server.access.sessions import SessionStore
 from server.experiments.review import Given, Review
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
@@ -159,7 +159,7 @@ def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) 
 def test_what_may_have_ended_since_does_not_come_back(tmp_path: Path) -> None:
     here, there = filled(tmp_path / "here"), places_in(tmp_path / "there")
     store = Store(here.url)
-    SessionStore(store).begin(Person("https://id", "1", "anna", "owner"), NOW, timedelta(days=9))
+    SessionStore(store).begin(lambda _session: "anna", "owner", NOW, timedelta(days=9))
     experiments, review = ExperimentStore(store), Review.of("ma2000", load_machine("ma2000"), "operator")
     made, _ = experiments.submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
     content = review.content(experiments.get("ma2000", made.id).content)
