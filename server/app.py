@@ -30,7 +30,6 @@ from server.api import (
     teaching,
     traces,
 )
-from server.api.state_metrics import StateMetrics
 from server.page import Page
 from server.routes import include
 from server.services import Services
@@ -46,7 +45,6 @@ Angles are in rad, times in s, joints are numbered from 1. Errors are applicatio
 def make_app(services: Services, gate: Gate) -> FastAPI:
     """Makes the application, behind its gate, for services that are not yet started."""
     app = bare_app(services)
-    services.metrics.registry.register(StateMetrics(services))
     app.add_middleware(gate.middleware)
     app.add_middleware(HeadAsGet)
     return app
@@ -111,6 +109,8 @@ def bare_app(services: Services | None) -> FastAPI:
     for plugin in plugins():
         for reference in plugin.routes:
             include(app, named(reference), API)
+        for reference in plugin.routes_at_root:
+            include(app, named(reference))
     include(app, system.plain)
     app.routes.append(Page())
     serve_site(app, site_index())

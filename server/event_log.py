@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime
 
@@ -10,7 +11,6 @@ from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.live import EventMessage
 from server.clock import Clock
 from server.live.hub import Hub
-from server.monitoring.metrics import Metrics
 from server.store.events import EventStore
 from server.store.waiting_events import WaitingEvents
 
@@ -18,11 +18,15 @@ log = logging.getLogger("server")
 
 
 class EventLog:
-    """Records events. `hubs`: those of the robots' live clients, by name, as soon as there are any."""
+    """Records events.
 
-    def __init__(self, store: EventStore, metrics: Metrics, clock: Clock) -> None:
+    `hubs`: those of the robots' live clients, by name, as soon as there are any. `counted`: hears of the robot and kind
+    of each event.
+    """
+
+    def __init__(self, store: EventStore, counted: Callable[[str, str], None], clock: Clock) -> None:
         self.hubs: dict[str, Hub] = {}
-        self._metrics = metrics
+        self._counted = counted
         self._clock = clock
         self._waiting = WaitingEvents(store, self._publish)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
@@ -43,7 +47,7 @@ class EventLog:
         row is written as soon as the database can be.
         """
         log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
-        self._metrics.count_event(robot, kind)
+        self._counted(robot, kind)
         self._waiting.add(robot, kind, text, at or self._clock.utc(), actor, experiment)
         if (hub := self.hubs.get(robot)) is not None:
             hub.look()

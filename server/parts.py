@@ -77,6 +77,15 @@ class Part:
     def acted(self, note: AuditNote, *, again: bool = False) -> None:
         """Hears of what somebody did otherwise than by a request that is watched. `again`: it may come all the time."""
 
+    def request_answered(self, method: str, status: int, seconds: float) -> None:
+        """Hears of a request, its status and how long it took."""
+
+    def refused(self, kind: str) -> None:
+        """Hears of the kind of problem of a request or WebSocket that is refused."""
+
+    def event_recorded(self, robot: str, kind: str) -> None:
+        """Hears of an event."""
+
     def arm_reported(self, robot: str, report: Report) -> None:
         """Hears what the owner of a robot's port reports."""
 

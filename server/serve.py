@@ -111,15 +111,14 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
         raise SpecError(f"{why}, and there is no token: {make}, or {instead}")
     known = KnownTokens(services.tokens, services.clock)
     names = tuple(name.lower() for name in section.names)
-    metrics = services.metrics
     return Gate(
         known,
         services.tickets,
         local,
         names,
         stop_port,
-        metrics.count_request,
-        metrics.count_refusal,
+        lambda *answered: services.tell(lambda part: part.request_answered(*answered)),
+        lambda kind: services.tell(lambda part: part.refused(kind)),
         cookie=session_cookie(section.address),
         parts=services.parts,
     )

@@ -1,6 +1,6 @@
 """How the service is composed, and in which order it ends.
 
-It has the database with a store for each kind of row; what all robots share (events, metrics, lanes, processes with
+It has the database with a store for each kind of row; what all robots share (events, lanes, processes with
 limits, workers of jobs); the parts of plug-ins; and for each robot its `RobotServices`. Routes are given what they
 declare (`server/api/dependencies.py`), never all of this.
 
@@ -44,13 +44,12 @@ from server.jobs.service import JobContext, JobService
 from server.jobs.shared_workers import SharedWorkers
 from server.live.history import History
 from server.live.hub import Hub
-from server.monitoring.metrics import Metrics
-from server.monitoring.readiness import Readiness
 from server.owner.messages import Answer
 from server.parts import Attention, Part
 from server.problems import ProblemError
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
+from server.readiness import Readiness
 from server.robot.control import ControlService
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
@@ -100,9 +99,8 @@ class Services:
         """Port of the stop listener; 0 until it is known."""
         self.lanes = Lanes()
         self.readiness = Readiness(self.clock)
-        self.metrics = Metrics()
         self.events = EventStore(self.store)
-        self.event_log = EventLog(self.events, self.metrics, self.clock)
+        self.event_log = EventLog(self.events, self._count_event, self.clock)
         limits = Limits(memory=settings.server.upload_memory << 20, seconds=settings.server.upload_time)
         self.uploads = Workers(limits, 1)
         self.motions = Workers(limits, 1)
@@ -192,7 +190,6 @@ class Services:
 
         hub = self.event_log.hubs[name] = Hub(self.clock, history, status)
         robot.listeners.append(hub.on_report)
-        robot.listeners.append(lambda report: self.metrics.count_report(name, report))
         robot.listeners.append(lambda report: self.tell(lambda part: part.arm_reported(name, report)))
         robot.disconnected.append(lambda _why: hub.look())
         models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
@@ -288,8 +285,10 @@ class Services:
         robot.disconnected.append(queue.connection_ended)
         return queue
 
+    def _count_event(self, robot: str, kind: str) -> None:
+        self.tell(lambda part: part.event_recorded(robot, kind))
+
     def _job_changed(self, hub: Hub, job: Job) -> None:
-        self.metrics.count_job(job)
         self.tell(lambda part: part.job_changed(job))
         hub.publish("jobs", JobMessage(job=job))
 

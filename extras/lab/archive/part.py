@@ -31,11 +31,9 @@ class Archives(Part, Collector):
         self._archived = ArchivedStore(services.store)
         services.traces.archived = self._archived  # also where there is no bucket any more: what it has is known
         self._of: dict[str, ArchiveService] = {}
-        registry = services.metrics.registry
         moved = "Traces sent to the archive or fetched from it, and attempts that failed."
-        self._moved = Counter("daq_archive_transfers", moved, ("robot", "direction", "result"), registry=registry)
-        self._size = Counter("daq_archive_bytes", "Sizes of these traces.", ("robot", "direction"), registry=registry)
-        registry.register(self)
+        self._moved = Counter("daq_archive_transfers", moved, ("robot", "direction", "result"), registry=None)
+        self._size = Counter("daq_archive_bytes", "Sizes of these traces.", ("robot", "direction"), registry=None)
 
     def of(self, robot: str) -> ArchiveService:
         """Returns the archive of a robot. Raises a 409 where there is none."""
@@ -94,7 +92,7 @@ class Archives(Part, Collector):
             waiting.add_metric((name, "send"), status.waiting)
             waiting.add_metric((name, "fetch"), status.fetching)
             local.add_metric((name,), status.local_bytes)
-        yield from (reached, traces, waiting, local)
+        yield from (reached, traces, waiting, local, *self._moved.collect(), *self._size.collect())
 
     def _lines(self, robot: str) -> list[str]:
         return self._of[robot].warnings(self._services.settings.traces.warn_at)

@@ -31,7 +31,6 @@ class AuditPart(Part, Collector):
         self._services = services
         self.log = AuditLog(services.store)
         self.writer = AuditWriter(self.log, services.folder / KEPT)
-        services.metrics.registry.register(self)
 
     def robots_made(self, robots: Sequence[Any]) -> None:
         """Notes the start, and what has changed in the configuration."""

@@ -150,7 +150,7 @@ def _told(request: Request, services: Services, problem: ProblemError) -> Respon
     """Sends the browser to the page's sign-in, which has words for each kind of problem; the logs have the details.
     Anybody can cause them without end."""
     log.warning("sign-in: %s: %s", problem.kind, problem.detail)
-    services.metrics.count_refusal(problem.kind)
+    services.tell(lambda part: part.refused(problem.kind))
     note = AuditNote(
         at=services.clock.utc(),
         actor=None,

@@ -13,7 +13,7 @@ REQUEST_BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 5.0)
 JOB_BUCKETS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0, 10000.0)
 
 
-class Metrics:
+class Counts:
     """Counts of one service, and the registry from which Prometheus reads them."""
 
     def __init__(self) -> None:

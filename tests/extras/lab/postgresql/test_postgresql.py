@@ -6,14 +6,15 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 
+from extras.lab.postgresql.lock import ServerLock
 from server.clock import SystemClock
 from server.stopping.tokens import reader_of
-from server.store.address import open_engine
-from server.store.engine import Store, StoreError
-from server.store.lock import InUseError, ServerLock, sole_use
+from server.store.address import StoreError, open_engine, parse_address
+from server.store.engine import Store
+from server.store.lock import InUseError, sole_use
 from server.store.traces import TraceStore
+from tests.extras.lab.postgresql.server import PostgresServer
 from tests.server.inside import service_inside
-from tests.server.postgresql import PostgresServer
 from tests.server.store.rows import new_trace
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
@@ -96,3 +97,15 @@ def test_the_service_keeps_everything_in_it_and_refuses_what_it_cannot_hold(
         assert api.post("/stop").status_code == 200
         postgresql.start()
         assert api.get("/experiments", params={"limit": 7}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("postgresql+psycopg2://anna:secret@db/arm", r"anna:\*\*\*@db/arm: its driver psycopg2 is not installed"),
+        ("postgresql+pg8000://db/arm", "driver pg8000 is not installed: `pip install 'pg8000'`"),
+    ],
+)
+def test_a_driver_that_is_missing_is_named(address: str, said: str) -> None:
+    with pytest.raises(StoreError, match=said):
+        parse_address(address)

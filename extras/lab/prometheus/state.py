@@ -30,6 +30,10 @@ class StateMetrics(Collector):
     def __init__(self, services: Services) -> None:
         self._services = services
 
+    def describe(self) -> Iterable[Metric]:
+        """Returns nothing: what is collected is asked for when Prometheus asks."""
+        return ()
+
     def collect(self) -> Iterable[Metric]:
         """Returns all metrics of the state."""
         yield from self._of_robots()

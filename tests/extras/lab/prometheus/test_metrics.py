@@ -8,7 +8,7 @@ from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from daq.contracts.service.jobs import CompareRequest, Job
-from server.monitoring.metrics import Metrics
+from extras.lab.prometheus.counts import Counts
 from tests.server.service import Service
 
 NOON = datetime(2026, 3, 2, 12, 0, tzinfo=UTC)
@@ -102,7 +102,7 @@ def test_stops_refused_tokens_and_outcomes_are_counted(service: Service) -> None
 
 
 def test_a_job_is_counted_once_when_it_has_ended() -> None:
-    metrics = Metrics()
+    metrics = Counts()
     begun = {"started": NOON}
     for job in (_job("queued"), _job("running", **begun), _job("running", **begun)):
         metrics.count_job(job)
