@@ -167,7 +167,7 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
     def stopped(news: Stopped) -> None:
         services.robot(news.robot).queue.stop_asked(news.actor)
         with suppress(RuntimeError):  # the service is ending, and records no more events
-            services.record_event_later(news.robot, "stop", news.text, actor=news.actor)
+            services.event_log.record_later(news.robot, "stop", news.text, actor=news.actor)
         note = _note_of_stop(news)
         services.tell(lambda part: part.acted(note))
 

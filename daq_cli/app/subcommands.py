@@ -110,14 +110,6 @@ CORE = {
             group="Model",
         ),
         Command(
-            "thesis",
-            "Reproduce the 1991 source beside its published results.",
-            "daq_cli.commands.thesis",
-            about="computer",
-            needs="model",
-            group="Model",
-        ),
-        Command(
             "blind",
             "Hide effects in the mock, diagnose blindly, and score.",
             "daq_cli.commands.blind",

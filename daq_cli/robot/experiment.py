@@ -36,21 +36,6 @@ class RunOptions:
     """When a service shall run it, again and again; None for now."""
 
 
-@dataclass(frozen=True)
-class Computation:
-    """How set points are to be computed: with a model, from the error of a trace, of which a share is corrected, or
-    both."""
-
-    model: str | None
-    learn_from: str | None
-    share: float
-
-    @property
-    def wanted(self) -> bool:
-        """Whether they are to be computed at all."""
-        return self.model is not None or self.learn_from is not None
-
-
 def read_spec(path: Path) -> ExperimentSpec:
     """The experiment that a .json or .toml file describes. Raises SpecError with one line."""
     from daq.contracts.documents import read_document

@@ -19,7 +19,7 @@ from server.access.limits import Bucket
 from server.live.hub import Client
 from server.live.outbox import Outbox
 from server.problems import ProblemError, field_of
-from server.services import RobotServices
+from server.robot_services import RobotServices
 
 BASE_RATE = 50
 WAITING_MESSAGES = 64

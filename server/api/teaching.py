@@ -20,12 +20,13 @@ from daq.teaching.program import Absolute, Instruction, Program, Relative
 from daq.traces.reader import read_trace
 from server.api.dependencies import (
     Arrived,
+    Experiments,
     IdempotencyKey,
     Identity,
     LeaseHeader,
+    Motions,
     Operator,
     RobotDep,
-    ServicesDep,
     Turn,
     Viewer,
 )
@@ -106,7 +107,8 @@ def finish_teaching(rig: RobotDep, _: Operator, lease: LeaseHeader = None) -> Te
 def calibrate_gain(
     request: CalibrationRequest,
     rig: RobotDep,
-    services: ServicesDep,
+    experiments: Experiments,
+    motions: Motions,
     caller: Operator,
     response: Response,
     _turn: Turn,
@@ -117,7 +119,8 @@ def calibrate_gain(
     It is checked like any experiment; the same Idempotency-Key returns the same experiment (200).
     """
     spec = gain_experiment(tuple(sorted(set(request.joints))))
-    return submit_experiment(ExperimentRequest(spec=spec), rig, services, caller, response, None, idempotency_key)
+    request_of = ExperimentRequest(spec=spec)
+    return submit_experiment(request_of, rig, experiments, motions, caller, response, None, idempotency_key)
 
 
 @router.get("/traces/{trace}/gain")

@@ -45,7 +45,7 @@ from server.robot.control import ControlService
 from server.robot.robot import Robot, RobotPlace
 from server.robot.stop import StopService
 from server.robot.teaching import TeachingService
-from server.services import RobotServices
+from server.robot_services import RobotServices
 from tests.server.clocks import HandClock
 
 MACHINE = load_machine("ma2000")

@@ -16,7 +16,8 @@ from extras.lab.archive.settings import ArchiveSettings
 from server.catalogue.room import of_robots
 from server.parts import Attention, Part
 from server.problems import conflict
-from server.services import RobotServices, Services
+from server.robot_services import RobotServices
+from server.services import Services
 
 
 class Archives(Part, Collector):
@@ -106,7 +107,7 @@ class Archives(Part, Collector):
                 catalogue=rig.catalogue,
                 archived=self._archived,
                 clock=self._services.clock,
-                tell=partial(self._services.record_event, name, "archive"),
+                tell=partial(self._services.event_log.record, name, "archive"),
                 fetched=rig.jobs.look,
                 count=partial(self._count, name),
             )

@@ -10,7 +10,7 @@ from daq.contracts.service.audit import AuditEntry, Outcome
 from daq.contracts.service.base import Moment, Page
 from extras.lab.audit.log import AuditSearch
 from extras.lab.audit.part import AuditPart
-from server.api.dependencies import CursorOf, Limit, Operator, ServicesDep
+from server.api.dependencies import CursorOf, Limit, Operator, part
 from server.problems import PROBLEMS
 from server.routes import Router
 
@@ -25,7 +25,7 @@ def _equals(what: str, longest: int = 200) -> object:
 
 @router.get("/audit")
 def list_audit(
-    services: ServicesDep,
+    audit: Annotated[AuditPart, part(AuditPart)],
     _: Operator,
     actor: Annotated[str | None, _equals("name of a token")] = None,
     robot: Annotated[str | None, _equals("robot")] = None,
@@ -41,7 +41,6 @@ def list_audit(
 
     Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
     """
-    audit = services.part(AuditPart)
     audit.writer.flush(FLUSHED_WITHIN)
     search = AuditSearch(actor, robot, action, subject, outcome, since, until)
     return audit.log.page(search, cursor, limit)
