@@ -9,10 +9,12 @@ import numpy as np
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
+from model.discrepancy.inverse_dynamics.priors import prior_distance
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.effects.library import find_named_effect
 from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.machine_model.record_verdict import FAR_OFF
 
 
 @dataclass(frozen=True)
@@ -47,12 +49,21 @@ def compare(standing: Standing, chosen: Fitted) -> Comparison | None:
 
 
 def _reference(standing: Standing, chosen: Fitted) -> BalanceFit:
-    """The fit that a candidate is held against: the last one, or that with a number as the file states it. With its
-    prior, a number far off may be fitted as well as without."""
+    """The fit that a candidate is held against: the last one, within what the file allows.
+
+    A number that is off by more than its file allows may have taken over what is missing. It is as the file expects it
+    where the candidate names that number, or brings it back.
+    """
     case, now = standing.case, standing.now
-    if not chosen.stated:
-        return now
     held = {p.name: p.value for p in chosen.stated}
+    for unknown in now.unknowns:
+        after = chosen.fit.values.get(unknown.name)
+        if unknown.deviation is not None and after is not None:
+            far, near = (abs(prior_distance(unknown, value)[0]) for value in (now.values[unknown.name], after))
+            if near < FAR_OFF <= far:
+                held[unknown.name] = unknown.expected
+    if not held:
+        return now
     unknowns = [u for u in now.unknowns if u.name not in held]
     balance = TorqueBalance(standing.model.with_values({**now.model_values, **held}), case.records)
     return fit(balance, unknowns, now.values, case.data, now.noise.memory)
