@@ -30,7 +30,6 @@ from daq_cli.robot.access import robot_of
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
     from model.machine_model.model import Model
-    from model.reports.motion import AGREEMENT, agreement_table
     from model.simulation.prepared import Options
 
 app = typer.Typer(add_completion=False)
@@ -66,6 +65,7 @@ def simulate(
     from daq_cli.app.progress import shown_progress
     from daq_cli.models.parameter_table import print_rows
     from model.comparison.compare import compare
+    from model.reports.motion import AGREEMENT, agreement_table
     from model.simulation.prepared import Options
 
     load_effects(effect_file)

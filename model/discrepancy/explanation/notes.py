@@ -59,14 +59,8 @@ def on_stated_numbers(numbers: Iterable[_Expected], values: Mapping[str, float])
     Args:
         numbers: with the value and the deviation that are expected. values: their estimates, by name.
     """
-    moved: list[dict[str, Any]] = [
-        {
-            "name": n.name,
-            "unit": n.unit,
-            "value": values[n.name],
-            "expected": n.expected,
-            "deviations": abs(values[n.name] - n.expected) / n.deviation,
-        }
+    moved = [
+        _moved(n, values[n.name], n.expected, n.deviation)
         for n in numbers
         if n.deviation is not None and abs(values[n.name] - n.expected) > FAR_OFF * n.deviation
     ]
@@ -82,16 +76,12 @@ def on_named_numbers(stated: Iterable[Parameter], values: Mapping[str, float]) -
     Args:
         stated: the numbers, with value and deviation as stated. values: their estimates, by name.
     """
-    numbers = [
-        {
-            "name": p.name,
-            "unit": p.unit,
-            "value": values[p.name],
-            "expected": p.value,
-            "deviations": abs(values[p.name] - p.value) / (p.deviation or 1.0),
-        }
-        for p in stated
-    ]
+    numbers = [_moved(p, values[p.name], p.value, p.deviation or 1.0) for p in stated]
     if not numbers:
         return ()
     return (Note(kind="stated-numbers-moved", values={"limit": FAR_OFF, "numbers": numbers, "named": True}),)
+
+
+def _moved(number: _Expected | Parameter, value: float, expected: float, deviation: float) -> dict[str, Any]:
+    away = abs(value - expected) / deviation
+    return {"name": number.name, "unit": number.unit, "value": value, "expected": expected, "deviations": away}

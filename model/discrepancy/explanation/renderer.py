@@ -9,12 +9,11 @@ from __future__ import annotations
 from model.discrepancy.diagnosis import Diagnosis, Gap, NextExperiment
 from model.discrepancy.explanation.answer_words import summary
 from model.discrepancy.explanation.note_words import note_words
-from model.discrepancy.explanation.step_words import PHASES, sentence, step_with_sentences, where_with_summary
+from model.discrepancy.explanation.phrases import PHASES, STAGES
+from model.discrepancy.explanation.step_words import sentence, step_with_sentences, where_with_summary
 from model.discrepancy.numbers import plain
 from model.effects.names import placed
 from model.units import shown_unit, with_unit
-
-STAGES = {"given": "model as given", "fitted": "its numbers fitted", "refitted": "everything refitted"}
 
 
 def with_sentences(answer: Diagnosis) -> Diagnosis:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
 
-from model.discrepancy.diagnosis import UNWRITTEN, FoundValue, Phase, Step, Where
+from model.discrepancy.diagnosis import UNWRITTEN, FoundValue, Step, Where
 from model.discrepancy.explanation.effect_words import called, shape_in_torques, size_on, size_words
 from model.discrepancy.explanation.pattern_words import pattern_words
-from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal, RefusalKind
+from model.discrepancy.explanation.phrases import PHASES, REFUSALS
+from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal
 from model.discrepancy.numbers import from_to, plain
 from model.effects.names import capitalised, joints_in_words
 
@@ -21,13 +21,6 @@ ALL = 0.95
 """Share of the evidence; with a margin above it, the next best candidate has next to no evidence."""
 LEAST_SHOWN = 5e-4
 """Least share of a mean square that is not shown as 0.0 %."""
-PHASES: Mapping[Phase, str] = {
-    "ramp_start": "as motion starts",
-    "steady_ramp": "in steady motion",
-    "reversal": "after reversals",
-    "creep": "in slow motion",
-    "hold": "at rest",
-}
 
 
 def sentence(words: str) -> str:
@@ -82,7 +75,7 @@ def reason_text(step: Step) -> str:
         return step.reason
     if reason.pattern is None or reason.units is None:
         return sentence(_torque_reason(step, effect, reason))
-    others = [j for j in step.main_joints if j != reason.joint]
+    others = [j for j in step.joints if j != reason.joint]
     alike = f" (and likewise {joints_in_words(others)})" if others else ""
     size = size_on(reason.joint or 0, effect, step.parameters)
     named = called(effect) + ("" if size is None else f", {size_words(size)}")
@@ -92,8 +85,6 @@ def reason_text(step: Step) -> str:
         sentences.append(sentence(_beaten(reason.rival, step)))
     if step.where.joint is None or (step.joints and step.where.joint not in step.joints):
         sentences.append("What shows it is the pattern over the whole record, not one place.")
-    if step.slight_joints:
-        sentences.append(sentence(_slight(step, effect)))
     return " ".join(sentences)
 
 
@@ -151,50 +142,14 @@ def _beaten(rival: NamedEffect, step: Step) -> str:
     return f"the next best, {name}, has evidence of {rival.evidence:.0f}, and this has {step.evidence:.0f}"
 
 
-def _slight(step: Step, effect: str) -> str:
-    """Where the effect of a step is slight, and what that may be."""
-    sizes = [size_on(joint, effect, step.parameters) for joint in step.slight_joints]
-    shown = ", ".join(size_words(v) for v in sizes if v is not None)
-    return (
-        f"on {joints_in_words(step.slight_joints)} it is slight{f' ({shown})' if shown else ''}, which may be what the "
-        "law leaves of the same effect on another joint"
-    )
-
-
-def _falls_too_little(share: float) -> str:
+def refusal_words(refusal: Refusal) -> str:
+    """Why an effect was not taken into the model, as a clause."""
+    share, joints = refusal.numbers.get("share", 0.0), refusal.joints
     change = "does not fall"
     if abs(share) >= LEAST_SHOWN:
         change = f"falls by only {share:.1%}" if share > 0.0 else f"grows by {-share:.1%}"
-    return f"on records not fitted to, the mean square {change}"
-
-
-def _only_resembles(joints: Sequence[int]) -> str:
-    disagree = f"{joints_in_words(joints)} still {'disagrees' if len(joints) == 1 else 'disagree'} beyond noise"
-    return f"it only resembles what is missing: with all that was found, {disagree}"
-
-
-REFUSALS: Mapping[RefusalKind, str | Callable[[Refusal], str]] = {
-    "contradicts-file": "with it, a number of the machine comes out {deviations:.1f} stated deviations from what its "
-    "file says, which it did not without",
-    "diverges": "with it, the simulation of the held-out traces does not stay finite",
-    "error-grows": "the error on the held-out traces grows, by {share:.0%} of what is beyond noise there",
-    "error-rises": "the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} "
-    "variances of a reading",
-    "falls-too-little": lambda refusal: _falls_too_little(refusal.numbers["share"]),
-    "found-one-way": "a search in the held-out traces, which are fitted to in turn, does not find it",
-    "leaves-more-than-noise": "it takes {share:.0%} of the mean square on records not fitted to, and leaves "
-    "{noises:.0f} times the noise: of what something else makes, any law takes a part",
-    "only-resembles": lambda refusal: _only_resembles(refusal.joints),
-    "superfluous": "a later effect explains what it explained",
-    "worse-than-given": "with it, the mean square on the held-out traces is {share:.0%} larger than with the model as "
-    "given: the fit has followed something that these traces do not have",
-}
-
-
-def refusal_words(refusal: Refusal) -> str:
-    """Why an effect was not taken into the model, as a clause."""
-    words = REFUSALS[refusal.kind]
-    return words.format(**refusal.numbers) if isinstance(words, str) else words(refusal)
+    disagree = f"{joints_in_words(joints)} still disagree{'s' if len(joints) == 1 else ''}" if joints else ""
+    return REFUSALS[refusal.kind].format(**refusal.numbers, change=change, disagree=disagree)
 
 
 def removed_words(share: float) -> str:

@@ -5,11 +5,11 @@ from typing import get_args
 
 import pytest
 
-from model.discrepancy.explanation.note_words import WORDS as NOTE_WORDS
-from model.discrepancy.explanation.note_words import note_words
+from model.discrepancy.diagnosis import Phase
+from model.discrepancy.explanation import phrases
+from model.discrepancy.explanation.note_words import WHOLE, WRITTEN, note_words
 from model.discrepancy.explanation.notes import on_drives_at_limit, on_named_numbers, on_stated_numbers, on_unfinished
-from model.discrepancy.explanation.pattern_words import WORDS as PATTERN_WORDS
-from model.discrepancy.grounds import Note, NoteKind, PatternKind
+from model.discrepancy.grounds import Method, Note, NoteKind, PatternKind, RefusalKind
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.shown_noise import note_on_noise
 from model.fitting.unknowns import Unknown
@@ -17,8 +17,12 @@ from tests.model.fitting import imagined
 
 
 def test_every_kind_of_note_and_pattern_has_its_words() -> None:
-    assert set(NOTE_WORDS) == set(get_args(NoteKind))
-    assert set(PATTERN_WORDS) == set(get_args(PatternKind))
+    assert {*phrases.NOTES, *WHOLE} == set(get_args(NoteKind))
+    assert set(WRITTEN) <= set(phrases.NOTES)
+    assert set(phrases.PATTERNS) == set(get_args(PatternKind))
+    assert set(phrases.REFUSALS) == set(get_args(RefusalKind))
+    assert set(phrases.PHASES) == set(get_args(Phase))
+    assert set(phrases.METHODS) == set(get_args(Method))
 
 
 def test_a_record_that_ended_early_is_named() -> None:
@@ -102,5 +106,3 @@ def test_noise_that_the_file_does_not_state_is_told_in_counts() -> None:
     assert note_words(note).startswith(
         "the noise of readings is larger than what the machine file states of noise and rounding: joint 2 "
     )
-    apart = Note(kind="larger-noise", values={"joints": [{**joint, "size": 1.0, "stated": 0.3, "apart": 1}]})
-    assert "joint 2 1 counts for 0.3 beside 1 reading far off, left out;" in note_words(apart)
