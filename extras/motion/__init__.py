@@ -13,7 +13,7 @@ PLUGIN = Plugin(
         ),
     ),
     names=(
-        Name("Followed", "extras.motion.tracking", "model"),
+        Name("Followed", "extras.motion.tracking"),
         Name("feedforward", "extras.motion.in_python", "model"),
         Name("followed", "extras.motion.in_python", "model"),
         Name("learn", "extras.motion.in_python", "model"),
