@@ -8,7 +8,7 @@ from typing import Any
 
 from daq.contracts.service.experiments import ExperimentState
 from daq.contracts.service.jobs import Job
-from server.owner.messages import Report
+from daq.owner.messages import Report
 
 
 @dataclass(frozen=True)

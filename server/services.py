@@ -26,6 +26,7 @@ from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
 from daq.contracts.service.robot import RobotStatus
 from daq.executors.address import parse_service_address
+from daq.owner.messages import Answer
 from daq.plugins import named, plugins
 from daq.trajectories import control_period
 from server.access.caller import Caller
@@ -51,7 +52,6 @@ from server.live.history import History
 from server.live.hub import Hub
 from server.monitoring.metrics import Metrics
 from server.monitoring.readiness import Readiness
-from server.owner.messages import Answer
 from server.parts import Attention, Part
 from server.problems import ProblemError, conflict, not_found
 from server.queue.context import QueueContext

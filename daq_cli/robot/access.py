@@ -12,12 +12,12 @@ import typer
 from daq_cli.app.context import Invocation, invocation
 
 if TYPE_CHECKING:
-    from daq.acquisition.messages import Finished
-    from daq.acquisition.stop_socket import StopAnswer
     from daq.client import Robot
     from daq.contracts.experiment import ExperimentSpec, Gain
     from daq.contracts.machine import Machine
     from daq.contracts.service.robot import ProcessState
+    from daq.owner.messages import Finished
+    from daq.owner.stop_socket import StopAnswer
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
     from daq_cli.app.consent import ConsentPrompt
@@ -74,7 +74,7 @@ class RobotAccess(Protocol):
     def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
         """Runs an experiment and shows its progress; its trace is in `folder` then. Ctrl-C stops the arm.
 
-        Raises AcquisitionFailedError when there is no trace.
+        Raises OrderFailedError when there is no trace.
         """
 
     def list_traces(self, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:

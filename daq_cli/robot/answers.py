@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from daq.contracts.errors import SafetyError
-
 if TYPE_CHECKING:
     from daq.contracts.experiment import Gain
     from daq.contracts.status import StatusReport
@@ -50,11 +48,3 @@ class ImportedTrace:
     file: str
     text: str
     notes: str = ""
-
-
-class AcquisitionFailedError(SafetyError):
-    """An acquisition that left no trace; it has the exit code that was reported."""
-
-    def __init__(self, message: str, exit_code: int) -> None:
-        super().__init__(message)
-        self.exit_code = exit_code  # type: ignore[misc]

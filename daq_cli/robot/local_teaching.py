@@ -17,9 +17,9 @@ from daq_cli.app.keyboard import open_keyboard
 from daq_cli.robot.pendant import HELP, Pendant, StatusLine, announce_lead
 
 if TYPE_CHECKING:
-    from daq.acquisition.owned import OwnedRobot
     from daq.contracts.machine import Machine
     from daq.contracts.sample import SampleRow
+    from daq.owner.owned import OwnedRobot
     from daq.teaching import RecordedPath
     from daq.teaching.controller_arm import ControllerArm
     from daq.teaching.jog import JogCommand
@@ -102,8 +102,8 @@ class LocalTeaching:
 
         `prepare` makes checks before anything moves; if it refuses, set points and gains stay as they were.
         """
-        from daq.acquisition.owned import owned_robot
         from daq.config.robot_files import load_memory_map
+        from daq.owner.owned import owned_robot
         from daq.runner import Consent, MissingConsentError
 
         robot, memory_map = self.call.settings.robot.name, load_memory_map(self.call.settings.robot.memory_map)

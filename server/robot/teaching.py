@@ -14,10 +14,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.joint_text import speed_unit
 from daq.contracts.service.robot import Activity
 from daq.contracts.service.teaching import TaughtPath, TeachingLine, TeachingStatus
-from daq.teaching import Program
-from daq.teaching.jog import DEAD_MAN, top_speed
-from daq.teaching.lead import PATIENCE
-from server.owner.messages import (
+from daq.owner.messages import (
     Answer,
     Finish,
     HaltRun,
@@ -28,6 +25,9 @@ from server.owner.messages import (
     RunProgram,
     TeachingText,
 )
+from daq.teaching import Program
+from daq.teaching.jog import DEAD_MAN, top_speed
+from daq.teaching.lead import PATIENCE
 from server.problems import ProblemError, conflict
 from server.robot.robot import ANSWER_WITHIN, Robot
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from daq.acquisition.port_stop import stop_at_port
 from daq.driver import Controller
+from daq.owner.port_stop import stop_at_port
 from daq.transport.mock_process import MockProcess
 from tests.daq_cli.board import ask
 from tests.daq_cli.invoke import CommandLine

@@ -9,16 +9,15 @@ from typing import Any, cast
 import greenlet
 import pytest
 
-from daq.acquisition import guardian
 from daq.contracts.errors import DaqError
 from daq.contracts.service.queue import ControlRequest, QueueResume
 from daq.contracts.service.robot import GripperRequest, ResetRequest
 from daq.contracts.service.teaching import JogRequest, StepRequest
+from daq.owner import guardian, long_orders, loop, owned_robot, quick_orders
 from daq_cli.robot.local import LocalRobot
 from server.access.caller import LOCAL
 from server.api import controller, robots, teaching
 from server.api import queue as queue_routes
-from server.owner import long_orders, owned_robot, owner, quick_orders
 from server.problems import ProblemError
 from server.queue.service import Review
 from server.robot import control
@@ -32,13 +31,13 @@ SERVICES: Any = SimpleNamespace(record_event=lambda *_, **__: None)
 @pytest.fixture(autouse=True)
 def virtual(monkeypatch: pytest.MonkeyPatch) -> None:
     """Time passes by the world's clock, and no thread is made."""
-    for module in (guardian, long_orders, owned_robot, owner, quick_orders):
+    for module in (guardian, long_orders, owned_robot, loop, quick_orders):
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: World.present.now))
     no_thread = SimpleNamespace(start=lambda: None)
     monkeypatch.setattr(
         control, "threading", SimpleNamespace(Condition=threading.Condition, Thread=lambda **_: no_thread)
     )
-    monkeypatch.setattr(owner, "_moved", moved)
+    monkeypatch.setattr(loop, "_moved", moved)
     monkeypatch.setattr(Review, "of", lambda *_: RULE)
 
 

@@ -16,12 +16,12 @@ from daq_cli.robot.answers import ImportChoice, ImportedTrace, ResetDone, RobotS
 from daq_cli.robot.remote.connection import connected_status, controlled, remote_robot
 
 if TYPE_CHECKING:
-    from daq.acquisition.messages import Finished
-    from daq.acquisition.stop_socket import StopAnswer
     from daq.client import Robot
     from daq.contracts.experiment import ExperimentSpec, Gain
     from daq.contracts.machine import Machine
     from daq.contracts.service.robot import ProcessState, RobotStatus
+    from daq.owner.messages import Finished
+    from daq.owner.stop_socket import StopAnswer
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
     from daq_cli.robot.pendant import Teaching

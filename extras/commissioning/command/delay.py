@@ -12,9 +12,9 @@ from extras.commissioning.computing_delay import ComputingDelay, Effect, computi
 from firmware_protocol.commands import Block, ReadBlock
 
 if TYPE_CHECKING:
-    from daq.acquisition.owned import OwnedRobot
     from daq.contracts.machine import Machine
     from daq.driver import Controller
+    from daq.owner.owned import OwnedRobot
     from daq.teaching.controller_arm import ControllerArm
 
 STEP = 2

@@ -4,11 +4,10 @@ from datetime import timedelta
 
 import pytest
 
-from daq.acquisition.messages import EventHappened, Progress
 from daq.contracts.experiment import ExperimentSpec, SlowRamp
 from daq.contracts.service.experiments import ExperimentRequest
 from daq.contracts.trace import TraceEvent
-from server.owner.messages import Opened
+from daq.owner.messages import EventHappened, Opened, Progress
 from server.problems import ProblemError
 from server.queue.attendance import ATTENDANCE, Attendance
 from tests.server.clocks import HandClock
