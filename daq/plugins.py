@@ -71,23 +71,6 @@ class Importer:
 
 
 @dataclass(frozen=True)
-class Executor:
-    """Computes jobs on other processes and computers: `--executor KIND://PLACE?OPTION=VALUE`."""
-
-    kind: str
-    example: str
-    """A URL that an error shows."""
-    checked: str
-    """"module:function" of a parsed `daq.executors.address.Address`: returns it as it is used; raises SpecError."""
-    opened: str
-    """"module:function" of an `Address` and a patience in s, which may be None: returns `daq.executors.Workers`."""
-    needs: tuple[Extra, str]
-    """The extra that installs what it needs, and a module of it."""
-    options: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    """The form of each option's value, as a regular expression, and an example of it."""
-
-
-@dataclass(frozen=True)
 class Plugin:
     """What a plug-in adds."""
 
@@ -97,7 +80,6 @@ class Plugin:
     dialects: Mapping[str, str] = field(default_factory=dict)
     """Line protocols by the name that a port's URL has: "module:function" of the joints' numbers on the bus, which
     makes a `firmware_protocol.dialect.LinkDialect`."""
-    executors: tuple[Executor, ...] = ()
     settings: Mapping[str, str] = field(default_factory=dict)
     """Sections of daq.toml by name: classes `daq.config.section.Section`, as "module:Class"."""
     checks: tuple[str, ...] = ()

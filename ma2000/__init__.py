@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from daq.contracts.extras import Extra
     from daq.contracts.machine import Machine as Machine
     from daq.contracts.machine import load_machine as load_machine
-    from daq.contracts.service.jobs import BatchRequest as BatchRequest
     from daq.contracts.service.jobs import CompareRequest as CompareRequest
     from daq.contracts.service.jobs import DiagnoseRequest as DiagnoseRequest
     from daq.contracts.service.jobs import FitRequest as FitRequest
@@ -39,8 +38,6 @@ if TYPE_CHECKING:
     from daq.trajectories.presets import PRESETS as PRESETS
     from ma2000.arm import Arm as Arm
     from ma2000.arm import connect as connect
-    from ma2000.batches import Batch as Batch
-    from ma2000.batches import batch as batch
     from ma2000.files import list_traces as list_traces
     from ma2000.files import read_trace as read_trace
     from ma2000.files import read_traces as read_traces
@@ -85,8 +82,6 @@ if TYPE_CHECKING:
 _HOME = {
     "Arm": "ma2000.arm",
     "BaseParameters": "model.base_parameters.result",
-    "Batch": "ma2000.batches",
-    "BatchRequest": "daq.contracts.service.jobs",
     "Client": "daq.client",
     "CompareRequest": "daq.contracts.service.jobs",
     "DaqError": "daq.contracts.errors",
@@ -118,7 +113,6 @@ _HOME = {
     "ValidateRequest": "daq.contracts.service.jobs",
     "base_model": "model.machine_model.model",
     "base_parameters": "ma2000.fitting",
-    "batch": "ma2000.batches",
     "connect": "ma2000.arm",
     "design": "ma2000.studies",
     "diagnose": "ma2000.studies",
@@ -156,7 +150,6 @@ _WITH_MODELS = {
     "Simulation",
     "TorqueFit",
     "base_parameters",
-    "batch",
     "design",
     "diagnose",
     "feedforward",

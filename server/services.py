@@ -25,7 +25,6 @@ from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import EventMessage, JobMessage
 from daq.contracts.service.robot import RobotStatus
-from daq.executors.address import parse_service_address
 from daq.owner.messages import Answer
 from daq.plugins import named, plugins
 from daq.trajectories import control_period
@@ -156,7 +155,6 @@ class Services:
     def __init__(self, settings: Settings, clock: Clock | None = None) -> None:
         self.settings = settings
         self.clock = clock or SystemClock()
-        parse_service_address(settings.server.executor)
         self.closed = False
         """Whether `close` has done everything."""
         self.store = Store(address_of(settings.server))
@@ -194,7 +192,7 @@ class Services:
         self.signed_out: Callable[[Caller], None] = lambda _caller: None
         self._robots: dict[str, RobotServices] = {}
         self.parts: list[Part] = [named(part)(self) for plugin in plugins() for part in plugin.parts]
-        self.workers = SharedWorkers(settings.server.executor, settings.server.jobs_at_once)
+        self.workers = SharedWorkers(settings.server.jobs_at_once)
         self._robots = {own.robot.name: self._make_robot(own) for own in settings.each_robot()}
         for part in self.parts:
             part.robots_made(self.robots())
@@ -290,7 +288,6 @@ class Services:
                 clock=self.clock,
                 changed=lambda job: self._job_changed(hub, job),
                 at_once=settings.server.jobs_at_once,
-                executor=settings.server.executor,
                 workers=self.workers,
             )
         )

@@ -56,13 +56,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 @pytest.fixture(scope="session")
-def hardware_port(request: pytest.FixtureRequest) -> str:
-    """The port of the real controller (`--port`); a test that asks for it is marked `hardware`."""
-    port: str = request.config.getoption("--port")
-    return port
-
-
-@pytest.fixture(scope="session")
 def lab_data(request: pytest.FixtureRequest) -> Path:
     """The folder of measured traces (`--lab-data`); a test that asks for it is marked `lab_data`."""
     folder: Path = request.config.getoption("--lab-data")

@@ -24,7 +24,7 @@ from daq.contracts.service.jobs import (
 
 
 class Jobs:
-    """Fits, validations, comparisons, diagnoses, batches."""
+    """Fits, validations, comparisons, diagnoses."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
         self._connection = connection
@@ -77,11 +77,6 @@ class Jobs:
     def download_report(self, job: str, target: Path) -> Path:
         """Downloads a job's report, one page. Raises SpecError when it cannot be written."""
         return _written(self._connection, f"{self._path}/{job}/report.html", target)
-
-    def download_table(self, job: str, target: Path) -> Path:
-        """Downloads the table of a batch, as CSV or Parquet by the target's suffix. Raises SpecError when it cannot be
-        written."""
-        return _written(self._connection, f"{self._path}/{job}/table{Path(target).suffix}", target)
 
     def delete(self, job: str) -> None:
         """An ended job and its result; a model that it made stays."""

@@ -46,9 +46,6 @@ class ServiceSettings(FrozenRecord):
     """Whether the queue may move a real arm while no operator has confirmed being present."""
     jobs_at_once: Annotated[int, Field(ge=1, le=64)] = 1
     """Worker processes for fits and diagnoses; short jobs have one of their own."""
-    executor: Annotated[str, Field(max_length=500)] = "local://"
-    """Who computes fits, diagnoses and the traces of batches: URL of an executor (docs/batches.md), which starts no
-    cluster. `local://` is processes of this computer, `jobs_at_once` of them."""
     history: Annotated[float, Field(ge=10, le=3600)] = 300.0
     """Time span (s) of live samples that a client receives when it joins."""
     upload_size: Annotated[int, Field(ge=1, le=65536)] = 512

@@ -1,7 +1,7 @@
-"""Where jobs are computed: processes of this computer, a Dask cluster, or Slurm, chosen by a URL."""
+"""Where jobs are computed: processes of this computer, or what a plug-in has in their place."""
 
 from daq.executors.each import done_in_any_order
-from daq.executors.opening import open_workers
+from daq.executors.local import LocalWorkers, cores
 from daq.executors.workers import Workers
 
-__all__ = ["Workers", "done_in_any_order", "open_workers"]
+__all__ = ["LocalWorkers", "Workers", "cores", "done_in_any_order"]

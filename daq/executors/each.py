@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Future
-from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from daq.contracts.errors import ReachError
 from daq.contracts.progress import Cancel, Never, stop_if
-from daq.executors.program import OtherVersionError
-from daq.executors.several import Several, Size
-from daq.executors.workers import BlamedError, Workers
+from daq.executors.workers import BlamedError, OtherVersionError, Workers
 
 MOST_ALONE = 2
 """How often a job is computed alone after a worker died: one that ends so twice is to blame itself."""
@@ -47,8 +44,7 @@ def done_in_any_order(
     """Calls the function with every task, and yields each task once, with its future, when it is done.
 
     Where a worker dies, it is not known whose fault that is: all tasks that were given and are lost are computed again,
-    one at a time. A task that ends the worker each time then yields a `BrokenExecutor` exception. Where giving a job
-    costs much, several short tasks are given as one; each is yielded by itself all the same.
+    one at a time. A task that ends the worker each time then yields a `BrokenExecutor` exception.
 
     Raises CancelledError when asked to end; OtherVersionError for a worker of another version; ReachError where a
     scheduler is lost.
@@ -61,67 +57,46 @@ class _Rounds:
         self._workers = workers
         self._function = function
         self._waiting = iter(tasks)
-        self._done: SimpleQueue[tuple[Sequence[Any], int, Future[Any]]] = SimpleQueue()
-        """What was given as one, how often it was computed alone, and its end."""
+        self._done: SimpleQueue[tuple[Any, int, Future[Any]]] = SimpleQueue()
+        """A task, how often it was computed alone, and its end."""
         self._lost: deque[tuple[Any, int]] = deque()
         """Tasks whose worker died, and how often each was computed alone."""
         self._given = 0
-        self._size = Size(workers.together)
 
     def run(self, cancel: Cancel) -> Iterator[tuple[Any, Future[Any]]]:
         while self._give_next():
             try:
-                tasks, alone, future = self._done.get(timeout=LOOK_EVERY)
+                task, alone, answer = self._done.get(timeout=LOOK_EVERY)
             except Empty:
                 stop_if(cancel)
                 continue
             self._given -= 1
-            for task, answer in self._answers(tasks, alone, future):
-                error = answer.exception()
-                if isinstance(error, OtherVersionError | ReachError):
-                    raise error
-                blamed = alone == MOST_ALONE or (alone > 0 and isinstance(error, BlamedError))
-                if isinstance(error, BrokenExecutor) and not blamed:
-                    self._lost.append((task, alone))
-                else:
-                    yield task, answer
-                    stop_if(cancel)
-
-    def _answers(self, tasks: Sequence[Any], alone: int, future: Future[Any]) -> Iterator[tuple[Any, Future[Any]]]:
-        """Each task with its own answer. Where several have failed as one, because an answer cannot be sent, they are
-        given again, each by itself."""
-        if not self._workers.together or alone:
-            yield tasks[0], future
-            return
-        error = future.exception()
-        if error is None:
-            answers, seconds = future.result()
-            self._size.note(len(tasks), seconds)
-            yield from zip(tasks, (answer.future() for answer in answers), strict=True)
-        elif len(tasks) == 1 or isinstance(error, BrokenExecutor | OtherVersionError | ReachError):
-            yield from ((task, future) for task in tasks)
-        else:
-            self._lost.extend((task, 0) for task in tasks)
+            error = answer.exception()
+            if isinstance(error, OtherVersionError | ReachError):
+                raise error
+            blamed = alone == MOST_ALONE or (alone > 0 and isinstance(error, BlamedError))
+            if isinstance(error, BrokenExecutor) and not blamed:
+                self._lost.append((task, alone))
+            else:
+                yield task, answer
+                stop_if(cancel)
 
     def _give_next(self) -> bool:
         """Gives what may be computed now. Returns whether anything is."""
         if self._lost:
             if not self._given:
                 task, alone = self._lost.popleft()
-                self._give([task], alone + 1)
+                self._give(task, alone + 1)
             return True
         count = self._workers.count()
         while self._given < AHEAD * count:
-            tasks = list(islice(self._waiting, self._size.of_next(self._waiting, count)))
-            if not tasks:
+            task = next(self._waiting, self)  # itself: there is none
+            if task is self:
                 break
-            self._give(tasks, 0)
+            self._give(task, 0)
         return self._given > 0
 
-    def _give(self, tasks: Sequence[Any], alone: int) -> None:
+    def _give(self, task: Any, alone: int) -> None:
         self._given += 1
-        if self._workers.together and not alone:
-            future = self._workers.submit(Several(self._function), tasks)
-        else:
-            future = self._workers.submit(self._function, tasks[0])
-        future.add_done_callback(lambda done: self._done.put((tasks, alone, done)))
+        future = self._workers.submit(self._function, task)
+        future.add_done_callback(lambda done: self._done.put((task, alone, done)))

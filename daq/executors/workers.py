@@ -6,7 +6,15 @@ import contextlib
 from abc import abstractmethod
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, Executor
-from typing import ClassVar
+
+from daq.contracts import exit_codes
+from daq.contracts.errors import DaqError
+
+
+class OtherVersionError(DaqError):
+    """A worker has another version of this program or of Python than the one that gives it jobs."""
+
+    exit_code = exit_codes.REFUSED
 
 
 class BlamedError(BrokenExecutor):
@@ -19,10 +27,6 @@ class Workers(Executor):
     A job whose worker has died ends with a `BrokenExecutor` exception, unless the executor has computed it again; the
     executor itself takes further jobs.
     """
-
-    together: ClassVar[float] = 0.0
-    """Time (s) that short jobs which are given as one should take together, where a job costs much to give; 0 to give
-    each by itself."""
 
     @abstractmethod
     def count(self) -> int:

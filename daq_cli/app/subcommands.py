@@ -110,13 +110,6 @@ CORE = {
             group="Model",
         ),
         Command(
-            "batch",
-            "Fit, validate, simulate or diagnose many traces, on many cores.",
-            "daq_cli.commands.batch",
-            needs="model",
-            group="Model",
-        ),
-        Command(
             "design",
             "Propose experiments that determine parameters best.",
             "daq_cli.commands.design",

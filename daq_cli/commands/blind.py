@@ -12,7 +12,6 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq_cli.app.context import JsonOption, console, print_json
-from daq_cli.models.model_input import ExecutorOption
 
 if TYPE_CHECKING:
     from daq_cli.trial.campaign import Campaign
@@ -43,7 +42,7 @@ def blind(
         typer.Option(help="Run a registered trial: its cases and experiments, with seeds drawn from its commit."),
     ] = None,
     run: Annotated[str, typer.Option(help="Name of the run of the registered trial.")] = "diagnostic",
-    executor: ExecutorOption = "local://1",
+    workers: Annotated[int, typer.Option(min=1, max=1000, help="Number of processes that compute.")] = 1,
     until: Annotated[
         Literal["detect", "record", "diagnose", "score"], typer.Option(help="Last stage to carry out.")
     ] = "score",
@@ -67,8 +66,7 @@ def blind(
 ) -> None:
     """Hide effects in the mock, diagnose blindly, reveal, and score."""
     from daq.contracts.extras import require_extra
-    from daq.executors import open_workers
-    from daq.executors.address import parse_address
+    from daq.executors import LocalWorkers
     from daq.executors.workers import ending
     from daq_cli.trial.campaign import Campaign
     from daq_cli.trial.folder import TrialFolder
@@ -77,8 +75,7 @@ def blind(
     if hashes:
         print(to_register())
         return
-    if parse_address(executor).kind == "local":
-        require_extra("model", "daq blind", "numba")
+    require_extra("model", "daq blind", "numba")
     if sharpness:
         campaign, chosen = _after_the_answers(context, folder)
     else:
@@ -92,8 +89,8 @@ def blind(
         kept = TrialFolder.open(folder.absolute(), experiment, acquire, drawn)
         campaign = Campaign(kept, load_machine("ma2000"), until=until)
     count = len(set(chosen))
-    with ending(open_workers(executor)) as workers:
-        left = campaign.run(chosen, workers, lambda number, said: console().print(f"{number}/{count}  {said}"), seconds)
+    with ending(LocalWorkers(workers)) as pool:
+        left = campaign.run(chosen, pool, lambda number, said: console().print(f"{number}/{count}  {said}"), seconds)
     _show(campaign, folder, as_json=json)
     if left:
         console().print(f"{left} cases are not done; the same command continues with them")

@@ -101,7 +101,6 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     """Check the configuration, the machine file, the memory map and the port; an error is one line."""
     from daq.config.robot_files import load_memory_map
     from daq.config.settings import load_settings
-    from daq.executors.address import parse_service_address
     from daq.link.dialects import dialect_of
     from daq.plugins import named, plugins
     from daq.safety import unchecked
@@ -114,7 +113,6 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
         from server.store.address import parse_address  # here: it needs the extra `server`
 
         parse_address(settings.server.database)
-    parse_service_address(settings.server.executor)
     for plugin in plugins():
         for reference in plugin.checks:
             named(reference)(settings)

@@ -119,10 +119,6 @@ ExaminedOption = Annotated[
     ),
 ]
 
-ExecutorOption = Annotated[
-    str,
-    typer.Option("--executor", help="Who computes: local://4 (processes), dask://host:8786, slurm://partition."),
-]
 MODEL_HELP = "A model (.json, as `daq fit` writes it), a machine file (.toml), or a machine that ships (ma2000)."
 
 

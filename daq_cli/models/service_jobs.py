@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,7 +14,6 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.service.jobs import (
     MACHINE,
-    BatchRequest,
     CompareRequest,
     DiagnoseRequest,
     FitRequest,
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
     from model.discrepancy.options import DiagnosisOptions
     from model.fitting.options import FitOptions
     from model.machine_model.model import Model
-    from server.jobs.results import BatchJobResult, ComparisonData, FitData, JobResult, ValidationData
+    from server.jobs.results import ComparisonData, FitData, JobResult, ValidationData
 
 LOOK_EVERY = 1.0
 """s between two questions about a job's progress."""
@@ -47,7 +46,6 @@ KINDS: dict[JobKind, str] = {
     "validate": "validation",
     "compare": "comparison",
     "diagnose": "diagnosis",
-    "batch": "batch",
 }
 EXIT_CODES = {
     "failed": exit_codes.WRONG_INPUT,
@@ -176,15 +174,6 @@ class ServiceJobs:
         assert isinstance(found, DiagnosisJobResult)
         return found.data
 
-    def batch(self, request: BatchRequest, model: Model | None, submitted: Callable[[str], object]) -> BatchJobResult:
-        """The batch, with a model that is sent, or that of the machine. `submitted` is called with the job's number."""
-        from server.jobs.results import BatchJobResult
-
-        number = MACHINE if model is None else self._number(model, "batch")
-        found = self._done(request.model_copy(update={"model": number}), None, submitted)
-        assert isinstance(found, BatchJobResult)
-        return found
-
     def _numbers(self, named: NamedTraces) -> tuple[str, ...]:
         """The service's numbers of traces; files of this computer are sent unless it has them."""
         with self.robot.service("jobs") as robot:
@@ -212,16 +201,14 @@ class ServiceJobs:
             save_model(model.with_lineage(model.lineage.model_copy(update={"traces": there})), file)
             return robot.models.upload(file, model_name(name)).id
 
-    def _done(
-        self, request: JobRequest, report: Path | None, submitted: Callable[[str], object] = lambda _job: None
-    ) -> JobResult:
+    def _done(self, request: JobRequest, report: Path | None) -> JobResult:
         """What a job found, once it is done; its report is fetched."""
         from pydantic import TypeAdapter
 
         from server.jobs.results import JobResult
 
         with self.robot.service("jobs") as robot:
-            job = _followed(robot, request, submitted)
+            job = _followed(robot, request)
             if job.state != "done":
                 raise JobEndedError(job)
             if report is not None:
@@ -254,9 +241,8 @@ def standing_of(job: Job, now: datetime) -> str:
     return f"waits behind: {of}{so_far}" + (f", {behind.others} more" if behind.others else "")
 
 
-def _followed(robot: Robot, request: JobRequest, submitted: Callable[[str], object]) -> Job:
+def _followed(robot: Robot, request: JobRequest) -> Job:
     job = robot.jobs.submit(request)
-    submitted(job.id)
     try:
         with shown_progress(f"{request.kind} at the server") as progress:
             return robot.jobs.wait(

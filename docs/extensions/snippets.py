@@ -15,8 +15,8 @@ DOCS = Path(__file__).parents[1]
 BLOCK = re.compile(r"^[ ]*```(python|console)\n(.*?)^[ ]*```$", re.DOTALL | re.MULTILINE)
 RUN: Mapping[tuple[str, str], str] = {
     ("audit.md", "console"): "tests/server/audit/test_page.py",
-    ("batches.md", "console"): "tests/daq_cli/test_batches_page.py",
-    ("batches.md", "python"): "tests/daq_cli/test_batches_page.py",
+    ("batches.md", "console"): "tests/extras/lab/batches/test_batches_page.py",
+    ("batches.md", "python"): "tests/extras/lab/batches/test_batches_page.py",
     ("fleet.md", "console"): "tests/extras/lab/fleet/test_page.py",
     ("fleet.md", "python"): "tests/extras/lab/fleet/test_page.py",
     ("index.md", "python"): "tests/repository/test_snippets.py",

@@ -41,13 +41,11 @@ from daq.contracts.service.fleet import (
     NumberChange,
 )
 from daq.contracts.service.jobs import (
-    BatchRequest,
     CompareRequest,
     DiagnoseRequest,
     EffectChoice,
     EffectInModel,
     FitRequest,
-    FitStudy,
     Job,
     KnownEffect,
     ModelChange,
@@ -56,7 +54,6 @@ from daq.contracts.service.jobs import (
     ModelLineage,
     ModelParameter,
     ParameterWords,
-    TraceFilter,
     ValidateRequest,
 )
 from daq.contracts.service.live import LiveFrame, RobotMessage, SampleMessage, Ticket
@@ -447,7 +444,6 @@ def _models() -> list[BaseModel]:
         ValidateRequest(traces=(TRACE,), model=MODEL),
         CompareRequest(traces=(TRACE,), models=("machine", MODEL)),
         DiagnoseRequest(traces=(TRACE,), model=MODEL, joints=(2,)),
-        BatchRequest(study=FitStudy(), filter=TraceFilter(kind="ramp", outcome="complete"), model=MODEL),
         job,
         effect,
         entry,

@@ -35,9 +35,7 @@ from server.api.dependencies import (
     Viewer,
 )
 from server.api.upload import store_model
-from server.batches.folder import CSV, PARQUET
 from server.jobs.effects import known_effects
-from server.jobs.mailbox import BATCH
 from server.jobs.results import JobResult
 from server.jobs.service import REPORT, RESULT
 from server.live.waiting import Wait, when_ended
@@ -46,7 +44,6 @@ from server.problems import PROBLEMS
 router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
 """A report is a single page with inline styles and no script."""
-PARQUET_TYPE = "application/vnd.apache.parquet"
 MOST_OF_A_LINEAGE = 500
 """Most models, and most jobs, in a lineage."""
 _JSON_FILE = {"application/json": {"schema": {"type": "object"}}}
@@ -128,27 +125,6 @@ def get_job_report(job: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
     """Returns the report of a job as a self-contained HTML page."""
     path = rig.jobs.result_file(job, REPORT)
     return FileResponse(path, media_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
-
-
-@router.get(
-    "/jobs/{job}/table.csv", tags=["jobs"], response_class=FileResponse, responses={200: {"content": {"text/csv": {}}}}
-)
-def get_batch_table(job: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
-    """Returns the table of a batch, a row for each trace, as CSV."""
-    return FileResponse(rig.jobs.result_file(job, f"{BATCH}/{CSV}"), media_type="text/csv", filename=f"{job}.csv")
-
-
-@router.get(
-    "/jobs/{job}/table.parquet",
-    tags=["jobs"],
-    response_class=FileResponse,
-    responses={200: {"content": {PARQUET_TYPE: {}}}},
-)
-def get_batch_parquet(job: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
-    """Returns the table of a batch as Parquet; 404 if the service had no `pyarrow` to write it."""
-    advice = "table.csv has the same; Parquet is written where `pip install 'ma2000-daq[tables]'` was done before"
-    path = rig.jobs.result_file(job, f"{BATCH}/{PARQUET}", advice)
-    return FileResponse(path, media_type=PARQUET_TYPE, filename=f"{job}.parquet")
 
 
 @router.get("/models", tags=["models"])

@@ -226,7 +226,6 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
         "POST …/experiments/preview shows the motion and its violations",
     ),
     _met("post .*/traces$", 422, "not-a-trace", "the body is empty", "send a trace"),
-    _met("post .*/jobs$", 422, "batch-size", "filter: finds no trace", "a batch has 1 to 2000 traces"),
     _met(
         "post .*/models$",
         422,

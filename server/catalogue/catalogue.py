@@ -14,14 +14,13 @@ from typing import Protocol
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.service.archive import Transfer
-from daq.contracts.service.jobs import TraceFilter
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import disk, layout
 from daq.traces.catalogue import TraceSummary, summary_of
 from daq.traces.salvage import salvage_folder
 from server.problems import ProblemError, conflict, not_found
 from server.store.experiments import ExperimentStore
-from server.store.traces import NewTrace, TraceSearch, TraceStore
+from server.store.traces import NewTrace, TraceStore
 
 UPLOAD = ".upload-"
 """Beginning of the name of a folder into which an upload is written."""
@@ -30,7 +29,7 @@ UPLOAD_IS_OLD = 2 * 3600.0
 OPENED_STAYS = 600.0
 """Time (s) for which the file of a trace stays after somebody has opened it."""
 PRUNE_EVERY = 60.0
-"""Time (s) between two searches for those of them that may go: a batch opens thousands of traces at once."""
+"""Time (s) between two searches for those of them that may go."""
 log = logging.getLogger("server.catalogue")
 SHOWN = 200
 """Number of characters of an error that the log shows."""
@@ -144,19 +143,6 @@ class Catalogue:
         if self.archive is not None:
             self.archive.deleted()
         return path
-
-    def find(self, wanted: TraceFilter, most: int) -> tuple[str, ...]:
-        """Returns the numbers of the traces that match, the newest first; `most` of them at most."""
-        search = TraceSearch(**dict(wanted))
-        found: list[str] = []
-        cursor: str | None = None
-        while len(found) < most:
-            page = self._traces.found(self._robot, search, cursor, min(500, most - len(found)))
-            found += (entry.id for entry in page.items if not entry.missing)
-            cursor = page.next
-            if cursor is None:
-                break
-        return tuple(found[:most])
 
     def path_of(self, identity: str) -> Path:
         """Returns the file of a trace. Raises a 404, also if the file is gone; a 503 if only the archive has it, from

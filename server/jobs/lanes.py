@@ -1,20 +1,17 @@
-"""Lanes of jobs: a job of known, short duration does not wait behind one that iterates until it converges, and neither
-behind a batch."""
+"""Lanes of jobs: a job of known, short duration does not wait behind one that iterates until it converges."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from typing import Literal, get_args
 
-from daq.contracts.service.jobs import BatchRequest, CompareRequest, Job, JobRequest, ValidateRequest, WaitsBehind
+from daq.contracts.service.jobs import CompareRequest, Job, JobRequest, ValidateRequest, WaitsBehind
 
-Lane = Literal["short", "long", "batch"]
+Lane = Literal["short", "long"]
 LANES: tuple[Lane, ...] = get_args(Lane)
 SHORT_LANE_WORKERS = 1
 """Number of worker processes of the short lane. One suffices, since a job there takes seconds; each costs about 250
 MB."""
-BATCH_LANE_WORKERS = 1
-"""Number of batches that run at once. The process of each gives its traces to an executor, and hardly computes."""
 MOST_PASSES = 20
 """Largest number of passes over a trace in a short job; one takes about 1 s. A longer comparison takes as long as a
 fit."""
@@ -23,8 +20,6 @@ fit."""
 def lane_of(request: JobRequest) -> Lane:
     """Returns the lane of a job, from what it has to compute. Fits and diagnoses iterate and are always long."""
     match request:
-        case BatchRequest():
-            return "batch"
         case CompareRequest():
             passes = len(request.traces) * len(request.models)
         case ValidateRequest():

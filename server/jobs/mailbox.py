@@ -12,14 +12,13 @@ from typing import Any
 
 TELL_EVERY = 0.2
 """Time (s) between two reports of progress, and between two checks whether the job must end."""
-REQUEST, PROGRESS, CANCEL, RESULT, REPORT, MODEL, BATCH = (
+REQUEST, PROGRESS, CANCEL, RESULT, REPORT, MODEL = (
     "request.json",
     "progress.json",
     "cancel",
     "result.json",
     "report.html",
     "model.json",
-    "batch",
 )
 
 

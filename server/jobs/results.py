@@ -143,32 +143,7 @@ class DiagnosisJobResult(FrozenRecord):
     data: DiagnosisData
 
 
-class BatchTrace(FrozenRecord):
-    """One trace of a batch. `problem` says why nothing was found; empty if it is done. `seconds`: computing time."""
-
-    trace: str
-    problem: str
-    seconds: float
-
-
-class BatchData(FrozenRecord):
-    """How a batch ended. What it found is in its table: `table.csv`, and `table.parquet` if `parquet` says so."""
-
-    done: int
-    failed: int
-    traces: tuple[BatchTrace, ...]
-    parquet: bool = False
-
-
-class BatchJobResult(FrozenRecord):
-    """Result of a batch."""
-
-    id: str
-    kind: Literal["batch"] = "batch"
-    data: BatchData
-
-
 JobResult = Annotated[
-    FitJobResult | ValidationJobResult | ComparisonJobResult | DiagnosisJobResult | BatchJobResult,
+    FitJobResult | ValidationJobResult | ComparisonJobResult | DiagnosisJobResult,
     Field(discriminator="kind"),
 ]

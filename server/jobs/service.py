@@ -14,24 +14,18 @@ from pathlib import Path
 
 from sqlalchemy.exc import OperationalError
 
-from daq.contracts.errors import DaqError
 from daq.contracts.machine import Machine
 from daq.contracts.processor import added, processor_time
 from daq.contracts.service.archive import Transfer
-from daq.contracts.service.jobs import MACHINE, BatchRequest, DiagnoseRequest, FitRequest, Job, JobRequest
-from daq.executors import Workers
-from daq.executors.address import LOCAL
-from daq.executors.local import LocalWorkers
-from daq.executors.program import OtherVersionError
-from daq.executors.workers import BlamedError
-from server.batches.folder import ASKED
+from daq.contracts.service.jobs import MACHINE, DiagnoseRequest, FitRequest, Job, JobRequest
+from daq.executors import LocalWorkers, Workers
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
 from server.experiments.states import Event
 from server.jobs.lanes import LANES, Lane, lane_of, with_what_it_waits_for
-from server.jobs.mailbox import BATCH, MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
+from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
 from server.jobs.models import Models
-from server.jobs.shared_workers import SharedWorkers, job_workers, worker_processes
+from server.jobs.shared_workers import SharedWorkers, worker_processes
 from server.jobs.standing import WAITS, Standing
 from server.jobs.work import Ended, Task, carry_out
 from server.problems import ProblemError, conflict, not_found
@@ -40,8 +34,6 @@ from server.store.labels import job_label
 
 LOOK_EVERY = 0.5
 """Time (s) between two checks of the jobs' progress."""
-MOST_OF_A_BATCH = 2000
-"""Largest number of traces of a batch."""
 MOST_TOLD = 50
 """Number of waiting jobs that are published again when a job before them has begun or ended."""
 log = logging.getLogger("server.jobs")
@@ -50,8 +42,7 @@ log = logging.getLogger("server.jobs")
 @dataclass(frozen=True)
 class JobContext:
     """Stores, services and callbacks of the jobs of one robot. `changed` is called with every job that has changed, and
-    must not block. `at_once`: the number of workers of the long lane. `executor`: the URL of what computes long jobs
-    and batches; short jobs, and what drives a batch, stay on this computer."""
+    must not block. `at_once`: the number of workers of the long lane."""
 
     robot: str
     machine: Machine
@@ -62,8 +53,7 @@ class JobContext:
     clock: Clock
     changed: Callable[[Job], None]
     at_once: int
-    executor: str = LOCAL
-    make_executor: Callable[[str, int], Workers] = job_workers
+    make_executor: Callable[[int], Workers] = worker_processes
     workers: SharedWorkers | None = None
     """The workers that the robots of a service share; None for workers of its own."""
 
@@ -85,13 +75,13 @@ class JobService:
         self._context = context
         self._wake = threading.Event()
         self._closing = False
-        self._workers = context.workers or SharedWorkers(context.executor, context.at_once, context.make_executor)
+        self._workers = context.workers or SharedWorkers(context.at_once, context.make_executor)
         self._running: dict[str, tuple[Job, Future[Ended]]] = {}
         self._fetched: dict[str, _Fetched] = {}
         """Waiting jobs whose traces are fetched from the archive."""
         self._given_to: dict[str, Workers] = {}
         self._standing: dict[str, Standing] = {}
-        """Running jobs that this computer computes, and whether they get a processor."""
+        """Running jobs, and whether they get a processor."""
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
         context.jobs.settle_after_restart(context.robot, context.clock.utc())
 
@@ -106,16 +96,13 @@ class JobService:
         before = context.jobs.made_before(context.robot, request, key)
         if before is not None:  # even if its traces and models have been deleted since
             return before, False
-        found = self._found(request)
         task = Task(
             request=request,
             machine=context.machine,
-            traces={number: context.catalogue.place_of(number) for number in found or traces_of(request)},
+            traces={number: context.catalogue.place_of(number) for number in traces_of(request)},
             models={number: context.models.path_of(number) for number in models_of(request) if number != MACHINE},
             names={number: context.models.name_of(number) for number in models_of(request)},
             limits=context.catalogue.limits,
-            executor=f"{LOCAL}{context.at_once}" if context.executor == LOCAL else context.executor,
-            continues=self._folder_to_continue(request),
         )
 
         def prepare(identity: str) -> None:
@@ -127,7 +114,7 @@ class JobService:
                 shutil.rmtree(folder, ignore_errors=True)
                 raise
 
-        job, new = context.jobs.submit(context.robot, request, context.clock.utc(), by, key, prepare, found)
+        job, new = context.jobs.submit(context.robot, request, context.clock.utc(), by, key, prepare)
         if new:
             self._tell(job)
             self._wake.set()
@@ -202,7 +189,7 @@ class JobService:
             self._thread.join(patience)
         for identity in list(self._running):
             with contextlib.suppress(OSError):
-                Mailbox(self._folder(identity)).cancel()  # it may run on another computer, which cannot be ended
+                Mailbox(self._folder(identity)).cancel()
         if self._context.workers is None:
             self._workers.abandon()
 
@@ -275,8 +262,7 @@ class JobService:
 
     def _away(self, job: Job) -> Transfer | None:
         """Returns how far the traces of a job are that only the archive has; None if all are here. It looks once every
-        LOOK_EVERY, however often it is asked: each trace that has been fetched wakes this thread, and a batch has
-        thousands."""
+        LOOK_EVERY, however often it is asked: each trace that has been fetched wakes this thread."""
         now, before = self._context.clock.monotonic(), self._fetched.get(job.id)
         if before is not None and now - before.looked < LOOK_EVERY:
             return before.transfer
@@ -345,14 +331,9 @@ class JobService:
         event, reason, model, headline = Event.COMPLETED, "", None, ""
         try:
             ended = future.result()
-        except BrokenExecutor as error:
-            if not isinstance(error, BlamedError):
-                self._give_up(identity, lane)
+        except BrokenExecutor:
+            self._give_up(identity, lane)
             event, reason = Event.LOST, "its worker process ended: it was killed, or ran out of memory"
-        except DaqError as error:  # of the executor: a job returns its own errors
-            if not isinstance(error, OtherVersionError):  # of one worker, beside which others work
-                self._give_up(identity, lane)
-            event, reason = Event.LOST, str(error)
         except Exception as error:
             log.exception("job %s", identity)
             event, reason = Event.FAULT, _fault(error)
@@ -372,36 +353,6 @@ class JobService:
                     event, reason = Event.FAULT, _fault(error)
         self._tell(context.jobs.change(context.robot, identity, event, context.clock.utc(), reason, model, headline))
         (self._folder(identity) / MODEL).unlink(missing_ok=True)  # not sooner: writing the end may have to be repeated
-
-    def _found(self, request: JobRequest) -> tuple[str, ...] | None:
-        """Returns the traces that a batch's filter finds; None where there is none. Raises a 422."""
-        if not isinstance(request, BatchRequest) or request.filter is None:
-            return None
-        if request.traces:
-            raise ProblemError(422, "not-valid", "traces and filter: are both given", "leave one of them out")
-        found = self._context.catalogue.find(request.filter, MOST_OF_A_BATCH + 1)
-        if found and len(found) <= MOST_OF_A_BATCH:
-            return found
-        said = f"more than {MOST_OF_A_BATCH} traces" if found else "no trace"
-        raise ProblemError(422, "batch-size", f"filter: finds {said}", f"a batch has 1 to {MOST_OF_A_BATCH} traces")
-
-    def _folder_to_continue(self, request: JobRequest) -> Path | None:
-        """Returns the folder of the batch that another one continues; of one that never began, the folder of the batch
-        that it continued itself, or None. Raises a 404, and a 409 if it has not ended."""
-        if not isinstance(request, BatchRequest) or request.continues is None:
-            return None
-        before = self._context.jobs.get(self._context.robot, request.continues)
-        if before.state in ("queued", "running"):
-            line = f"{job_label(before.request.kind, before.submitted)} is {before.state}"
-            raise conflict("job-state", line, "continue it when it has ended")
-        while isinstance(before.request, BatchRequest) and not (self._folder(before.id) / BATCH / ASKED).is_file():
-            if before.request.continues is None:
-                return None
-            try:
-                before = self._context.jobs.get(self._context.robot, before.request.continues)
-            except ProblemError:  # it has been deleted
-                return None
-        return self._folder(before.id)
 
     def _keep_model(self, identity: str) -> str:
         context = self._context

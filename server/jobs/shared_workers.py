@@ -5,21 +5,11 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from daq.executors import Workers, open_workers
-from daq.executors.address import LOCAL
-from daq.executors.local import LocalWorkers
-from server.jobs.lanes import BATCH_LANE_WORKERS, LANES, SHORT_LANE_WORKERS, Lane
+from daq.executors import LocalWorkers, Workers
+from server.jobs.lanes import LANES, SHORT_LANE_WORKERS, Lane
 from server.jobs.yielding import begin_worker
 
-SCHEDULER_PATIENCE = 5.0
-"""Time (s) within which a scheduler must answer, and have a worker; no other job is begun or ended meanwhile."""
 Wake = Callable[[], None]
-
-
-def job_workers(url: str, count: int) -> Workers:
-    """Opens an executor for jobs; `count` is the number of processes where it is this computer. Raises SpecError,
-    ReachError, OtherVersionError."""
-    return worker_processes(count) if url == LOCAL else open_workers(url, begin_worker, SCHEDULER_PATIENCE)
 
 
 def worker_processes(count: int) -> LocalWorkers:
@@ -34,14 +24,13 @@ class SharedWorkers:
     a robot that has had one since: a thousand jobs of one robot delay another's by the length of one.
     """
 
-    def __init__(self, url: str, at_once: int, make_executor: Callable[[str, int], Workers] = job_workers) -> None:
-        self._url = url
+    def __init__(self, at_once: int, make_executor: Callable[[int], Workers] = worker_processes) -> None:
         self._make_executor = make_executor
-        self._places: dict[Lane, int] = {"short": SHORT_LANE_WORKERS, "long": at_once, "batch": BATCH_LANE_WORKERS}
+        self._places: dict[Lane, int] = {"short": SHORT_LANE_WORKERS, "long": at_once}
         self._lock = threading.Lock()
         self._taken: dict[Lane, int] = dict.fromkeys(LANES, 0)
         self._waiting: dict[Lane, list[Wake]] = {lane: [] for lane in LANES}
-        self._opening: dict[Lane, threading.Lock] = {lane: threading.Lock() for lane in LANES}
+        self._opening = threading.Lock()
         self._executors: dict[Lane, Workers] = {}
 
     def take_place(self, lane: Lane, robot: Wake) -> bool:
@@ -81,21 +70,19 @@ class SharedWorkers:
             wake()
 
     def executor(self, lane: Lane) -> Workers:
-        """Returns the executor of a lane. Raises what opening it raises."""
-        with self._opening[lane]:  # a scheduler that does not answer holds up no other lane
+        """Returns the executor of a lane."""
+        with self._opening:
             found = self._executors.get(lane)
             if found is None:
-                url = self._url if lane == "long" else LOCAL
-                found = self._executors[lane] = self._make_executor(url, self._places[lane])
+                found = self._executors[lane] = self._make_executor(self._places[lane])
             return found
 
     def give_up(self, lane: Lane, lost: Workers | None) -> None:
         """Ends an executor that a job was lost with, unless another has taken its place already."""
-        with self._opening[lane]:
+        with self._opening:
             if lost is None or self._executors.get(lane) is not lost:
                 return
             del self._executors[lane]
-        # A scheduler that is gone is not waited for.
         threading.Thread(target=lost.abandon, name="executor-end", daemon=True).start()
 
     def abandon(self) -> None:

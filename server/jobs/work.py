@@ -13,7 +13,6 @@ from daq.contracts.machine import Machine
 from daq.contracts.progress import CancelledError
 from daq.contracts.service.jobs import (
     MACHINE,
-    BatchRequest,
     CompareRequest,
     DiagnoseRequest,
     FitRequest,
@@ -21,11 +20,10 @@ from daq.contracts.service.jobs import (
     ValidateRequest,
 )
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
-from daq.executors.address import LOCAL
 from daq.traces.reader import read_trace
-from server.batches.study import options_of, with_effects
 from server.jobs.headlines import of_comparison, of_fit, of_validation
-from server.jobs.mailbox import BATCH, MODEL, REPORT, REQUEST, RESULT, Mailbox
+from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
+from server.jobs.options import options_of, with_effects
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,7 +33,6 @@ if TYPE_CHECKING:
     from model.machine_model.model import Model
     from model.reports.page import Report
     from model.simulation.prepared import Options
-    from server.batches.run import Standing
     from server.jobs.results import JobResult
 
 CURVE_POINTS = 21
@@ -57,10 +54,6 @@ class Task(FrozenRecord):
     """The names of the models, for tables."""
     limits: TraceLimits = DEFAULT_TRACE_LIMITS
     """The limits within which traces are read."""
-    executor: str = LOCAL
-    """The URL of what computes the traces of a batch."""
-    continues: Path | None = None
-    """The folder of the job whose batch this one continues."""
 
 
 @dataclass(frozen=True)
@@ -103,8 +96,6 @@ class _Worker:
                 return self.compare(request)
             case DiagnoseRequest() as request:
                 return self.diagnose(request)
-            case BatchRequest() as request:
-                return self.batch(request)
 
     def fit(self, request: FitRequest) -> Ended:
         """Does the same as `daq fit`."""
@@ -241,33 +232,6 @@ class _Worker:
         result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison, given, efforts))
         report = diagnosis_report(found, comparison, efforts=efforts)
         return self._done(result, report, headline(found), found.model_after if changed else None)
-
-    def batch(self, request: BatchRequest) -> Ended:
-        """Does the same as `daq batch`."""
-        from daq.executors import open_workers
-        from daq.executors.workers import ending
-        from server.batches.folder import asked_of, opened, take_over
-        from server.batches.run import run_batch
-        from server.batches.study import Common
-        from server.jobs.batch_result import batch_report, batch_result, chosen_files
-        from server.jobs.yielding import begin_worker
-
-        model = self._model(request.model).model_dump_json()
-        common = Common(study=request.study, model=model, machine=self.task.machine, limits=self.task.limits)
-        chosen, place = chosen_files(self.task.traces, self.task.limits), self.mailbox.folder / BATCH
-        if self.task.continues is not None:
-            take_over(self.task.continues / BATCH, place, set(self.task.traces))
-        with opened(place, asked_of(common)) as folder:
-            with ending(open_workers(self.task.executor, begin_worker)) as workers:
-                ended = run_batch(
-                    folder, common, chosen, workers, lambda standing, _row: self._tell_batch(standing), self.mailbox
-                )
-            result = batch_result(self._job, ended, folder)
-        report = batch_report(request.study, result.data, self._name(request.model))
-        return self._done(result, report, f"{ended.before + ended.done} of {ended.total} traces done")
-
-    def _tell_batch(self, standing: Standing) -> None:
-        self._tell(0, REPORT_SHARE, 1 - standing.left / max(1, standing.total), str(standing))
 
     def _compared(
         self,

@@ -66,20 +66,16 @@ class JobStore:
         by: str,
         key: str | None,
         prepare: Callable[[str], None] = lambda _identity: None,
-        found: Sequence[str] | None = None,
     ) -> tuple[Job, bool]:
         """Queues a new job, and returns it with True; or returns the one that the key made before, with False.
 
         `prepare` is given the number that the job will have, and writes what its worker needs; if it raises, no job is
-        made. `found`: the traces of a batch whose request has a filter. Raises a 409 if the key was used for another
-        request, and a 404 if a trace no longer exists.
+        made. Raises a 409 if the key was used for another request, and a 404 if a trace no longer exists.
         """
         digest = digest_of(request)
         with self._store.writing() as session:
             if (before := made_before(session, JobRow, robot, key, digest)) is not None:
                 return as_job(before), False
-            if found is not None:
-                request = request.model_copy(update={"traces": tuple(found)})
             row = JobRow(
                 **new_columns(robot, key, digest, now, by),
                 kind=request.kind,

@@ -136,10 +136,6 @@ class TraceStore:
                 found |= _archived(session, names[first : first + 500])
         return found
 
-    def found(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
-        """Returns a part of the list, newest first, read anew."""
-        return self._page(robot, search, cursor, limit)
-
     def _page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a part of the list, newest first."""
         place = None if cursor is None else Cursor.parse(cursor)

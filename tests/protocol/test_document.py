@@ -55,13 +55,6 @@ def test_the_frames_constants_are_those_of_the_document() -> None:
     }
 
 
-def test_the_documents_figures_about_frames_are_right() -> None:
-    largest = framing.MAX_PAYLOAD + framing.FRAME_OVERHEAD
-    assert f"takes {largest * BITS_PER_BYTE / 115200 * 1000:.2f} ms at 115200 baud" in section("Frames")
-    assert f"up to a zero, {framing.MAX_ENCODED} at most. When a {framing.MAX_ENCODED + 1}th" in section("Receiving")
-    assert f"Version of the protocol: {c.PROTOCOL_VERSION}." in TEXT
-
-
 def test_the_documents_example_frame_is_what_the_code_makes() -> None:
     steps = {step: bytes.fromhex(data) for step, data in table("A frame step by step")}
     request = c.WriteSetPoints(((1, 500), (2, 508), (3, 515)))
@@ -322,18 +315,3 @@ def test_the_documents_line_rates_are_right() -> None:
 def bytes_of_joint(memory_map: Any, name: str, index: int) -> list[int]:
     register = memory_map[name]
     return [register.low[index], *([register.high[index]] if register.high else [])]
-
-
-def test_the_documents_figures_about_line_rates_are_right() -> None:
-    text = section("Line rate against what can be sampled")
-    for joints in range(1, 7):
-        assert sampled(joints) == 29 + 7 * joints
-        assert commanded(joints) + sampled(joints) == 61 + 9 * joints
-    for joints in range(1, 7):
-        assert compact(joints) == 39 + 6 * joints
-    assert "39 + 2m + 4n bytes on the line" in section("The turn for slow lines")
-    assert f"{compact(3)} bytes instead of 88 for three joints, {compact(6)} instead of 115 for six" in text
-    assert "61 + 9n bytes for n joints, 88 for three, 115 for six; Sample alone is 29 + 7n" in text
-    assert f"Sample and its reply alone take {sampled(3) / 230.4 * 100:.0f} %" in text
-    assert f"one joint in every period and send no set points meanwhile: {sampled(1)} of the 38 bytes" in text
-    assert "one block of 35 bytes, twice: 112 bytes" in text

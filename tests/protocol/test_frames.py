@@ -126,10 +126,6 @@ def test_the_longest_frame_fits_and_one_byte_more_does_not() -> None:
     assert decoder.oversized == 1
 
 
-def test_the_longest_frame_takes_less_than_5_ms_at_115200_baud() -> None:
-    assert (MAX_PAYLOAD + FRAME_OVERHEAD) * 10 / 115200 < 0.005
-
-
 def test_reset_forgets_the_unfinished_frame_and_keeps_the_counters() -> None:
     decoder = FrameDecoder()
     frame = Frame(1, 2, b"three")

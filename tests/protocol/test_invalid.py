@@ -36,9 +36,5 @@ def test_the_first_wrong_value_is_told_with_its_place_its_rule_and_its_bounds() 
     assert (found.value, found.kind, found.bounds) == (3, "less_than_equal", {"le": 2.0})
 
 
-def test_the_message_of_a_validator_comes_without_pydantics_prefix() -> None:
-    assert refused({"parts": [], "name": "a b"}).message == "a name has no blanks"
-
-
 def test_data_that_are_wrong_as_a_whole_have_the_name_that_the_caller_gives_them() -> None:
     assert refused(1).where("file") == "file"

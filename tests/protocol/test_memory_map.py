@@ -145,11 +145,6 @@ def test_the_memory_may_reach_to_the_end_of_the_address_space() -> None:
         parse_memory_map(SHIPPED.replace("size = 0x80", "size = 0x401"))
 
 
-def test_a_map_without_a_name_for_its_file_is_called_a_memory_map() -> None:
-    with pytest.raises(MemoryMapError, match=r"^memory map: not TOML: "):
-        parse_memory_map("version =")
-
-
 @given(st.text(max_size=60), st.integers(0, len(SHIPPED)), st.integers(0, 60))
 def test_a_file_damaged_anywhere_is_a_map_or_one_line(text: str, place: int, length: int) -> None:
     try:

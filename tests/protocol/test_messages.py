@@ -64,24 +64,6 @@ def test_a_command_travels_behind_its_stamp(
     assert c.parse_request(frame) == request
 
 
-@pytest.mark.parametrize(
-    ("kind", "field", "highest"),
-    [
-        (c.Advanced, "time_us", 2**64 - 1),
-        (c.Advanced, "tick", 2**32 - 1),
-        (c.Refused, "opcode", 2**8 - 1),
-        (c.Advance, "microseconds", 2**32 - 1),
-    ],
-)
-def test_a_number_fills_its_bytes_and_not_one_more(kind: type[c.Message], field: str, highest: int) -> None:
-    others = {each.name: 0 for each in dataclasses.fields(kind)}
-    message = kind(**others | {field: highest})
-    assert kind.parse(message.pack()) == message
-    for value in (-1, highest + 1):
-        with pytest.raises(ProtocolError, match=f"{field} of {value}: allowed are 0 to {highest}"):
-            kind(**others | {field: value})
-
-
 @dataclasses.dataclass(frozen=True)
 class EveryWidth(c.Message):
     """A message with a field of each kind that a layout may name."""
@@ -109,12 +91,6 @@ def test_a_field_takes_exactly_the_values_that_its_bytes_hold(place: int, letter
             EveryWidth(*fields)
 
 
-def test_a_stop_has_no_stamp_and_the_layout_of_version_1() -> None:
-    assert not c.Stop.IS_COMMAND
-    assert c.to_frame(1, c.Stop(), c.Stamp(1, 1)).payload == b""
-    assert len(c.Stopped(1, (500,) * 6).pack()) == 16
-
-
 @pytest.mark.parametrize("payload", [b"", b"\x01", b"\x03", b"\x03" + bytes(30)])
 def test_a_greeting_of_any_other_version_is_understood_as_such(payload: bytes) -> None:
     request = c.parse_request(Frame(0, c.Hello.OPCODE, payload))
@@ -139,15 +115,6 @@ def test_unknown_opcodes_are_refused_as_such(opcode: int) -> None:
             with pytest.raises(ProtocolError, match="opcode") as caught:
                 parse(Frame(0, opcode, b""))
             assert c.refusal_of(caught.value) is c.Refusal.UNKNOWN_OPCODE
-
-
-def test_a_reply_has_its_request_s_opcode_with_the_top_bit() -> None:
-    assert {opcode | 0x80 for opcode in c.REQUESTS} == c.REPLIES.keys() - {c.Refused.OPCODE}
-
-
-def test_the_snapshot_of_six_joints_fills_a_frame() -> None:
-    reading = c.JointReading(1, 2, 3, 4)
-    assert len(c.Snapshot(1, 0, tuple((joint, reading) for joint in range(1, 7))).pack()) == MAX_PAYLOAD
 
 
 def test_joint_masks_have_bit_0_for_joint_1() -> None:
@@ -284,16 +251,6 @@ def test_the_set_point_of_a_compact_reading_is_what_position_and_error_come_to(
     assert c.CompactReading(position, error, 3).whole == c.JointReading(set_point, position, error, 3)
     mirrored = c.CompactReading(4096 - position, -error, 3).whole
     assert mirrored.set_point == (500 if set_point == 500 else 0)
-
-
-@pytest.mark.parametrize(
-    ("payload", "says"),
-    [(b"\x00\x00", "payload of 2 bytes, expected at least 3"), (b"\x00", "payload of 1 bytes, expected at least 3")],
-)
-def test_a_poke_without_a_byte_is_too_short(payload: bytes, says: str) -> None:
-    with pytest.raises(PayloadLengthError, match=says):
-        c.WriteBlock.parse(payload)
-    assert c.WriteBlock.parse(b"\x00\x20\x07") == c.WriteBlock(0x2000, b"\x07")
 
 
 def test_a_turn_whose_set_points_are_of_no_joint_has_nothing_behind_their_mask() -> None:

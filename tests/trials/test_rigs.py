@@ -27,8 +27,6 @@ from trials.rigs.lab import machine_text
 from trials.rigs.world import hidden_rig, make_world
 
 OURS = Path(trials.rigs.__file__).parent
-ALLOWED = {"numpy", "numba", "llvmlite", "scipy", "mujoco"}
-"""Libraries that rigs may use; besides, Python's own and each other."""
 FORBIDDEN = {"model", "daq", "daq_cli", "server", "mock_controller", "firmware_protocol", "benchmarks", "tests"}
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import AwareDatetime, Field, FiniteFloat, StrictBool, model_validator
+from pydantic import AwareDatetime, Field, FiniteFloat, StrictBool
 
 from daq.contracts.experiment import JointNumber
-from daq.contracts.labels import Outcome, Source, Tag
-from daq.contracts.service.base import Moment, SpokenWire, Wire
+from daq.contracts.service.base import SpokenWire, Wire
 
-JobKind = Literal["fit", "validate", "compare", "diagnose", "batch"]
+JobKind = Literal["fit", "validate", "compare", "diagnose"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
 """The same states as those of experiments; an interrupted job is not run again by itself either."""
 
@@ -64,15 +63,6 @@ class ValidateStudy(SpokenWire):
     damping_ratio: Annotated[float, Field(gt=0, le=10)] = 0.5
 
 
-class SimulateStudy(Wire):
-    """How traces are simulated, to compare them with the simulation. The fields are the options of `daq simulate`."""
-
-    kind: Literal["simulate"] = "simulate"
-    loop: Literal["closed", "open"] = "closed"
-    quantise: StrictBool = True
-    """Whether readings and drive are rounded, as those of a real board."""
-
-
 class DiagnoseStudy(SpokenWire):
     """How a missing effect is looked for. The fields are the options of `daq diagnose`."""
 
@@ -86,10 +76,6 @@ class DiagnoseStudy(SpokenWire):
     """How model and traces are compared; None: as machine and traces allow."""
     despite_doubts: StrictBool = False
     """Compute although the check of the records raises doubts; the verdict stays `check-the-record`."""
-
-
-Study = Annotated[FitStudy | ValidateStudy | SimulateStudy | DiagnoseStudy, Field(discriminator="kind")]
-"""What a batch does with each of its traces."""
 
 
 class FitRequest(FitStudy):
@@ -131,43 +117,7 @@ class DiagnoseRequest(DiagnoseStudy):
     name: ModelName | None = None
 
 
-class TraceFilter(Wire):
-    """Traces of the catalogue by what is known of them, as the parameters of its list; None does not filter. `text` is
-    searched in number, file, name, kind, operator, notes and tags."""
-
-    text: Annotated[str, Field(min_length=1, max_length=100)] | None = None
-    tag: Tag | None = None
-    source: Source | None = None
-    outcome: Outcome | None = None
-    kind: Annotated[str, Field(min_length=1, max_length=32)] | None = None
-    since: Moment | None = None
-    until: Moment | None = None
-
-
-class BatchRequest(SpokenWire):
-    """Studies many traces, each by itself: a table with a row for each is the result. A trace that cannot be studied
-    has its problem in its row, and keeps no other from being studied."""
-
-    kind: Literal["batch"] = "batch"
-    study: Study
-    traces: Annotated[tuple[TraceNumber, ...], Field(max_length=2000, fail_fast=True)] = ()
-    """The traces; a job whose request had a filter instead has those that were found when it was submitted."""
-    filter: TraceFilter | None = None
-    """Finds the traces in the catalogue, 2000 at most."""
-    model: ModelNumber = MACHINE
-    continues: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")] | None = None
-    """An ended batch of the same study and model: what it has done is not done again."""
-
-    @model_validator(mode="after")
-    def _has_traces(self) -> Self:
-        if not self.traces and self.filter is None:
-            raise ValueError("name traces, or a filter that finds them")
-        return self
-
-
-JobRequest = Annotated[
-    FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest | BatchRequest, Field(discriminator="kind")
-]
+JobRequest = Annotated[FitRequest | ValidateRequest | CompareRequest | DiagnoseRequest, Field(discriminator="kind")]
 
 
 class KnownEffect(Wire):
@@ -222,7 +172,7 @@ class Job(Wire):
     has_report: bool = False
     waits_behind: WaitsBehind | None = None
     """What it waits for while it is queued behind others. Short jobs (comparisons and validations of few traces) have a
-    worker of their own, and never wait for a fit or a diagnosis. Batches wait for batches alone."""
+    worker of their own, and never wait for a fit or a diagnosis."""
 
 
 class ModelEntry(Wire):

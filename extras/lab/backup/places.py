@@ -20,7 +20,6 @@ DATABASE = "database/service.sqlite"
 NAMES = re.compile(
     r"database/service\.sqlite|traces/([a-z0-9][a-z0-9_-]{0,31}/)?[^/\\]{1,250}\.mcap|models/[A-Za-z0-9_-]{1,64}\.json"
     r"|jobs/[0-9a-f]{12}/[A-Za-z0-9_-]{1,64}\.(json|html)"
-    r"|jobs/[0-9a-f]{12}/batch/((rows|batch|table)\.(jsonl|json|csv|parquet)|answers/[A-Za-z0-9_-]{1,64}\.json)"
 )
 """Names that the files of a backup may have. A restore writes no file with any other name."""
 

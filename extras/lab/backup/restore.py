@@ -56,7 +56,6 @@ class _Led(BaseModel):
 
     traces: dict[str, Path] = {}
     models: dict[str, Path] = {}
-    continues: Path | None = None
 
 
 def restore(
@@ -198,8 +197,6 @@ class _Staged:
         models = self._places.service / "models"
         task.traces = {number: self._place_of(number, file.name) for number, file in task.traces.items()}
         task.models = {number: models / file.name for number, file in task.models.items()}
-        if task.continues is not None:
-            task.continues = self._places.service / "jobs" / task.continues.name
         with request.open("w", encoding="utf-8") as stream:
             stream.write(task.model_dump_json())
             stream.flush()

@@ -7,9 +7,7 @@ import pytest
 
 from daq.contracts.errors import ReachError
 from daq.executors.each import AHEAD, done_in_any_order
-from daq.executors.program import Checked, OtherVersionError, Program
-from daq.executors.several import MOST, Size
-from daq.executors.workers import BlamedError, ending
+from daq.executors.workers import BlamedError, OtherVersionError, ending
 from tests.daq.executors.by_hand import WorkersByHand, square
 
 
@@ -97,66 +95,6 @@ def test_only_a_task_that_was_computed_alone_is_blamed() -> None:
     workers = Blaming()
     assert answers(workers, range(8)) == {n: n**2 for n in range(7)} | {7: BlamedError}
     assert sorted(workers.given) == [*range(6), 6, 6, 7, 7]
-
-
-class Together(WorkersByHand):
-    """Workers that are given several jobs as one."""
-
-    together = 0.5
-
-
-def refuse_odd(task: int) -> int:
-    if task % 2:
-        raise ValueError(f"{task} is odd")
-    return task
-
-
-def test_short_jobs_that_are_given_as_one_are_answered_each() -> None:
-    workers = Together()
-    assert answers(workers, range(500)) == {n: n**2 for n in range(500)}
-    assert len(workers.given) < 250
-    failed = {task: future.exception() for task, future in done_in_any_order(Together(), refuse_odd, range(40))}
-    assert all((error is None) == (task % 2 == 0) for task, error in failed.items())
-    assert str(failed[7]) == "7 is odd"
-
-
-def test_of_those_given_as_one_only_the_one_that_kills_is_blamed() -> None:
-    workers = Together(dies=lambda task, _time: task == 77 or (isinstance(task, list) and 77 in task))
-    assert answers(workers, range(200)) == {n: n**2 for n in range(200)} | {77: BrokenExecutor}
-
-
-class Unsendable(Together):
-    """Cannot send the answers of those given as one that have 40 among them."""
-
-    def submit(self, function: Any, /, *args: Any, **named: Any) -> Future[Any]:
-        if isinstance(args[0], list) and len(args[0]) > 1 and 40 in args[0]:
-            self.given.append(args[0])
-            future: Future[Any] = Future()
-            future.set_exception(TypeError("cannot pickle"))
-            return future
-        return super().submit(function, *args, **named)
-
-
-def test_an_answer_that_cannot_be_sent_keeps_no_other_from_being_answered() -> None:
-    assert answers(Unsendable(), range(100)) == {n: n**2 for n in range(100)}
-
-
-def test_jobs_given_as_one_are_as_many_as_their_time_says_and_fewer_towards_the_end() -> None:
-    size = Size(0.5)
-    assert size.of_next(iter([]), 2) == 1
-    size.note(4, 0.4)
-    assert size.of_next((n for n in range(9)), 2) == 5
-    assert [size.of_next(iter(range(left)), 2) for left in (100, 12, 3)] == [5, 3, 1]
-    size.note(1, 20.0)
-    assert size.of_next(iter(range(100)), 2) == 1
-    fast = Size(0.5)
-    fast.note(3, 0.0)
-    assert fast.of_next(iter(range(10_000)), 2) == MOST
-
-
-def test_a_worker_of_another_version_is_refused_by_name() -> None:
-    with pytest.raises(OtherVersionError, match=r"worker .*process \d+: has ma2000-daq .* and ma2000-daq 0\.0\.1 on "):
-        Checked(square, Program("0.0.1", "3.9"))(2)
 
 
 def test_workers_are_given_up_when_the_block_fails() -> None:

@@ -3,22 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import pytest
-
 from mock_controller.board import Board, BoardParameters
 from mock_controller.modifications import build_modifications
 
 MakeBoard = Callable[..., Board]
-
-
-@dataclass
-class ShiftedWiper:
-    joint: int
-    angle: float
-    name = "shifted_wiper"
-
-    def sensed_angle(self, angle: float) -> float:
-        return angle + self.angle
 
 
 @dataclass
@@ -37,13 +25,6 @@ class DroppedBit:
 
     def set_point(self, counts: int, tick: int) -> int:
         return counts & ~0x10 if tick > 10 else counts
-
-
-def test_shifted_wiper_shows_in_the_reading_alone(make_board: MakeBoard) -> None:
-    plain, shifted = make_board(), make_board(modifications=(ShiftedWiper(2, 0.1),))
-    difference = shifted.memory.values("position")[1] - plain.memory.values("position")[1]
-    assert difference == pytest.approx(0.1 * 4096 / 4.712389, abs=4)
-    assert shifted.plant.joint_angles == plain.plant.joint_angles
 
 
 def test_changed_board_and_set_point_act(make_board: MakeBoard) -> None:

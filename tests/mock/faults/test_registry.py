@@ -34,19 +34,6 @@ def test_every_fault_has_a_name_a_line_and_parameters_that_are_explained() -> No
         assert describe(parse_fault(name))["name"] == name
 
 
-def test_a_fault_is_asked_for_with_its_parameters() -> None:
-    fault = parse_fault("flip:rate=0.01, seed=3, direction=to_host")
-    assert describe(fault) == {
-        "name": "flip",
-        "rate": 0.01,
-        "seed": 3,
-        "direction": "to_host",
-        "bits": 1,
-        "start": 0.0,
-        "duration": None,
-    }
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [

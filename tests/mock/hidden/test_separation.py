@@ -69,11 +69,6 @@ def test_the_loop_without_rounding_is_the_board_s_loop_but_for_rounding() -> Non
     assert np.abs(difference[:, :3].mean(axis=0)).max() < 0.5
 
 
-def test_no_effect_is_no_separation(known: Tangents) -> None:
-    nothing = separation(SOUND, short(), known)
-    assert (nothing.d_prime, nothing.before_refit) == (0.0, 0.0)
-
-
 def test_tangents_are_those_of_every_tolerance_and_curve(known: Tangents) -> None:
     assert known.names[: len(tolerances())] == tuple(tolerance.name for tolerance in tolerances())
     assert len(known.names) == len(tolerances()) + 3 * 3 * 2

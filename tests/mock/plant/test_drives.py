@@ -208,16 +208,6 @@ def test_default_step_is_converged_far_below_an_adc_count() -> None:
     assert default_error < 0.4 * coarse_error  # second order: a half step brings a quarter of the error
 
 
-def test_two_plants_alike_agree_to_the_bit() -> None:
-    def run() -> list[float]:
-        plant = Plant(default_plant(), angles=UP)
-        for k in range(20):
-            plant.advance([0.03 * k, -0.02 * k, 0.05, 0, 0, 0.1], 20_000)
-        return plant.joint_angles
-
-    assert run() == run()
-
-
 def test_reset_forgets_everything() -> None:
     plant = Plant(default_plant(), angles=UP)
     plant.advance([0.5] * 6, 200_000)

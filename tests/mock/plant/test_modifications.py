@@ -20,19 +20,6 @@ def moved(modifications: Sequence[Modification] = (), volts: Sequence[float] = (
     return plant.joint_angles
 
 
-def test_payload_slows_the_arm_and_weighs_on_it() -> None:
-    loaded = Plant(default_plant(), build_modifications([("payload", {"mass": 0.5})]), angles=LOW)
-    bare = Plant(default_plant(), angles=LOW)
-    for plant in (loaded, bare):
-        plant.advance([0.0] * 6, 1_000_000)
-    assert loaded.parameters.rigid_body.m_load == pytest.approx(default_plant().rigid_body.m_load + 0.5)
-    assert loaded.joint_angles[1] < bare.joint_angles[1] - 1e-3
-
-
-def test_payload_of_nothing_changes_nothing() -> None:
-    assert moved(build_modifications([("payload", {"mass": 0.0})])) == moved()
-
-
 def test_compliant_gear_tends_to_the_rigid_one_as_it_hardens() -> None:
     def difference(stiffness: float) -> float:
         spring = {"joint": 1, "compliance": 1 / stiffness, "damping": 2.0}

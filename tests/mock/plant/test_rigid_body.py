@@ -58,14 +58,6 @@ def test_inertias_with_the_wrist_straight_are_the_published_ones() -> None:
     assert full[0, 0] == pytest.approx(stretched + 0.5 * body.m1 * body.r1**2 + own, rel=1e-4)
 
 
-def test_straight_up_is_shoulder_at_ninety_degrees() -> None:
-    parameters, model, data = bare_arm()
-    data.qpos[:] = [0.5, math.pi / 2, 0, 0, 0, 0]
-    mujoco.mj_forward(model, data)
-    body = parameters.rigid_body
-    assert data.body("hand").xpos == pytest.approx([0, 0, body.a2 + body.a3], abs=1e-12)
-
-
 def test_hand_is_where_the_denavit_hartenberg_chain_puts_it() -> None:
     parameters, model, data = bare_arm(b2=0.03, b3=0.02)
     body = parameters.rigid_body

@@ -30,7 +30,6 @@ from tests.daq.servo_bench import recorded as recorded_on_bench
 from tests.model.dynamics.chains import random_chain, random_link
 from tests.model.inverse_dynamics.test_fit_torques import COULOMB, LENGTH, MASS, ROTOR, VISCOUS, rod, swinging
 
-AGREEMENT = 1e-9
 EXAMPLES = Path(__file__).parents[3] / "examples"
 
 

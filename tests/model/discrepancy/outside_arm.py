@@ -24,12 +24,9 @@ RESOLUTION, LIMIT = 0.14, 16.0
 """Of the controller's output, V."""
 COUNT = 2 * np.pi / 2**14
 """rad"""
-GAINS = ((90.0, 0.0, 4.0), (110.0, 0.0, 5.0), (70.0, 0.0, 2.5))
-"""P (V/rad), I, D (V·s/rad) a joint."""
 LENGTHS, MASSES, WAIST = (0.4, 0.35), (3.2, 2.1), 0.09
 """Of the two rods, m and kg; inertia of the waist, kg·m²."""
 RESISTANCE, TORQUE_CONSTANT, BACK_EMF, ROTOR = 2.1, 0.055, 0.055, 4.2e-5
-GEARS = (90.0, 110.0, 80.0)
 VISCOUS, COULOMB = (2.4e-4, 2.2e-4, 1.8e-4), (1.1, 1.4, 0.7)
 """Motor side, N·m·s/rad; at the joint, N·m."""
 

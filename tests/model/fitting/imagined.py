@@ -1,7 +1,6 @@
 """Records of an arm that is the model itself, with noise drawn and readings rounded: what a fit must get right
 first."""
 
-from collections.abc import Sequence
 from datetime import UTC, datetime
 
 import numpy as np
@@ -89,8 +88,3 @@ def changed(given: Trace, **fields: object) -> Trace:
     """The trace with some signals replaced."""
     kept = {name: getattr(given, name) for name in Trace.__dataclass_fields__}
     return Trace(**{**kept, **fields})
-
-
-def without_drive(given: Sequence[Trace]) -> list[Trace]:
-    """Positions and set points alone."""
-    return [changed(t, drive=None, error=None) for t in given]

@@ -1,7 +1,6 @@
 """Answers and truths made by hand, as short as they can be."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from daq.contracts.machine import load_machine
 from model.discrepancy.diagnosis import (
@@ -106,7 +105,3 @@ def seen(of: Truth, d_prime: float = 20.0) -> Detectability:
 
 def found(value: float, low: float | None, high: float | None) -> FoundValue:
     return FoundValue(value=value, low=low, high=high, unit="1")
-
-
-def as_told(of: Truth) -> dict[str, Any]:
-    return of.model_dump(mode="json")

@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from firmware_protocol.dynamixel import instructions as ask
-from firmware_protocol.dynamixel.packets import BROADCAST, LONGEST, Packet, PacketDecoder, crc16, encode, stuff, unstuff
+from firmware_protocol.dynamixel.packets import BROADCAST, LONGEST, Packet, PacketDecoder, crc16, encode
 from firmware_protocol.errors import ProtocolError
 from tests.mock.servos.makers_client import MemoryPort, client
 
@@ -47,20 +47,9 @@ def test_the_examples_of_the_makers_manual(packet: Packet, wire: str) -> None:
     assert PacketDecoder().feed(expected) == [packet]
 
 
-def test_the_check_value_of_this_crc() -> None:
-    assert crc16(b"123456789") == 0xFEE8
-
-
 @given(st.binary(max_size=80))
 def test_the_crc_is_that_of_the_makers_client(data: bytes) -> None:
     assert crc16(data) == client().updateCRC(0, list(data), len(data))
-
-
-@given(DATA)
-def test_stuffed_content_holds_no_header_and_is_found_again(data: bytes) -> None:
-    stuffed = stuff(data)
-    assert b"\xff\xff\xfd\x00" not in stuffed
-    assert unstuff(stuffed) == data
 
 
 @given(DEVICES, st.integers(0, 700), DATA)

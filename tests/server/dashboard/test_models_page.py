@@ -1,6 +1,5 @@
 """The page of models: where they come from, what is known of them, and jobs begun, followed and ended there."""
 
-import json
 import re
 
 import pytest
@@ -8,7 +7,7 @@ from playwright.sync_api import expect
 
 from tests.server.dashboard.browser import TABLET, Dashboard, row_of
 from tests.server.dashboard.faults import faults_of
-from tests.server.dashboard.studied import Studied, done
+from tests.server.dashboard.studied import Studied
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
 
@@ -77,46 +76,18 @@ def test_a_comparison_is_begun_here_and_its_result_shown(studied: Studied, studi
     assert studied.service.robot.get(f"/jobs/{job}").json()["request"]["models"] == ["machine", studied.model]
 
 
-def test_a_batch_is_followed_and_cancelled(studied: Studied, studied_dashboard: Dashboard) -> None:
+def test_a_job_is_followed_and_cancelled(studied: Studied, studied_dashboard: Dashboard) -> None:
     page = studied_dashboard.open("models")
-    study = {"kind": "diagnose", "most_steps": 3}
-    sent = studied.service.robot.post("/jobs", json={"kind": "batch", "study": study, "traces": list(studied.traces)})
+    sent = studied.service.robot.post(
+        "/jobs", json={"kind": "diagnose", "most_steps": 3, "traces": list(studied.traces)}
+    )
     job = sent.json()["id"]
     computing = page.get_by_role("region", name="Computing")
-    expect(computing).to_contain_text("Batch of diagnoses")
-    expect(computing.get_by_role("progressbar", name="Batch of diagnoses")).to_be_attached()
+    expect(computing).to_contain_text("Diagnosis")
+    expect(computing.get_by_role("progressbar", name="Diagnosis")).to_be_attached()
     computing.get_by_role("button", name="Cancel").click()
     expect(computing).to_have_count(0)
     assert studied.service.robot.get(f"/jobs/{job}").json()["state"] == "cancelled"
-
-
-def test_a_batch_gives_its_table(studied: Studied, studied_dashboard: Dashboard) -> None:
-    job = done(studied.service, {"kind": "batch", "study": {"kind": "simulate"}, "traces": list(studied.traces)})
-    page = studied_dashboard.open(f"models/job/{job['id']}")
-    expect(page.get_by_role("region", name="Batch of simulations")).to_contain_text("2 of 2 traces done")
-    table = page.get_by_role("region", name=re.compile("^Table"))
-    expect(table).to_contain_text("none failed")
-    with page.expect_download() as told:
-        table.get_by_role("button", name="CSV").click()
-    head, *rows = told.value.path().read_text("utf-8").splitlines()
-    assert head.startswith("trace,file,")
-    assert sorted(row.split(",")[0] for row in rows) == sorted(studied.traces)
-    expect(table.get_by_role("button", name="Parquet")).to_be_visible()
-
-
-def test_parquet_is_offered_only_where_the_service_has_written_it(
-    studied: Studied, studied_dashboard: Dashboard
-) -> None:
-    job = done(studied.service, {"kind": "batch", "study": {"kind": "simulate"}, "traces": list(studied.traces)})
-    place = studied.service.folder / "service" / "jobs" / job["id"]
-    (place / "batch" / "table.parquet").unlink()
-    told = json.loads((place / "result.json").read_text("utf-8"))
-    told["data"]["parquet"] = False  # as a service without pyarrow writes it
-    (place / "result.json").write_text(json.dumps(told), "utf-8")
-    page = studied_dashboard.open(f"models/job/{job['id']}")
-    table = page.get_by_role("region", name=re.compile("^Table"))
-    expect(table.get_by_role("button", name="CSV")).to_be_visible()
-    expect(table.get_by_role("button", name="Parquet")).to_have_count(0)
 
 
 def test_what_the_service_refuses_is_said_beside_the_form(studied: Studied, studied_dashboard: Dashboard) -> None:

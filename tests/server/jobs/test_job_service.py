@@ -12,23 +12,18 @@ import pytest
 from sqlalchemy.event import listen
 from sqlalchemy.exc import OperationalError
 
-from daq.contracts.errors import ReachError, SpecError
+from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import (
-    BatchRequest,
     CompareRequest,
     DiagnoseRequest,
     FitRequest,
     Job,
     JobRequest,
-    SimulateStudy,
-    TraceFilter,
 )
 from daq.contracts.trace_limits import TraceLimits
 from daq.executors import Workers
-from daq.executors.program import OtherVersionError
-from daq.executors.workers import BlamedError
 from model.machine_model.model import base_model
 from model.machine_model.model_file import file_of
 from server.api.traces import delete_trace
@@ -95,7 +90,7 @@ class Bench:
         self.models: Any = Meanwhile(models)
         self.carry_out: Callable[[Path], Ended] = lambda _folder: Ended(headline="found")
         self.executor = HandExecutor(self._carry_out)
-        self.make_executor: Callable[[str, int], Workers] = lambda _url, _count: self.executor
+        self.make_executor: Callable[[int], Workers] = lambda _count: self.executor
         self.changed = threading.Condition()
         self.told: list[Job] = []
         self.service = JobService(
@@ -117,8 +112,8 @@ class Bench:
     def _carry_out(self, folder: Path) -> Ended:
         return self.carry_out(folder)  # as it is then
 
-    def _make_executor(self, url: str, count: int) -> Workers:
-        return self.make_executor(url, count)
+    def _make_executor(self, count: int) -> Workers:
+        return self.make_executor(count)
 
     def _hear(self, job: Job) -> None:
         with self.changed:
@@ -237,7 +232,7 @@ class HandArchive:
 
 
 def test_a_folder_that_cannot_be_looked_into_keeps_neither_places_nor_turns_from_other_robots(tmp_path: Path) -> None:
-    shared = SharedWorkers("local://", 1, lambda _url, _count: HandExecutor(lambda _folder: Ended()))
+    shared = SharedWorkers(1, lambda _count: HandExecutor(lambda _folder: Ended()))
     bench, told = Bench(tmp_path, shared), threading.Event()
     HandArchive(bench).ends()
     assert shared.take_place("long", lambda: None)
@@ -343,7 +338,7 @@ def test_a_job_whose_executor_is_broken_is_given_to_a_new_one(bench: Bench) -> N
             raise BrokenExecutor
 
     executors = [Broken(lambda _folder: Ended()), bench.executor]
-    bench.make_executor = lambda _url, _count: executors.pop(0)
+    bench.make_executor = lambda _count: executors.pop(0)
     job = _submitted(bench)
     bench.service.start()
     assert bench.end_of(job).state == "done"
@@ -456,7 +451,7 @@ def _until(bench: Bench, is_so: Callable[[], bool]) -> None:
 
 def test_a_short_job_waits_behind_no_diagnosis_and_the_next_one_says_behind_what(bench: Bench) -> None:
     held = HeldExecutor()
-    bench.make_executor = lambda _url, _count: held
+    bench.make_executor = lambda _count: held
     diagnosis = _asked(bench, DiagnoseRequest(traces=(TRACE,)))
     fit, other_fit = _asked(bench, FitRequest(traces=(TRACE,))), _asked(bench, FitRequest(traces=(TRACE,)))
     short, next_short = _asked(bench, COMPARE), _asked(bench, COMPARE)
@@ -487,7 +482,7 @@ def test_a_worker_that_ends_takes_no_job_of_the_other_lane_with_it(bench: Bench)
     executors = [HeldExecutor(), HeldExecutor(), HeldExecutor()]
     made: list[HeldExecutor] = []
 
-    def make_executor(_url: str, _count: int) -> Workers:
+    def make_executor(_count: int) -> Workers:
         made.append(executors[len(made)])
         return made[-1]
 
@@ -502,30 +497,19 @@ def test_a_worker_that_ends_takes_no_job_of_the_other_lane_with_it(bench: Bench)
     assert not made[0].futures[diagnosis.id].done()
 
 
-@pytest.mark.parametrize(
-    ("error", "given_up"),
-    [
-        (BrokenExecutor("killed"), True),
-        (ReachError("the scheduler is gone"), True),
-        (BlamedError("killed four workers"), False),
-        (OtherVersionError("worker a: has 0.0.9"), False),
-    ],
-)
-def test_an_executor_is_ended_when_it_is_lost_and_not_for_the_fault_of_one_job(
-    bench: Bench, error: Exception, given_up: bool
-) -> None:
+def test_an_executor_that_is_lost_is_ended_and_the_next_job_has_another(bench: Bench) -> None:
     held, ended = HeldExecutor(), threading.Event()
     held.abandon = ended.set  # type: ignore[method-assign]
     executors: list[Workers] = [held, bench.executor]
-    bench.make_executor = lambda _url, _count: executors.pop(0)
+    bench.make_executor = lambda _count: executors.pop(0)
     job = _submitted(bench)
     bench.service.start()
     _until(bench, lambda: job.id in held.futures)
-    held.futures[job.id].set_exception(error)
+    held.futures[job.id].set_exception(BrokenExecutor("killed"))
     assert bench.end_of(job).failure == "lost"
-    assert ended.wait(5 if given_up else 0) is given_up
+    assert ended.wait(5)
     following = _submitted(bench)
-    _until(bench, lambda: following.id in (bench.executor.given if given_up else held.futures))
+    _until(bench, lambda: following.id in bench.executor.given)
 
 
 @pytest.mark.parametrize(("models", "lane"), [(10, "short"), (11, "long")])
@@ -545,74 +529,6 @@ def test_a_job_reads_traces_within_the_limits_that_are_configured(bench: Bench) 
     ended = bench.end_of(job)
     assert ended.state == "failed"
     assert "traces.limits.records" in ended.reason
-
-
-def test_a_batch_has_the_traces_that_its_filter_finds_when_it_is_submitted(bench: Bench) -> None:
-    request = BatchRequest(study=SimulateStudy(), filter=TraceFilter())
-    job, _new = bench.service.submit(request, "anna", "key")
-    assert isinstance(job.request, BatchRequest)
-    assert job.request.traces == (TRACE,)
-    assert lane_of(job.request) == "batch"
-    task = Mailbox(bench.folder / job.id).read("request.json")
-    assert (list(task["traces"]), task["executor"], task["continues"]) == ([TRACE], "local://1", None)
-    assert bench.service.submit(request, "anna", "key") == (job, False)
-    for nothing in (TraceFilter(text="nothing is called so"), TraceFilter(kind="sweep")):
-        with pytest.raises(ProblemError) as refused:
-            bench.service.submit(request.model_copy(update={"filter": nothing}), "anna", None)
-        assert (refused.value.status, refused.value.kind) == (422, "batch-size")
-    with pytest.raises(ProblemError, match="traces and filter: are both given"):
-        bench.service.submit(request.model_copy(update={"traces": (TRACE,)}), "anna", None)
-
-
-def test_a_batch_goes_on_from_one_that_has_ended_and_from_no_other(bench: Bench) -> None:
-    request = BatchRequest(study=SimulateStudy(), traces=(TRACE,))
-    first, _new = bench.service.submit(request, "anna", None)
-    further = request.model_copy(update={"continues": first.id})
-    with pytest.raises(ProblemError) as refused:
-        bench.service.submit(further, "anna", None)
-    assert (refused.value.status, refused.value.kind) == (409, "job-state")
-    bench.service.cancel(first.id, "anna")
-    begun = bench.folder / first.id / "batch" / "batch.json"
-    begun.parent.mkdir()
-    begun.touch()
-    second, _new = bench.service.submit(further, "anna", None)
-    assert _continues(bench, second) == str(bench.folder / first.id)
-
-
-def _continues(bench: Bench, job: Job) -> str | None:
-    found: str | None = Mailbox(bench.folder / job.id).read("request.json")["continues"]
-    return found
-
-
-def test_a_batch_that_never_began_is_continued_where_the_one_before_it_ended(bench: Bench) -> None:
-    def cancelled(before: Job | None) -> Job:
-        request = BatchRequest(study=SimulateStudy(), traces=(TRACE,), continues=before and before.id)
-        job, _new = bench.service.submit(request, "anna", None)
-        return bench.service.cancel(job.id, "anna")
-
-    first = cancelled(None)
-    second = cancelled(first)
-    assert _continues(bench, second) is None
-    (bench.folder / first.id / "batch").mkdir()
-    (bench.folder / first.id / "batch" / "batch.json").touch()
-    third = cancelled(second)
-    assert _continues(bench, third) == str(bench.folder / first.id)
-    bench.service.remove(first.id)
-    assert _continues(bench, cancelled(third)) is None
-
-
-def test_an_executor_that_is_not_reached_is_the_reason_of_a_job(bench: Bench) -> None:
-    def unreachable(url: str, _count: int) -> Workers:
-        asked.append(url)
-        raise ReachError("executor dask://host:8786: no scheduler answers")
-
-    asked: list[str] = []
-    bench.make_executor = unreachable
-    job, _new = bench.service.submit(FitRequest(traces=(TRACE,)), "anna", None)
-    bench.service.start()
-    ended = bench.end_of(job)
-    assert (ended.state, ended.failure, asked) == ("interrupted", "lost", ["local://"])
-    assert ended.reason == "executor dask://host:8786: no scheduler answers"
 
 
 def test_a_model_is_not_taken_for_another_that_is_in_its_file(bench: Bench) -> None:

@@ -33,7 +33,7 @@ class Idle(Workers):
 
 
 def test_robots_take_turns_however_many_jobs_one_of_them_has() -> None:
-    workers = SharedWorkers("local://", 1)
+    workers = SharedWorkers(1)
     many, few = Robot(), Robot()
     assert workers.take_place("long", many.wake)
     assert not workers.take_place("long", many.wake)  # it has a second one
@@ -50,7 +50,7 @@ def test_robots_take_turns_however_many_jobs_one_of_them_has() -> None:
 
 
 def test_a_turn_that_is_given_up_passes_to_the_next() -> None:
-    workers = SharedWorkers("local://", 1)
+    workers = SharedWorkers(1)
     first, second, third = Robot(), Robot(), Robot()
     assert workers.take_place("short", first.wake)
     assert not workers.take_place("short", second.wake)
@@ -62,7 +62,7 @@ def test_a_turn_that_is_given_up_passes_to_the_next() -> None:
 
 
 def test_two_places_that_come_free_together_reach_two_robots() -> None:
-    workers = SharedWorkers("local://", 2)
+    workers = SharedWorkers(2)
     busy, first, second = Robot(), Robot(), Robot()
     assert [workers.take_place("long", robot.wake) for robot in (busy, busy, first, second)] == [True, True] + [
         False
@@ -76,21 +76,20 @@ def test_two_places_that_come_free_together_reach_two_robots() -> None:
 
 
 def test_lanes_do_not_wait_for_each_other() -> None:
-    workers = SharedWorkers("local://", 2)
+    workers = SharedWorkers(2)
     robot = Robot()
     assert [workers.take_place("long", robot.wake) for _ in range(3)] == [True, True, False]
     assert workers.take_place("short", robot.wake)
-    assert workers.take_place("batch", robot.wake)
 
 
 def test_an_executor_is_opened_once_and_given_up_once() -> None:
     opened: list[Idle] = []
 
-    def make(_url: str, _count: int) -> Workers:
+    def make(_count: int) -> Workers:
         opened.append(Idle())
         return opened[-1]
 
-    workers = SharedWorkers("local://", 1, make)
+    workers = SharedWorkers(1, make)
     first = workers.executor("long")
     assert workers.executor("long") is first
     workers.give_up("long", first)

@@ -96,11 +96,7 @@ def filled(folder: Path) -> Places:
     job = places.service / "jobs" / "0123456789ab"
     job.mkdir(parents=True)
     (job / "result.json").write_text('{"found": 1}')
-    for name in ("rows.jsonl", "batch.json", "table.csv", "table.parquet", "answers/request.json"):
-        (job / "batch" / name).parent.mkdir(exist_ok=True, parents=True)
-        (job / "batch" / name).write_text('{"of": "a batch"}')
     task = {"request": {"kind": "fit"}, "traces": {"aaa": str(places.traces["ma2000"] / "aaa.mcap")}, "models": {}}
-    task["continues"] = str(places.service / "jobs" / "ba9876543210")
     (job / "request.json").write_text(json.dumps(task))
     (job / "cancel").touch()
     return places
@@ -140,7 +136,6 @@ def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path
     assert {name: after[name] for name in set(after) - changed} == {name: before[name] for name in set(after) - changed}
     task = json.loads(after["service/jobs/0123456789ab/request.json"])
     assert task["traces"] == {"aaa": str(places.traces["ma2000"] / "aaa.mcap")}
-    assert task["continues"] == str(places.service / "jobs" / "ba9876543210")
     store = Store(places.url)
     store.migrate()
     assert ExperimentStore(store).count_waiting("ma2000") == 1

@@ -1120,46 +1120,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/robots/{robot}/jobs/{job}/table.csv": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Batch Table
-         * @description Returns the table of a batch, a row for each trace, as CSV.
-         */
-        get: operations["get_batch_table"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/robots/{robot}/jobs/{job}/table.parquet": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Batch Parquet
-         * @description Returns the table of a batch as Parquet; 404 if the service had no `pyarrow` to write it.
-         */
-        get: operations["get_batch_parquet"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/v1/robots/{robot}/models": {
         parameters: {
             query?: never;
@@ -1850,76 +1810,6 @@ export interface components {
             longest?: number;
         };
         /**
-         * BatchData
-         * @description How a batch ended. What it found is in its table: `table.csv`, and `table.parquet` if `parquet` says so.
-         */
-        BatchData: {
-            /** Done */
-            done: number;
-            /** Failed */
-            failed: number;
-            /** Traces */
-            traces: components["schemas"]["BatchTrace"][];
-            /**
-             * Parquet
-             * @default false
-             */
-            parquet?: boolean;
-        };
-        /**
-         * BatchJobResult
-         * @description Result of a batch.
-         */
-        BatchJobResult: {
-            /** Id */
-            id: string;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "batch";
-            data: components["schemas"]["BatchData"];
-        };
-        /**
-         * BatchRequest
-         * @description Studies many traces, each by itself: a table with a row for each is the result. A trace that cannot be studied
-         *     has its problem in its row, and keeps no other from being studied.
-         */
-        BatchRequest: {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "batch";
-            /** Study */
-            study: components["schemas"]["FitStudy"] | components["schemas"]["ValidateStudy"] | components["schemas"]["SimulateStudy"] | components["schemas"]["DiagnoseStudy"];
-            /**
-             * Traces
-             * @default []
-             */
-            traces?: string[];
-            filter?: components["schemas"]["TraceFilter"] | null;
-            /**
-             * Model
-             * @default machine
-             */
-            model?: string;
-            /** Continues */
-            continues?: string | null;
-        };
-        /**
-         * BatchTrace
-         * @description One trace of a batch. `problem` says why nothing was found; empty if it is done. `seconds`: computing time.
-         */
-        BatchTrace: {
-            /** Trace */
-            trace: string;
-            /** Problem */
-            problem: string;
-            /** Seconds */
-            seconds: number;
-        };
-        /**
          * BoardPid
          * @description The MA2000's own controller: integer PID on ADC counts, every `period`, its output `delay` later.
          */
@@ -2361,30 +2251,6 @@ export interface components {
             design?: boolean;
             /** Name */
             name?: string | null;
-        };
-        /**
-         * DiagnoseStudy
-         * @description How a missing effect is looked for. The fields are the options of `daq diagnose`.
-         */
-        DiagnoseStudy: {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "diagnose";
-            /** Effects */
-            effects?: string[] | null;
-            /** Joints */
-            joints?: number[] | null;
-            /** Most Steps */
-            most_steps?: number | null;
-            /** Method */
-            method?: ("output-error" | "inverse-dynamics") | null;
-            /**
-             * Despite Doubts
-             * @default false
-             */
-            despite_doubts?: boolean;
         };
         /**
          * DiagnosisData
@@ -3255,65 +3121,6 @@ export interface components {
             name?: string | null;
         };
         /**
-         * FitStudy
-         * @description How parameters are estimated with which a model best reproduces traces. The fields are the options of
-         *     `daq fit`.
-         */
-        FitStudy: {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "fit";
-            /**
-             * Effects
-             * @default []
-             */
-            effects?: components["schemas"]["EffectChoice"][];
-            /** Parameters */
-            parameters?: string[] | null;
-            /**
-             * Held
-             * @default []
-             */
-            held?: string[];
-            /** Bounds */
-            bounds?: {
-                [key: string]: [
-                    number | null,
-                    number | null
-                ];
-            };
-            /**
-             * Use Priors
-             * @default true
-             */
-            use_priors?: boolean;
-            /**
-             * Method
-             * @default least_squares
-             * @enum {string}
-             */
-            method?: "least_squares" | "nelder_mead";
-            /**
-             * Starts
-             * @default 1
-             */
-            starts?: number;
-            /**
-             * Seed
-             * @default 0
-             */
-            seed?: number;
-            /** Loop */
-            loop?: ("closed" | "open") | null;
-            /**
-             * Consistent Inertias
-             * @default false
-             */
-            consistent_inertias?: boolean;
-        };
-        /**
          * FittedNumber
          * @description A parameter that a fit has determined, with its 95 % interval.
          */
@@ -3784,7 +3591,7 @@ export interface components {
             /** Robot */
             robot: string;
             /** Request */
-            request: components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"] | components["schemas"]["BatchRequest"];
+            request: components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"];
             /**
              * State
              * @enum {string}
@@ -6003,28 +5810,6 @@ export interface components {
             provider?: string | null;
         };
         /**
-         * SimulateStudy
-         * @description How traces are simulated, to compare them with the simulation. The fields are the options of `daq simulate`.
-         */
-        SimulateStudy: {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "simulate";
-            /**
-             * Loop
-             * @default closed
-             * @enum {string}
-             */
-            loop?: "closed" | "open";
-            /**
-             * Quantise
-             * @default true
-             */
-            quantise?: boolean;
-        };
-        /**
          * Sine
          * @description `cycles` of a sine about the start posture. Each joint lags `phase` rad behind the one before it.
          */
@@ -6465,27 +6250,6 @@ export interface components {
             joint?: number | null;
         };
         /**
-         * TraceFilter
-         * @description Traces of the catalogue by what is known of them, as the parameters of its list; None does not filter. `text` is
-         *     searched in number, file, name, kind, operator, notes and tags.
-         */
-        TraceFilter: {
-            /** Text */
-            text?: string | null;
-            /** Tag */
-            tag?: string | null;
-            /** Source */
-            source?: ("mock" | "real" | "imported") | null;
-            /** Outcome */
-            outcome?: ("complete" | "stopped" | "fault" | "interrupted") | null;
-            /** Kind */
-            kind?: string | null;
-            /** Since */
-            since?: string | null;
-            /** Until */
-            until?: string | null;
-        };
-        /**
          * TraceRecord
          * @description What a trace says about itself: the metadata record at the start of the file, and at its end the outcome.
          */
@@ -6695,26 +6459,6 @@ export interface components {
             model: string;
         };
         /**
-         * ValidateStudy
-         * @description How a model is validated against traces. The fields are the options of `daq validate`.
-         */
-        ValidateStudy: {
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "validate";
-            /** Parameters */
-            parameters?: string[] | null;
-            /** Joints */
-            joints?: number[] | null;
-            /**
-             * Damping Ratio
-             * @default 0.5
-             */
-            damping_ratio?: number;
-        };
-        /**
          * ValidationData
          * @description A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other one (with the
          *     same curves), and for each trace, thinned, how parameters would have to vary with time.
@@ -6820,7 +6564,7 @@ export interface components {
             /** Job */
             job: string;
             /** Request */
-            request: components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"] | components["schemas"]["BatchRequest"];
+            request: components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"];
             /** Started */
             started: string | null;
             /** Others */
@@ -8559,7 +8303,7 @@ export interface operations {
         parameters: {
             query?: {
                 state?: ("queued" | "running" | "done" | "failed" | "cancelled" | "interrupted")[] | null;
-                kind?: ("fit" | "validate" | "compare" | "diagnose" | "batch") | null;
+                kind?: ("fit" | "validate" | "compare" | "diagnose") | null;
                 model?: string | null;
                 /** @description Length of this part of the list. */
                 limit?: number;
@@ -8601,7 +8345,7 @@ export interface operations {
         };
         requestBody: {
             content: {
-                "application/json": components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"] | components["schemas"]["BatchRequest"];
+                "application/json": components["schemas"]["FitRequest"] | components["schemas"]["ValidateRequest"] | components["schemas"]["CompareRequest"] | components["schemas"]["DiagnoseRequest"];
             };
         };
         responses: {
@@ -8717,7 +8461,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["FitJobResult"] | components["schemas"]["ValidationJobResult"] | components["schemas"]["ComparisonJobResult"] | components["schemas"]["DiagnosisJobResult"] | components["schemas"]["BatchJobResult"];
+                    "application/json": components["schemas"]["FitJobResult"] | components["schemas"]["ValidationJobResult"] | components["schemas"]["ComparisonJobResult"] | components["schemas"]["DiagnosisJobResult"];
                 };
             };
         };
@@ -8742,54 +8486,6 @@ export interface operations {
                 };
                 content: {
                     "text/html": unknown;
-                };
-            };
-        };
-    };
-    get_batch_table: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                job: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "text/csv": unknown;
-                };
-            };
-        };
-    };
-    get_batch_parquet: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                job: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/vnd.apache.parquet": unknown;
                 };
             };
         };

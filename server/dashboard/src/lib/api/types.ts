@@ -17,7 +17,6 @@ export type Told<T> = T extends readonly (infer Item)[]
 export type AuditEntry = Told<Schemas['AuditEntry']>;
 export type CatalogueEntry = Told<Schemas['CatalogueEntry']>;
 export type ComparisonData = Told<Schemas['ComparisonData']>;
-export type BatchData = Told<Schemas['BatchData']>;
 export type Control = Told<Schemas['Control']>;
 export type ControlLease = Told<Schemas['ControlLease']>;
 export type Dependence = Told<Schemas['Dependence']>;

@@ -10,7 +10,6 @@ const NOUNS: Readonly<Record<JobKind, string>> = {
   validate: 'validation',
   compare: 'simulation',
   diagnose: 'diagnosis',
-  batch: 'batch',
 };
 
 /** Traces that are called by name; of more, how many. */

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Job, ModelEntry, ModelLineage } from '../api/types';
-import { jobName, lineageTree, shownRows, treeKey, type LineageNode } from './tree';
+import { lineageTree, shownRows, treeKey, type LineageNode } from './tree';
 
 const model = (id: string, parent: string | null, job: string | null): ModelEntry => ({
   id,
@@ -33,11 +33,6 @@ const lineage: ModelLineage = {
 };
 const drawn = (nodes: readonly LineageNode[]): unknown =>
   nodes.map((one) => (one.children.length === 0 ? one.key : [one.key, drawn(one.children)]));
-
-it('calls a batch by what it does to each trace', () => {
-  expect(jobName(job('b', { kind: 'batch', study: { kind: 'diagnose' } }, null))).toBe('Batch of diagnoses');
-  expect(jobName(job('f', { kind: 'fit' }, null))).toBe('Fit');
-});
 
 describe('the tree of models', () => {
   const roots = lineageTree(lineage, 'arm');

@@ -125,22 +125,11 @@ export const JOB_NAMES: Record<Job['request']['kind'], string> = {
   validate: 'Validation',
   compare: 'Comparison',
   diagnose: 'Diagnosis',
-  batch: 'Batch',
 };
 
-const STUDIES = {
-  fit: 'fits',
-  validate: 'validations',
-  simulate: 'simulations',
-  diagnose: 'diagnoses',
-} as const;
-
-/** What a job is: `Fit`, `Batch of fits`. */
+/** What a job is: `Fit`. */
 export function jobName(job: Job): string {
-  const { request } = job;
-  return request.kind === 'batch'
-    ? `${JOB_NAMES.batch} of ${STUDIES[request.study.kind]}`
-    : JOB_NAMES[request.kind];
+  return JOB_NAMES[job.request.kind];
 }
 
 /** The lines that are shown: children of what is closed are not. */

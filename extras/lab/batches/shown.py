@@ -14,15 +14,11 @@ from daq_cli.models.model_input import load_effects, read_model
 from daq_cli.robot.access import RobotAccess
 
 if TYPE_CHECKING:
-    from daq.contracts.service.jobs import Study, TraceFilter
     from daq.traces.query import TraceQuery
-    from server.batches.folder import Row
-    from server.batches.run import Chosen, Standing, Told
-    from server.batches.study import Common
+    from extras.lab.batches.folder import Row
+    from extras.lab.batches.run import Chosen, Standing, Told
+    from extras.lab.batches.study import Common, Study
 
-LOCAL = "local://"
-JOB = "job"
-"""File of the folder that holds the number of the service's job."""
 TELL_EVERY = 10.0
 """Time (s) between two lines of progress where standard error is no terminal."""
 
@@ -39,16 +35,14 @@ class Asked:
     as_json: bool
 
 
-def run_here(robot: RobotAccess, asked: Asked, study: Study) -> bool:
+def run(robot: RobotAccess, asked: Asked, study: Study) -> bool:
     """Runs a batch and prints what came out. Returns whether every trace is done."""
-    from daq.executors import open_workers
-    from daq.executors.address import parse_address
     from daq.executors.workers import ending
-    from server.batches.folder import asked_of, opened
-    from server.batches.run import run_batch
+    from extras.lab.batches.executors import LOCAL, open_workers, parse_address
+    from extras.lab.batches.folder import asked_of, opened
+    from extras.lab.batches.run import run_batch
 
     parse_address(asked.executor)
-    _require_none(asked.out, JOB, "of a service")
     common, chosen = _common(robot, asked, study), _chosen(robot, asked.traces)
     with opened(asked.out, asked_of(common)) as folder:
         if all(folder.is_done(one.job.key) for one in chosen):
@@ -63,72 +57,8 @@ def run_here(robot: RobotAccess, asked: Asked, study: Study) -> bool:
     return not ended.failed
 
 
-def run_at_service(robot: RobotAccess, asked: Asked, study: Study) -> bool:
-    """Has the service run a batch, and fetches its table into the folder. A batch that the folder knows is continued.
-
-    Returns whether every trace is done. Raises SpecError for what a service cannot do, JobEndedError, and what it
-    refuses.
-    """
-    from daq.client.errors import ServiceError
-    from daq.contracts.errors import SpecError
-    from daq.contracts.service.jobs import BatchRequest
-    from daq_cli.models.service_jobs import ServiceJobs
-    from server.batches.folder import ASKED, CSV, PARQUET
-
-    if asked.executor != LOCAL:
-        raise SpecError("--executor and --server: a service has an executor of its own; leave one of them out")
-    load_effects(asked.effect_files, robot)
-    wanted = _filter(asked.traces)
-    _require_none(asked.out, ASKED, "that this computer computed")
-    asked.out.mkdir(parents=True, exist_ok=True)
-    before = asked.out / JOB
-    request = BatchRequest(
-        study=study,
-        filter=wanted,
-        continues=before.read_text("ascii").strip() if before.is_file() else None,
-    )
-    model = None if asked.model is None else read_model(asked.model)
-    found = ServiceJobs(robot).batch(request, model, lambda job: before.write_text(f"{job}\n", "ascii"))
-    with robot.service("jobs") as service:
-        service.jobs.download_table(found.id, asked.out / CSV)
-        try:
-            service.jobs.download_table(found.id, asked.out / PARQUET)
-        except ServiceError as error:
-            (asked.out / PARQUET).unlink(missing_ok=True)  # of an earlier run
-            console().print(f"no Parquet: {error}")
-    for one in found.data.traces:
-        if one.problem:
-            console().print(printable(f"{one.trace}: {one.problem}"))
-    _print_end(asked, found.data.done, found.data.failed, sum(one.seconds for one in found.data.traces))
-    return not found.data.failed
-
-
-def _require_none(out: Path, file: str, whose: str) -> None:
-    """Raises SpecError where the folder holds a batch that was computed elsewhere, which leaves this file."""
-    from daq.contracts.errors import SpecError
-
-    if (out / file).exists():
-        raise SpecError(f"{out}: holds a batch {whose}; take another folder")
-
-
-def _filter(text: str) -> TraceFilter:
-    """The traces of a service that a query means. Raises SpecError."""
-    from daq.contracts.errors import SpecError
-    from daq.contracts.service.jobs import TraceFilter
-
-    folder, query = place_and_query(text)
-    if folder is not None:
-        raise SpecError(f"{text}: is a folder of this computer; a service studies its own traces: write a query")
-    if query.robot is not None:
-        raise SpecError("query: robot: a service has the traces of its own robot; leave it out")
-    if len(query.words) > 1:
-        raise SpecError(f"query: {' '.join(query.words)}: a service looks for one word; leave the others out")
-    known = query.model_dump(exclude={"words", "robot"}, exclude_none=True)
-    return TraceFilter.model_validate({"text": next(iter(query.words), None), **known})
-
-
 def _common(robot: RobotAccess, asked: Asked, study: Study) -> Common:
-    from server.batches.study import Common
+    from extras.lab.batches.study import Common
 
     load_effects(asked.effect_files, robot)
     return Common(
@@ -141,7 +71,7 @@ def _common(robot: RobotAccess, asked: Asked, study: Study) -> Common:
 
 
 def _chosen(robot: RobotAccess, text: str) -> list[Chosen]:
-    from server.batches.choice import chosen_traces, require_any
+    from extras.lab.batches.choice import chosen_traces, require_any
 
     folder, query = place_and_query(text)
     summaries, place = robot.list_traces(folder)
@@ -208,7 +138,7 @@ def _lines() -> Iterator[Callable[[Standing], None]]:
 
 
 def _print_end(asked: Asked, done: int, failed: int, seconds: float) -> None:
-    from server.batches.folder import CSV, PARQUET
+    from extras.lab.batches.folder import CSV, PARQUET
 
     tables = [asked.out / CSV, asked.out / PARQUET]
     written = [file for file in tables if file.exists()]

@@ -11,9 +11,9 @@ from daq.contracts.extras import require_extra
 from daq.contracts.progress import Cancel
 from daq.executors import Workers, done_in_any_order
 from daq.executors.local import LocalWorkers
-from server.batches.columns import Columns
-from server.batches.folder import BatchFolder, Row
-from server.batches.study import Answer, Common, OneTrace, Studying
+from extras.lab.batches.columns import Columns
+from extras.lab.batches.folder import BatchFolder, Row
+from extras.lab.batches.study import Answer, Common, OneTrace, Studying
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
@@ -17,13 +17,12 @@ from daq.contracts.documents import parse_json, read_text
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.file_lock import take_lock
 from daq.contracts.frozen import FrozenRecord
-from daq.contracts.service.jobs import Study
-from daq.executors.program import program_here
 from daq.traces.disk import rename
+from extras.lab.batches.columns import Columns
+from extras.lab.batches.program import program_here
+from extras.lab.batches.study import Answer, Common, Study
+from extras.lab.batches.table import write_csv, write_parquet
 from firmware_protocol.invalid import first_invalid
-from server.batches.columns import Columns
-from server.batches.study import Answer, Common
-from server.batches.table import write_csv, write_parquet
 
 ASKED, ROWS, ANSWERS, CSV, PARQUET = "batch.json", "rows.jsonl", "answers", "table.csv", "table.parquet"
 _HIDDEN_LOCK = ".lock"
@@ -203,25 +202,6 @@ def _whole_lines(file: Path) -> list[bytes]:
         raise SpecError(f"{file}: cannot be read: {error.strerror or error}") from error
     # A row may hold other characters at which text is split into lines, such as U+2028.
     return content[:whole].split(b"\n")[:-1]
-
-
-def take_over(former: Path, path: Path, keys: Collection[str]) -> None:
-    """Copies what another batch has about these traces into a new folder, which is a batch's when all is there.
-
-    Raises SpecError.
-    """
-    if not (former / ASKED).is_file():
-        raise SpecError("continues: is no batch that has begun")
-    try:
-        (path / ANSWERS).mkdir(parents=True)
-        rows = [row for row in _read_rows(former / ROWS).values() if row.key in keys]
-        for row in rows:
-            if (answer := former / ANSWERS / f"{row.key}.json").is_file():
-                _write(path / ANSWERS / answer.name, answer.read_text("utf-8"))
-        _write(path / ROWS, "".join(row.model_dump_json() + "\n" for row in rows))
-        _write(path / ASKED, (former / ASKED).read_text("utf-8"))
-    except OSError as error:
-        raise _unwritable(path, error) from error
 
 
 def _write(file: Path, text: str) -> None:

@@ -5,34 +5,39 @@ from __future__ import annotations
 import os
 import platform
 import time
-from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field, StrictBool
 
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.extras import missing_extras_named
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
-from daq.contracts.service.jobs import (
-    DiagnoseStudy,
-    EffectChoice,
-    FitStudy,
-    SimulateStudy,
-    Study,
-    ValidateStudy,
-)
+from daq.contracts.service.base import Wire
+from daq.contracts.service.jobs import DiagnoseStudy, FitStudy, ValidateStudy
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.reader import read_trace
-from server.batches.columns import Columns, of_diagnosis, of_fit, of_simulation, of_validation
+from extras.lab.batches.columns import Columns, of_diagnosis, of_fit, of_simulation, of_validation
+from server.jobs.options import options_of, with_effects
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
-    from model.discrepancy.options import DiagnosisOptions
-    from model.fitting.options import FitOptions
     from model.machine_model.model import Model
 
-Chosen = TypeVar("Chosen", "FitOptions", "DiagnosisOptions")
+
+class SimulateStudy(Wire):
+    """How traces are simulated, to compare them with the simulation. The fields are the options of `daq simulate`."""
+
+    kind: Literal["simulate"] = "simulate"
+    loop: Literal["closed", "open"] = "closed"
+    quantise: StrictBool = True
+    """Whether readings and drive are rounded, as those of a real board."""
+
+
+Study = Annotated[FitStudy | ValidateStudy | SimulateStudy | DiagnoseStudy, Field(discriminator="kind")]
+"""What a batch does with each of its traces."""
 
 
 class Common(FrozenRecord):
@@ -167,26 +172,3 @@ def _diagnosed(study: DiagnoseStudy, model: Model, trace: Trace) -> tuple[Column
 
     found = diagnose(model, [trace], [], options_of(study, DiagnosisOptions))
     return of_diagnosis(found, headline(found)), found.model_dump_json()
-
-
-def options_of(study: FitStudy | DiagnoseStudy, kind: type[Chosen]) -> Chosen:
-    """Returns the options of a study. What the study leaves open is left to the method, which has defaults of its
-    own."""
-    given = {name: getattr(study, name, None) for name in kind.model_fields}
-    return kind(**{name: value for name, value in given.items() if value is not None})
-
-
-def with_effects(model: Model, effects: Sequence[EffectChoice]) -> Model:
-    """Adds effects to a model; one without joints acts on all that it can act on. Raises SpecError."""
-    from model.effects.library import effect, library
-
-    for choice in effects:
-        if choice.name not in library():
-            raise SpecError(f"effects: {choice.name!r}: not in the library; it has {', '.join(library())}")
-        found = effect(choice.name)
-        if found.whole_machine:
-            model = model.with_effect(choice.name)
-        else:
-            every = tuple(j for j in model.machine.modelled_joints if not found.joints or j in found.joints)
-            model = model.with_effect(choice.name, choice.joints or every)
-    return model

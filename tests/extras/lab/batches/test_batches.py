@@ -10,24 +10,25 @@ from pyarrow import parquet
 
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import CancelledError
-from daq.contracts.service.jobs import DiagnoseRequest, DiagnoseStudy, FitRequest, SimulateStudy
+from daq.contracts.service.jobs import DiagnoseRequest, DiagnoseStudy, FitRequest
 from daq.executors import Workers
 from daq.traces.catalogue import list_traces
 from daq.traces.query import TraceQuery
 from daq.traces.reader import read_trace
 from daq_cli.models.service_jobs import _given
+from extras.lab.batches.choice import chosen_traces
+from extras.lab.batches.folder import BatchFolder, BatchInUseError, asked_of, opened
+from extras.lab.batches.run import Chosen, Standing, run_batch
+from extras.lab.batches.study import Answer, Common, SimulateStudy
 from model.discrepancy.inverse_dynamics.options import torque_options
 from model.discrepancy.options import DiagnosisOptions
 from model.fitting.options import FitOptions
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
-from server.batches.choice import chosen_traces
-from server.batches.folder import BatchFolder, BatchInUseError, asked_of, opened, take_over
-from server.batches.run import Chosen, Standing, run_batch
-from server.batches.study import Answer, Common, options_of
+from server.jobs.options import options_of
 from tests.daq.executors.by_hand import WorkersByHand
-from tests.server.batches.traces import MACHINE, folder_of_traces, number
+from tests.extras.lab.batches.traces import MACHINE, folder_of_traces, number
 
 COMMON = Common(study=SimulateStudy(), model=None, machine=MACHINE)
 
@@ -128,20 +129,6 @@ def test_a_line_that_a_crash_cut_short_is_studied_again(tmp_path: Path, traces: 
     rows = out / "rows.jsonl"
     rows.write_bytes(rows.read_bytes()[:-40])
     assert (run(out, traces).done, len(rows.read_text("utf-8").splitlines())) == (1, 3)
-
-
-def test_what_another_batch_has_is_taken_over_for_the_traces_that_are_asked_for(tmp_path: Path) -> None:
-    former, new = tmp_path / "former", tmp_path / "new"
-    with opened(former, asked_of(COMMON)) as folder:
-        for key in ("first", "second"):
-            folder.add(Answer(key=key, text="{}"), {"name": key})
-    take_over(former, new, {"second", "third"})
-    with opened(new, asked_of(COMMON)) as folder:
-        assert [row.key for row in folder.rows] == ["second"]
-        assert folder.answer_file("second").read_text() == "{}\n"
-        assert not folder.answer_file("first").exists()
-    with pytest.raises(SpecError, match="is no batch that has begun"):
-        take_over(tmp_path, tmp_path / "other", {"first"})
 
 
 def test_rows_are_read_whatever_characters_they_hold_and_wherever_a_crash_cut_them(tmp_path: Path) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.extras.lab.cluster.dask_processes import cluster
-from tests.server.batches.traces import folder_of_traces, number
+from tests.extras.lab.batches.dask_processes import cluster
+from tests.extras.lab.batches.traces import folder_of_traces, number
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 TRACES = 40
@@ -40,14 +40,14 @@ def test_a_worker_killed_in_mid_batch_costs_no_trace_and_none_is_in_the_result_t
     if where == "dask":
         with cluster(4) as made:
             processes = [worker.pid for worker in made.workers]
-            done = finished("tests.server.batches.killing", made.url, traces, out)
+            done = finished("tests.extras.lab.batches.killing", made.url, traces, out)
             ended = [worker.poll() for worker in made.workers]
         said = json.loads(done.stdout)
         assert {pid: code for pid, code in zip(processes, ended, strict=True) if code is not None} == {
             said["killed"]: -9
         }
     else:
-        said = json.loads(finished("tests.server.batches.killing", "local://4", traces, out).stdout)
+        said = json.loads(finished("tests.extras.lab.batches.killing", "local://4", traces, out).stdout)
     assert (said["done"], said["failed"]) == (TRACES, 0)
     assert numbers_in_rows(out) == dict.fromkeys(map(number, range(TRACES)), 1)
     with (out / "table.csv").open(encoding="utf-8", newline="") as stream:
@@ -59,7 +59,7 @@ def test_a_worker_killed_in_mid_batch_costs_no_trace_and_none_is_in_the_result_t
 def test_a_batch_that_loses_its_scheduler_ends_in_one_line_and_goes_on(tmp_path: Path) -> None:
     traces, out = folder_of_traces(tmp_path / "traces", TRACES), tmp_path / "out"
     with cluster(1) as made:
-        done = finished("tests.server.batches.killing", made.url, traces, out, made.scheduler.pid)
+        done = finished("tests.extras.lab.batches.killing", made.url, traces, out, made.scheduler.pid)
     said = json.loads(done.stdout)
     assert (said["code"], said["killed"]) == (3, made.scheduler.pid)
     assert "the connection to Dask's scheduler was lost" in said["error"]

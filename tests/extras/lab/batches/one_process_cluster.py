@@ -7,7 +7,7 @@ from distributed import LocalCluster
 from daq.contracts.errors import ReachError
 from daq.executors import done_in_any_order
 from daq.executors.workers import ending
-from extras.lab.cluster.dask import connected
+from extras.lab.batches.dask import connected
 from tests.daq.executors.by_hand import square
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from daq.contracts.extras import is_installed
-from server.batches.columns import Columns
+from extras.lab.batches.columns import Columns
 
 
 def write_csv(rows: Sequence[Columns], path: Path) -> Path:

@@ -9,9 +9,9 @@ import pytest
 
 import ma2000
 from tests.daq_cli.invoke import CommandLine
-from tests.server.batches.traces import folder_of_traces
+from tests.extras.lab.batches.traces import folder_of_traces
 
-PAGE = Path(__file__).parents[2].joinpath("docs", "batches.md").read_text("utf-8")
+PAGE = Path(__file__).parents[4].joinpath("docs", "batches.md").read_text("utf-8")
 COMMANDS = re.findall(r"^\$ daq (.+)$", PAGE, re.MULTILINE)
 
 

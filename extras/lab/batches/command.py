@@ -21,21 +21,21 @@ from daq_cli.commands.fit import (
     SeedOption,
 )
 from daq_cli.commands.simulate import NoRoundingOption
-from daq_cli.models.batch import LOCAL, Asked, run_at_service, run_here
 from daq_cli.models.model_input import (
     MODEL_HELP,
     CandidatesOption,
     ComparisonOption,
     EffectFileOption,
     ExaminedOption,
-    ExecutorOption,
     MostOption,
 )
 from daq_cli.models.record_doubts import DespiteDoubtsOption
 from daq_cli.robot.access import robot_of
+from extras.lab.batches.executors import LOCAL
+from extras.lab.batches.shown import Asked, run
 
 if TYPE_CHECKING:
-    from daq.contracts.service.jobs import Study
+    from extras.lab.batches.study import Study
 
 app = typer.Typer(
     add_completion=False,
@@ -50,6 +50,10 @@ TracesOf = Annotated[
         help="A folder of traces; or which of the configured folder: words, and kind:, source:, outcome:, robot:, "
         "since:, until:.",
     ),
+]
+ExecutorOption = Annotated[
+    str,
+    typer.Option("--executor", help="Who computes: local://4 (processes), dask://host:8786, slurm://partition."),
 ]
 OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder of the result; a batch in it goes on.")]
 ModelOption = Annotated[
@@ -143,7 +147,7 @@ def simulate(
     json: JsonOption = False,
 ) -> None:
     """Simulate every trace and compare it with the measurement: a row of errors for each."""
-    from daq.contracts.service.jobs import SimulateStudy
+    from extras.lab.batches.study import SimulateStudy
 
     study = SimulateStudy(loop="open" if open_loop else "closed", quantise=not no_rounding)
     _run(context, Asked(traces, out, executor, model, effect_file or (), json), study)
@@ -177,7 +181,5 @@ def diagnose(
 
 
 def _run(context: typer.Context, asked: Asked, study: Study) -> None:
-    robot = robot_of(context)
-    run = run_here if robot.call.server is None else run_at_service
-    if not run(robot, asked, study):
+    if not run(robot_of(context), asked, study):
         raise typer.Exit(exit_codes.FAULT)

@@ -10,13 +10,17 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from daq.contracts.extras import MissingExtraError
-from daq.executors import open_workers
-from daq.executors.address import parse_address, parse_service_address
+from daq.executors.workers import OtherVersionError
+from extras.lab.batches.executors import open_workers, parse_address
+from extras.lab.batches.program import Checked, Program
+from tests.daq.executors.by_hand import square
 
 
 @pytest.mark.parametrize(
     ("url", "kind", "place", "workers"),
     [
+        ("local://4", "local", "4", 4),
+        ("local://", "local", "", None),
         ("dask://host", "dask", "host:8786", None),
         ("dask://[::1]:9000", "dask", "[::1]:9000", None),
         ("dask://", "dask", "", None),
@@ -34,6 +38,14 @@ def test_what_is_understood(url: str, kind: str, place: str, workers: int | None
 @pytest.mark.parametrize(
     ("url", "says"),
     [
+        ("", "is none; write local://4"),
+        ("4", "is none"),
+        ("local", "is none"),
+        ("ray://host", "is none"),
+        ("local://four", "write the number of processes"),
+        ("local://0", "0 workers; 1 to 10000"),
+        ("local://4?memory=1GB", "option 'memory' is not known; it has none"),
+        ("http://[", "Invalid IPv6 URL"),
         ("dask://host:port", "Port could not be cast"),
         ("dask://host/path", "is none"),
         ("dask://host?workers=4", "leave one of them out"),
@@ -54,14 +66,6 @@ def test_what_is_refused(url: str, says: str) -> None:
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("url", ["slurm://compute", "slurm://", "dask://", "dask://?workers=4"])
-def test_a_service_starts_no_cluster(url: str) -> None:
-    with pytest.raises(SpecError, match="a service starts no cluster; write local://, or a running scheduler"):
-        parse_service_address(url)
-    assert parse_service_address("dask://host").place == "host:8786"
-    assert parse_service_address("local://2").workers == 2
-
-
 def test_without_its_package_a_cluster_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(MissingExtraError, match=r"executor dask://.*distributed.*\[cluster\]"):
@@ -72,3 +76,8 @@ def test_every_executor_of_the_page_is_understood() -> None:
     page = Path(__file__).parents[4].joinpath("docs", "batches.md").read_text("utf-8")
     urls = re.findall(r"`((?:local|dask|dask\+tls|slurm)://[^`]*)`", page)
     assert {parse_address(url).kind for url in urls} == {"local", "dask", "dask+tls", "slurm"}
+
+
+def test_a_worker_of_another_version_is_refused_by_name() -> None:
+    with pytest.raises(OtherVersionError, match=r"worker .*process \d+: has ma2000-daq .* and ma2000-daq 0\.0\.1 on "):
+        Checked(square, Program("0.0.1", "3.9"))(2)

@@ -18,10 +18,10 @@ from distributed.deploy.cluster import Cluster
 from distributed.scheduler import KilledWorker
 
 from daq.contracts.errors import ReachError
-from daq.executors.address import Address
 from daq.executors.local import cores
-from daq.executors.program import PACKAGE, Checked, Program, program_here, refuse_other
 from daq.executors.workers import BlamedError, Workers
+from extras.lab.batches.executors import Address
+from extras.lab.batches.program import PACKAGE, Checked, Program, program_here, refuse_other
 
 PATIENCE = 20.0
 """Time (s) within which a scheduler must answer, and have a worker."""
@@ -39,8 +39,6 @@ class DaskWorkers(Workers):
     Args:
         cluster: what was started for this executor, and ends with it.
     """
-
-    together = 1.0
 
     def __init__(self, client: Client, cluster: Cluster | None = None) -> None:
         self._client = client
@@ -100,11 +98,11 @@ def _pass_on(future: Future[Any], given: Future[Any]) -> None:
         future.set_result(given.result())
 
 
-def dask_workers(address: Address, patience: float | None = None) -> DaskWorkers:
+def dask_workers(address: Address) -> DaskWorkers:
     """Connects to a scheduler, or starts a cluster on this computer. Raises ReachError, OtherVersionError."""
     if address.place:
         scheme = "tls" if address.kind == "dask+tls" else "tcp"
-        return connected(address.url, f"{scheme}://{address.place}", patience=patience or PATIENCE)
+        return connected(address.url, f"{scheme}://{address.place}")
     with dask.config.set(CONFIGURATION):
         cluster = LocalCluster(
             n_workers=address.workers or cores(),

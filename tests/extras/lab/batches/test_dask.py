@@ -9,7 +9,7 @@ import pytest
 
 @pytest.mark.slow
 def test_jobs_are_answered_once_with_their_own_errors_and_a_missing_scheduler_is_told_in_one_line() -> None:
-    command = [sys.executable, "-m", "tests.extras.lab.cluster.one_process_cluster"]
+    command = [sys.executable, "-m", "tests.extras.lab.batches.one_process_cluster"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)

@@ -12,15 +12,15 @@ from pathlib import Path
 
 from daq.contracts.errors import DaqError
 from daq.contracts.service.jobs import SimulateStudy
-from daq.executors import open_workers
 from daq.executors.workers import ending
 from daq.traces.catalogue import list_traces
 from daq.traces.query import TraceQuery
-from server.batches.choice import chosen_traces
-from server.batches.folder import Row, asked_of, opened
-from server.batches.run import Standing, run_batch
-from server.batches.study import Common
-from tests.server.batches.traces import MACHINE
+from extras.lab.batches.choice import chosen_traces
+from extras.lab.batches.executors import open_workers
+from extras.lab.batches.folder import Row, asked_of, opened
+from extras.lab.batches.run import Standing, run_batch
+from extras.lab.batches.study import Common
+from tests.extras.lab.batches.traces import MACHINE
 
 AFTER = 5
 

@@ -8,8 +8,8 @@ import sys
 from dask_jobqueue.slurm import SLURMCluster
 
 from daq.contracts.errors import ReachError, SpecError
-from daq.executors.address import Address
-from extras.lab.cluster.dask import DaskWorkers, connected
+from extras.lab.batches.dask import DaskWorkers, connected
+from extras.lab.batches.executors import Address
 
 MEMORY, WALLTIME = "4GB", "08:00:00"
 """What each worker may use where the URL does not say it."""
@@ -17,7 +17,7 @@ PATIENCE = 24 * 3600.0
 """Time (s) that jobs may wait in Slurm's queue before the first of them begins."""
 
 
-def slurm_workers(address: Address, patience: float | None = None) -> DaskWorkers:
+def slurm_workers(address: Address) -> DaskWorkers:
     """Asks Slurm for workers of one core each, and waits for the first. Raises SpecError, ReachError."""
     if shutil.which("sbatch") is None:
         raise ReachError(f"executor {address.url}: there is no sbatch here; start this on a computer of the cluster")
@@ -41,4 +41,4 @@ def slurm_workers(address: Address, patience: float | None = None) -> DaskWorker
     except (OSError, RuntimeError) as error:
         cluster.close()
         raise ReachError(f"executor {address.url}: sbatch: {str(error).partition(chr(10))[0]}") from error
-    return connected(address.url, cluster.scheduler_address, cluster, patience or PATIENCE)
+    return connected(address.url, cluster.scheduler_address, cluster, PATIENCE)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.server.batches.traces import folder_of_traces
+from tests.extras.lab.batches.traces import folder_of_traces
 
 SBATCH = """#!/bin/sh
 cp "$1" "$SLURM_STAND_IN/script"

@@ -11,16 +11,9 @@ from functools import cache
 from importlib.metadata import version
 from typing import Any
 
-from daq.contracts import exit_codes
-from daq.contracts.errors import DaqError
+from daq.executors.workers import OtherVersionError
 
 PACKAGE = "ma2000-daq"
-
-
-class OtherVersionError(DaqError):
-    """A worker has another version of this program or of Python than the one that gives it jobs."""
-
-    exit_code = exit_codes.REFUSED
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from pathlib import Path
 from daq.contracts.errors import SpecError
 from daq.traces.catalogue import TraceSummary
 from daq.traces.query import TraceQuery
-from server.batches.columns import Columns
-from server.batches.run import Chosen
-from server.batches.study import OneTrace
+from extras.lab.batches.columns import Columns
+from extras.lab.batches.run import Chosen
+from extras.lab.batches.study import OneTrace
 
 
 def chosen_traces(summaries: Iterable[TraceSummary], query: TraceQuery) -> tuple[list[Chosen], list[str]]:

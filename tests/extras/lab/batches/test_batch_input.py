@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from daq.contracts.service.jobs import DiagnoseStudy, Study
-from daq_cli.commands import batch
-from daq_cli.models.batch import Asked
+from daq.contracts.service.jobs import DiagnoseStudy
 from daq_cli.robot.access import RobotAccess
+from extras.lab.batches import command
+from extras.lab.batches.shown import Asked
+from extras.lab.batches.study import Study
 from tests.daq_cli.invoke import CommandLine
 
 
@@ -47,28 +48,13 @@ def test_a_batch_of_diagnoses_takes_the_method_and_the_steps_that_were_asked_for
 ) -> None:
     begun: list[Study] = []
 
-    def run_here(_robot: RobotAccess, _asked: Asked, study: Study) -> bool:
+    def run(_robot: RobotAccess, _asked: Asked, study: Study) -> bool:
         begun.append(study)
         return True
 
-    monkeypatch.setattr(batch, "run_here", run_here)
+    monkeypatch.setattr(command, "run", run)
     assert daq("batch", "diagnose", "traces", "--out", "o", *words.split()).code == 0
     assert begun == [study]
-
-
-def test_a_service_looks_for_one_word(daq: CommandLine) -> None:
-    words = ("--server", "http://127.0.0.1:9", "batch", "simulate", "ramp slow", "--out", "o")
-    daq(*words).complains(2, "query: ramp slow: a service looks for one word")
-    assert not Path("o").exists()
-
-
-def test_a_batch_goes_on_only_where_it_began(daq: CommandLine) -> None:
-    service = ("--server", "http://127.0.0.1:9")
-    for folder, file in (("here", "batch.json"), ("there", "job")):
-        Path(folder).mkdir()
-        Path(folder, file).touch()
-    daq(*service, "batch", "simulate", "ramp", "--out", "here").complains(2, "a batch that this computer computed")
-    daq("batch", "simulate", "here", "--out", "there").complains(2, "there: holds a batch of a service")
 
 
 def test_a_file_in_place_of_the_result_folder_is_told(daq: CommandLine) -> None:
@@ -77,8 +63,3 @@ def test_a_file_in_place_of_the_result_folder_is_told(daq: CommandLine) -> None:
     Path("o").write_text("mine")
     daq("batch", "simulate", "traces", "--out", "o").complains(2, "o: cannot be written")
     assert Path("o").read_text() == "mine"
-
-
-def test_the_executor_of_a_service_is_checked_with_its_configuration(daq: CommandLine) -> None:
-    Path("daq.toml").write_text('[server]\nexecutor = "dask:/host"\n')
-    daq("config", "check").complains(2, "executor 'dask:/host': is none")

@@ -12,18 +12,17 @@ from pydantic import TypeAdapter, ValidationError
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.progress import Cancel
-from daq.contracts.service.jobs import Study
-from daq.executors import open_workers
 from daq.executors.workers import ending
 from daq.traces.catalogue import list_traces
 from daq.traces.query import parse_query
+from extras.lab.batches.choice import chosen_traces, require_any
+from extras.lab.batches.executors import open_workers
+from extras.lab.batches.folder import asked_of, opened
+from extras.lab.batches.run import run_batch
+from extras.lab.batches.study import Common, Study
 from firmware_protocol.invalid import first_invalid
 from ma2000.progress import Shown, told
 from model.machine_model.model import Model
-from server.batches.choice import chosen_traces, require_any
-from server.batches.folder import asked_of, opened
-from server.batches.run import run_batch
-from server.batches.study import Common
 
 
 @dataclass(frozen=True)

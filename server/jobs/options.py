@@ -1,0 +1,39 @@
+"""The options and effects of a study, as its request names them, for the functions that compute it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeVar
+
+from daq.contracts.errors import SpecError
+from daq.contracts.service.jobs import DiagnoseStudy, EffectChoice, FitStudy
+
+if TYPE_CHECKING:
+    from model.discrepancy.options import DiagnosisOptions
+    from model.fitting.options import FitOptions
+    from model.machine_model.model import Model
+
+Chosen = TypeVar("Chosen", "FitOptions", "DiagnosisOptions")
+
+
+def options_of(study: FitStudy | DiagnoseStudy, kind: type[Chosen]) -> Chosen:
+    """Returns the options of a study. What the study leaves open is left to the method, which has defaults of its
+    own."""
+    given = {name: getattr(study, name, None) for name in kind.model_fields}
+    return kind(**{name: value for name, value in given.items() if value is not None})
+
+
+def with_effects(model: Model, effects: Sequence[EffectChoice]) -> Model:
+    """Adds effects to a model; one without joints acts on all that it can act on. Raises SpecError."""
+    from model.effects.library import effect, library
+
+    for choice in effects:
+        if choice.name not in library():
+            raise SpecError(f"effects: {choice.name!r}: not in the library; it has {', '.join(library())}")
+        found = effect(choice.name)
+        if found.whole_machine:
+            model = model.with_effect(choice.name)
+        else:
+            every = tuple(j for j in model.machine.modelled_joints if not found.joints or j in found.joints)
+            model = model.with_effect(choice.name, choice.joints or every)
+    return model
