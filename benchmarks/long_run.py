@@ -88,9 +88,7 @@ def record(minutes: float, folder: Path) -> Recorded:
         fetching = threading.Thread(target=board.fetch_until_over)
         fetching.start()
         url = f"{mock.url}?baud={BAUD}"
-        with OwnerOnDemand(
-            Open(url=url, machine=machine, limits=machine.limits, folder=folder, watched=False)
-        ) as owner:
+        with OwnerOnDemand(Open(url=url, machine=machine, limits=machine.limits, folder=folder)) as owner:
             last = owner.run(spec)
         board.over()
         fetching.join()

@@ -88,7 +88,6 @@ def run(
         limits=machine.limits,
         folder=Path(folder),
         memory_map=None if memory_map is None else read_text(memory_map, f"memory map {memory_map}"),
-        watched=False,
     )
     real = require_word(moves_real_arm)
     try:

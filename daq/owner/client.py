@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any, Self
 
@@ -156,9 +156,11 @@ class OwnerProcess:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         for line in self._process.stdout:
+            if not line.endswith(b"\n"):
+                break  # half a line of a killed process
             try:
                 self._hear(REPORT.validate_json(line))
-            except Exception:  # half a line of a killed process, or a listener's fault; the end is reported below
+            except Exception:  # no report of ours, or a listener's fault; the end is reported below
                 log.exception("owner process %s: %.200r", self.pid, line)
         code = self._process.wait()
         self._process.stdout.close()
@@ -201,7 +203,7 @@ class OwnerOnDemand:
         except BaseException:
             self._close()
             raise
-        self.identity = report
+        self.identity = report.identity
         return self
 
     def __exit__(
@@ -224,28 +226,39 @@ class OwnerOnDemand:
             raise OrderFailedError("stopped before it began (by Ctrl-C); nothing moved", exit_codes.STOPPED)
         return self._process.ask(kind, asked=time.monotonic(), **fields)
 
-    def answer_to(self, asked: Future[Answer], heard: Callable[[Report], None] = lambda _report: None) -> Answer:
-        """Waits for an answer, while `heard` is called with every report.
+    def tell(self, order: Order) -> None:
+        """Gives an order that has no answer."""
+        self._process.send(order)
 
-        Raises OrderFailedError when the order was refused, or the process has ended.
+    def answer_to(self, asked: Future[Answer], heard: Callable[[Report], None] = lambda _report: None) -> Answer:
+        """Waits for an answer, also one with a problem, while `heard` is called with every report.
+
+        Raises OrderFailedError when the process has ended.
         """
         asked.add_done_callback(self._heard.put)
         while (report := self._heard.get()) is not asked:
-            if isinstance(report, CannotOpen):
-                _require_opening(report)
-            elif not isinstance(report, Future | str):
-                heard(report)
+            self._pass_on(report, heard)
         try:
-            answer = asked.result()
+            return asked.result()
         except OwnerGoneError as error:
             raise _gone(error.why) from error
-        if answer.problem:
-            raise OrderFailedError(answer.problem, answer.exit_code)
-        return answer
+
+    def hear(self, heard: Callable[[Report], None], within: float) -> None:
+        """Calls `heard` with every report that comes `within` s. Raises OrderFailedError for a process at fault."""
+        until = time.monotonic() + within
+        while (left := until - time.monotonic()) > 0:
+            with contextlib.suppress(Empty):
+                self._pass_on(self._heard.get(timeout=left), heard)
+
+    def _pass_on(self, report: Report | Future[Answer] | str, heard: Callable[[Report], None]) -> None:
+        if isinstance(report, CannotOpen):
+            _require_opening(report)
+        elif not isinstance(report, Future | str):
+            heard(report)
 
     def ask(self, kind: Callable[..., Any], **fields: object) -> dict[str, Any]:
         """Gives an order and returns its answer's data. Raises OrderFailedError."""
-        return self.answer_to(self.begin(kind, **fields)).data
+        return done(self.answer_to(self.begin(kind, **fields))).data
 
     def run(
         self,
@@ -276,7 +289,15 @@ def _gone(why: str) -> OrderFailedError:
     return OrderFailedError(f"{line}: {left}", exit_codes.PROGRAM_FAULT)
 
 
+def done(answer: Answer) -> Answer:
+    """The answer to an order that was carried out. Raises OrderFailedError."""
+    if answer.problem:
+        raise OrderFailedError(answer.problem, answer.exit_code)
+    return answer
+
+
 def end_of(answer: Answer) -> Finished:
-    """The end of a run that has left a trace."""
-    assert answer.finished is not None
-    return answer.finished
+    """The end of a run that has left a trace. Raises OrderFailedError for one that has left none."""
+    finished = done(answer).finished
+    assert finished is not None
+    return finished

@@ -25,8 +25,8 @@ from daq.owner.messages import (
 )
 from daq.owner.owned_robot import OwnedRobot
 from daq.owner.quick_orders import carry_out
-from daq.runner import Consent, RunResult, RunSetup, StoppedError, StopRequests, run_experiment
-from daq.teaching import JogCommand, RecordedPath, check_program, jog, lead_by_nose, plan_program, run_program
+from daq.runner import Consent, RunResult, RunSetup, StoppedError, StopRequests, require_not_stopped, run_experiment
+from daq.teaching import JogCommand, Program, RecordedPath, check_program, jog, lead_by_nose, plan_program, run_program
 from daq.teaching.jog import top_speed
 from daq.teaching.performer import FollowingPerformer
 from firmware_protocol.errors import ProtocolError
@@ -94,7 +94,7 @@ def perform(robot: OwnedRobot, order: RunProgram) -> Answer:
     """Runs a taught program, which is checked completely before its first motion."""
     _require_ready(robot)
     here = robot.arm().next_sample()
-    planned = plan_program(order.program, robot.machine, here.set_point)
+    planned = plan_program(Program.model_validate(order.program), robot.machine, here.set_point)
     against = check_program(planned, robot.machine, robot.limits)
     if against:
         raise SafetyError(f"program refused: {against[0]}; nothing moved")
@@ -137,6 +137,8 @@ def _require_ready(robot: OwnedRobot) -> None:
     """Raises SafetyError or StoppedError if neither keys nor programs may move the arm."""
     if (cause := robot.end_cause() or robot.control.halted) is not None:
         raise StoppedError(cause)
+    if not robot.opening.watched:
+        require_not_stopped(robot.controller)
     line = limp_line(robot.read_gains())
     if line:
         raise SafetyError(f"{line}; hold the arm, reset it here, then set their gains; nothing moved")

@@ -12,9 +12,8 @@ from daq.contracts.frozen import FrozenRecord
 from daq.contracts.labels import Outcome
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
-from daq.contracts.service.robot import Activity, ArmState, ControlPeriod
+from daq.contracts.service.robot import Activity, ArmState, ControlPeriod, RobotIdentity
 from daq.contracts.trace import TraceEvent
-from daq.teaching import Program
 from daq.traces.naming import new_trace_id
 
 WAITS_AT_MOST = 2.0
@@ -30,8 +29,9 @@ BEGINS_WITHIN = 5.0
 class Open(FrozenRecord):
     """The first line: which robot to open, and where.
 
-    With `watched`, samples are read and reported at all times, and a lost link is restored. Without it nothing is read
-    between two orders, and a stop that a lost link has not delivered is tried for `late_stop_window` s after a run.
+    With `watched`, samples are read at all times, and a lost link is restored. Without it nothing is read between two
+    orders, and a stop that a lost link has not delivered is tried for `late_stop_window` s after a run. With `live`,
+    every sample and the state of the arm are reported.
     """
 
     kind: Literal["open"] = "open"
@@ -42,7 +42,8 @@ class Open(FrozenRecord):
     robot: str = "ma2000"
     memory_map: str | None = None
     """Text of a memory map file; None for the one in the package."""
-    watched: bool = True
+    watched: bool = False
+    live: bool = False
     late_stop_window: Annotated[float, Field(ge=0)] = 10.0
     """An assumption: time enough to push a plug in."""
 
@@ -98,7 +99,8 @@ class RunProgram(_LongRequest):
 
     kind: Literal["program"] = "program"
     activity: Literal["program", "step"] = "program"
-    program: Program
+    program: dict[str, object]
+    """The data of a `daq.teaching.Program`, of which the client need not load the code."""
 
 
 class LeadBegin(_LongRequest):
@@ -127,6 +129,12 @@ class Freeze(_Request):
     """Stops the arm, as the stop socket does. The answer's data are those of a `StopAnswer`; it comes at once."""
 
     kind: Literal["freeze"] = "freeze"
+
+
+class ReadState(_QuickRequest):
+    """Reads status, sample and gains: the answer's data are those of a `Seen`."""
+
+    kind: Literal["read_state"] = "read_state"
 
 
 class ReadGains(_QuickRequest):
@@ -166,10 +174,11 @@ class MoveGripper(_QuickRequest):
 
 
 class Reset(_QuickRequest):
-    """Ends the stop of number `stop` (`ArmReport.stop`), and no other."""
+    """Ends the stop of number `stop` (`ArmReport.stop`), and no other. Without a number it ends the one that the board
+    is in when this begins."""
 
     kind: Literal["reset"] = "reset"
-    stop: int
+    stop: int | None
     here: StrictBool
 
 
@@ -189,6 +198,7 @@ Order = Annotated[
     | Finish
     | HaltRun
     | Freeze
+    | ReadState
     | ReadGains
     | WriteGains
     | ReadProcess
@@ -201,7 +211,7 @@ Order = Annotated[
 ORDER: TypeAdapter[Order] = TypeAdapter(Order)
 
 Long = RunExperiment | JogBegin | RunProgram | LeadBegin
-Quick = ReadGains | WriteGains | ReadProcess | WriteOutput | MoveGripper | Reset
+Quick = ReadState | ReadGains | WriteGains | ReadProcess | WriteOutput | MoveGripper | Reset
 
 
 # ---- from the owner
@@ -211,12 +221,7 @@ class Opened(FrozenRecord):
     """The controller has answered, and the robot is connected."""
 
     kind: Literal["opened"] = "opened"
-    simulated: bool
-    protocol: int
-    period: float
-    boots: int
-    samples: bool = True
-    compact: bool = False
+    identity: RobotIdentity
 
 
 class LiveSample(ControlPeriod):
@@ -242,6 +247,16 @@ class ArmReport(FrozenRecord):
     """Number of the board's newest stop, 0 if there was none; None while it is not known, such as just after a stop."""
     unheard: str = ""
     """Why `daq stop` and the stop listener do not reach this process; empty where they do."""
+
+
+class Seen(FrozenRecord):
+    """What one look at the robot has shown."""
+
+    arm: ArmReport
+    sample: LiveSample
+    gains: dict[int, Gain]
+    missed: int
+    """Set points that the board has missed since its power-up."""
 
 
 class TeachingText(FrozenRecord):

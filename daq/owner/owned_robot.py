@@ -11,6 +11,7 @@ from daq.contracts.limp import limp_joints
 from daq.contracts.machine import Machine
 from daq.contracts.service.robot import Activity
 from daq.driver import BoardSnapshot
+from daq.driver.controller import ControllerStatus
 from daq.owner.guardian import Guardian
 from daq.owner.inbox import Inbox
 from daq.owner.messages import ArmReport, Open, TeachingText
@@ -42,15 +43,14 @@ class OwnedRobot:
     _told_at: float = 0.0
 
     def __post_init__(self) -> None:
-        if not self.opening.watched:
-            return
-        maker = SampleMaker(self.machine, self.controller.period_s)
+        self.samples = SampleMaker(self.machine, self.controller.period_s)
 
         def listen(snapshot: BoardSnapshot) -> None:
-            self.speaker.say(maker.sample(snapshot, time.monotonic()))
+            self.speaker.say(self.samples.sample(snapshot, time.monotonic()))
             self.tell_arm()
 
-        self.controller.listener = listen
+        if self.opening.live:
+            self.controller.listener = listen
 
     @property
     def machine(self) -> Machine:
@@ -88,27 +88,35 @@ class OwnedRobot:
         somebody else may stop it again, which no sample shows. Raises LinkError."""
         due = self.control.arm.state is not State.IDLE and time.monotonic() - self._stop[2] >= REPORT_EVERY
         if due or self.newest_stop is None:
-            self.read_stop()
+            self.read_status()
 
-    def read_stop(self) -> int:
-        """Returns the number of the newest stop on the board, which the next report has too. Raises LinkError."""
+    def read_status(self) -> ControllerStatus:
+        """Reads the board's status; the next report has the number of its newest stop. Raises LinkError."""
         now, freezes = time.monotonic(), self.control.freezes
-        self._stop = (self.controller.status().stop, freezes, now)
-        return self._stop[0]
+        status = self.controller.status()
+        self._stop = (status.stop, freezes, now)
+        return status
 
     def say(self, line: str) -> None:
         """Reports a line for the operator who teaches."""
         self.speaker.say(TeachingText(text=line))
 
     def tell_arm(self, *, anew: bool = False) -> None:
-        """Reports the state of an arm that is watched if it has changed, or once a second; in any case with `anew`."""
-        if not self.opening.watched:
+        """Reports the arm's state if it has changed, or once a second; in any case with `anew`."""
+        if not self.opening.live:
             return
+        report = self.report()
+        if anew or report != self._told or self._due():
+            self._told, self._told_at = report, time.monotonic()
+            self.speaker.say(report)
+
+    def report(self) -> ArmReport:
+        """The state of the arm and of the link now; counters are those of the last report unless another is due."""
         arm, ended = self.control.arm, self.end_cause()
         # The arm counts as stopped even before the board has confirmed it:
         stopping = ended is not None and arm.connected and arm.state is not State.FAULT
         counters = self.controller.counters.numbers() if self._due() else (self._told.counters if self._told else {})
-        report = ArmReport(
+        return ArmReport(
             arm="stopped" if stopping else arm.state.value,
             cause=arm.cause or ended or "",
             activity=self.activity,
@@ -118,9 +126,6 @@ class OwnedRobot:
             stop=self.newest_stop,
             unheard=self.guardian.unheard,
         )
-        if anew or report != self._told or self._due():
-            self._told, self._told_at = report, time.monotonic()
-            self.speaker.say(report)
 
     def _due(self) -> bool:
         return time.monotonic() - self._told_at >= REPORT_EVERY

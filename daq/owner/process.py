@@ -7,6 +7,8 @@ from collections.abc import Callable
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
+from daq.contracts.service.robot import RobotIdentity
+from daq.driver.controller import Identity
 from daq.owner.guardian import Guardian
 from daq.owner.inbox import Inbox
 from daq.owner.loop import serve
@@ -74,16 +76,17 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker, loaded: Callable[[], None
         if opening.watched:
             require_fitting(controller, opening.machine)
             robot.read_gains()
-        identity = controller.identity
         loaded()
-        speaker.ended(
-            Opened(
-                simulated=identity.simulated,
-                protocol=identity.version,
-                period=identity.period_s,
-                boots=identity.boots,
-                samples=identity.keeps_samples,
-                compact=Capability.COMPACT in identity.capabilities,
-            )
-        )
+        speaker.ended(Opened(identity=_identity(controller.identity)))
         serve(robot)
+
+
+def _identity(told: Identity) -> RobotIdentity:
+    return RobotIdentity(
+        simulated=told.simulated,
+        protocol=told.version,
+        period=told.period_s,
+        boots=told.boots,
+        samples=told.keeps_samples,
+        compact=Capability.COMPACT in told.capabilities,
+    )

@@ -14,17 +14,20 @@ from daq.owner.messages import (
     Quick,
     ReadGains,
     ReadProcess,
+    ReadState,
     Reset,
+    Seen,
     WriteGains,
     WriteOutput,
 )
 from daq.owner.owned_robot import OwnedRobot
-from daq.runner import StoppedError
+from daq.runner import StoppedError, require_fitting
 from daq.safety import Event, State
-from firmware_protocol.commands import Refusal
+from firmware_protocol.commands import Refusal, StatusFlag
 
 BITS = 8
-_READS = (ReadProcess, ReadGains)
+_STOPPED = StatusFlag.FROZEN | StatusFlag.NO_TORQUE
+_READS = (ReadState, ReadProcess, ReadGains)
 _WHILE_TEACHING = (*_READS, WriteOutput, MoveGripper)
 
 
@@ -57,22 +60,34 @@ def _carried_out(robot: OwnedRobot, order: Quick, stops: int) -> dict[str, objec
     """The answer's data. Raises StopCameFirstError for what would change something behind a stop that was written since
     there were so many `stops`."""
     match order:
+        case ReadState():
+            return _state(robot).model_dump(mode="json")
         case ReadGains():
             return {"gains": robot.read_gains()}
         case WriteGains():
             return _write_gains(robot, order, stops)
         case ReadProcess():
             return _process(robot)
-        case WriteOutput():
+        case WriteOutput() | MoveGripper():
             _require_not_stopped(robot, order)
-            robot.controller.write_outputs(1 << order.output, order.on << order.output, stops)
-            return _process(robot)
-        case MoveGripper():
-            _require_not_stopped(robot, order)
-            robot.controller.set_gripper(closed=order.closed, before_stop=stops)
+            if isinstance(order, WriteOutput):
+                robot.controller.write_outputs(1 << order.output, order.on << order.output, stops)
+            else:
+                robot.controller.set_gripper(closed=order.closed, before_stop=stops)
             return _process(robot)
         case Reset():
             return {"text": _reset(robot, order)}
+
+
+def _state(robot: OwnedRobot) -> Seen:
+    """Raises SafetyError for another machine's file: its angles would be wrong."""
+    require_fitting(robot.controller, robot.machine)
+    status, gains = robot.read_status(), robot.read_gains()
+    sample = robot.samples.sample(robot.controller.next_snapshot(), time.monotonic())
+    arm = robot.report()
+    if StatusFlag.FROZEN in status.flags and arm.arm == "idle":
+        arm = arm.model_copy(update={"arm": "stopped"})
+    return Seen(arm=arm, sample=sample, gains=gains, missed=status.missed)
 
 
 def _write_gains(robot: OwnedRobot, order: WriteGains, stops: int) -> dict[str, object]:
@@ -85,11 +100,16 @@ def _write_gains(robot: OwnedRobot, order: WriteGains, stops: int) -> dict[str, 
 
 
 def _require_not_stopped(robot: OwnedRobot, order: WriteOutput | MoveGripper) -> None:
-    """Raises StoppedError if the arm is stopped, unless the order says that its sender knows of the stop."""
+    """Raises StoppedError, or SafetyError for a stop before this connection, if the arm is stopped, unless the order
+    says that its sender knows of the stop."""
+    if order.while_stopped:
+        return
     cause = robot.end_cause() or robot.control.halted
-    if cause is not None and not order.while_stopped:
+    if cause is not None:
         line = f"the arm has been stopped ({cause}): nothing was switched; while_stopped overrides this"
         raise StoppedError(cause, line)
+    if not robot.opening.watched and StatusFlag.FROZEN in robot.controller.status().flags:
+        raise SafetyError("the arm has been stopped: `daq reset` first, or --while-stopped; nothing was switched")
 
 
 def _process(robot: OwnedRobot) -> dict[str, object]:
@@ -101,11 +121,11 @@ def _process(robot: OwnedRobot) -> dict[str, object]:
     }
 
 
-def _release(robot: OwnedRobot, order: Reset) -> None:
-    """Releases the arm from the stop that the order names. Raises RequestRefusedError or SafetyError if there is a
+def _release(robot: OwnedRobot, order: Reset, stop: int) -> None:
+    """Releases the arm from the stop of this number. Raises RequestRefusedError or SafetyError if there is a
     newer one: of one from this computer the guardian knows first, of one from elsewhere the board alone."""
     controller, control = robot.controller, robot.control
-    number = controller.stop_here(order.stop) if order.here else order.stop
+    number = controller.stop_here(stop) if order.here else stop
     if not robot.guardian.forget(order.asked):
         raise _overtaken(order.kind, robot.end_cause())
     if control.arm.state in (State.STOPPED, State.FAULT):
@@ -122,12 +142,14 @@ def _overtaken(name: str, cause: str | None = None) -> SafetyError:
 def _reset(robot: OwnedRobot, order: Reset) -> str:
     """Ends the stop or fault that the sender of the reset saw. Another one remains."""
     control, here = robot.control, order.here
-    if control.arm.state not in (State.STOPPED, State.FAULT) and not here:
+    status = robot.read_status()
+    found = not robot.opening.watched and bool(status.flags & _STOPPED)
+    if control.arm.state not in (State.STOPPED, State.FAULT) and not found and not here:
         return "was not stopped"
-    if robot.read_stop() != order.stop:  # before anything changes; the board looks once more
+    if order.stop not in (None, status.stop):  # before anything changes; the board looks once more
         raise _overtaken(order.kind)
     try:
-        _release(robot, order)
+        _release(robot, order, status.stop)
     except RequestRefusedError as error:
         if error.reason != Refusal.OTHER_STOP:
             raise

@@ -6,7 +6,6 @@ the reverse order, except the port, which closes last, after everybody who asked
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -49,7 +48,6 @@ def port_session(
     memory_map: MemoryMap,
     *,
     parent: int | None = None,
-    ctrl_z_stops: bool = False,
     guarded: Callable[[Guardian], None] = lambda _guardian: None,
 ) -> Iterator[PortSession[C]]:
     """Opens the port at `url`, with the guardian listening from before it is opened until nothing can move any more.
@@ -60,7 +58,6 @@ def port_session(
         connect: opens the port and connects to the controller, such as `Controller.connect`.
         parent: descriptor of the parent's pipe: any byte is a stop, its end the loss of the parent.
         guarded: called with the guardian before the port is opened.
-        ctrl_z_stops: Ctrl-Z counts as a stop. A process that the terminal has suspended could not be asked for one.
 
     Raises ReachError when the stop socket cannot be made, LinkError when the robot is not reached.
     """
@@ -70,19 +67,7 @@ def port_session(
         stop_listener(robot) as listener,
         Guardian(listener, parent, freezer.freeze) as guardian,
     ):
-        if ctrl_z_stops:
-            closed_last.enter_context(_stopped_by_ctrl_z())
         guarded(guardian)
         controller = connect(url, memory_map)
         closed_last.enter_context(controller)
         yield PortSession(controller, guardian, freezer)
-
-
-@contextmanager
-def _stopped_by_ctrl_z() -> Iterator[None]:
-    """With a handler of Python's own, the guardian's wake-up pipe hears of Ctrl-Z as it does of Ctrl-C."""
-    before = signal.signal(signal.SIGTSTP, lambda _number, _frame: None)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTSTP, before)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from daq.contracts.experiment import ExperimentSpec, Feedforward, TrackingError
     from daq.contracts.machine import Machine
     from daq.contracts.trace import Trace
-    from daq_cli.robot.access import RobotAccess
+    from daq_cli.robot.operations import RobotAccess
 
 
 def with_computed_set_points(

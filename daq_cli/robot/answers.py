@@ -22,14 +22,6 @@ class RobotState:
 
 
 @dataclass(frozen=True)
-class ResetDone:
-    """The result of a reset in one line and, from a local board, the joints that nothing holds."""
-
-    text: str
-    limp: str = ""
-
-
-@dataclass(frozen=True)
 class ImportChoice:
     """What is taken from a bag: the topic, the names of the joints, whether the times are those of reception, and the
     unit of the effort. Of any other file only the unit of the drive can be chosen."""
@@ -48,3 +40,14 @@ class ImportedTrace:
     file: str
     text: str
     notes: str = ""
+
+
+def headline(found: StatusReport) -> str:
+    """The state of a robot in one line."""
+    if found.identity is None:
+        problem = f": {found.connection_problem}" if found.connection_problem else ""
+        return f"{found.robot}: {found.connection}{problem}"
+    kind = "mock" if found.identity.simulated else "REAL ARM"
+    tick = "" if found.sample is None else f", tick {found.sample.tick}, {found.sample.age * 1e3:.0f} ms old"
+    cause = f" ({found.cause})" if found.cause else ""
+    return f"{kind}{tick}, {found.arm}{cause}; {found.activity}; link {found.link.state}"

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import Machine
     from daq.owner.messages import Finished
-    from daq_cli.robot.access import RobotAccess
+    from daq_cli.robot.operations import RobotAccess
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from daq.contracts.errors import SpecError
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.machine import Machine
+from daq.owner.messages import EventHappened, Finished, Progress, Report
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
 from daq_cli.robot.own_owner import owned
 from daq_cli.robot.run_display import run_display
-
-if TYPE_CHECKING:
-    from daq.contracts.experiment import ExperimentSpec
-    from daq.contracts.machine import Machine
-    from daq.owner.messages import Finished, Report
 
 
 def acquire_locally(
@@ -24,8 +21,6 @@ def acquire_locally(
 
     Raises OrderFailedError if there is no trace, SpecError for a folder or a port that is not valid.
     """
-    from daq.owner.messages import EventHappened, Progress
-
     if not str(folder).isprintable():
         raise SpecError(f"folder {str(folder)!r}: a trace's folder has a name of printable characters")
     with owned(call, machine, consent, folder, moves=True) as owner, run_display(spec) as display:

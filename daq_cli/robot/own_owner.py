@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 def owned(
     call: Invocation,
     machine: Machine,
-    consent: ConsentPrompt,
+    consent: ConsentPrompt | None,
     folder: Path | None = None,
     *,
     moves: bool = False,
-    watched: bool = False,
+    live: bool = False,
 ) -> Iterator[OwnerOnDemand]:
-    """An owner of the command's port, with the operator's consent on a real arm. Where it `moves` the arm, Ctrl-C,
-    Ctrl-Z and SIGTERM become a stop.
+    """An owner of the command's port; with `consent` only with the operator's word on a real arm. Where it `moves` the
+    arm, Ctrl-C, Ctrl-Z and SIGTERM become a stop.
 
     No process has the port while the operator is asked, so that a stop gets through. Raises OrderFailedError when the
     robot is not reached, SpecError for a port that is not valid, SafetyError without consent.
@@ -46,11 +46,11 @@ def owned(
         folder=folder or Path(),
         robot=call.settings.robot.name,
         memory_map=call.memory_map_text,
-        watched=watched,
+        live=live,
     )
     with _opened(opening, moves=moves) as owner:
         identity = owner.identity
-        if not lacks_consent(identity, consent.given):
+        if consent is None or not lacks_consent(identity, consent.given):
             yield owner
             return
     consent.for_gains_of(load_memory_map(call.settings.robot.memory_map)).require(call.port, identity)

@@ -41,7 +41,6 @@ def record(seed: int, run: str, spec: ExperimentSpec, machine: Machine, folder: 
             limits=machine.limits,
             folder=Path(place),
             robot=f"trial-{secrets.token_hex(4)}",  # its stop socket: runs go on beside each other
-            watched=False,
         )
         try:
             with OwnerOnDemand(opening) as owner:

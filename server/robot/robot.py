@@ -231,6 +231,8 @@ class Robot:
             folder=place.folder,
             robot=place.name,
             memory_map=place.memory_map,
+            watched=True,
+            live=True,
         )
         try:
             self._owner = self._start_owner(opening, self._on_report, self._on_end)
@@ -255,14 +257,7 @@ class Robot:
         _notify_each(self.listeners, report)
 
     def _set_opened(self, report: Opened) -> None:
-        identity = RobotIdentity(
-            simulated=report.simulated,
-            protocol=report.protocol,
-            period=report.period,
-            boots=report.boots,
-            samples=report.samples,
-            compact=report.compact,
-        )
+        identity = report.identity
         port = parse_port_url(self.place.url)
         with self._lock:
             self._identity = identity

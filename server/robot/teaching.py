@@ -93,7 +93,7 @@ class TeachingService:
     def perform(self, word: Word, program: Program, activity: Literal["program", "step"] = "program") -> None:
         """Begins a taught program. Raises a 409 while something else is taught, or without control."""
         with self._changed:
-            self._begin(word, activity, RunProgram, program=program, activity=activity)
+            self._begin(word, activity, RunProgram, program=program.model_dump(mode="json"), activity=activity)
 
     def lead(self, word: Word, joints: tuple[int, ...]) -> None:
         """Begins leading by hand. Raises a 409 while something else is taught, or without control."""

@@ -383,6 +383,14 @@ class Scene:
 
     # ---- what is made
 
+    def owned_on_demand(self) -> OwnedRobot:
+        """The robot of an owner that a command has started: it has heard of no stop yet."""
+        opening = Open(url="wire", machine=MACHINE, limits=MACHINE.limits, folder=Path())
+        control = ArmControl(self.controller)
+        guardian = Guardian(cast(Any, SimpleNamespace(problem="")), None, lambda _cause: control.stop("a stop"))  # type: ignore[arg-type, return-value]
+        guardian._thread = cast(Any, SimpleNamespace(is_alive=lambda: True))
+        return OwnedRobot(opening, self.controller, control, guardian, self.inbox, cast(Any, None))
+
     def _make_owner(self) -> None:
         self.control = ArmControl(self.controller)
         freezer = Freezer("arm", "wire")
@@ -392,7 +400,9 @@ class Scene:
         self.guardian._thread = cast(Any, SimpleNamespace(is_alive=lambda: True))
         self.inbox = InboxHere(self.world, self._spawn_cancel)
         self.owned = OwnedRobot(
-            Open(url="wire", machine=MACHINE, limits=MACHINE.limits, folder=Path(), robot="arm"),
+            Open(
+                url="wire", machine=MACHINE, limits=MACHINE.limits, folder=Path(), robot="arm", watched=True, live=True
+            ),
             self.controller,
             self.control,
             self.guardian,

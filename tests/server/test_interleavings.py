@@ -1,8 +1,8 @@
 """No order of what people, queue, owner and board do moves the arm after a confirmed stop that nobody has released."""
 
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -14,7 +14,8 @@ from daq.contracts.service.queue import ControlRequest, QueueResume
 from daq.contracts.service.robot import GripperRequest, ResetRequest
 from daq.contracts.service.teaching import JogRequest, StepRequest
 from daq.owner import guardian, long_orders, loop, owned_robot, quick_orders
-from daq_cli.robot.local import LocalRobot
+from daq.owner.messages import Reset
+from daq.owner.quick_orders import carry_out
 from server.access.caller import LOCAL
 from server.api import controller, robots, teaching
 from server.api import queue as queue_routes
@@ -161,21 +162,18 @@ def _moving(seed: int) -> Scene:
     return scene
 
 
-@contextmanager
-def at_the_port(scene: Scene) -> Iterator[Any]:
-    """The scene's controller, to commands."""
-    yield scene.controller
-
-
 def command_line(seed: int) -> Scene:
-    """Commands at the port itself, which others stop meanwhile: both resets, a run."""
+    """Commands at the port, one after the other, which others stop meanwhile: both resets, a run."""
     scene = Scene(seed, stopped=True)
     scene.inbox.closing.set()  # no service owns this port
-    people, local = People(scene), LocalRobot(cast(Any, None))
-    local._connected = lambda: at_the_port(scene)  # type: ignore[method-assign]
-    people.does("reset", lambda: local.reset(adopt_posture=False))
-    people.does("reset here", lambda: local.reset(adopt_posture=True))
-    people.does("another computer", scene.stop_elsewhere)
+    people = People(scene)
+
+    def reset(*, here: bool) -> None:
+        cast(Actor, greenlet.getcurrent()).named = None  # it acts on the stop that it sees
+        carry_out(scene.owned_on_demand(), Reset(number=0, asked=scene.world.clock.now, stop=None, here=here))
+
+    people.does("reset", *[lambda: reset(here=False), lambda: reset(here=True)] * 2)
+    people.does("another computer", scene.stop_elsewhere, scene.stop_elsewhere)
     people.does("run", lambda: scene.controller.set_points({1: 1}), lambda: scene.controller.set_points({1: 2}))
     return scene
 

@@ -23,7 +23,7 @@ AFTERMATH_PERIODS = 50
 def opening(folder: Path, url: str = "mock://?lock_step=1&seed=3", **more: object) -> Open:
     """A mock of its own, not watched."""
     machine = load_machine("ma2000")
-    told = {"url": url, "machine": machine, "limits": machine.limits, "folder": folder, "watched": False, **more}
+    told = {"url": url, "machine": machine, "limits": machine.limits, "folder": folder, **more}
     return Open.model_validate(told)
 
 

@@ -147,7 +147,8 @@ def test_a_key_pressed_while_an_order_is_written_follows_it(tmp_path: Path) -> N
 
         owner._process._write = pressed  # type: ignore[method-assign]
         answer = owner.begin(RunExperiment, spec=ENDLESS, moves_real_arm=False).result()
-    assert answer.exit_code == exit_codes.STOPPED
+    assert answer.exit_code in (exit_codes.REFUSED, exit_codes.STOPPED), answer
+    assert "by Ctrl-C" in (answer.finished.reason if answer.finished else answer.problem)
 
 
 def test_an_opening_that_is_none_is_refused_in_one_line() -> None:
@@ -179,7 +180,7 @@ def test_a_disk_that_fills_up_ends_the_run_and_what_was_written_is_salvaged(tmp_
 
 def test_a_client_that_does_not_read_costs_no_sample(tmp_path: Path) -> None:
     spec = ExperimentSpec(trajectory=Pause(duration=20), settle=0, hold=0)
-    with running(text_of(tmp_path / "traces", watched=True)) as process:
+    with running(text_of(tmp_path / "traces", live=True)) as process:
         process.run(spec)
         watched = os.pidfd_open(process.process.pid)
         try:
@@ -237,8 +238,8 @@ def test_an_owner_that_does_not_end_is_killed(tmp_path: Path, monkeypatch: pytes
     """The wait for it is given up; here at once."""
     deaf = """
 import os, signal, sys, threading
-os.write(1, b'{"kind":"opened","simulated":true,"protocol":1,"period":0.02,"boots":0}\\n')
-threading.Event().wait()
+os.write(1, b'{"kind":"opened","identity":{"simulated":true,"protocol":1,"period":0.02,"boots":0}}\\n')
+threading.Event().wait(100)
 """
     monkeypatch.setattr(client, "PROGRAM", (sys.executable, "-c", deaf))
     monkeypatch.setattr(client, "OWN_GRACE", 0.0)

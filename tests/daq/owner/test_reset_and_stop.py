@@ -89,7 +89,7 @@ def owner_at(endpoint: InProcess) -> Iterator[Scene]:
 
     with stop_listener("arm") as listener, Guardian(listener, None, freeze) as guardian:
         unheard, no_inbox = Speaker(-1), cast(Any, None)
-        opening = Open(url="wire", machine=machine, limits=machine.limits, folder=Path(), robot="arm")
+        opening = Open(url="wire", machine=machine, limits=machine.limits, folder=Path(), robot="arm", watched=True)
         robot = OwnedRobot(opening, controller, control, guardian, no_inbox, unheard)
         yield Scene(endpoint, guardian, control, robot)
 

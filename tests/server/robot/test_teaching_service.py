@@ -71,7 +71,9 @@ def test_a_command_that_was_held_up_begins_nothing(robot: Asked, teaching: Teach
 def test_a_step_is_asked_for_as_one(robot: Asked, teaching: TeachingService) -> None:
     program = Program(name="step", machine="ma2000", instructions=(Relative(angles={1: 0.1}),))
     teaching.perform(Word(robot.clock.monotonic()), program, "step")
-    assert robot.orders == [RunProgram(number=0, asked=robot.clock.monotonic(), program=program, activity="step")]
+    assert robot.orders == [
+        RunProgram(number=0, asked=robot.clock.monotonic(), program=program.model_dump(mode="json"), activity="step")
+    ]
 
 
 def test_nothing_begins_once_the_control_has_lapsed_while_a_jog_came_to_its_end(

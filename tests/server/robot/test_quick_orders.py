@@ -102,7 +102,12 @@ def _robot(moved: list[bool], ended: str | None = None, halted: str | None = Non
     control = SimpleNamespace(halted=halted)
     guardian = SimpleNamespace(outdated=lambda _asked: False)
     return SimpleNamespace(
-        activity="none", controller=_gripper_of(moved), control=control, guardian=guardian, end_cause=lambda: ended
+        opening=SimpleNamespace(watched=True),
+        activity="none",
+        controller=_gripper_of(moved),
+        control=control,
+        guardian=guardian,
+        end_cause=lambda: ended,
     )
 
 
