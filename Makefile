@@ -26,7 +26,7 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 # Even with -j: `page` and the background part of `lint` both install the page's packages into one folder.
 .NOTPARALLEL:
-.PHONY: help serve demo docs page test test-thorough test-all checks compiled page-tests lint format types requirements bench golden firmware clean distclean
+.PHONY: help serve demo docs page test test-thorough test-all checks compiled page-tests lint format types requirements bench golden net firmware clean distclean
 
 help: ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -88,6 +88,19 @@ bench: $(FOR_DEVELOPMENT) ## measure the figures about recording of docs/benchma
 
 golden: $(FOR_DEVELOPMENT) ## compare answers of every command with those recorded before, to the digit (20 minutes)
 	@$(BIN)/python -m benchmarks.golden
+
+# What a large change must not tear: less than 10 minutes on two cores.
+NET_GOLDEN = api trace help small design/3 fit/rig diagnose/rig-bench diagnose/rig-single fit/0 validate/0 compare/0 \
+	diagnose/single-coulomb_friction-1 diagnose/pair-0 diagnose/secret-110 diagnose/open-tight_spot
+NET_TESTS = tests/protocol tests/contract tests/daq_cli/test_run.py tests/server/command_line \
+	tests/server/dashboard/test_from_form_to_trace.py
+
+net: $(FOR_DEVELOPMENT) page ## golden answers, vectors, contracts, a ramp in real time, the service, test rigs (10 minutes)
+	@code=0; \
+	echo "== golden answers"; $(BIN)/python -m benchmarks.golden $(NET_GOLDEN) || code=1; \
+	echo "== vectors, contracts, a ramp, the service"; $(PYTEST) -m "not slow" $(NET_TESTS) || code=1; \
+	echo "== test rigs"; $(BIN)/python -m trials.net || code=1; \
+	exit $$code
 
 firmware: $(if $(MAP),$(FOR_USE)) ## build the bridge's programs for boards, from Debian's packages; MAP=FILE.toml: the Mega's, for that memory map
 	@$(MAKE) --no-print-directory -C firmware_protocol/bridge BUILD=$(CURDIR)/build/firmware \

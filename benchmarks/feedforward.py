@@ -40,10 +40,10 @@ from daq.contracts.machine import load_machine
 from daq.contracts.trace import Floats, Trace
 from daq.safety.planned import motion_of, planned
 from daq.trajectories.presets import preset
+from extras.motion.inverse import feedforward
+from extras.motion.learning import learn
+from extras.motion.tracking import followed
 from model.discrepancy.workflow import diagnose
-from model.feedforward.inverse import feedforward
-from model.feedforward.learning import learn
-from model.feedforward.tracking import followed
 from model.fitting.fit import fit
 from model.machine_model.model import Model, base_model
 
@@ -123,11 +123,11 @@ def study(seed: int, times: float) -> dict[str, Any]:
         plain = run([spec])[0]
         computed = {label: _computed(model, spec) for label, model in models.items()}
         traces = {"plain": plain, **dict(zip(computed, run(list(computed.values())), strict=True))}
-        corrected = learn(traces["diagnosed"], spec, MACHINE, _plan, answer.model_after)
+        corrected = learn(traces["diagnosed"], MACHINE, _plan, answer.model_after)
         traces["diagnosed, learned once"] = run([corrected])[0]
         last = plain
         for attempt in range(1, LEARNED + 1):
-            last = traces[f"learned {attempt}"] = run([_learned(last, spec)])[0]
+            last = traces[f"learned {attempt}"] = run([_learned(last)])[0]
         runs[name] = {label: _judged(trace) for label, trace in traces.items()}
     named = [f"{step.effect} on {list(step.joints)}" for step in answer.steps if step.adopted]
     return {"seed": seed, "hidden": effects, "verdict": answer.verdict, "named": named, "runs": runs}
@@ -141,10 +141,10 @@ def _computed(model: Model, spec: ExperimentSpec) -> ExperimentSpec:
     return feedforward(model, spec, MACHINE, _plan)
 
 
-def _learned(trace: Trace, asked: ExperimentSpec) -> ExperimentSpec:
+def _learned(trace: Trace) -> ExperimentSpec:
     """The next attempt; where learning is said to diverge, the set points of this one once more."""
     try:
-        return learn(trace, asked, MACHINE, _plan)
+        return learn(trace, MACHINE, _plan)
     except TraceError as error:
         print(f"  {error}", file=sys.stderr)
         assert trace.record.spec is not None

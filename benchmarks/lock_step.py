@@ -26,7 +26,9 @@ from daq.contracts.machine import load_machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TraceEvent
 from daq.driver import Controller
-from daq.runner import ArmControl, Consent, RunSetup, StopRequests, run_experiment
+from daq.runner.arm_control import ArmControl
+from daq.runner.experiment import RunSetup, StopRequests, run_experiment
+from daq.runner.preparation import Consent
 from mock_controller.device import build_device
 from mock_controller.options import Options
 

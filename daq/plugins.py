@@ -86,12 +86,19 @@ class Plugin:
     """Functions of the `Settings`, as "module:function", that `daq config check` calls: each raises SpecError for what
     cannot be used."""
     migrations: Mapping[str, str] = field(default_factory=dict)
-    """Packages of Alembic's migrations, by a name that no other plug-in uses. They make tables of the service's
-    database, each named so that it begins with this name."""
+    """Packages of migrations (`server/store/schema.py`), by a name that no other plug-in uses. They make tables of the
+    service's database, each named so that it begins with this name."""
+    databases: Mapping[str, str] = field(default_factory=dict)
+    """Kinds of databases beside SQLite, by SQLAlchemy's name: `server.store.databases.Database`, as "module:object"."""
+    noted: tuple[str, ...] = ()
+    """Functions of a session of the database and an `AuditNote`, as "module:function". They are called for each command
+    beside the service that changes who may use it, within the command's transaction."""
     parts: tuple[str, ...] = ()
     """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
+    routes_at_root: tuple[str, ...] = ()
+    """Routers whose addresses begin at the root, as "module:router"."""
     routes: tuple[str, ...] = ()
-    """Routers of FastAPI below /api/v1, as "module:router"."""
+    """Routers below /api/v1, as "module:router": of `server.routes`, or FastAPI's."""
 
 
 @cache

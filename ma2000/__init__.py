@@ -55,17 +55,12 @@ if TYPE_CHECKING:
     from ma2000.running import run as run
     from ma2000.studies import design as design
     from ma2000.studies import diagnose as diagnose
-    from ma2000.studies import feedforward as feedforward
-    from ma2000.studies import followed as followed
-    from ma2000.studies import learn as learn
     from ma2000.studies import validate as validate
-    from ma2000.thesis import reproduce_thesis as reproduce_thesis
     from model.base_parameters.result import BaseParameters as BaseParameters
     from model.design.search import DesignedExperiments as DesignedExperiments
     from model.design.search import DesignOptions as DesignOptions
     from model.discrepancy.diagnosis import Diagnosis as Diagnosis
     from model.discrepancy.options import DiagnosisOptions as DiagnosisOptions
-    from model.feedforward.tracking import Followed as Followed
     from model.fitting.options import FitOptions as FitOptions
     from model.fitting.profile import Profile as Profile
     from model.fitting.result import FitResult as FitResult
@@ -76,7 +71,6 @@ if TYPE_CHECKING:
     from model.machine_model.model_file import save_model as save_model
     from model.simulation.simulate import Simulation as Simulation
     from model.simulation.simulate import simulate as simulate
-    from model.thesis.reproduction import Reproduction as Reproduction
     from model.validation.criterion import Fidelity as Fidelity
 
 _HOME = {
@@ -95,13 +89,11 @@ _HOME = {
     "FitOptions": "model.fitting.options",
     "FitRequest": "daq.contracts.service.jobs",
     "FitResult": "model.fitting.result",
-    "Followed": "model.feedforward.tracking",
     "LocalService": "ma2000.local_service",
     "Machine": "daq.contracts.machine",
     "Model": "model.machine_model.model",
     "PRESETS": "daq.trajectories.presets",
     "Profile": "model.fitting.profile",
-    "Reproduction": "model.thesis.reproduction",
     "Run": "ma2000.running",
     "RunError": "ma2000.running",
     "ServiceError": "daq.client",
@@ -116,11 +108,8 @@ _HOME = {
     "connect": "ma2000.arm",
     "design": "ma2000.studies",
     "diagnose": "ma2000.studies",
-    "feedforward": "ma2000.studies",
     "fit": "ma2000.fitting",
     "fit_torques": "ma2000.fitting",
-    "followed": "ma2000.studies",
-    "learn": "ma2000.studies",
     "list_traces": "ma2000.files",
     "load_machine": "daq.contracts.machine",
     "load_model": "model.machine_model.model_file",
@@ -128,7 +117,6 @@ _HOME = {
     "profile": "ma2000.fitting",
     "read_trace": "ma2000.files",
     "read_traces": "ma2000.files",
-    "reproduce_thesis": "ma2000.thesis",
     "run": "ma2000.running",
     "save_machine": "ma2000.machine_file",
     "save_model": "model.machine_model.model_file",
@@ -146,19 +134,14 @@ _WITH_MODELS = {
     "DesignOptions",
     "DesignedExperiments",
     "Profile",
-    "Reproduction",
     "Simulation",
     "TorqueFit",
     "base_parameters",
     "design",
     "diagnose",
-    "feedforward",
     "fit",
     "fit_torques",
-    "followed",
-    "learn",
     "profile",
-    "reproduce_thesis",
     "simulate",
     "validate",
 }

@@ -1,4 +1,4 @@
-"""Design, validation, diagnosis and feedforward with the defaults of the commands of the same names.
+"""Design, validation and diagnosis with the defaults of the commands of the same names.
 
 `progress` of each says whether a bar shows how far it is: docs/python.md.
 """
@@ -7,21 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from daq.contracts.errors import TraceError
-from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.machine import Machine, load_machine
 from daq.contracts.progress import Cancel
 from daq.contracts.trace import Trace
-from daq.safety.planned import motion_of, planned
-from daq.trajectories.presets import preset
+from daq.safety.planned import planned
 from ma2000.progress import Shown, told
 from model.design import search
 from model.design.search import DesignedExperiments, DesignOptions
 from model.discrepancy import workflow
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.options import DiagnosisOptions
-from model.feedforward import inverse, learning, tracking
-from model.feedforward.tracking import Followed
 from model.fitting.options import FitOptions
 from model.machine_model.model import Model
 from model.simulation.prepared import Options
@@ -91,58 +85,3 @@ def design(
     """
     with told(progress, "designing") as tell:
         return search.design(model, lambda spec: planned(spec, model.machine), options, fit_options, tell, cancel)
-
-
-def feedforward(
-    model: Model,
-    experiment: ExperimentSpec | str = "ramp",
-    machine: Machine | None = None,
-    *,
-    progress: Shown = True,
-) -> ExperimentSpec:
-    """The experiment whose set points make the arm follow the motion of `experiment`, as the model knows the arm.
-
-    Args:
-        experiment: or the name of a preset.
-        machine: the machine that carries it out; None for the MA2000. Its limits hold.
-
-    `result.feedforward.expected` has the tracking error that the model expects of each joint. Raises SpecError,
-    SafetyError.
-    """
-    machine = machine or load_machine("ma2000")
-    with told(progress, "computing set points") as tell:
-        return inverse.feedforward(model, _spec(experiment), machine, lambda spec: planned(spec, machine), tell)
-
-
-def learn(
-    trace: Trace,
-    model: Model | None = None,
-    machine: Machine | None = None,
-    *,
-    share: float = 1.0,
-) -> ExperimentSpec:
-    """The experiment that corrects the set points of a recorded one by its tracking error: iterative learning.
-
-    Args:
-        model: says how the arm answers set points; None: that is estimated from the trace.
-        machine: the machine that carries it out; None for the one that the trace is of.
-        share: of the correction that is made, above 0 and up to 1.
-
-    Raises TraceError for a trace that nothing can be learned from; SpecError, SafetyError.
-    """
-    own = trace.record.machine if machine is None else machine
-    spec = trace.record.spec
-    if spec is None or own is None:
-        raise TraceError(f"trace {trace.record.trace_id}: does not say which experiment it is of")
-    return learning.learn(trace, spec.plain, own, lambda one: planned(one, own), model, share)
-
-
-def followed(trace: Trace) -> Followed | None:
-    """The motion that a trace's experiment asked for beside the arm's, with the tracking error of each joint; None for
-    a trace that does not say which experiment it is of. Raises SpecError, TraceError."""
-    machine = trace.record.machine
-    return None if machine is None else tracking.followed(trace, lambda spec: motion_of(spec, machine))
-
-
-def _spec(experiment: ExperimentSpec | str) -> ExperimentSpec:
-    return preset(experiment).spec if isinstance(experiment, str) else experiment

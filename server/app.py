@@ -7,9 +7,8 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.metadata import version
 
-from fastapi import APIRouter, FastAPI
+from fastapi import FastAPI
 from fastapi.concurrency import run_in_threadpool
-from fastapi.routing import APIRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from daq.config.documents import site_index
@@ -17,14 +16,12 @@ from daq.plugins import named, plugins
 from server import problems
 from server.access.gate import Gate
 from server.api import (
-    audit,
     controller,
     description,
     experiments,
     fleet,
     jobs,
     live,
-    login,
     presets,
     programs,
     queue,
@@ -33,8 +30,8 @@ from server.api import (
     teaching,
     traces,
 )
-from server.api.state_metrics import StateMetrics
-from server.page import page_router
+from server.page import Page
+from server.routes import include
 from server.services import Services
 from server.site import serve_site
 
@@ -48,7 +45,6 @@ Angles are in rad, times in s, joints are numbered from 1. Errors are applicatio
 def make_app(services: Services, gate: Gate) -> FastAPI:
     """Makes the application, behind its gate, for services that are not yet started."""
     app = bare_app(services)
-    services.metrics.registry.register(StateMetrics(services))
     app.add_middleware(gate.middleware)
     app.add_middleware(HeadAsGet)
     return app
@@ -92,11 +88,9 @@ def bare_app(services: Services | None) -> FastAPI:
         openapi_url=None,
         docs_url=None,
         redoc_url=None,
-        generate_unique_id_function=_name,
         redirect_slashes=False,
     )
     problems.install(app)
-    api = APIRouter(prefix=API)
     for part in (
         robots,
         fleet,
@@ -108,25 +102,19 @@ def bare_app(services: Services | None) -> FastAPI:
         queue,
         traces,
         jobs,
-        audit,
         live,
-        login,
         system,
     ):
-        api.include_router(part.router)
+        include(app, part.router, API)
     for plugin in plugins():
         for reference in plugin.routes:
-            api.include_router(named(reference))
-    app.include_router(api)
-    app.include_router(system.plain)
-    app.include_router(page_router())
+            include(app, named(reference), API)
+        for reference in plugin.routes_at_root:
+            include(app, named(reference))
+    include(app, system.plain)
+    app.routes.append(Page())
     serve_site(app, site_index())
     description.install(app)
     kept = None if services is None else services.folder / description.KEPT
     described = description.serve(app, f"{API}/openapi.json", kept)
     return app
-
-
-def _name(route: APIRoute) -> str:
-    """Names an operation like its function, since clients are generated from these names."""
-    return route.name

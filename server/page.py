@@ -1,13 +1,18 @@
-"""Serves the files of the dashboard's built page. They are read once; the build has made their compressed forms."""
+"""Serves the files of the dashboard's built page. The first request reads all of them; the build has made their
+compressed forms."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 
-from fastapi import APIRouter, Request, Response
-from fastapi.responses import PlainTextResponse, RedirectResponse
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.routing import BaseRoute, Match
+from starlette.types import Receive, Scope, Send
 
 FOLDER = Path(__file__).parent / "dashboard" / "dist"
 INDEX = "index.html"
@@ -70,33 +75,38 @@ def is_built(folder: Path = FOLDER) -> bool:
     return (folder / INDEX).is_file()
 
 
-def page_router(folder: Path = FOLDER) -> APIRouter:
-    """Returns the routes of all files of the page. `/` is its index, and `/api/docs` leads to the reference of the
-    API; if the page is not built, both say how to build it."""
-    router = APIRouter(include_in_schema=False)
-    files = _files(folder) if is_built(folder) else {}
+class Page(BaseRoute):
+    """The routes of all files of the page. `/` is its index, and `/api/docs` leads to the reference of the API; if the
+    page is not built, both say how to build it."""
 
-    @router.get("/")
-    async def index(request: Request) -> Response:
-        if INDEX not in files:
+    def __init__(self, folder: Path = FOLDER) -> None:
+        self._folder = folder
+
+    @cached_property
+    def _found(self) -> dict[str, PageFile]:
+        return _files(self._folder) if is_built(self._folder) else {}
+
+    def matches(self, scope: Scope) -> tuple[Match, Scope]:
+        """Whether this is a request of the page."""
+        if scope["type"] != "http" or (
+            scope["path"] not in ("/", "/api/docs") and scope["path"][1:] not in self._found
+        ):
+            return Match.NONE, {}
+        return Match.FULL if scope["method"] == "GET" else Match.PARTIAL, {}
+
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answers with a file. Raises a 405."""
+        if scope["method"] != "GET":
+            raise HTTPException(405, headers={"Allow": "GET"})
+        await self._answer(scope["path"], Request(scope))(scope, receive, send)
+
+    def _answer(self, path: str, request: Request) -> Response:
+        wanted = {"/": INDEX, "/api/docs": REFERENCE}.get(path, path[1:])
+        if wanted not in self._found:
             return PlainTextResponse(NOT_BUILT + "\n", 503)
-        return files[INDEX].response(request)
-
-    @router.get("/api/docs")
-    async def reference() -> Response:
-        if REFERENCE not in files:
-            return PlainTextResponse(NOT_BUILT + "\n", 503)
-        return RedirectResponse(f"../{REFERENCE}")  # beside its files, which it names by relative addresses
-
-    def add(name: str, file: PageFile) -> None:
-        async def get(request: Request) -> Response:
-            return file.response(request)
-
-        router.add_api_route(f"/{name}", get, methods=["GET"], name=name)
-
-    for name, file in files.items():
-        add(name, file)
-    return router
+        if path == "/api/docs":
+            return RedirectResponse(f"../{REFERENCE}")  # beside its files, which it names by relative addresses
+        return self._found[wanted].response(request)
 
 
 def _files(folder: Path) -> dict[str, PageFile]:

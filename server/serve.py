@@ -22,7 +22,6 @@ from server.access.origin import is_loopback
 from server.access.session_cookie import session_cookie
 from server.access.tokens import KnownTokens
 from server.app import make_app
-from server.audit.words import line_of
 from server.descriptors import most_connections
 from server.ending import EndInTime
 from server.listening import listening
@@ -102,7 +101,8 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
     """Makes the gate. Raises SpecError if tokens are needed and there is none."""
     loopback = is_loopback(section.host)
     local = _is_open_here(section)
-    if not local and section.oidc.issuer is None and all(token.revoked is not None for token in services.tokens.all()):
+    let_in = any(part.lets_people_in for part in services.parts)
+    if not local and not let_in and all(token.revoked is not None for token in services.tokens.all()):
         why, instead = 'server.tokens is "always"', 'say "remote"'
         if not loopback:
             why = f"server.host {section.host}: people at other computers could reach the robot"
@@ -111,17 +111,16 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
         raise SpecError(f"{why}, and there is no token: {make}, or {instead}")
     known = KnownTokens(services.tokens, services.clock)
     names = tuple(name.lower() for name in section.names)
-    metrics = services.metrics
     return Gate(
         known,
         services.tickets,
         local,
         names,
         stop_port,
-        metrics.count_request,
-        metrics.count_refusal,
-        cookie=session_cookie(section.oidc.address),
-        audit=services.audit,
+        lambda *answered: services.tell(lambda part: part.request_answered(*answered)),
+        lambda kind: services.tell(lambda part: part.refused(kind)),
+        cookie=session_cookie(section.address),
+        parts=services.parts,
     )
 
 
@@ -139,7 +138,7 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
         service_port=listener.getsockname()[1],
         open_on_loopback=_is_open_here(section),
         names=tuple(name.lower() for name in section.names),
-        cookie=session_cookie(section.oidc.address),
+        cookie=session_cookie(section.address),
         urls={own.robot.name: own.port for own in settings.each_robot()},
         database_url=database.render_as_string(hide_password=False),
         sqlite=sqlite_file(database),
@@ -147,19 +146,18 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
 
 
 def _note_of_stop(news: Stopped) -> AuditNote:
-    """Returns the audit log's note of a stop at the listener. It is done, whatever the arm has answered: `detail` says
-    that."""
+    """Returns what plug-ins are told of a stop at the listener. It is done; `detail` says what the arm answered."""
     return AuditNote(
         at=news.at,
         actor=news.actor,
         role=news.role,
         origin=news.origin,
         action="stop_fleet" if news.address.endswith("/fleet/stop") else "stop_robot",
-        request=line_of(f"POST {news.address} at the stop listener"),
+        request=f"POST {news.address} at the stop listener",
         robot=news.robot,
         outcome="done",
         status=200,
-        detail=line_of(news.text),
+        detail=news.text,
     )
 
 
@@ -169,8 +167,9 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
     def stopped(news: Stopped) -> None:
         services.robot(news.robot).queue.stop_asked(news.actor)
         with suppress(RuntimeError):  # the service is ending, and records no more events
-            services.record_event_later(news.robot, "stop", news.text, actor=news.actor)
-        services.audit.writer.note(_note_of_stop(news))
+            services.event_log.record_later(news.robot, "stop", news.text, actor=news.actor)
+        note = _note_of_stop(news)
+        services.tell(lambda part: part.acted(note))
 
     services.stop_port = listener.getsockname()[1]
     door.stopped = stopped

@@ -11,8 +11,8 @@ loop would wait that long for every thread that reads the database or checks a m
 
 
 def keep_steady() -> None:
-    """Freezes loaded objects out of garbage collection, where a full collection would pause everything for 0.1 s; and
-    switches threads more often. Call this when everything is loaded."""
+    """Freezes loaded objects out of garbage collection, where a full collection would pause everything for 0.1 s, and
+    lets collections begin; and switches threads more often. Call this when everything is loaded."""
     sys.setswitchinterval(SWITCH_EVERY)
-    gc.collect()
     gc.freeze()
+    gc.enable()

@@ -31,7 +31,7 @@ DOORS = (
     "server/dashboard/test_stop.py",
 )
 """Files that `make test` runs all the same: one path through every door."""
-ONE_WORKER = ("server/dashboard", "server/jobs", "server", "extras/lab", "deploy", "model/thesis")
+ONE_WORKER = ("server/dashboard", "server/jobs", "server", "extras/lab", "deploy", "extras/thesis")
 """Folders whose tests share a service, a browser or a reproduction of the thesis, each costly to make: one worker runs
 the whole folder."""
 

@@ -2,7 +2,7 @@
 
 python -m benchmarks.golden                compare; exit code 1 where anything differs
 python -m benchmarks.golden --record       record (of the sources as they are)
-python -m benchmarks.golden NAME…          only questions whose name begins so
+python -m benchmarks.golden NAME…          only questions whose name begins so, api, help and trace among them
 """
 
 from __future__ import annotations
@@ -52,7 +52,8 @@ def main() -> int:
         for group in (lambda n: not n.startswith("compare/"), lambda n: n.startswith("compare/")):
             wanted = [(q.name, partial(_asked, q.words)) for q in asked if group(q.name)]
             if group("help"):
-                wanted += [("api", _api), ("help", _help), ("trace", _trace)] if not given.names else []
+                others = (("api", _api), ("help", _help), ("trace", _trace))
+                wanted += [(name, answer) for name, answer in others if _is_wanted(name, given.names)]
             for name, answer in zip([n for n, _ in wanted], pool.map(_guarded, [w for _, w in wanted]), strict=True):
                 found[name] = answer
                 print(_told(name, kept, answer, given.record), flush=True)

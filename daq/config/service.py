@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import ipaddress
 from pathlib import Path
 from typing import Annotated, Literal
+from urllib.parse import urlsplit
 
 from pydantic import BeforeValidator, Field, field_validator
 
-from daq.config.oidc import OidcSettings
 from daq.contracts.frozen import FrozenRecord
 
 DEFAULT_PORT = 8300
@@ -22,6 +23,29 @@ def _true_or_false(given: object) -> object:
 
 TrueOrFalse = Annotated[bool, BeforeValidator(_true_or_false)]
 """Consent that may move an arm: `true`, and no other value that is merely truthy."""
+
+
+def protected(address: str | None) -> str | None:
+    """Raises ValueError for an address that is none, or over which a code could be read on the way."""
+    if address is None:
+        return None
+    try:
+        parts = urlsplit(address)
+        _ = parts.port
+    except ValueError:
+        raise ValueError("is no address; write https://host") from None
+    if not parts.hostname or parts.username is not None or parts.query or parts.fragment:
+        raise ValueError("is no address; write https://host")
+    if parts.scheme != "https" and not (parts.scheme == "http" and _is_loopback(parts.hostname)):
+        raise ValueError("must begin with https://, unless it is on this computer")
+    return address
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 class ServiceSettings(FrozenRecord):
@@ -56,7 +80,13 @@ class ServiceSettings(FrozenRecord):
     """Time limit (s) of that process."""
     names: tuple[Annotated[str, Field(max_length=253)], ...] = ()
     """Names by which browsers reach this service, beside its address: others are refused."""
-    oidc: OidcSettings = OidcSettings()
+    address: Annotated[str, Field(max_length=500)] | None = None
+    """Address at which browsers reach this service, where people sign in."""
+
+    @field_validator("address")
+    @classmethod
+    def _is_protected(cls, address: str | None) -> str | None:
+        return protected(address)
 
     @field_validator("folder")
     @classmethod

@@ -20,7 +20,6 @@ from pydantic_settings import (
 )
 
 from daq.config.limits import merged_limits
-from daq.config.oidc import OidcSettings
 from daq.config.section import Section
 from daq.config.service import ServiceSettings, TrueOrFalse
 from daq.contracts.documents import parse_toml, read_text, shown
@@ -295,8 +294,6 @@ def _require_apart(settings: Settings, what: str) -> None:
 def _is_secret(where: tuple[int | str, ...]) -> bool:
     """Whether a wrong value may be a secret, or an address with one in it: who writes a key of the archive into the
     wrong place shall not find it in a log."""
-    if where[:2] == ("server", "oidc"):
-        return where[-1] not in OidcSettings.model_fields
     field = settings_type().model_fields.get(str(where[0])) if where else None
     kind = None if field is None else field.annotation
     return isinstance(kind, type) and issubclass(kind, Section) and where[-1] not in kind.SHOWN

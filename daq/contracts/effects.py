@@ -1,4 +1,4 @@
-"""The shared names of physical effects."""
+"""The shared names of physical effects, and their words."""
 
 from __future__ import annotations
 
@@ -19,18 +19,31 @@ FORMER_EFFECTS = {
 
 @dataclass(frozen=True)
 class EffectName:
-    """One effect: its usual name, where it acts, the family in which effects are easily confused, and one line."""
+    """One effect in words.
+
+    name: its usual one. acts_on: where it acts. family: of effects that are easily confused. line: one line on it.
+    called: its name in a sentence. size: the parameter that is its size, if one is. in_torques: how a balance of
+    torques shows it, with {torque}, {angle} and {turn}. shows: patterns of a residual that show it, the plainest first.
+    """
 
     name: str
     acts_on: str
     family: str
     line: str
+    called: str = ""
+    size: str | None = None
+    in_torques: str = ""
+    shows: tuple[str, ...] = ()
 
 
 @cache
 def effect_names() -> dict[str, EffectName]:
     """Every shared effect by name, in the order of `effects.toml`."""
-    text = resources.files("daq.contracts").joinpath("effects.toml").read_text("utf-8")
+    return entries_of(resources.files("daq.contracts").joinpath("effects.toml").read_text("utf-8"))
+
+
+def entries_of(text: str) -> dict[str, EffectName]:
+    """Entries by name, from TOML in the form of `effects.toml`."""
     return {name: EffectName(name=name, **entry) for name, entry in tomllib.loads(text).items()}
 
 

@@ -30,7 +30,6 @@ EXTRA_OF: dict[str, Extra] = {
     "serial": "robot",
     "typer": "robot",
     "numba": "model",
-    "alembic": "server",
     "cronsim": "server",
     "fastapi": "server",
     "httptools": "server",

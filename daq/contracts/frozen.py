@@ -10,11 +10,14 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from daq.contracts.errors import SpecError
 from firmware_protocol.invalid import first_invalid
 
+WHEN_USED = ConfigDict(defer_build=True)
+"""For a `TypeAdapter`: pydantic builds what checks it when that is used first, as it does for `FrozenRecord`s."""
+
 
 class FrozenRecord(BaseModel):
     """Named values that do not change once made. Unknown ones are refused, never ignored."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
     shown: ClassVar[tuple[str, ...]] = ()
     """Fields and properties that `repr` shows, for records that would fill a page; empty for all fields."""
 

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Self
 
 from daq.owner.stop_socket import StopAnswer
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 
 ANSWER_WITHIN = 0.7
 """s after which a stop that the board has not confirmed is answered as just that; it goes on being repeated."""

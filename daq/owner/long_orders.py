@@ -25,10 +25,15 @@ from daq.owner.messages import (
 )
 from daq.owner.owned_robot import OwnedRobot
 from daq.owner.quick_orders import carry_out
-from daq.runner import Consent, RunResult, RunSetup, StoppedError, StopRequests, require_not_stopped, run_experiment
-from daq.teaching import JogCommand, Program, RecordedPath, check_program, jog, lead_by_nose, plan_program, run_program
-from daq.teaching.jog import top_speed
+from daq.runner.arm_control import StoppedError
+from daq.runner.experiment import RunResult, RunSetup, StopRequests, run_experiment
+from daq.runner.preparation import Consent, require_not_stopped
+from daq.teaching.jog import JogCommand, jog, top_speed
+from daq.teaching.lead import lead_by_nose
 from daq.teaching.performer import FollowingPerformer
+from daq.teaching.program import Program
+from daq.teaching.program_plan import check_program, plan_program, run_program
+from daq.teaching.recording import RecordedPath
 from firmware_protocol.errors import ProtocolError
 
 

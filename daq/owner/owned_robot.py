@@ -17,7 +17,7 @@ from daq.owner.inbox import Inbox
 from daq.owner.messages import ArmReport, Open, TeachingText
 from daq.owner.speaker import Speaker
 from daq.owner.watched_controller import SampleMaker, WatchedController
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 from daq.safety import State
 from daq.teaching.controller_arm import ControllerArm
 

@@ -17,7 +17,7 @@ from daq.owner.owned_robot import OwnedRobot
 from daq.owner.session import port_session
 from daq.owner.speaker import Speaker
 from daq.owner.watched_controller import WatchedController
-from daq.runner import require_fitting
+from daq.runner.preparation import require_fitting
 from daq.transport import PortBusyError
 from firmware_protocol.commands import Capability
 from firmware_protocol.errors import ProtocolError

@@ -21,7 +21,8 @@ from daq.owner.messages import (
     WriteOutput,
 )
 from daq.owner.owned_robot import OwnedRobot
-from daq.runner import StoppedError, require_fitting
+from daq.runner.arm_control import StoppedError
+from daq.runner.preparation import require_fitting
 from daq.safety import Event, State
 from firmware_protocol.commands import Refusal, StatusFlag
 
@@ -142,9 +143,11 @@ def _overtaken(name: str, cause: str | None = None) -> SafetyError:
 def _reset(robot: OwnedRobot, order: Reset) -> str:
     """Ends the stop or fault that the sender of the reset saw. Another one remains."""
     control, here = robot.control, order.here
+    stopped = control.arm.state in (State.STOPPED, State.FAULT)
+    if robot.opening.watched and not stopped and not here:
+        return "was not stopped"
     status = robot.read_status()
-    found = not robot.opening.watched and bool(status.flags & _STOPPED)
-    if control.arm.state not in (State.STOPPED, State.FAULT) and not found and not here:
+    if not stopped and not status.flags & _STOPPED and not here:
         return "was not stopped"
     if order.stop not in (None, status.stop):  # before anything changes; the board looks once more
         raise _overtaken(order.kind)

@@ -15,7 +15,7 @@ from daq.driver import Controller
 from daq.owner.freezer import Freezer
 from daq.owner.guardian import Guardian
 from daq.owner.stop_socket import stop_listener
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 from firmware_protocol.memory_map import MemoryMap
 
 C = TypeVar("C", bound=Controller)

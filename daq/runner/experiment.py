@@ -27,7 +27,7 @@ from daq.runner.recorder import ApproachObserver, Recorder, RunListener
 from daq.safety import Event
 from daq.traces.naming import new_trace_id, trace_path
 from daq.traces.writer import TraceWriter
-from daq.trajectories import Plan
+from daq.trajectories.set_points import Plan
 
 AFTERMATH = 1.0
 """Seconds recorded after a stop, a fault or the loss of the parent."""

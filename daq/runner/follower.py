@@ -16,7 +16,7 @@ from daq.runner.arm_control import ArmControl, stop_line
 from daq.runner.lag import Lag
 from daq.runner.rows import RowMaker
 from daq.safety import Event, RunningGuards, Verdict
-from daq.trajectories import Plan
+from daq.trajectories.set_points import Plan
 from firmware_protocol.commands import Capability
 
 RETRIES_LOOKED_AT_EVERY = 50

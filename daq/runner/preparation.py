@@ -16,7 +16,9 @@ from daq.driver import Controller, LineRate
 from daq.runner.rows import RowMaker
 from daq.safety import Violation, check_move_to_start, check_plan
 from daq.traces.room import require_room
-from daq.trajectories import Plan, control_period, plan, plan_move, start_angles
+from daq.trajectories.move import plan_move
+from daq.trajectories.planner import plan, start_angles
+from daq.trajectories.set_points import Plan, control_period
 from firmware_protocol.commands import StatusFlag
 from firmware_protocol.framing import FRAME_OVERHEAD
 from firmware_protocol.stamp import STAMP_BYTES

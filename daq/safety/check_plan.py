@@ -11,8 +11,8 @@ from daq.contracts.machine import Machine
 from daq.safety.joint_limits import joint_violations, rounding_slack
 from daq.safety.violation import Violation
 from daq.safety.workspace import workspace_violations
-from daq.trajectories import Plan
 from daq.trajectories.kinematics import link_ends
+from daq.trajectories.set_points import Plan
 
 
 def check_plan(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.trace import EventKind
-from daq.trajectories import control_period
+from daq.trajectories.set_points import control_period
 from firmware_protocol.units import JointCalibration
 
 

@@ -8,7 +8,7 @@ from daq.contracts.joint_text import position_text, speed_text
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.safety.violation import TOLERANCE, Violation
-from daq.trajectories import Plan
+from daq.trajectories.set_points import Plan
 
 STATIC_ERROR_MARGIN = 12
 """ADC counts kept free between a step and the following-error limit for the arm's static error: an assumption. At the

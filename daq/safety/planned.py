@@ -9,7 +9,7 @@ from daq.contracts.errors import SafetyError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine
 from daq.safety.check_plan import check_plan
-from daq.trajectories import plan, start_angles
+from daq.trajectories.planner import plan, start_angles
 
 
 def motion_of(spec: ExperimentSpec, machine: Machine) -> NDArray[np.float64]:

@@ -10,8 +10,8 @@ from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Floats
 from daq.safety.violation import TOLERANCE, Violation
-from daq.trajectories import Plan
 from daq.trajectories.kinematics import link_ends
+from daq.trajectories.set_points import Plan
 
 FINEST_LOOK = math.radians(1.0)
 """Largest distance (rad, or m) between set points that is not subdivided for the check."""

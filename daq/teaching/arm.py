@@ -10,7 +10,7 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.contracts.experiment import Gain
 from daq.contracts.sample import SampleRow
-from daq.runner import StoppedError
+from daq.runner.arm_control import StoppedError
 
 
 class TeachingError(DaqError):

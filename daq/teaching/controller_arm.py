@@ -11,13 +11,13 @@ from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkError, RequestRefusedError
-from daq.runner import ArmControl, StoppedError, require_fitting
-from daq.runner.preparation import PERIOD_TOLERANCE
+from daq.runner.arm_control import ArmControl, StoppedError
+from daq.runner.preparation import PERIOD_TOLERANCE, require_fitting
 from daq.runner.rows import RowMaker
 from daq.safety import Event
 from daq.teaching import halting
 from daq.teaching.arm import TeachingError
-from daq.trajectories import control_period
+from daq.trajectories.set_points import control_period
 
 
 def require_period(controller: Controller, machine: Machine) -> None:

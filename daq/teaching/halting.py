@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from daq.runner import ArmControl, StoppedError
-from daq.runner.arm_control import stop_line
+from daq.runner.arm_control import ArmControl, StoppedError, stop_line
 from daq.safety import Event
 from daq.teaching.arm import TeachingError
 

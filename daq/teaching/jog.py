@@ -16,7 +16,7 @@ from daq.contracts.trace import Floats
 from daq.runner.lag import Lag
 from daq.safety import RunningGuards, check_move_to_start
 from daq.teaching.arm import TeachableArm
-from daq.trajectories import control_period, make_plan
+from daq.trajectories.set_points import control_period, make_plan
 
 JOG_SPEED = 0.35
 """Highest speed of jogging in rad/s (20 °/s): an assumption. A joint's own limit may be lower."""

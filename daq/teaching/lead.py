@@ -9,12 +9,12 @@ from daq.contracts.experiment import Gain
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
-from daq.runner import StoppedError
+from daq.runner.arm_control import StoppedError
 from daq.runner.lag import oldest_to_act_on
 from daq.safety import RestGuards
 from daq.teaching.arm import TeachableArm, TeachingError
 from daq.teaching.recording import RecordedPath
-from daq.trajectories import control_period
+from daq.trajectories.set_points import control_period
 from firmware_protocol.units import counts_to_posture
 
 STILL_WITHIN = 8

@@ -10,12 +10,12 @@ from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import EventKind
 from daq.driver import Controller
-from daq.runner import ArmControl, StoppedError
+from daq.runner.arm_control import ArmControl, StoppedError
 from daq.runner.follower import Follower
 from daq.safety import Event, RunningGuards
 from daq.teaching import halting
 from daq.teaching.controller_arm import ControllerArm
-from daq.trajectories import Plan
+from daq.trajectories.set_points import Plan
 
 
 class _AlarmReporter:

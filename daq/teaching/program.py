@@ -14,7 +14,7 @@ from daq.contracts.experiment import Angle, Duration, JointNumber
 from daq.contracts.frozen import FrozenRecord
 from daq.teaching.files import write_whole
 from daq.teaching.recording import FASTEST_RATE, SLOWEST_RATE, RecordedPath
-from daq.trajectories import MOVE_SPEED
+from daq.trajectories.move import MOVE_SPEED
 from firmware_protocol.invalid import first_invalid
 
 NAME = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"

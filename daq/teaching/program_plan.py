@@ -23,7 +23,9 @@ from daq.teaching.program import (
     Wait,
 )
 from daq.teaching.recording import playback
-from daq.trajectories import Plan, control_period, plan, plan_move
+from daq.trajectories.move import plan_move
+from daq.trajectories.planner import plan
+from daq.trajectories.set_points import Plan, control_period
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import getpass
 from typing import TYPE_CHECKING
 
 from daq_cli.app.context import Invocation
@@ -18,3 +19,11 @@ def service_database(call: Invocation) -> Store:
     store = Store(address_of(call.configuration.server))
     store.migrate()
     return store
+
+
+def computers_user() -> str:
+    """Returns the name of the user who runs this program; `unknown`, if they have no name here."""
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError):
+        return "unknown"

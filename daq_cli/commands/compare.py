@@ -8,7 +8,7 @@ import typer
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import shipped_machines
-from daq_cli.app.context import JsonOption, console, print_json, print_table
+from daq_cli.app.context import JsonOption, console, print_json
 from daq_cli.models.model_input import (
     MODEL_HELP,
     EffectFileOption,
@@ -89,19 +89,22 @@ def _held_out(models: Sequence[Model], traces: Sequence[str]) -> list[str] | Non
 
 
 def _print_result(models: Sequence[ModelAgreement], differing: Sequence[ParameterDifference], *, as_json: bool) -> None:
-    from daq_cli.models.agreement_table import agreement_data, print_agreement
+    from daq_cli.models.parameter_table import print_rows
+    from model.reports.comparison_report import differences_table
+    from model.reports.motion import AGREEMENT, agreement_table
     from model.units import squared
 
     if as_json:
+        every = [one.model_dump(mode="json") for one in models]
         data = [difference.model_dump(mode="json") for difference in differing]
-        print_json({"models": agreement_data(models), "mean_squared_error": _errors(models), "differences": data})
+        print_json({"models": every, "mean_squared_error": _errors(models), "differences": data})
         return
-    print_agreement(models)
+    print_rows(agreement_table(models).only(*AGREEMENT))
     unit = squared(joint.unit for model in models for trace in model.traces for joint in trace.joints)
     for label, by_kind in _errors(models).items():
         text = ", ".join(f"{kind.replace('_', ' ')} {e:.4g} {unit}" for kind, e in by_kind.items() if e is not None)
         print(f"{label}: mean squared error summed over the joints, {text}")
-    _print_differences(differing, [model.label for model in models])
+    print_rows(differences_table(differing, [model.label for model in models]))
 
 
 def _errors(models: Sequence[ModelAgreement]) -> dict[str, dict[str, float | None]]:
@@ -109,16 +112,3 @@ def _errors(models: Sequence[ModelAgreement]) -> dict[str, dict[str, float | Non
         m.label: {"in_sample": m.mean_squared_error("in_sample"), "held_out": m.mean_squared_error("held_out")}
         for m in models
     }
-
-
-def _print_differences(differing: Sequence[ParameterDifference], labels: Sequence[str]) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, header_style="bold")
-    table.add_column("parameter")
-    for label in (*labels, "in expected deviations"):
-        table.add_column(label, justify="right")
-    for d in differing:
-        values = ("–" if v is None else f"{v:.5g} {d.unit}" for v in d.values)
-        table.add_row(d.name, *values, "–" if d.deviations is None else f"{d.deviations:.2f}")
-    print_table(table)

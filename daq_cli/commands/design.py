@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.contracts.errors import SpecError
-from daq_cli.app.context import JsonOption, console, print_json, print_table
+from daq_cli.app.context import JsonOption, console, print_json
 from daq_cli.models.effect_choice import patterns
 from daq_cli.models.model_input import MODEL_HELP, EffectFileOption, ReportOption, load_effects, read_model
 
@@ -147,12 +147,8 @@ def _written(specs: tuple[ExperimentSpec, ...], folder: Path) -> list[Path]:
 
 
 def _print_gain(gain: InformationGain) -> None:
-    from rich.table import Table
+    from daq_cli.models.parameter_table import print_rows
+    from model.reports.design_report import gain_table
 
-    table = Table(box=None, header_style="bold")
-    for name in ("parameter", "95 % width before", "after", "unit", "left"):
-        table.add_column(name, justify="left" if name in ("parameter", "unit") else "right")
-    for p in gain.parameters:
-        table.add_row(p.name, f"{p.before:.3g}", f"{p.after:.3g}", p.unit, f"{100 * p.share:.0f} %")
-    print_table(table)
+    print_rows(gain_table(gain))
     print(f"together: {gain.nats:.1f} more nats of information")

@@ -27,7 +27,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.models.parameter_table import print_on_the_edge, print_parameters, print_undetermined
+from daq_cli.models.parameter_table import print_on_the_edge, print_parameters, print_rows, print_undetermined
 from daq_cli.models.record_doubts import DespiteDoubtsOption, end_if_doubted, print_record, stop_if_doubted
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import robot_of
@@ -236,7 +236,6 @@ def _print_result(
 
 
 def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, base: BaseParameters | None) -> None:
-    from daq_cli.models.agreement_table import agreement_data
 
     print_json(
         {
@@ -246,7 +245,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
             "undetermined": [c.model_dump(mode="json") for c in found.identifiability.undetermined],
             "verdict": None if found.verdict is None else found.verdict.model_dump(mode="json"),
             "base_parameters": None if base is None else base.model_dump(mode="json"),
-            "agreement": agreement_data(agreement),
+            "agreement": [one.model_dump(mode="json") for one in agreement],
             "whitened_mean_square": found.whitened_mean_square,
             "converged": found.converged,
             "on_the_edge": list(found.on_the_edge),
@@ -258,7 +257,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
 
 
 def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BaseParameters | None) -> None:
-    from daq_cli.models.agreement_table import print_agreement
+    from model.reports.motion import AGREEMENT, agreement_table
 
     print_record(found.record)
     print_parameters(found.parameters)
@@ -271,7 +270,7 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BasePara
 
         print_prose(headline(base))
     print()
-    print_agreement(agreement)
+    print_rows(agreement_table(agreement).only(*AGREEMENT))
     if not found.converged:
         print(f"the search did not converge: {found.message}")
     print_on_the_edge(found.on_the_edge)

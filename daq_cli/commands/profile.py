@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.contracts.errors import SpecError
-from daq_cli.app.context import JsonOption, console, print_json, print_table
+from daq_cli.app.context import JsonOption, console, print_json
 from daq_cli.app.output_file import check_folder, replacing
 from daq_cli.models.effect_choice import bounds, patterns, with_effects
 from daq_cli.models.model_input import (
@@ -151,17 +151,10 @@ def _fitted(
 
 
 def _print(found: Sequence[Profile]) -> None:
-    from rich.table import Table
+    from daq_cli.models.parameter_table import print_rows
+    from model.reports.profile_report import better_fit, bounds_table
 
-    from model.reports.profile_report import better_fit
-
-    table = Table(box=None, header_style="bold")
-    for name in ("parameter", "best", "at least", "at most", "unit"):
-        table.add_column(name, justify="left" if name in ("parameter", "unit") else "right")
-    for one in found:
-        ends = ("–" if end is None else f"{end:.4g}" for end in (one.low, one.high))
-        table.add_row(one.name, f"{one.value:.5g}", *ends, one.unit)
-    print_table(table)
+    print_rows(bounds_table(found))
     if any(None in (one.low, one.high) for one in found):
         print("– these traces do not bound it on this side, as far as the profile reaches")
     if better := [one.name for one in found if one.better]:

@@ -19,9 +19,8 @@ from daq.contracts.experiment import ExperimentSpec, parse_joints, parse_spec
 from daq_cli.app import completion
 from daq_cli.app.context import JsonOption, YesOption, invocation, print_json
 from daq_cli.app.quantities import parse_angle, parse_gains, parse_per_joint_angles, require_units
-from daq_cli.models.model_input import MODEL_HELP
 from daq_cli.robot.access import robot_of
-from daq_cli.robot.experiment import Computation, RunOptions, carry_out, cron_of
+from daq_cli.robot.experiment import RunOptions, carry_out, cron_of
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
@@ -80,25 +79,6 @@ NameOption = Annotated[str | None, typer.Option(help="A name for the experiment.
 OperatorOption = Annotated[str | None, typer.Option(help="Who runs it.")]
 NotesOption = Annotated[str, typer.Option(help="Remarks that are kept with the trace.")]
 FolderOption = Annotated[Path | None, typer.Option(help="Folder for the trace (default: the configured one).")]
-FeedforwardOption = Annotated[
-    str | None,
-    typer.Option(
-        "--feedforward",
-        help=f"Compute set points with which the arm follows the motion, by a model. {MODEL_HELP}",
-        metavar="MODEL",
-    ),
-]
-LearnFromOption = Annotated[
-    str | None,
-    typer.Option(
-        "--learn-from",
-        help="A trace of the same motion: correct its set points by its error.",
-        autocompletion=completion.traces,
-    ),
-]
-LearnShareOption = Annotated[
-    float, typer.Option("--learn-share", min=0.01, max=1.0, help="Share of the correction that --learn-from makes.")
-]
 DailyOption = Annotated[
     str | None, typer.Option("--daily", help="Have the server run it every day at this time of its clock: 02:00.")
 ]
@@ -120,9 +100,6 @@ COMMON: dict[str, tuple[Any, Any]] = {
     "notes": (NotesOption, ""),
 }
 EXECUTION: dict[str, tuple[Any, Any]] = {
-    "feedforward": (FeedforwardOption, None),
-    "learn_from": (LearnFromOption, None),
-    "learn_share": (LearnShareOption, 1.0),
     "folder": (FolderOption, None),
     "daily": (DailyOption, None),
     "cron": (CronOption, None),
@@ -204,17 +181,6 @@ def _require_units(trajectory: dict[str, Any], start: str | None, machine: Machi
         require_units("start", parse_per_joint_angles(start, "start"), machine, joints)
 
 
-def _carry_out(context: typer.Context, spec: ExperimentSpec, options: RunOptions, computation: Computation) -> None:
-    robot = robot_of(context)
-    if computation.learn_from is None and computation.share != 1.0:
-        raise SpecError("--learn-share: is for --learn-from; leave it out")
-    if computation.wanted:
-        from daq_cli.models.feedforward import with_computed_set_points
-
-        spec = with_computed_set_points(robot, spec, computation, options)
-    carry_out(robot, spec, options)
-
-
 def _command(kind: type[BaseModel]) -> Callable[..., None]:
     """The function behind `daq run KIND`: typer reads its signature, which is made from the kind's fields."""
 
@@ -225,8 +191,7 @@ def _command(kind: type[BaseModel]) -> Callable[..., None]:
         _require_units(trajectory, values["start"], robot_of(context).machine, spec.joints)
         cron = cron_of(values["daily"], values["cron"])
         options = RunOptions(values["folder"], values["dry_run"], values["yes"], values["json"], cron)
-        computation = Computation(values["feedforward"], values["learn_from"], values["learn_share"])
-        _carry_out(context, spec, options, computation)
+        carry_out(robot_of(context), spec, options)
 
     own = {name: _option(name, field) for name, field in kind.model_fields.items() if name != "kind"}
     options = {**own, **COMMON, **EXECUTION}
@@ -249,9 +214,6 @@ for _name, _kind in KINDS.items():
 def from_file(
     context: typer.Context,
     file: Annotated[Path, typer.Argument(help="An experiment as JSON or TOML, angles in rad.")],
-    feedforward: FeedforwardOption = None,
-    learn_from: LearnFromOption = None,
-    learn_share: LearnShareOption = 1.0,
     folder: FolderOption = None,
     daily: DailyOption = None,
     cron: CronOption = None,
@@ -262,8 +224,7 @@ def from_file(
     """Run an experiment from a file: any kind, also paths and sequences."""
     from daq_cli.robot.experiment import read_spec
 
-    computation = Computation(feedforward, learn_from, learn_share)
-    _carry_out(context, read_spec(file), RunOptions(folder, dry_run, yes, json, cron_of(daily, cron)), computation)
+    carry_out(robot_of(context), read_spec(file), RunOptions(folder, dry_run, yes, json, cron_of(daily, cron)))
 
 
 @app.command("preset")
@@ -272,9 +233,6 @@ def by_name(
     name: Annotated[
         str, typer.Argument(help="Name of a preset; without one, all are listed.", autocompletion=completion.presets)
     ] = "",
-    feedforward: FeedforwardOption = None,
-    learn_from: LearnFromOption = None,
-    learn_share: LearnShareOption = 1.0,
     folder: FolderOption = None,
     daily: DailyOption = None,
     cron: CronOption = None,
@@ -292,16 +250,12 @@ def by_name(
         for known, one in PRESETS.items():
             print(f"{known:14s} {one.description}")
         return
-    computation = Computation(feedforward, learn_from, learn_share)
-    _carry_out(context, preset(name).spec, RunOptions(folder, dry_run, yes, json, cron_of(daily, cron)), computation)
+    carry_out(robot_of(context), preset(name).spec, RunOptions(folder, dry_run, yes, json, cron_of(daily, cron)))
 
 
 @app.command()
 def diagnostic(
     context: typer.Context,
-    feedforward: FeedforwardOption = None,
-    learn_from: LearnFromOption = None,
-    learn_share: LearnShareOption = 1.0,
     folder: FolderOption = None,
     daily: DailyOption = None,
     cron: CronOption = None,
@@ -310,4 +264,4 @@ def diagnostic(
     json: JsonOption = False,
 ) -> None:
     """Run the preset `diagnostic`: about 55 s of motion that distinguishes hidden effects."""
-    by_name(context, "diagnostic", feedforward, learn_from, learn_share, folder, daily, cron, dry_run, yes, json)
+    by_name(context, "diagnostic", folder, daily, cron, dry_run, yes, json)

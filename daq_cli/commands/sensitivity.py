@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.contracts.errors import SpecError
-from daq_cli.app.context import JsonOption, console, print_json, print_table
+from daq_cli.app.context import JsonOption, console, print_json
 from daq_cli.app.output_file import check_folder, replacing
 from daq_cli.models.effect_choice import patterns
 from daq_cli.models.model_input import (
@@ -70,7 +70,9 @@ def sensitivity(
     of a reading cannot be found from this trace; two whose curves have one shape cannot be told apart.
     """
     from daq_cli.app.progress import shown_progress
+    from daq_cli.models.parameter_table import print_rows
     from model.analysis.sensitivity import sensitivity_curves
+    from model.reports.sensitivity_report import changes_table
     from model.simulation.prepared import Options
     from model.validation.names import names_to_validate
 
@@ -85,7 +87,7 @@ def sensitivity(
         print_json(found.model_dump(mode="json"))
     else:
         print(f"{model_label(model)} ({found.model}), {found.trace}: largest change of each joint's reading, and when")
-        _print(found, chosen.machine)
+        print_rows(changes_table(found, chosen.machine))
     if output is not None:
         _write(found, chosen.machine, output)
         console().print(f"curves: {output}")
@@ -95,20 +97,6 @@ def sensitivity(
 
         page = sensitivity_report(model_label(model), found, chosen.machine)
         console().print(f"report: {write_report(page, report)}")
-
-
-def _print(found: SensitivityCurves, machine: Machine) -> None:
-    from rich.table import Table
-
-    from model.reports.sensitivity_report import largest_change
-
-    table = Table(box=None, header_style="bold")
-    for name in ("parameter", "changes by", *(f"joint {joint}" for joint in found.joints)):
-        table.add_column(name, justify="left" if name == "parameter" else "right")
-    for curve in found.curves:
-        moved = [largest_change(found, curve, k, machine) for k in range(len(found.joints))]
-        table.add_row(curve.name, f"{curve.expected:.3g} {curve.unit}", *moved)
-    print_table(table)
 
 
 def _write(found: SensitivityCurves, machine: Machine, path: Path) -> None:

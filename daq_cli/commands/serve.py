@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 from typing import Annotated
 
@@ -26,7 +27,7 @@ def serve(
     from daq.transport.url import parse_port_url
     from server import logs
 
-    require_extra("server", "daq serve", "uvicorn", "fastapi", "sqlalchemy", "alembic", "prometheus_client")
+    require_extra("server", "daq serve", "uvicorn", "fastapi", "sqlalchemy", "prometheus_client")
     logs.begin()  # first, so that errors of the configuration are lines of the log, too
     call = invocation(context)
     settings = call.configuration
@@ -39,6 +40,7 @@ def serve(
         raise SpecError("--port: several robots are configured, each with a port of its own: robots.NAME.port")
     for own in settings.each_robot():  # an invalid port is refused now, instead of being retried
         parse_port_url(own.port)
+    gc.disable()  # collections would be a tenth of the start, and find nothing; `keep_steady` lets them begin
     from server.serve import serve as run
 
     run(settings.model_copy(update={"server": section}), _announce)

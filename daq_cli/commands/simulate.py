@@ -30,6 +30,7 @@ from daq_cli.robot.access import robot_of
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
     from model.machine_model.model import Model
+    from model.reports.motion import AGREEMENT, agreement_table
     from model.simulation.prepared import Options
 
 app = typer.Typer(add_completion=False)
@@ -63,7 +64,7 @@ def simulate(
     Nothing is fitted. A machine is taken as its file describes it, with the friction stated there.
     """
     from daq_cli.app.progress import shown_progress
-    from daq_cli.models.agreement_table import agreement_data, print_agreement
+    from daq_cli.models.parameter_table import print_rows
     from model.comparison.compare import compare
     from model.simulation.prepared import Options
 
@@ -81,10 +82,10 @@ def simulate(
     with shown_progress("simulating") as progress:
         comparison = compare([(model_label(model), chosen)], found, options=options, progress=progress)
     if json:
-        print_json({"model": chosen.identity, "agreement": agreement_data(comparison.models)[0]})
+        print_json({"model": chosen.identity, "agreement": comparison.models[0].model_dump(mode="json")})
     else:
         print(f"measured − simulated, {model_label(model)} ({chosen.identity}), nothing fitted:")
-        print_agreement(comparison.models)
+        print_rows(agreement_table(comparison.models).only(*AGREEMENT))
     if output is not None:
         console().print(f"simulated trace: {_written(_simulated(chosen, found[0], options), output)}")
     if report is not None:

@@ -10,7 +10,7 @@ from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 from daq.contracts.service.queue import Role
 from daq_cli.app.context import Invocation, JsonOption, console, invocation, print_json
-from daq_cli.app.database import service_database
+from daq_cli.app.database import computers_user, service_database
 
 if TYPE_CHECKING:
     from server.access.tokens import TokenStore
@@ -37,7 +37,6 @@ def add(
     ] = "viewer",
 ) -> None:
     """Make a token. It is shown only once; its hash is stored."""
-    from server.audit.command import computers_user
     from server.clock import SystemClock
 
     _require_name(name)
@@ -61,7 +60,6 @@ def ls(context: typer.Context, json: JsonOption = False) -> None:
 @app.command()
 def revoke(context: typer.Context, name: NameArgument) -> None:
     """Revoke a token; within two seconds it is no longer accepted."""
-    from server.audit.command import computers_user
     from server.clock import SystemClock
 
     _require_name(name)
@@ -89,7 +87,6 @@ def sessions(context: typer.Context, json: JsonOption = False) -> None:
 def sign_out(context: typer.Context, name: Annotated[str, typer.Argument(help="Name of the person.")]) -> None:
     """End all sessions of a person; within two seconds they must sign in again."""
     from server.access.sessions import SessionStore
-    from server.audit.command import computers_user
     from server.clock import SystemClock
 
     count = SessionStore(service_database(invocation(context))).end_all(name, SystemClock().utc(), computers_user())

@@ -101,7 +101,6 @@ def show(
 ) -> None:
     """Show a trace's record, and its figures by joint."""
     from daq.traces.summary import joint_figures
-    from daq_cli.models.feedforward import print_tracking, tracking_data
     from daq_cli.robot.seen import print_figures
 
     path, found = _read(context, trace, folder)
@@ -116,7 +115,6 @@ def show(
                 "samples": len(found),
                 "missing": None if found.tick is None else found.missing,
                 "joints": joints,
-                "tracking": tracking_data(found),
             }
         )
         return
@@ -130,7 +128,6 @@ def show(
     if record.operator or record.notes:
         print(printable(f"operator {record.operator or '?'}: {record.notes}"))
     print_figures(found)
-    print_tracking(found)
     for event in found.events:
         print(printable(f"  {event.time:8.2f} s  {event.kind.replace('_', ' ')}: {event.message}"))
     print(printable(f"file: {path}"))

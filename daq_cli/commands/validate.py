@@ -20,6 +20,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
+from daq_cli.models.parameter_table import print_rows
 from daq_cli.models.record_doubts import DespiteDoubtsOption
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import robot_of
@@ -155,20 +156,11 @@ def _print_joints(fidelity: Fidelity, machine: Machine) -> None:
 
 def _print_details(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine) -> None:
     """Every parameter, and how each would have to vary with time."""
-    from rich.table import Table
+    from model.reports.validation_report import distortion_table
 
+    shown = ("parameter", "value", "doubles the error at", "σ needed", "τ′ expected", "λ²", "unit")
     print()
-    table = Table(box=None, header_style="bold")
-    for name in ("parameter", "value", "doubles the error at", "σ needed", "τ′ expected", "λ²", "unit"):
-        table.add_column(name, justify="left" if name in ("parameter", "unit") else "right")
-    for p in fidelity.parameters:
-        down = "–" if p.change_down is None else f"−{p.change_down:.3g}"
-        up = "–" if p.change_up is None else f"+{p.change_up:.3g}"
-        needed = "very large" if p.required is None else f"{p.required:.3g}"
-        table.add_row(
-            p.name, f"{p.value:.5g}", f"{down} / {up}", needed, f"{p.expected:.3g}", f"{p.contribution:.4f}", p.unit
-        )
-    print_table(table)
+    print_rows(distortion_table(fidelity, three).only(*shown))
     for note in fidelity.notes:
         print_prose(note, "  ")
     print_prose(f"Σλ² with τ′ = â/3 instead of the source's â/(3√2): {three.sum_of_contributions:.4f}")
@@ -179,18 +171,11 @@ def _print_details(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDo
 
 
 def _print_in_time(one: TimeDomain, machine: Machine) -> None:
-    from rich.table import Table
-
+    from model.reports.validation_report import variation_table
     from model.units import joint_unit
 
-    table = Table(box=None, header_style="bold")
-    for name in ("parameter", "σ of α(t)", "τ′", "beyond noise", "explains, constant", "varying", "goes with"):
-        table.add_column(name, justify="left" if name in ("parameter", "goes with") else "right")
-    for v in one.parameters:
-        strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in v.against if c.significant][:2]
-        shares = (f"{100 * share:.0f} %" for share in (v.significant, v.alone_constant, v.alone_varying))
-        table.add_row(v.name, f"{v.deviation:.3g}", f"{v.expected:.3g}", *shares, ", ".join(strongest))
-    print_table(table)
+    shown = ("parameter", "σ of α(t)", "τ′", "beyond noise", "explains, constant", "varying", "goes with")
+    print_rows(variation_table(one).only(*shown))
     for j in one.joints:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in j.against if c.significant][:3]
         unit = f"{joint_unit(machine, j.joint)}/s²"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from daq_cli.models.gap_text import gap_lines
 from model.discrepancy.diagnosis import in_order
+from model.discrepancy.explanation.answer_words import best_tried, headline, method_words, what_is_left
 from model.discrepancy.explanation.fitted_numbers import (
     FittedNumber,
     most_moved,
@@ -15,9 +16,7 @@ from model.discrepancy.explanation.fitted_numbers import (
     stated_numbers,
     with_deviation,
 )
-from model.discrepancy.explanation.headline import headline
-from model.discrepancy.explanation.method_words import method_words
-from model.discrepancy.explanation.renderer import best_tried, removed_words, sentence, what_is_left
+from model.discrepancy.explanation.step_words import removed_words, sentence
 from model.effects.names import capitalised, effect_on
 from model.record_check.finding import doubts_in, lines_of
 from model.units import shown_unit

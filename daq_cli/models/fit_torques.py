@@ -70,7 +70,7 @@ def _print(found: TorqueFit, files: Mapping[str, str]) -> None:
 
     from model.discrepancy.explanation.note_words import note_words
     from model.discrepancy.explanation.notes import on_drives_at_limit
-    from model.discrepancy.explanation.renderer import sentence
+    from model.discrepancy.explanation.step_words import sentence
     from model.reports.page import trace_names
 
     print_record(found.record)

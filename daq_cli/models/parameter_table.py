@@ -1,4 +1,4 @@
-"""Fitted parameters as a table on standard output."""
+"""Tables of results on standard output, and what stands beside fitted parameters."""
 
 from __future__ import annotations
 
@@ -9,22 +9,28 @@ from daq_cli.app.context import print_prose, print_table
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from model.blocks import Table
+    from model.fitting.fitted import FittedParameter
     from model.fitting.identifiability import IdentifiabilityReport
-    from model.fitting.result import FittedParameter
+
+
+def print_rows(table: Table) -> None:
+    """Prints a table of a result, as wide as the terminal."""
+    from rich.table import Table as Printed
+
+    shown = Printed(box=None, header_style="bold")
+    for name, number in zip(table.head, table.numeric, strict=True):
+        shown.add_column(name, justify="right" if number else "left", overflow="fold")
+    for row in table.rows:
+        shown.add_row(*(cell.text for cell in row))
+    print_table(shown)
 
 
 def print_parameters(parameters: Sequence[FittedParameter]) -> None:
     """Prints one line for each parameter; without a number where the data do not determine one."""
-    from rich.table import Table
+    from model.fitting.shown import COLUMNS, parameter_table
 
-    from model.fitting.shown import COLUMNS, NUMBERS, row_of
-
-    table = Table(box=None, header_style="bold")
-    for name, number in zip(COLUMNS, NUMBERS, strict=True):
-        table.add_column(name, justify="right" if number else "left", overflow="fold")
-    for p in parameters:
-        table.add_row(*row_of(p))
-    print_table(table)
+    print_rows(parameter_table(parameters).only(*COLUMNS))
 
 
 def print_undetermined(report: IdentifiabilityReport) -> None:

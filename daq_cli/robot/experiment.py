@@ -35,21 +35,6 @@ class RunOptions:
     """When a service shall run it, again and again; None for now."""
 
 
-@dataclass(frozen=True)
-class Computation:
-    """How set points are to be computed: with a model, from the error of a trace, of which a share is corrected, or
-    both."""
-
-    model: str | None
-    learn_from: str | None
-    share: float
-
-    @property
-    def wanted(self) -> bool:
-        """Whether they are to be computed at all."""
-        return self.model is not None or self.learn_from is not None
-
-
 def read_spec(path: Path) -> ExperimentSpec:
     """The experiment that a .json or .toml file describes. Raises SpecError with one line."""
     from daq.contracts.documents import read_document
@@ -119,7 +104,7 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
     """Prints the planned motion and the limits that it violates. Raises SafetyError when it violates any."""
     from daq.contracts.joint_text import position_text, speed_text
     from daq.safety import check_plan, unchecked
-    from daq.trajectories import plan, start_angles
+    from daq.trajectories.planner import plan, start_angles
 
     motion = plan(spec, machine, start_angles(spec, machine))
     shown = motion.preview()

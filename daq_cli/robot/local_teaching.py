@@ -26,7 +26,8 @@ from daq.owner.messages import (
     RunProgram,
     TeachingText,
 )
-from daq.teaching import Program, RecordedPath
+from daq.teaching.program import Program
+from daq.teaching.recording import RecordedPath
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, console
 from daq_cli.app.keyboard import open_keyboard

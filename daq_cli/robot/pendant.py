@@ -16,8 +16,8 @@ from daq_cli.app.context import console
 from daq_cli.app.keyboard import LEFT, RIGHT, Keyboard
 
 if TYPE_CHECKING:
-    from daq.teaching import RecordedPath
     from daq.teaching.program import Program
+    from daq.teaching.recording import RecordedPath
 
 HELP = "1-6 joint   ← → drive while held   + - speed   o c gripper   p keep this posture   q end   Ctrl-C stop"
 KEYS_EVERY = 0.05

@@ -30,7 +30,7 @@ def _ramp_step() -> ExperimentSpec:
 
 def write_set_points(spec: ExperimentSpec, machine: Machine, path: Path) -> Path:
     """The experiment's set points as the mock's side reads them: a line a period, posture units."""
-    from daq.trajectories import plan, start_angles
+    from daq.trajectories.planner import plan, start_angles
 
     motion = plan(spec, machine, start_angles(spec, machine))
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -43,7 +43,7 @@ def write_set_points(spec: ExperimentSpec, machine: Machine, path: Path) -> Path
 def write_experiment(spec: ExperimentSpec, machine: Machine, path: Path) -> Path:
     """The experiment as the mock's side reads it, with its gains: set points (posture units, a list per period), and
     P, I, D of the six joints."""
-    from daq.trajectories import plan, start_angles
+    from daq.trajectories.planner import plan, start_angles
 
     motion = plan(spec, machine, start_angles(spec, machine))
     own = machine.controller.gains if isinstance(machine.controller, BoardPid) else ()

@@ -68,7 +68,7 @@ def undocumented(name: str) -> list[str]:
     if name in ("PRESETS", "__version__"):
         return []
     missing = [] if (found.__doc__ or "").strip() else [name]
-    for key, member in vars(found).items() if inspect.isclass(found) else ():
+    for key, member in list(vars(found).items()) if inspect.isclass(found) else ():
         function = getattr(member, "fget", None) or getattr(member, "__func__", member)
         if key.startswith("_") or not inspect.isroutine(function):
             continue

@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 DOCS = Path(__file__).parents[1]
 BLOCK = re.compile(r"^[ ]*```(python|console)\n(.*?)^[ ]*```$", re.DOTALL | re.MULTILINE)
 RUN: Mapping[tuple[str, str], str] = {
-    ("audit.md", "console"): "tests/server/audit/test_page.py",
+    ("audit.md", "console"): "tests/extras/lab/audit/test_page.py",
     ("batches.md", "console"): "tests/extras/lab/batches/test_batches_page.py",
     ("batches.md", "python"): "tests/extras/lab/batches/test_batches_page.py",
+    ("feedforward.md", "python"): "tests/extras/motion/test_command.py",
     ("fleet.md", "console"): "tests/extras/lab/fleet/test_page.py",
     ("fleet.md", "python"): "tests/extras/lab/fleet/test_page.py",
     ("index.md", "python"): "tests/repository/test_snippets.py",
@@ -32,7 +33,7 @@ RUN: Mapping[tuple[str, str], str] = {
 """The test that runs a page's blocks of a language."""
 NOT_RUN: Mapping[tuple[str, str], str] = {
     ("archive.md", "console"): "needs a store; tests/extras/lab/archive/test_service.py gives the same commands",
-    ("thesis.md", "python"): "takes minutes; tests/model/thesis/test_page.py makes the same calls",
+    ("thesis.md", "python"): "takes minutes; tests/extras/thesis/test_page.py makes the same calls",
 }
 """Why a page's blocks of a language are not run. That what they import exists is checked all the same."""
 

@@ -108,3 +108,5 @@ def _sequence(rng: np.random.Generator, joints: tuple[int, ...], duration: float
 
 
 KINDS: tuple[Callable[..., Multisine | Sequence], ...] = (_multisine, _sequence, _slow_ramps)
+CALLED = ("sines of many frequencies", "ramps and smooth moves", "slow ramps with reversals")
+"""The same in words."""

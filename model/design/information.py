@@ -85,14 +85,22 @@ def information_gain(
     unknowns = added[0][0]
     known = prior_information(unknowns) if fitted is None else _fitted_information(unknowns, fitted)
     total = known + sum(information for _, information in added)
-    natural = scales(unknowns)
-    before, after = inverse(known), inverse(total)
+    return gain_of(unknowns, known, total)
+
+
+def gain_of(unknowns: Sequence[Unknown], known: Floats, total: Floats) -> InformationGain:
+    """What becomes known between two informations (p, p) in natural sizes."""
+    widths = [np.sqrt(np.diag(np.linalg.inv(information))) for information in (known, total)]
     parameters = tuple(
-        ParameterGain(name=u.name, unit=u.unit, before=2 * INTERVAL * s * b**0.5, after=2 * INTERVAL * s * a**0.5)
-        for u, s, b, a in zip(unknowns, natural, np.diag(before), np.diag(after), strict=True)
+        ParameterGain(name=u.name, unit=u.unit, before=2 * INTERVAL * s * b, after=2 * INTERVAL * s * a)
+        for u, s, b, a in zip(unknowns, scales(tuple(unknowns)), *widths, strict=True)
     )
-    nats = 0.5 * float(np.linalg.slogdet(total)[1] - np.linalg.slogdet(known)[1])
-    return InformationGain(parameters=parameters, nats=nats)
+    return InformationGain(parameters=parameters, nats=log_det(total) - log_det(known))
+
+
+def log_det(information: Floats) -> float:
+    """Half of the logarithm of the determinant, in nats."""
+    return 0.5 * float(np.linalg.slogdet(information)[1])
 
 
 def prior_information(unknowns: Sequence[Unknown]) -> Floats:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from daq.contracts.errors import DaqError, SpecError
@@ -16,14 +15,14 @@ from model.arrays import Floats
 from model.design.drawn_experiments import drawn_experiment
 from model.design.information import (
     InformationGain,
-    ParameterGain,
     Planner,
     experiment_information,
+    gain_of,
+    log_det,
     prior_information,
 )
-from model.fitting.fit import INTERVAL
 from model.fitting.options import FitOptions
-from model.fitting.unknowns import Unknown, scales
+from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 
 
@@ -89,16 +88,11 @@ def design(
     prior = prior_information(unknowns)
     chosen = best_set(prior, informations, options.experiments)
     totals = [prior + sum(informations[k] for k in chosen[: i + 1]) for i in range(len(chosen))]
-    nats = tuple(_log_det(total) - _log_det(prior) for total in totals)
-    widths = [np.sqrt(np.diag(np.linalg.inv(m))) for m in (prior, totals[-1])]
-    gains = tuple(
-        ParameterGain(name=u.name, unit=u.unit, before=2 * INTERVAL * s * b, after=2 * INTERVAL * s * a)
-        for u, s, b, a in zip(unknowns, scales(unknowns), *widths, strict=True)
-    )
+    nats = tuple(log_det(total) - log_det(prior) for total in totals)
     progress(1.0, "done")
     return DesignedExperiments(
         specs=tuple(specs[k] for k in chosen),
-        gain=InformationGain(parameters=gains, nats=nats[-1]),
+        gain=gain_of(unknowns, prior, totals[-1]),
         nats=nats,
         refused=refused,
         considered=options.candidates,
@@ -119,16 +113,11 @@ def best_set(prior: Floats, informations: Sequence[Floats], count: int) -> list[
             others = [k for i, k in enumerate(chosen) if i != place]
             total = prior + sum(informations[k] for k in others)
             better = _best_addition(total, informations, others)
-            if _log_det(total + informations[better]) > _log_det(total + informations[chosen[place]]) + 1e-9:
+            if log_det(total + informations[better]) > log_det(total + informations[chosen[place]]) + 1e-9:
                 chosen[place], improved = better, True
     return chosen
 
 
 def _best_addition(total: Floats, informations: Sequence[Floats], taken: Sequence[int]) -> int:
     free = [k for k in range(len(informations)) if k not in taken]
-    return max(free, key=lambda k: _log_det(total + informations[k]))
-
-
-def _log_det(information: Floats) -> float:
-    """Half of the logarithm of the determinant, in nats."""
-    return 0.5 * float(np.linalg.slogdet(information)[1])
+    return max(free, key=lambda k: log_det(total + informations[k]))

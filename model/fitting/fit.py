@@ -18,6 +18,7 @@ from model.fitting.choice import BEND, chosen_unknowns, friction_forms, start_po
 from model.fitting.consistent_bodies import coordinates_of, on_the_edge
 from model.fitting.coordinates import Coordinates
 from model.fitting.covariance import sandwich
+from model.fitting.fitted import FittedParameter, JointError
 from model.fitting.identifiability import IdentifiabilityReport, ParameterVerdict, judged
 from model.fitting.least_squares import Search, Solution, solve
 from model.fitting.nelder_mead import climb
@@ -25,7 +26,7 @@ from model.fitting.noise import noise_effect
 from model.fitting.options import FitOptions
 from model.fitting.problem import Evaluation, whitened
 from model.fitting.records import Signal, noise_floor, records_of
-from model.fitting.result import FitResult, FittedParameter, JointError
+from model.fitting.result import FitResult
 from model.fitting.robust import influence
 from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown, prior_precision, scales

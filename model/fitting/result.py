@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,8 @@ from daq.contracts.documents import parse_json, read_text
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
-from model.fitting.identifiability import IdentifiabilityReport, Verdict
+from model.fitting.fitted import FittedParameter, JointError
+from model.fitting.identifiability import IdentifiabilityReport
 from model.fitting.options import FitOptions
 from model.fitting.shown import doubt_of, html_of, known_of, text_of
 from model.machine_model.model import Model
@@ -22,40 +23,6 @@ from model.record_check.finding import RecordFinding, doubts_headline
 
 RESULT_FORMAT = 1
 """Version of the file; a reader refuses newer ones."""
-
-
-class FittedParameter(FrozenRecord):
-    """One parameter after a fit.
-
-    `value`, `deviation` and the 95 % interval `low` to `high` are None unless the data determine the parameter;
-    `model_value` is what the fitted model carries all the same, since a model needs a number.
-    """
-
-    name: str
-    unit: str
-    verdict: Verdict
-    reason: str
-    value: float | None
-    deviation: float | None
-    low: float | None
-    high: float | None
-    model_value: float
-    before: float
-    expected: float | None
-    expected_deviation: float | None
-    at_bound: Literal["low", "high"] | None
-
-
-class JointError(FrozenRecord):
-    """Root mean square of simulated − measured on one joint over all traces, and the noise of the measurement
-    itself. `noise`: what a right model would leave, where noise goes round the loop; None in older results."""
-
-    joint: int
-    unit: str
-    before: float
-    after: float
-    floor: float
-    noise: float | None = None
 
 
 class FitResult(FrozenRecord):

@@ -16,12 +16,12 @@ from model.fitting.choice import chosen_unknowns
 from model.fitting.consistent_bodies import coordinates_of, on_the_edge
 from model.fitting.covariance import sandwich
 from model.fitting.fit import fitted_parameter
+from model.fitting.fitted import FittedParameter
 from model.fitting.identifiability import IdentifiabilityReport, judged
 from model.fitting.least_squares import Search, solve
 from model.fitting.options import FitOptions
 from model.fitting.problem import whitened
 from model.fitting.records import records_of
-from model.fitting.result import FittedParameter
 from model.fitting.robust import influence
 from model.fitting.shown import html_of, known_of, text_of
 from model.fitting.unknowns import prior_precision, scales

@@ -5,7 +5,8 @@ from __future__ import annotations
 from model.base_parameters.excitation import TOLD
 from model.base_parameters.result import BaseParameters, RecordedBaseParameter, headline
 from model.base_parameters.standard import WORDS
-from model.reports.page import Cell, Points, Section, Table, Text, Tone, cells, listed
+from model.blocks import Cell, Points, Section, Table, Text, Tone, cells
+from model.reports.page import listed
 
 
 def base_parameter_section(found: BaseParameters) -> Section:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from model.blocks import Cell, Report, Section, Table, cells, numbers
 from model.comparison.agreement import ModelAgreement
 from model.comparison.compare import Comparison
 from model.comparison.difference import ParameterDifference
 from model.reports.motion import ROLES, agreement_table, motion_section
-from model.reports.page import Cell, Report, Section, Table, cells, effect_list, listed, numbers
+from model.reports.page import effect_list, listed
 from model.units import squared
 
 
@@ -20,7 +21,7 @@ def comparison_report(found: Comparison, differences: Sequence[ParameterDifferen
         motion_section(found.signals, labels),
     ]
     if differences:
-        sections.append(Section("Where the models differ", (_differences(differences, labels),)))
+        sections.append(Section("Where the models differ", (differences_table(differences, labels),)))
     facts = [(m.label, f"{m.model}, {effect_list(m.effects)}") for m in found.models]
     facts.append(("traces", listed([s.trace for s in found.signals])))
     return Report(_title(labels), _answer(found.models), tuple(facts), tuple(sections))
@@ -63,10 +64,12 @@ def _squared_errors(models: Sequence[ModelAgreement]) -> Table:
     return Table(("trace", "", *(m.label for m in models)), tuple(rows), caption)
 
 
-def _differences(differences: Sequence[ParameterDifference], labels: Sequence[str]) -> Table:
+def differences_table(differences: Sequence[ParameterDifference], labels: Sequence[str]) -> Table:
+    """Parameters whose values differ between models."""
     rows = []
     for d in differences:
-        values = ("–" if v is None else f"{v:.6g}" for v in d.values)
-        rows.append(cells(d.name, *values, d.unit, "–" if d.deviations is None else f"{d.deviations:.2f}"))
+        values = ("–" if v is None else f"{v:.5g}" for v in d.values)
+        apart = "–" if d.deviations is None else f"{d.deviations:.2f}"
+        rows.append((*cells(d.name, *values), Cell(d.unit), *numbers(apart)))
     head = ("parameter", *labels, "unit", "in expected deviations")
     return Table(head, tuple(rows), "Parameters whose values differ; a dash where a model has no such parameter.")

@@ -11,10 +11,11 @@ import numpy as np
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import NoController
 from model.arrays import Floats
+from model.blocks import Cell, Picture, Points, Report, Section, Table, Text, cells
 from model.design.information import InformationGain, ParameterGain
 from model.machine_model.model import Model
 from model.reports.figures import COLOURS, QUIET, drawn, panels, thinned
-from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, cells, effect_list, listed
+from model.reports.page import effect_list, listed
 from model.units import joint_unit, shown_unit
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def design_report(model: Model, planned: Sequence[PlannedExperiment], gain: Info
     """The page. `how` is a sentence on how the experiments were chosen."""
     machine = model.machine
     sections = (
-        Section("What becomes known", (_gain_table(gain), *_gain_picture(gain), *_left_open(gain))),
+        Section("What becomes known", (gain_table(gain), *_gain_picture(gain), *_left_open(gain))),
         Section("The experiments", tuple(b for p in planned for b in _experiment(p, model))),
         Section("How it was done", (Text(how), Text(LIMITS_OF_IT))),
     )
@@ -69,10 +70,11 @@ def _answer(planned: Sequence[PlannedExperiment], gain: InformationGain) -> str:
     )
 
 
-def _gain_table(gain: InformationGain) -> Table:
+def gain_table(gain: InformationGain) -> Table:
+    """How much narrower each interval becomes."""
     rows = []
     for p in gain.parameters:
-        left = Cell(f"{100 * p.share:.2g} %", "good" if p.share <= 0.5 else "plain", number=True)
+        left = Cell(f"{100 * p.share:.0f} %", "good" if p.share <= 0.5 else "plain", number=True)
         rows.append((*cells(p.name, f"{p.before:.3g}", f"{p.after:.3g}"), Cell(p.unit), left))
     head = ("parameter", "95 % width before", "after", "unit", "left")
     caption = "Width of the 95 % interval, from its lower to its upper end, without and with these experiments."

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
+from model.blocks import Picture
 from model.discrepancy.diagnosis import Dependence, Phase, PhaseCell, Where
 from model.discrepancy.localisation.statistics import chance_significance
 from model.reports.figures import COLOURS, QUIET, baseline, drawn, panels
-from model.reports.page import Picture
 from model.units import shown_unit
 
 if TYPE_CHECKING:

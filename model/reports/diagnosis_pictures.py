@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from model.blocks import Picture
 from model.discrepancy.diagnosis import Candidate, RemainingShape, in_order
 from model.effects.names import placed
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels
 from model.reports.numbers import whole
-from model.reports.page import Picture
 from model.units import shown_unit
 
 if TYPE_CHECKING:

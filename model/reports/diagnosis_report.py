@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from daq.contracts.machine import NoController
+from model.blocks import Block, Cell, Points, Report, Section, Table, Text
 from model.comparison.compare import Comparison, TraceSignals
 from model.discrepancy.diagnosis import (
     Acquired,
@@ -13,11 +14,10 @@ from model.discrepancy.diagnosis import (
     clear_shape,
     in_order,
 )
+from model.discrepancy.explanation.answer_words import best_tried, headline, method_words, what_is_left
 from model.discrepancy.explanation.class_words import class_words
 from model.discrepancy.explanation.fitted_numbers import FittedNumber, most_moved, stated_numbers, with_deviation
-from model.discrepancy.explanation.headline import headline
-from model.discrepancy.explanation.method_words import method_words
-from model.discrepancy.explanation.renderer import best_tried, sentence, what_is_left
+from model.discrepancy.explanation.step_words import sentence
 from model.effects.names import capitalised
 from model.reports.diagnosis_map import map_picture
 from model.reports.diagnosis_pictures import evidence_picture, remaining_picture
@@ -25,7 +25,7 @@ from model.reports.diagnosis_steps import step_sections, where_blocks
 from model.reports.diagnosis_words import Compared, compared
 from model.reports.gap import gap_section
 from model.reports.motion import motion_section
-from model.reports.page import Block, Cell, Points, Report, Section, Table, Text, effect_list, html, listed, trace_names
+from model.reports.page import effect_list, html, listed, trace_names
 from model.reports.record_section import record_sections
 
 VERDICTS = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from model.blocks import Block, Cell, Section, Table, Text
 from model.discrepancy.diagnosis import Candidate, Dependence, SignalError, Step, Where
 from model.discrepancy.explanation.fitted_numbers import stated_beside
 from model.effects.names import capitalised, placed
@@ -12,7 +13,6 @@ from model.reports.diagnosis_map import dependence_picture, map_picture
 from model.reports.diagnosis_pictures import evidence_picture
 from model.reports.diagnosis_words import Compared, gap
 from model.reports.numbers import column, estimate
-from model.reports.page import Block, Cell, Section, Table, Text
 
 
 def step_sections(number: int, steps: Sequence[Step], of: Compared, stated: Mapping[str, Parameter]) -> list[Section]:

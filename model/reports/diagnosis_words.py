@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from model.discrepancy.diagnosis import Diagnosis, Step
-from model.discrepancy.explanation.renderer import removed_words
+from model.discrepancy.explanation.step_words import removed_words
 
 
 @dataclass(frozen=True)

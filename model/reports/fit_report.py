@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from model.base_parameters.result import BaseParameters
+from model.blocks import Cell, Report, Section, Table
 from model.comparison.compare import Comparison
 from model.fitting.result import FitResult
+from model.fitting.shown import parameter_table
 from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.motion import agreement_table, in_sample, motion_section
-from model.reports.page import Cell, Report, Section, Table, effect_list, listed, trace_names
-from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
+from model.reports.page import effect_list, listed, trace_names
+from model.reports.parameter_blocks import interval_picture, undetermined_blocks
 from model.reports.record_section import record_sections
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from model.blocks import Cell, Picture, Section, Table, Text, cells
 from model.discrepancy.diagnosis import Gap
 from model.reports.figures import COLOURS, INK, drawn, panels
 from model.reports.numbers import column
-from model.reports.page import Cell, Picture, Section, Table, Text, cells
 from model.units import shown_unit, with_unit
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from model.blocks import Cell, Picture, Section, Table, numbers
 from model.comparison.agreement import JointAgreement, ModelAgreement
 from model.comparison.compare import TraceSignals
 from model.reports.figures import (
@@ -23,7 +24,7 @@ from model.reports.figures import (
     thinned,
 )
 from model.reports.motion_closer import closer_picture, what_is_shown
-from model.reports.page import Cell, Picture, Section, Table, cells, trace_names
+from model.reports.page import trace_names
 from model.units import shown_unit, with_unit
 
 if TYPE_CHECKING:
@@ -132,6 +133,10 @@ def _joint(
         below.set_ylabel(f"residual / {unit}")
 
 
+AGREEMENT = ("model", "traces", "joint", "rms", "in counts", "largest", "noise")
+"""What a terminal shows of an agreement."""
+
+
 def agreement_table(models: Sequence[ModelAgreement]) -> Table:
     """By model, kind of trace and joint: root mean square, largest, and the noise beside it."""
     rows = []
@@ -139,7 +144,7 @@ def agreement_table(models: Sequence[ModelAgreement]) -> Table:
         for kind, joints in ((in_sample(model), model.in_sample), (ROLES[True], model.held_out)):
             rows += [_row(model.label, kind, one) for one in joints or ()]
     return Table(
-        ("model", "traces", "joint", "rms", "in counts", "largest", "noise", "noise in counts", "of the motion"),
+        (*AGREEMENT, "noise in counts", "of the motion"),
         tuple(rows),
         "Measured − simulated over all samples of these traces. Noise is what a right model would leave: the "
         "sensor's noise and rounding, as they go round the loop. Of the motion: rms of the residual over that of the "
@@ -149,10 +154,10 @@ def agreement_table(models: Sequence[ModelAgreement]) -> Table:
 
 def _row(label: str, kind: str, one: JointAgreement) -> tuple[Cell, ...]:
     factor, unit = shown_unit(one.unit)
-    error = (f"{one.rmse * factor:.4g} {unit}", counted(one.counts), f"{one.largest * factor:.4g} {unit}")
-    floor = (f"{one.floor * factor:.3g} {unit}", counted(one.floor_counts))
+    rms, largest, noise = (with_unit(f"{v * factor:.4f}", unit) for v in (one.rmse, one.largest, one.floor))
     share = "–" if one.share is None else f"{100 * one.share:.2g} %"
-    return (Cell(label), Cell(kind), *cells(str(one.joint), *error, *floor, share))
+    figures = (str(one.joint), rms, counted(one.counts), largest, noise, counted(one.floor_counts), share)
+    return (Cell(label), Cell(kind), *numbers(*figures))
 
 
 def in_sample(model: ModelAgreement) -> str:

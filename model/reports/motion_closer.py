@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.arrays import Floats
+from model.blocks import Picture
 from model.comparison.compare import TraceSignals
 from model.reports.figures import INK, MODEL_COLOURS, QUIET, as_label, baseline, drawn, panels
-from model.reports.page import Picture
 from model.units import shown_unit
 
 if TYPE_CHECKING:

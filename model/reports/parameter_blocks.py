@@ -1,41 +1,18 @@
-"""The parameters in a report of a fit: a table, a picture of the intervals, and what the data leave open."""
+"""The parameters in a report of a fit: a picture of the intervals, and what the data leave open."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from model.blocks import Picture, Points, Text
+from model.fitting.fitted import FittedParameter
 from model.fitting.identifiability import IdentifiabilityReport
-from model.fitting.result import FittedParameter
 from model.machine_model.model import Model
 from model.reports.figures import COLOURS, QUIET, drawn, panels
-from model.reports.page import Cell, Picture, Points, Table, Text, Tone, cells
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-VERDICTS = {"known": "known", "combination": "only\u00a0in\u00a0combination", "unknown": "not\u00a0determined"}
-
-
-def parameter_table(parameters: Sequence[FittedParameter]) -> Table:
-    """Values with intervals where the data give one, and what was expected."""
-    return Table(
-        ("parameter", "value", "95 % interval", "unit", "before", "expected", "verdict"),
-        tuple(_parameter_row(p) for p in parameters),
-        "In brackets: the traces do not determine the number, and the model carries one of those that fit as well. "
-        "Intervals take the correlation of the residual into account.",
-    )
-
-
-def _parameter_row(p: FittedParameter) -> tuple[Cell, ...]:
-    expected = "–" if p.expected is None else f"{p.expected:.4g} ± {p.expected_deviation:.2g}"
-    verdict = VERDICTS[p.verdict] + ("" if p.at_bound is None else f", at its {p.at_bound} bound")
-    tone: Tone = "plain" if p.verdict == "known" else "warning"
-    value, interval = f"({p.model_value:.4g})", "–"
-    if p.value is not None and p.low is not None and p.high is not None:
-        value, interval = f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}"
-    before, after = Cell(f"{p.before:.5g}", number=True), Cell(expected, number=True)
-    return (*cells(p.name, value, interval), Cell(p.unit), before, after, Cell(verdict, tone))
 
 
 def interval_picture(model: Model, parameters: Sequence[FittedParameter]) -> tuple[Picture, ...]:

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from model.blocks import Cell, Picture, Report, Section, Table, Text, cells
 from model.fitting.profile import Profile
 from model.fitting.result import FitResult
 from model.reports.figures import COLOURS, QUIET, drawn, panels, saved
-from model.reports.page import Cell, Picture, Report, Section, Table, Text, cells, listed
+from model.reports.page import listed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +28,7 @@ def profile_report(fitted: FitResult, profiles: Sequence[Profile]) -> Report:
         "Rise of −2 ln L when the parameter is moved and all others are fitted again. The line is the rise at which "
         "the 95 % interval ends; the band is the interval. Dashed: the parabola that the fit's covariance stands for.",
     )
-    blocks: list[Table | Text] = [_table(profiles)]
+    blocks: list[Table | Text] = [bounds_table(profiles)]
     if better := [one.name for one in profiles if one.better]:
         blocks.append(Text(better_fit(better), "warning"))
     facts = (
@@ -65,7 +66,8 @@ def save_profiles(fitted: FitResult, profiles: Sequence[Profile], path: Path, ki
     saved(lambda figure: _draw(figure, fitted, profiles), PANEL_HEIGHT * len(profiles), path, kind)
 
 
-def _table(profiles: Sequence[Profile]) -> Table:
+def bounds_table(profiles: Sequence[Profile]) -> Table:
+    """The best value of each parameter, and what the data bound."""
     rows = tuple(
         (*cells(one.name, f"{one.value:.5g}"), *(_end(end) for end in (one.low, one.high)), Cell(one.unit))
         for one in profiles

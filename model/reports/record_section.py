@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from model.blocks import Points, Section, Text
 from model.record_check.finding import RecordFinding, doubts_in, lines_of
-from model.reports.page import Points, Section, Text
 
 
 def record_sections(findings: Sequence[RecordFinding]) -> list[Section]:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from model.analysis.sensitivity import SensitivityCurve, SensitivityCurves
+from model.blocks import Cell, Picture, Report, Section, Table, cells, numbers
 from model.reports.figures import COLOURS, baseline, drawn, panels, saved, thinned
-from model.reports.page import Cell, Picture, Report, Section, Table, cells, numbers
 from model.units import joint_unit, shown_unit, with_unit
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def sensitivity_report(label: str, found: SensitivityCurves, machine: Machine) -
         f"each joint the {SHOWN} parameters that move it most."
     )
     picture = Picture(drawn(lambda figure: _draw(figure, found, machine), PANEL_HEIGHT * len(found.joints)), caption)
-    sections = (Section("How much, and when", (_table(found, machine),)), Section("Curves", (picture,)))
+    sections = (Section("How much, and when", (changes_table(found, machine),)), Section("Curves", (picture,)))
     errors = "Changes are exact to first order; each parameter changes alone."
     return Report(f"Sensitivity of {label}", answer, facts, sections, errors)
 
@@ -54,7 +54,8 @@ def save_curves(found: SensitivityCurves, machine: Machine, path: Path, kind: st
     saved(lambda figure: _draw(figure, found, machine), PANEL_HEIGHT * len(found.joints), path, kind)
 
 
-def _table(found: SensitivityCurves, machine: Machine) -> Table:
+def changes_table(found: SensitivityCurves, machine: Machine) -> Table:
+    """How much each parameter moves each joint, and when."""
     rows = []
     for curve in found.curves:
         changes = (largest_change(found, curve, k, machine) for k in range(len(found.joints)))

@@ -6,14 +6,16 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from model.base_parameters.result import BaseParameters
+from model.blocks import Cell, Picture, Report, Section, Table, Text, cells
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.explanation.notes import on_drives_at_limit
-from model.discrepancy.explanation.renderer import sentence
+from model.discrepancy.explanation.step_words import sentence
+from model.fitting.shown import parameter_table
 from model.inverse_dynamics.fit import TorqueCurves, TorqueFit
 from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.figures import COLOURS, INK, baseline, drawn, panels, thinned
-from model.reports.page import Cell, Picture, Report, Section, Table, Text, cells, effect_list, listed, trace_names
-from model.reports.parameter_blocks import interval_picture, parameter_table, undetermined_blocks
+from model.reports.page import effect_list, listed, trace_names
+from model.reports.parameter_blocks import interval_picture, undetermined_blocks
 from model.reports.record_section import record_sections
 
 if TYPE_CHECKING:

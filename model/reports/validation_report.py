@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from model.blocks import Cell, Picture, Points, Report, Section, Table, Text, Tone, cells, numbers
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels, thinned
-from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, Tone, cells, listed, numbers
+from model.reports.page import listed
 from model.reports.record_section import record_sections
 from model.units import joint_unit, squared
 from model.validation.criterion import Curve, Fidelity
@@ -36,7 +37,7 @@ def validation_report(
     sections = [
         Section(
             "How far parameters would have to vary",
-            (_distortion_table(source, three), _contribution_picture(source, three)),
+            (distortion_table(source, three), _contribution_picture(source, three)),
         ),
         *([Section("How the error grows", (_curves(source),))] if source.curves else []),
         *(_in_time(one, machine) for one in in_time),
@@ -65,7 +66,8 @@ def _answer(source: Fidelity) -> str:
     return f"{source.said} The largest contribution is that of {strongest.name}, {strongest.contribution:.2g}."
 
 
-def _distortion_table(source: Fidelity, three: Fidelity) -> Table:
+def distortion_table(source: Fidelity, three: Fidelity) -> Table:
+    """How far each parameter alone would have to vary, in both conventions of τ′."""
     rows = []
     for one, other in zip(source.parameters, three.parameters, strict=True):
         down = "–" if one.change_down is None else f"−{one.change_down:.3g}"
@@ -78,7 +80,7 @@ def _distortion_table(source: Fidelity, three: Fidelity) -> Table:
         "The change of one parameter alone that doubles the mean squared error gives σ, the standard deviation it "
         "would need to explain the residual (4.63); λ² = τ′²/σ² (4.92) compares it with the expected one."
     )
-    head = ("parameter", "value", "unit", "doubles the error", "σ needed", "τ′ expected", "λ²", "λ² with â/3")
+    head = ("parameter", "value", "unit", "doubles the error at", "σ needed", "τ′ expected", "λ²", "λ² with â/3")
     return Table(head, tuple(rows), caption)
 
 
@@ -152,7 +154,7 @@ def _in_time(one: TimeDomain, machine: Machine) -> Section:
             "All parameters vary together, as little as explains the measured accelerations. A variation beyond its "
             "noise says which term is wrong, when, and what it goes with."
         ),
-        _variation_table(one),
+        variation_table(one),
         _residual_picture(one, machine),
         _variation_picture(one, shown),
     ]
@@ -161,7 +163,8 @@ def _in_time(one: TimeDomain, machine: Machine) -> Section:
     return Section(f"Variation with time: {one.trace}", tuple(blocks))
 
 
-def _variation_table(one: TimeDomain) -> Table:
+def variation_table(one: TimeDomain) -> Table:
+    """How far each parameter would have to vary with time, and with what."""
     rows = []
     for v in one.parameters:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in v.against if c.significant][:2]

@@ -8,7 +8,7 @@ import re
 import secrets
 import time
 from collections import Counter
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from urllib.parse import parse_qs
@@ -35,8 +35,8 @@ from server.access.session_cookie import says_where_it_is_from, session_cookie, 
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
 from server.access.turns import Turns
-from server.audit.request import Audit
 from server.database_errors import DamagedError
+from server.parts import Part
 from server.problems import ProblemError, of_damage, of_database, response
 
 STOP = re.compile(r"/api/v1/(robots/[^/]+|fleet)/stop")
@@ -78,8 +78,8 @@ class Gate:
     turns: Turns = field(default_factory=Turns)
     look_every: float = LOOK_EVERY
     cookie: str = session_cookie(None)
-    audit: Audit | None = None
-    """Notes what is asked; None where nothing is noted."""
+    parts: Sequence[Part] = ()
+    """Parts of plug-ins, which may watch requests."""
 
     def middleware(self, app: ASGIApp) -> ASGIApp:
         """Returns `app` behind this gate."""
@@ -117,8 +117,10 @@ class Gate:
             await send(message)
 
         uploads = _is_post(scope, UPLOADS)
-        asked = None if self.audit is None else self.audit.watched(scope, with_content=not uploads)
-        answer = secured if asked is None else asked.send(secured)
+        watches = [watch for one in self.parts if (watch := one.watch(scope, with_content=not uploads)) is not None]
+        answer: Send = secured
+        for watch in watches:
+            answer = watch.send(answer)
         try:
             try:
                 state["caller"] = await self._admit(scope)
@@ -130,12 +132,14 @@ class Gate:
             try:
                 most = MOST_OF_A_PROGRAM if PROGRAMS.fullmatch(scope["path"]) else MOST_FIELDS
                 body = receive if uploads else counted(receive, LARGEST_BODY, most)
-                await app(scope, body if asked is None else asked.receive(body), turn.send)
+                for watch in watches:
+                    body = watch.receive(body)
+                await app(scope, body, turn.send)
             finally:
                 turn.end()
         finally:
-            if asked is not None:
-                asked.end()
+            for watch in watches:
+                watch.end()
             seconds = time.perf_counter() - begun
             self.observed(scope["method"], status, seconds)
             self._log(scope, state.get("caller"), status, seconds)

@@ -20,7 +20,7 @@ that they must sign in again. A session that somebody has left stops nothing."""
 
 
 def session_cookie(address: str | None) -> str:
-    """Returns the name of the session's cookie. `address`: where people reach the service (`server.oidc.address`);
+    """Returns the name of the session's cookie. `address`: where people reach the service (`server.address`);
     None where nobody signs in."""
     return _name(SESSION, address)
 

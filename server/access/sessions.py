@@ -3,60 +3,39 @@
 from __future__ import annotations
 
 import secrets
-from dataclasses import dataclass
+from collections.abc import Callable
 from datetime import datetime, timedelta
 
 from sqlalchemy import delete, select
+from sqlalchemy.orm import Session
 
 from daq.contracts.service.queue import Role, role_of
-from server.access.caller import LOCAL, Caller
+from server.access.caller import Caller
+from server.access.commands import note_command
 from server.access.digest import digest_of
 from server.access.session_cookie import STOPS_FOR
-from server.audit.command import by_command
-from server.audit.log import append_in
-from server.problems import ProblemError
 from server.store.engine import Store
-from server.store.tables import PersonRow, SessionRow
-
-
-@dataclass(frozen=True)
-class Person:
-    """A person as the provider names them. `subject`: the provider's own number, which never changes."""
-
-    issuer: str
-    subject: str
-    name: str
-    role: Role
+from server.store.tables import SessionRow
 
 
 class SessionStore:
-    """Sessions, and the people who have ever signed in."""
+    """Sessions of people whom a plug-in has let in."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
 
-    def begin(self, person: Person, now: datetime, lasts: timedelta) -> tuple[str, Caller]:
-        """Begins a session, and returns its secret, which is shown to nobody else, with its caller.
-
-        A person keeps the name of their first session. Raises a 403 for a name that somebody else has.
-        """
+    def begin(
+        self, name_of: Callable[[Session], str], role: Role, now: datetime, lasts: timedelta
+    ) -> tuple[str, Caller]:
+        """Begins a session, and returns its secret, which is shown to nobody else, with its caller. `name_of` returns
+        the person's name, within the same transaction."""
         secret = secrets.token_urlsafe(32)
         with self._store.writing() as session:
             session.execute(delete(SessionRow).where(SessionRow.expires < now - timedelta(seconds=STOPS_FOR)))
-            row = session.scalar(select(PersonRow).filter_by(issuer=person.issuer, subject=person.subject))
-            if row is None:
-                if person.name == LOCAL.name or session.get(PersonRow, person.name) is not None:
-                    line = f"the name {person.name} belongs to somebody else"
-                    raise ProblemError(
-                        403, "name-taken", line, "choose another claim for names: server.oidc.name_claim"
-                    )
-                row = PersonRow(name=person.name, issuer=person.issuer, subject=person.subject, since=now)
-                session.add(row)
-            made = SessionRow(
-                digest=digest_of(secret), name=row.name, role=person.role, created=now, expires=now + lasts
-            )
+            name = name_of(session)
+            made = SessionRow(digest=digest_of(secret), name=name, role=role, created=now, expires=now + lasts)
             session.add(made)
-            return secret, Caller(made.name, person.role, made.digest, made.expires)
+            return secret, Caller(name, role, made.digest, made.expires)
 
     def end(self, digest: str) -> None:
         """Ends one session."""
@@ -64,13 +43,13 @@ class SessionStore:
             session.execute(delete(SessionRow).where(SessionRow.digest == digest))
 
     def end_all(self, name: str, now: datetime, by: str = "unknown") -> int:
-        """Ends all sessions of a person, and returns how many there were. `by`: who does it, for the audit log."""
+        """Ends all sessions of a person, and returns how many there were. `by`: who does it."""
         with self._store.writing() as session:
             rows = list(session.scalars(select(SessionRow).filter_by(name=name)))
             for row in rows:
                 session.delete(row)
             if rows:
-                append_in(session, [by_command(now, by, "sign_out", "daq token sign-out", name)])
+                note_command(session, now, by, "sign_out", "daq token sign-out", name)
             return len(rows)
 
     def all(self, now: datetime) -> list[Caller]:

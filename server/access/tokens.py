@@ -19,10 +19,9 @@ from sqlalchemy.exc import SQLAlchemyError
 from daq.contracts.errors import SpecError
 from daq.contracts.service.queue import Role, role_of
 from server.access.caller import LOCAL, Caller
+from server.access.commands import note_command
 from server.access.digest import digest_of
 from server.access.sessions import SessionStore
-from server.audit.command import by_command
-from server.audit.log import append_in
 from server.clock import Clock
 from server.database_errors import DamagedError
 from server.store.engine import Store
@@ -58,7 +57,7 @@ class TokenStore:
         self._sessions = SessionStore(store)
 
     def add(self, name: str, role: Role, now: datetime, by: str = "unknown") -> str:
-        """Makes a new token and returns it; it cannot be shown again. `by`: who makes it, for the audit log. Raises
+        """Makes a new token and returns it; it cannot be shown again. `by`: who makes it. Raises
         SpecError if the name is taken."""
         if name == LOCAL.name:
             raise SpecError(f"token {name!r}: users of this computer have this name; choose another one")
@@ -68,18 +67,18 @@ class TokenStore:
                 raise SpecError(f"token {name!r}: a token of this name exists, or was revoked; choose another name")
             row = TokenRow(id=secrets.token_hex(6), name=name, role=role, digest=digest_of(token), created=now)
             session.add(row)
-            append_in(session, [by_command(now, by, "add_token", f"daq token add --role {role}", name)])
+            note_command(session, now, by, "add_token", f"daq token add --role {role}", name)
         return token
 
     def revoke(self, name: str, now: datetime, by: str = "unknown") -> None:
-        """Revokes a token; its name stays taken. `by`: who does it, for the audit log. Raises SpecError if there is no
+        """Revokes a token; its name stays taken. `by`: who does it. Raises SpecError if there is no
         token of this name."""
         with self._store.writing() as session:
             row = session.scalar(select(TokenRow).filter_by(name=name))
             if row is None:
                 raise SpecError(f"token {name!r}: does not exist; `daq token ls` lists all tokens")
             row.revoked = row.revoked or now
-            append_in(session, [by_command(now, by, "revoke_token", "daq token revoke", name)])
+            note_command(session, now, by, "revoke_token", "daq token revoke", name)
 
     def all(self) -> list[TokenInfo]:
         """Returns all tokens, including the revoked ones."""

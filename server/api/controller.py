@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path
+from fastapi import Path
 
 from daq.contracts.errors import SpecError
 from daq.contracts.service.robot import GripperRequest, JointGains, OutputRequest, ProcessState
 from daq.owner.messages import Answer, MoveGripper, ReadGains, ReadProcess, WriteGains, WriteOutput
-from server.api.dependencies import Arrived, LeaseHeader, Operator, RobotDep, ServicesDep, Viewer
+from server.api.dependencies import Arrived, LeaseHeader, Operator, RobotDep, Viewer
 from server.problems import PROBLEMS
 from server.robot.orders import answer_of
+from server.routes import Router
 
-router = APIRouter(prefix="/robots/{robot}", tags=["controller"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}", tags=["controller"], responses=PROBLEMS)
 OutputNumber = Annotated[int, Path(ge=0, le=7)]
 
 
@@ -27,7 +28,6 @@ def get_gains(rig: RobotDep, _: Viewer, arrived: Arrived) -> JointGains:
 def set_gains(
     request: JointGains,
     rig: RobotDep,
-    services: ServicesDep,
     caller: Operator,
     arrived: Arrived,
     lease: LeaseHeader = None,
@@ -40,7 +40,7 @@ def set_gains(
             raise SpecError(f"gains.{joint}: {rig.robot.machine.name} has joints 1 to {count}")
     gains = JointGains.model_validate(answer_of(rig.robot, WriteGains, arrived, gains=request.gains).data)
     gains_of = ", ".join(f"joint {joint}: {'/'.join(map(str, gain))}" for joint, gain in sorted(request.gains.items()))
-    services.record_event(rig.robot.name, "gains", f"gains set: {gains_of}", actor=caller.name)
+    rig.record_event("gains", f"gains set: {gains_of}", actor=caller.name)
     return gains
 
 
@@ -55,7 +55,6 @@ def set_output(
     output: OutputNumber,
     request: OutputRequest,
     rig: RobotDep,
-    services: ServicesDep,
     caller: Operator,
     arrived: Arrived,
     lease: LeaseHeader = None,
@@ -64,9 +63,7 @@ def set_output(
     rig.require_motion(lease)
     switched = {"output": output, "on": request.on, "while_stopped": request.while_stopped}
     state = _process(answer_of(rig.robot, WriteOutput, arrived, **switched))
-    services.record_event(
-        rig.robot.name, "process", f"output {output} switched {'on' if request.on else 'off'}", actor=caller.name
-    )
+    rig.record_event("process", f"output {output} switched {'on' if request.on else 'off'}", actor=caller.name)
     return state
 
 
@@ -74,7 +71,6 @@ def set_output(
 def set_gripper(
     request: GripperRequest,
     rig: RobotDep,
-    services: ServicesDep,
     caller: Operator,
     arrived: Arrived,
     lease: LeaseHeader = None,
@@ -83,9 +79,7 @@ def set_gripper(
     rig.require_motion(lease)
     wanted = {"closed": request.closed, "while_stopped": request.while_stopped}
     state = _process(answer_of(rig.robot, MoveGripper, arrived, **wanted))
-    services.record_event(
-        rig.robot.name, "process", f"gripper {'closed' if request.closed else 'opened'}", actor=caller.name
-    )
+    rig.record_event("process", f"gripper {'closed' if request.closed else 'opened'}", actor=caller.name)
     return state
 
 

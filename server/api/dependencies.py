@@ -6,9 +6,9 @@ under load costs more than most answers.
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from datetime import UTC, datetime
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import Depends, Header, Path, Query
 from pydantic import AfterValidator
@@ -16,9 +16,23 @@ from starlette.requests import HTTPConnection
 
 from daq.contracts.service.base import PageLimit
 from server.access.caller import Caller, require_operator, require_viewer
+from server.access.lanes import Lanes
+from server.access.tickets import Tickets
+from server.api.upload import Uploads
+from server.bounded.workers import Workers
+from server.clock import Clock
+from server.parts import Part
 from server.problems import ProblemError
-from server.services import RobotServices, Services
+from server.robot_services import RobotServices
+from server.services import Services
+from server.store.events import EventStore
+from server.store.experiments import ExperimentStore
+from server.store.jobs import JobStore
+from server.store.models import ModelStore
 from server.store.pages import Cursor
+from server.store.programs import ProgramStore
+from server.store.schedules import ScheduleStore
+from server.store.traces import TraceStore
 
 
 def services_of(connection: HTTPConnection) -> Services:
@@ -43,6 +57,41 @@ async def robot_services(
 
 
 RobotDep = Annotated[RobotServices, Depends(robot_services)]
+
+
+def given(get: Callable[[Services], object]) -> Any:
+    """Returns the dependency of a route on a part of the service."""
+
+    async def found(connection: HTTPConnection) -> object:
+        return get(services_of(connection))
+
+    return Depends(found)
+
+
+def part(kind: type[Part]) -> Any:
+    """Returns the dependency of a route on the part of a plug-in."""
+    return given(lambda services: services.part(kind))
+
+
+def _uploads(services: Services) -> Uploads:
+    section, traces = services.settings.server, services.settings.traces
+    return Uploads(services.uploads, services.lanes, section.upload_size, traces.limits)
+
+
+Robots = Annotated[list[RobotServices], given(lambda services: services.robots())]
+Experiments = Annotated[ExperimentStore, given(lambda services: services.experiments)]
+Schedules = Annotated[ScheduleStore, given(lambda services: services.schedules)]
+Traces = Annotated[TraceStore, given(lambda services: services.traces)]
+Programs = Annotated[ProgramStore, given(lambda services: services.programs)]
+ModelRows = Annotated[ModelStore, given(lambda services: services.models)]
+JobRows = Annotated[JobStore, given(lambda services: services.jobs)]
+Events = Annotated[EventStore, given(lambda services: services.events)]
+Motions = Annotated[Workers, given(lambda services: services.motions)]
+"""Processes that plan motions."""
+UploadsDep = Annotated[Uploads, given(_uploads)]
+LanesDep = Annotated[Lanes, given(lambda services: services.lanes)]
+TicketsDep = Annotated[Tickets, given(lambda services: services.tickets)]
+ClockDep = Annotated[Clock, given(lambda services: services.clock)]
 
 
 async def _viewer(connection: HTTPConnection) -> Caller:
@@ -79,8 +128,6 @@ Arrived = Annotated[float, Depends(_arrived)]
 """When the request's first byte arrived (s, monotonic), before it waited for anything."""
 Viewer = Annotated[Caller, Depends(_viewer)]
 Operator = Annotated[Caller, Depends(_operator)]
-Auditor = Operator
-"""Who may read the audit log, which names people and their computers: whoever may change something."""
 
 
 def _require_cursor(cursor: str | None) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import Query, Response
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
@@ -21,30 +21,33 @@ from daq.contracts.service.experiments import (
 from server.access.caller import Caller
 from server.api.dependencies import (
     CursorOf,
+    Experiments,
     IdempotencyKey,
     Identity,
     Limit,
+    Motions,
     Operator,
     RobotDep,
-    ServicesDep,
     Turn,
     Viewer,
 )
 from server.api.presets import with_preset
 from server.bounded.messages import WorkOutMotion
 from server.bounded.motion import preview_of
-from server.bounded.workers import ExhaustedError
+from server.bounded.workers import ExhaustedError, Workers
 from server.catalogue.room import require_room
 from server.experiments.length import LONGEST, least_length, points_of
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
-from server.services import RobotServices, Services
+from server.robot_services import RobotServices
+from server.routes import Router
+from server.store.experiments import ExperimentStore
 
 MOST_SHOWN = 5000
 """Most set points in a preview; of a longer motion every second, third, … is returned."""
 SHORT, FEW_POINTS = 60.0, 5000
 """Longest motion (s) and most given set points that are planned here, in a moment; others are planned by a process."""
-router = APIRouter(prefix="/robots/{robot}/experiments", tags=["experiments"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}/experiments", tags=["experiments"], responses=PROBLEMS)
 StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only experiments in one of these states.")]
 
 
@@ -52,7 +55,8 @@ StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only ex
 def submit_experiment(
     request: ExperimentRequest,
     rig: RobotDep,
-    services: ServicesDep,
+    experiments: Experiments,
+    motions: Motions,
     caller: Operator,
     response: Response,
     _turn: Turn,
@@ -63,9 +67,9 @@ def submit_experiment(
     The same Idempotency-Key returns the same experiment (200) and never queues a second one.
     """
     request = with_preset(request)
-    experiment, new = services.experiments.made_before(rig.robot.name, request, idempotency_key), False
+    experiment, new = experiments.made_before(rig.robot.name, request, idempotency_key), False
     if experiment is None:  # one that was accepted stays accepted, even if the disk is full by now
-        require_possible(services, rig, request.spec)
+        require_possible(motions, rig, request.spec)
         require_room(rig.catalogue.folder)
         experiment, new = rig.queue.submit(request, caller.name, idempotency_key)
     response.status_code = 201 if new else 200
@@ -74,9 +78,9 @@ def submit_experiment(
 
 
 @router.get("")
-async def list_experiments(
+def list_experiments(
     rig: RobotDep,
-    services: ServicesDep,
+    experiments: Experiments,
     _: Viewer,
     state: StateFilter = None,
     schedule: Annotated[str | None, Query(max_length=64)] = None,
@@ -85,27 +89,27 @@ async def list_experiments(
     cursor: CursorOf = None,
 ) -> Page[Experiment]:
     """Lists experiments, the last submitted or the last ended first."""
-    page = await services.experiments.page.fetch(rig.robot.name, tuple(state or ()), schedule, cursor, limit, order)
+    page = experiments.page(rig.robot.name, tuple(state or ()), schedule, cursor, limit, order)
     return page.model_copy(update={"items": tuple(rig.queue.with_progress(item) for item in page.items)})
 
 
 @router.post("/preview")
 def preview_experiment(
-    request: ExperimentRequest, rig: RobotDep, services: ServicesDep, _: Viewer, _turn: Turn
+    request: ExperimentRequest, rig: RobotDep, motions: Motions, _: Viewer, _turn: Turn
 ) -> MotionPreview:
     """Plans an experiment and returns its motion and all violations of limits. Nothing is queued, nothing moves."""
-    return _preview(services, rig, with_preset(request).spec, MOST_SHOWN)
+    return _preview(motions, rig, with_preset(request).spec, MOST_SHOWN)
 
 
 @router.get("/{experiment}")
 async def get_experiment(
-    experiment: Identity, rig: RobotDep, services: ServicesDep, _: Viewer, wait: Wait = 0
+    experiment: Identity, rig: RobotDep, experiments: Experiments, _: Viewer, wait: Wait = 0
 ) -> Experiment:
     """Returns one experiment with its state, progress and outcome. With `wait`, answers when it has ended."""
     return await when_ended(
         rig.hub,
         {"events"},
-        lambda: rig.queue.with_progress(services.experiments.get(rig.robot.name, experiment)),
+        lambda: rig.queue.with_progress(experiments.get(rig.robot.name, experiment)),
         lambda now: now.state in ENDS,
         wait,
     )
@@ -113,68 +117,74 @@ async def get_experiment(
 
 @router.patch("/{experiment}")
 def change_experiment(
-    experiment: Identity, change: ExperimentChange, rig: RobotDep, services: ServicesDep, caller: Operator, _turn: Turn
+    experiment: Identity,
+    change: ExperimentChange,
+    rig: RobotDep,
+    experiments: Experiments,
+    motions: Motions,
+    caller: Operator,
+    _turn: Turn,
 ) -> Experiment:
     """Changes an experiment that still waits: one's own, or, for owners of the robot, anybody's.
 
     A new specification is checked like that of a new experiment, and ends its approval.
     """
-    _require_own(services, rig, caller, experiment)
+    _require_own(experiments, rig, caller, experiment)
     if change.spec is not None:
-        require_possible(services, rig, change.spec)
-    changed, ended = services.experiments.change(rig.robot.name, experiment, caller.name, change.priority, change.spec)
+        require_possible(motions, rig, change.spec)
+    changed, ended = experiments.change(rig.robot.name, experiment, caller.name, change.priority, change.spec)
     what = ["specification changed"] if change.spec is not None else []
     what += [f"approval of {ended} ended"] if ended else []
     what += [f"priority {change.priority}"] if change.priority is not None else []
-    services.record_event(rig.robot.name, "experiment", ", ".join(what), actor=caller.name, experiment=experiment)
+    rig.record_event("experiment", ", ".join(what), actor=caller.name, experiment=experiment)
     rig.queue.wake()
     return rig.queue.with_progress(changed)
 
 
 @router.put("/{experiment}/approval")
 def approve_experiment(
-    experiment: Identity, request: ApprovalRequest, rig: RobotDep, services: ServicesDep, caller: Operator
+    experiment: Identity, request: ApprovalRequest, rig: RobotDep, experiments: Experiments, caller: Operator
 ) -> Experiment:
     """Approves exactly this content of a waiting experiment, so that it may move a real arm.
 
     Whoever submitted or changed it cannot. It begins as soon as the queue lets it; a change ends the approval.
     """
     given = rig.approval(caller, request.content)
-    approved = services.experiments.approve(rig.robot.name, experiment, rig.queue.review, given, services.clock.utc())
-    services.record_event(rig.robot.name, "review", "approved", actor=caller.name, experiment=experiment)
+    approved = experiments.approve(rig.robot.name, experiment, rig.queue.review, given, rig.robot.clock.utc())
+    rig.record_event("review", "approved", actor=caller.name, experiment=experiment)
     rig.queue.wake()
     return rig.queue.with_progress(approved)
 
 
 @router.delete("/{experiment}/approval")
 def withdraw_experiment_approval(
-    experiment: Identity, rig: RobotDep, services: ServicesDep, caller: Operator
+    experiment: Identity, rig: RobotDep, experiments: Experiments, caller: Operator
 ) -> Experiment:
     """Ends the approval of an experiment that still waits. Every operator may."""
-    found, ended = services.experiments.withdraw_approval(rig.robot.name, experiment)
+    found, ended = experiments.withdraw_approval(rig.robot.name, experiment)
     if ended is not None:
         line = f"approval of {ended} withdrawn"
-        services.record_event(rig.robot.name, "review", line, actor=caller.name, experiment=experiment)
+        rig.record_event("review", line, actor=caller.name, experiment=experiment)
     return rig.queue.with_progress(found)
 
 
 @router.post("/{experiment}/cancel")
-def cancel_experiment(experiment: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Experiment:
+def cancel_experiment(experiment: Identity, rig: RobotDep, experiments: Experiments, caller: Operator) -> Experiment:
     """Cancels an experiment: one's own, or, for owners of the robot, anybody's.
 
     One that runs is ended by a stop: the arm is frozen and needs a reset.
     """
-    _require_own(services, rig, caller, experiment)
+    _require_own(experiments, rig, caller, experiment)
     return rig.queue.cancel(experiment, caller.name)
 
 
-def _require_own(services: Services, rig: RobotServices, caller: Caller, experiment: str) -> None:
+def _require_own(experiments: ExperimentStore, rig: RobotServices, caller: Caller, experiment: str) -> None:
     """Raises a 403 unless the caller may change this experiment, and a 404."""
-    found = services.experiments.get(rig.robot.name, experiment)
+    found = experiments.get(rig.robot.name, experiment)
     rig.require_own(caller, found.owner, f"experiment {found.spec.name or found.id}")
 
 
-def _preview(services: Services, rig: RobotServices, spec: ExperimentSpec, most_shown: int) -> MotionPreview:
+def _preview(motions: Workers, rig: RobotServices, spec: ExperimentSpec, most_shown: int) -> MotionPreview:
     """Plans a short motion here and a long one in a worker process. Raises SpecError, and a 422 for a motion that is
     too long to be planned."""
     length = least_length(spec)
@@ -185,7 +195,7 @@ def _preview(services: Services, rig: RobotServices, spec: ExperimentSpec, most_
     if length <= SHORT and spec.repeats == 1 and points_of(spec) <= FEW_POINTS:
         return preview_of(order)
     try:
-        answer = services.motions.ask(order)
+        answer = motions.ask(order)
     except ExhaustedError as error:
         raise ProblemError(422, "beyond-limits", f"spec: {error}", "make it shorter") from error
     if answer.problem:
@@ -193,9 +203,9 @@ def _preview(services: Services, rig: RobotServices, spec: ExperimentSpec, most_
     return MotionPreview.model_validate(answer.data)
 
 
-def require_possible(services: Services, rig: RobotServices, spec: ExperimentSpec) -> None:
+def require_possible(motions: Workers, rig: RobotServices, spec: ExperimentSpec) -> None:
     """Raises SpecError, and a 422 for a motion beyond the limits."""
-    violations = _preview(services, rig, spec, 1).violations
+    violations = _preview(motions, rig, spec, 1).violations
     if violations:
         more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
         line = f"spec.trajectory: {violations[0].message}{more}"

@@ -4,40 +4,39 @@ from __future__ import annotations
 
 import asyncio
 
-from fastapi import APIRouter
-
 from daq.contracts.service.fleet import (
     FleetRobot,
     FleetStatus,
 )
 from daq.contracts.service.robot import FleetStopResult
-from server.api.dependencies import ServicesDep, Viewer
+from server.api.dependencies import ClockDep, Robots, Viewer
 from server.problems import PROBLEMS
-from server.services import RobotServices
+from server.robot_services import RobotServices
+from server.routes import Router
 from server.stopping.arm import together
 
-router = APIRouter(prefix="/fleet", tags=["fleet"], responses=PROBLEMS)
+router = Router(prefix="/fleet", tags=["fleet"], responses=PROBLEMS)
 
 
 @router.get("")
-async def get_fleet(services: ServicesDep, _: Viewer) -> FleetStatus:
+async def get_fleet(robots: Robots, clock: ClockDep, _: Viewer) -> FleetStatus:
     """Returns the state of every robot at a glance, with the age of its newest sample."""
-    return FleetStatus(utc=services.clock.utc(), robots=tuple(map(_at_a_glance, services.robots())))
+    return FleetStatus(utc=clock.utc(), robots=tuple(map(_at_a_glance, robots)))
 
 
 @router.post("/stop", responses={200: {"description": "The outcome of the stops: read `confirmed`"}})
-async def stop_fleet(services: ServicesDep, caller: Viewer) -> FleetStopResult:
+async def stop_fleet(robots: Robots, caller: Viewer) -> FleetStopResult:
     """Freezes every arm of this service at once. Anybody who may see the robots may stop them, without control.
 
     Unless the answer is `confirmed`, use the emergency stops. Only a reset of each arm ends its freeze.
     """
-    rigs = services.robots()
-    for rig in rigs:
+    for rig in robots:
         rig.queue.stop_asked(caller.name)  # first, so that nothing begins while the stops are under way
-    results = await asyncio.gather(*(rig.stop.stop() for rig in rigs))
-    found = {rig.robot.name: result for rig, result in zip(rigs, results, strict=True)}
-    for name, result in found.items():
-        services.record_event_later(name, "stop", result.text, actor=caller.name)
+    results = await asyncio.gather(*(rig.stop.stop() for rig in robots))
+    found = {rig.robot.name: result for rig, result in zip(robots, results, strict=True)}
+    for rig in robots:
+        result = found[rig.robot.name]
+        rig.record_event_later("stop", result.text, actor=caller.name)
     return together(found)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from fastapi.responses import FileResponse
 
 from daq.contracts.service.base import Page
@@ -27,11 +27,14 @@ from server.api.dependencies import (
     CursorOf,
     IdempotencyKey,
     Identity,
+    JobRows,
     Limit,
+    ModelRows,
     Operator,
     RobotDep,
-    ServicesDep,
+    Robots,
     Turn,
+    UploadsDep,
     Viewer,
 )
 from server.api.upload import store_model
@@ -40,8 +43,9 @@ from server.jobs.results import JobResult
 from server.jobs.service import REPORT, RESULT
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS
+from server.routes import Router
 
-router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}", responses=PROBLEMS)
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
 """A report is a single page with inline styles and no script."""
 MOST_OF_A_LINEAGE = 500
@@ -71,7 +75,7 @@ def submit_job(
 @router.get("/jobs", tags=["jobs"])
 def list_jobs(
     rig: RobotDep,
-    services: ServicesDep,
+    jobs: JobRows,
     _: Viewer,
     state: Annotated[list[JobState] | None, Query()] = None,
     kind: JobKind | None = None,
@@ -80,17 +84,17 @@ def list_jobs(
     cursor: CursorOf = None,
 ) -> Page[Job]:
     """Lists jobs, the newest first. `model` selects the jobs that used a model and the job that made it."""
-    page = services.jobs.page(rig.robot.name, state or (), kind, cursor, limit, model)
+    page = jobs.page(rig.robot.name, state or (), kind, cursor, limit, model)
     return page.model_copy(update={"items": rig.jobs.with_progress_all(page.items)})
 
 
 @router.get("/jobs/{job}", tags=["jobs"])
-async def get_job(job: Identity, rig: RobotDep, services: ServicesDep, _: Viewer, wait: Wait = 0) -> Job:
+async def get_job(job: Identity, rig: RobotDep, jobs: JobRows, _: Viewer, wait: Wait = 0) -> Job:
     """Returns one job with its state, progress and outcome. With `wait`, answers when it has ended."""
     return await when_ended(
         rig.hub,
         {"jobs"},
-        lambda: rig.jobs.with_progress(services.jobs.get(rig.robot.name, job)),
+        lambda: rig.jobs.with_progress(jobs.get(rig.robot.name, job)),
         lambda now: now.state in ENDS,
         wait,
     )
@@ -129,10 +133,10 @@ def get_job_report(job: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
 
 @router.get("/models", tags=["models"])
 def list_models(
-    rig: RobotDep, services: ServicesDep, _: Viewer, limit: Limit = 50, cursor: CursorOf = None
+    rig: RobotDep, models: ModelRows, _: Viewer, limit: Limit = 50, cursor: CursorOf = None
 ) -> Page[ModelEntry]:
     """Lists models, the newest first."""
-    return services.models.page(rig.robot.name, cursor, limit)
+    return models.page(rig.robot.name, cursor, limit)
 
 
 @router.post(
@@ -145,7 +149,9 @@ def list_models(
 async def upload_model(
     request: Request,
     rig: RobotDep,
-    services: ServicesDep,
+    uploads: UploadsDep,
+    models: ModelRows,
+    robots: Robots,
     caller: Operator,
     response: Response,
     name: Annotated[ModelName, Query()],
@@ -155,7 +161,7 @@ async def upload_model(
     The same file again is the same entry (200). Refused are models with user-defined effects, and models that name
     traces which the service does not have.
     """
-    entry, new = await store_model(request, name, rig, services, caller)
+    entry, new = await store_model(request, name, rig, uploads, models, [one.robot.name for one in robots], caller)
     response.status_code = 201 if new else 200
     return entry
 
@@ -167,13 +173,13 @@ def list_machine_parameters(rig: RobotDep, _: Viewer, _turn: Turn) -> tuple[Mode
 
 
 @router.get("/lineage", tags=["models"])
-def get_lineage(rig: RobotDep, services: ServicesDep, _: Viewer, _turn: Turn) -> ModelLineage:
+def get_lineage(rig: RobotDep, jobs: JobRows, models: ModelRows, _: Viewer, _turn: Turn) -> ModelLineage:
     """Returns the models and the jobs that made or used them; at most the newest 500 of each."""
-    jobs = services.jobs.page(rig.robot.name, (), None, None, MOST_OF_A_LINEAGE).items
+    listed = jobs.page(rig.robot.name, (), None, None, MOST_OF_A_LINEAGE).items
     return ModelLineage(
         machine=rig.models.machine_identity(),
-        models=services.models.newest(rig.robot.name, MOST_OF_A_LINEAGE)[::-1],
-        jobs=rig.jobs.with_progress_all(reversed(jobs)),
+        models=models.newest(rig.robot.name, MOST_OF_A_LINEAGE)[::-1],
+        jobs=rig.jobs.with_progress_all(reversed(listed)),
     )
 
 
@@ -203,15 +209,15 @@ def download_model(model: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
 
 
 @router.patch("/models/{model}", tags=["models"])
-def change_model(model: Identity, change: ModelChange, rig: RobotDep, services: ServicesDep, _: Operator) -> ModelEntry:
+def change_model(model: Identity, change: ModelChange, rig: RobotDep, models: ModelRows, _: Operator) -> ModelEntry:
     """Changes the name or the notes of a model."""
-    return services.models.change(rig.robot.name, model, change)
+    return models.change(rig.robot.name, model, change)
 
 
 @router.delete("/models/{model}", tags=["models"], status_code=204)
-def delete_model(model: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
+def delete_model(model: Identity, rig: RobotDep, models: ModelRows, caller: Operator) -> Response:
     """Deletes a model for good. Refused while another model was made from it."""
-    name = services.models.get(rig.robot.name, model).name
+    name = models.get(rig.robot.name, model).name
     rig.models.remove(model)
-    services.record_event(rig.robot.name, "model", f"model {name!r} was deleted", actor=caller.name)
+    rig.record_event("model", f"model {name!r} was deleted", actor=caller.name)
     return Response(status_code=204)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, WebSocket
+from fastapi import WebSocket
 
 from daq.contracts.service.live import LiveFrame, Ticket
 from server.access.caller import require_viewer
-from server.api.dependencies import RobotDep, ServicesDep, Viewer, services_of
+from server.api.dependencies import (
+    RobotDep,
+    TicketsDep,
+    Viewer,
+    services_of,
+)
 from server.api.stream import stream
 from server.problems import PROBLEMS, ProblemError
+from server.routes import Router
 
-router = APIRouter(tags=["live"])
+router = Router(tags=["live"])
 NOT_ALLOWED = 1008
 """Close code: policy."""
 
@@ -38,6 +44,6 @@ def get_live_frame(rig: RobotDep, _: Viewer, history: float = 10.0) -> LiveFrame
 
 
 @router.post("/tickets", status_code=201, responses=PROBLEMS)
-def create_ticket(services: ServicesDep, caller: Viewer) -> Ticket:
+def create_ticket(tickets: TicketsDep, caller: Viewer) -> Ticket:
     """Issues a ticket for one WebSocket (`?ticket=…`), since browsers cannot send a token with it."""
-    return services.tickets.give(caller)
+    return tickets.give(caller)

@@ -4,31 +4,33 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastapi import APIRouter
-
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.experiments import ExperimentPreset, Submission
-from daq.trajectories.presets import PRESETS
 from server.api.dependencies import RobotDep, Viewer
 from server.problems import PROBLEMS, ProblemError
+from server.routes import Router
 
 
 def with_preset(request: Submission) -> Submission:
     """Returns a request whose specification is that of the preset that it names, if it names one. Raises a 422."""
     if request.preset is None:
         return request
+    from daq.trajectories.presets import PRESETS  # which makes all of them
+
     if request.preset not in PRESETS:
         detail = f"preset: is none of {', '.join(PRESETS)} (got {request.preset!r:.80})"
         raise ProblemError(422, "not-valid", detail, "name one of them, or give a `spec`")
     return request.model_copy(update={"spec": PRESETS[request.preset].spec, "preset": None})
 
 
-router = APIRouter(prefix="/robots/{robot}", tags=["experiments"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}", tags=["experiments"], responses=PROBLEMS)
 
 
 @router.get("/presets")
 def list_presets(rig: RobotDep, _: Viewer) -> tuple[ExperimentPreset, ...]:
     """Lists the named experiments for the joints of this robot: to run as they are, or to start from."""
+    from daq.trajectories.presets import PRESETS
+
     count = len(rig.robot.machine.joints)
     return tuple(
         ExperimentPreset(name=name, description=preset.description, spec=preset.spec)

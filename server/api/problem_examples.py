@@ -280,8 +280,8 @@ PROBLEM_EXAMPLES: tuple[Met, ...] = (
     _met(NOWHERE, 403, "sign-in-unknown", "this answer of the provider was used, or is too old", "begin anew"),
     _met(NOWHERE, 403, "sign-in-refused", "the provider refused: access_denied", "see its own message"),
     _met(NOWHERE, 403, "sign-in-not-proven", "the ID token is not for this service", "see the service's log"),
-    _met(NOWHERE, 403, "no-role", "none of the person's groups has a role", "see `server.oidc.roles`"),
-    _met(NOWHERE, 403, "no-name", "the claim has no usable name", "see `server.oidc.name_claim`"),
+    _met(NOWHERE, 403, "no-role", "none of the person's groups has a role", "see `oidc.roles`"),
+    _met(NOWHERE, 403, "no-name", "the claim has no usable name", "see `oidc.name_claim`"),
     _met(
         NOWHERE, 403, "name-taken", "somebody else has had the name anna first", "ask whoever looks after the service"
     ),

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import Path, Query, Response
 
 from daq.contracts.service.teaching import ProgramEntry, TeachingStatus
-from daq.teaching import Program
-from daq.teaching.program import NAME
-from server.api.dependencies import Arrived, LeaseHeader, Operator, RobotDep, ServicesDep, Viewer
+from daq.teaching.program import NAME, Program
+from server.api.dependencies import (
+    Arrived,
+    LeaseHeader,
+    Operator,
+    Programs,
+    RobotDep,
+    Viewer,
+)
 from server.problems import PROBLEMS
+from server.routes import Router
 from server.store.programs import StoredProgram
 
-router = APIRouter(prefix="/robots/{robot}/programs", tags=["teaching"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}/programs", tags=["teaching"], responses=PROBLEMS)
 ProgramName = Annotated[str, Path(pattern=f"^{NAME}$", description="Name of the program.")]
 Revision = Annotated[
     int | None,
@@ -22,15 +29,15 @@ Revision = Annotated[
 
 
 @router.get("")
-def list_programs(rig: RobotDep, services: ServicesDep, _: Viewer) -> tuple[ProgramEntry, ...]:
+def list_programs(rig: RobotDep, programs: Programs, _: Viewer) -> tuple[ProgramEntry, ...]:
     """Lists the stored programs, the last changed first."""
-    return services.programs.all(rig.robot.name)
+    return programs.all(rig.robot.name)
 
 
 @router.get("/{program}")
-def get_program(program: ProgramName, rig: RobotDep, services: ServicesDep, _: Viewer) -> StoredProgram:
+def get_program(program: ProgramName, rig: RobotDep, programs: Programs, _: Viewer) -> StoredProgram:
     """Returns one program with its revision, which a change has to name."""
-    return services.programs.get(rig.robot.name, program)
+    return programs.get(rig.robot.name, program)
 
 
 @router.put("/{program}")
@@ -38,7 +45,7 @@ def put_program(
     program: ProgramName,
     request: Program,
     rig: RobotDep,
-    services: ServicesDep,
+    programs: Programs,
     caller: Operator,
     revision: Revision = None,
 ) -> ProgramEntry:
@@ -47,14 +54,14 @@ def put_program(
     A body with another name than the address renames the program. A program that somebody else has changed meanwhile
     is not overwritten (409).
     """
-    return services.programs.put(rig.robot.name, program, request, revision, services.clock.utc(), caller.name)
+    return programs.put(rig.robot.name, program, request, revision, rig.robot.clock.utc(), caller.name)
 
 
 @router.delete("/{program}", status_code=204)
-def delete_program(program: ProgramName, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
+def delete_program(program: ProgramName, rig: RobotDep, programs: Programs, caller: Operator) -> Response:
     """Deletes a program for good."""
-    services.programs.remove(rig.robot.name, program)
-    services.record_event(rig.robot.name, "teaching", f"program {program} was deleted", actor=caller.name)
+    programs.remove(rig.robot.name, program)
+    rig.record_event("teaching", f"program {program} was deleted", actor=caller.name)
     return Response(status_code=204)
 
 
@@ -62,12 +69,12 @@ def delete_program(program: ProgramName, rig: RobotDep, services: ServicesDep, c
 def run_stored_program(
     program: ProgramName,
     rig: RobotDep,
-    services: ServicesDep,
+    programs: Programs,
     _: Operator,
     arrived: Arrived,
     lease: LeaseHeader = None,
 ) -> TeachingStatus:
     """Runs a stored program, as POST …/teaching/program runs one that is sent."""
     rig.require_motion(lease)
-    rig.teaching.perform(rig.word(lease, arrived), services.programs.get(rig.robot.name, program).program)
+    rig.teaching.perform(rig.word(lease, arrived), programs.get(rig.robot.name, program).program)
     return rig.teaching.status()

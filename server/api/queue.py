@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Response
+from fastapi import Body, Response
 
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import ApprovalRequest, Experiment, Schedule, ScheduleChange, ScheduleRequest
@@ -13,21 +13,25 @@ from server.access.caller import Caller
 from server.api.dependencies import (
     Arrived,
     CursorOf,
+    Experiments,
     Identity,
     LeaseHeader,
     Limit,
+    Motions,
     Operator,
     RobotDep,
-    ServicesDep,
+    Schedules,
     Turn,
     Viewer,
 )
 from server.api.experiments import require_possible
 from server.api.presets import with_preset
 from server.problems import PROBLEMS
-from server.services import RobotServices, Services
+from server.robot_services import RobotServices
+from server.routes import Router
+from server.store.schedules import ScheduleStore
 
-router = APIRouter(prefix="/robots/{robot}", responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}", responses=PROBLEMS)
 
 
 @router.get("/queue", tags=["queue"])
@@ -37,9 +41,9 @@ async def get_queue(rig: RobotDep, _: Viewer) -> QueueStatus:
 
 
 @router.get("/queue/experiments", tags=["queue"])
-def list_queue(rig: RobotDep, services: ServicesDep, _: Viewer) -> tuple[Experiment, ...]:
+def list_queue(rig: RobotDep, experiments: Experiments, _: Viewer) -> tuple[Experiment, ...]:
     """Lists the waiting experiments in the order in which they will run."""
-    return tuple(map(rig.queue.with_progress, services.experiments.in_order(rig.robot.name)))
+    return tuple(map(rig.queue.with_progress, experiments.in_order(rig.robot.name)))
 
 
 @router.post("/queue/pause", tags=["queue"])
@@ -71,81 +75,81 @@ def attend_queue(rig: RobotDep, _: Operator) -> QueueStatus:
 
 @router.post("/schedules", tags=["queue"], status_code=201)
 def create_schedule(
-    request: ScheduleRequest, rig: RobotDep, services: ServicesDep, caller: Operator, _turn: Turn
+    request: ScheduleRequest, rig: RobotDep, schedules: Schedules, motions: Motions, caller: Operator, _turn: Turn
 ) -> Schedule:
     """Creates a schedule that submits an experiment at even intervals or by the wall clock. It is checked now and
     before every run."""
     request = with_preset(request)
-    require_possible(services, rig, request.spec)
-    made = services.schedules.create(rig.robot.name, request, services.clock.utc(), caller.name)
+    require_possible(motions, rig, request.spec)
+    made = schedules.create(rig.robot.name, request, rig.robot.clock.utc(), caller.name)
     when = f"every {made.every:g} s" if made.every is not None else f"at {made.cron} of {made.zone}"
-    services.record_event(rig.robot.name, "schedule", f"schedule {made.id}: {when}", actor=caller.name)
+    rig.record_event("schedule", f"schedule {made.id}: {when}", actor=caller.name)
     rig.queue.wake()
     return rig.queue.with_review(made)
 
 
 @router.get("/schedules", tags=["queue"])
 def list_schedules(
-    rig: RobotDep, services: ServicesDep, _: Viewer, limit: Limit = 50, cursor: CursorOf = None
+    rig: RobotDep, schedules: Schedules, _: Viewer, limit: Limit = 50, cursor: CursorOf = None
 ) -> Page[Schedule]:
     """Lists schedules, the newest first."""
-    page = services.schedules.page(rig.robot.name, cursor, limit)
+    page = schedules.page(rig.robot.name, cursor, limit)
     return page.model_copy(update={"items": tuple(map(rig.queue.with_review, page.items))})
 
 
 @router.get("/schedules/{schedule}", tags=["queue"])
-def get_schedule(schedule: Identity, rig: RobotDep, services: ServicesDep, _: Viewer) -> Schedule:
+def get_schedule(schedule: Identity, rig: RobotDep, schedules: Schedules, _: Viewer) -> Schedule:
     """Returns one schedule."""
-    return rig.queue.with_review(services.schedules.get(rig.robot.name, schedule))
+    return rig.queue.with_review(schedules.get(rig.robot.name, schedule))
 
 
 @router.patch("/schedules/{schedule}", tags=["queue"])
 def change_schedule(
-    schedule: Identity, change: ScheduleChange, rig: RobotDep, services: ServicesDep, caller: Operator
+    schedule: Identity, change: ScheduleChange, rig: RobotDep, schedules: Schedules, caller: Operator
 ) -> Schedule:
     """Switches a schedule on or off: one's own, or, for owners of the robot, anybody's."""
-    _require_own(services, rig, caller, schedule)
-    changed = services.schedules.switch(rig.robot.name, schedule, active=change.active, now=services.clock.utc())
+    _require_own(schedules, rig, caller, schedule)
+    changed = schedules.switch(rig.robot.name, schedule, active=change.active, now=rig.robot.clock.utc())
     state = "on" if change.active else "off"
-    services.record_event(rig.robot.name, "schedule", f"schedule {schedule} switched {state}", actor=caller.name)
+    rig.record_event("schedule", f"schedule {schedule} switched {state}", actor=caller.name)
     rig.queue.wake()
     return rig.queue.with_review(changed)
 
 
 @router.put("/schedules/{schedule}/approval", tags=["queue"])
 def approve_schedule(
-    schedule: Identity, request: ApprovalRequest, rig: RobotDep, services: ServicesDep, caller: Operator
+    schedule: Identity, request: ApprovalRequest, rig: RobotDep, schedules: Schedules, caller: Operator
 ) -> Schedule:
     """Approves exactly this content of a schedule: its later runs may move a real arm. Its maker cannot."""
     given = rig.approval(caller, request.content)
-    approved = services.schedules.approve(rig.robot.name, schedule, rig.queue.review, given, services.clock.utc())
-    services.record_event(rig.robot.name, "review", f"schedule {schedule} approved", actor=caller.name)
+    approved = schedules.approve(rig.robot.name, schedule, rig.queue.review, given, rig.robot.clock.utc())
+    rig.record_event("review", f"schedule {schedule} approved", actor=caller.name)
     rig.queue.wake()
     return rig.queue.with_review(approved)
 
 
 @router.delete("/schedules/{schedule}/approval", tags=["queue"])
-def withdraw_schedule_approval(schedule: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Schedule:
+def withdraw_schedule_approval(schedule: Identity, rig: RobotDep, schedules: Schedules, caller: Operator) -> Schedule:
     """Ends the approval of a schedule. Runs that wait keep theirs. Every operator may."""
-    found, ended = services.schedules.withdraw_approval(rig.robot.name, schedule)
+    found, ended = schedules.withdraw_approval(rig.robot.name, schedule)
     if ended is not None:
         line = f"schedule {schedule}: approval of {ended} withdrawn"
-        services.record_event(rig.robot.name, "review", line, actor=caller.name)
+        rig.record_event("review", line, actor=caller.name)
     return rig.queue.with_review(found)
 
 
 @router.delete("/schedules/{schedule}", tags=["queue"], status_code=204)
-def delete_schedule(schedule: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
+def delete_schedule(schedule: Identity, rig: RobotDep, schedules: Schedules, caller: Operator) -> Response:
     """Deletes a schedule: one's own, or, for owners of the robot, anybody's. Its experiments are kept."""
-    _require_own(services, rig, caller, schedule)
-    services.schedules.remove(rig.robot.name, schedule)
-    services.record_event(rig.robot.name, "schedule", f"schedule {schedule} deleted", actor=caller.name)
+    _require_own(schedules, rig, caller, schedule)
+    schedules.remove(rig.robot.name, schedule)
+    rig.record_event("schedule", f"schedule {schedule} deleted", actor=caller.name)
     return Response(status_code=204)
 
 
-def _require_own(services: Services, rig: RobotServices, caller: Caller, schedule: str) -> None:
+def _require_own(schedules: ScheduleStore, rig: RobotServices, caller: Caller, schedule: str) -> None:
     """Raises a 403 unless the caller may change this schedule, and a 404."""
-    found = services.schedules.get(rig.robot.name, schedule)
+    found = schedules.get(rig.robot.name, schedule)
     rig.require_own(caller, found.created_by, f"schedule {found.spec.name or found.id}")
 
 
@@ -159,13 +163,12 @@ async def get_control(rig: RobotDep, _: Viewer) -> Control:
 def take_control(
     request: Annotated[ControlRequest, Body(default_factory=ControlRequest)],
     rig: RobotDep,
-    services: ServicesDep,
     caller: Operator,
 ) -> ControlLease:
     """Gives one client control of the robot. Without heartbeats it lapses: the arm holds and the queue is paused."""
     rig.require_consent(request.moves_real_arm, "is its workspace clear? then try again with moves_real_arm")
     lease = rig.control.take(caller.name, moves_real_arm=request.moves_real_arm)
-    services.record_event(rig.robot.name, "control", f"{caller.name} took control", actor=caller.name)
+    rig.record_event("control", f"{caller.name} took control", actor=caller.name)
     return lease
 
 
@@ -176,7 +179,7 @@ def renew_control(rig: RobotDep, _: Operator, lease: LeaseHeader = None) -> Cont
 
 
 @router.delete("/control", tags=["control"], status_code=204)
-def give_control_back(rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None) -> Response:
+def give_control_back(rig: RobotDep, caller: Operator, lease: LeaseHeader = None) -> Response:
     """Gives control back. The arm holds its posture; a program that still runs is stopped.
 
     If experiments are waiting, the queue is paused until somebody resumes it.
@@ -184,6 +187,6 @@ def give_control_back(rig: RobotDep, services: ServicesDep, caller: Operator, le
     rig.control.give_back(lease or "")
     rig.teaching.hold()
     rig.teaching.finish()
-    services.record_event(rig.robot.name, "control", f"{caller.name} gave control back", actor=caller.name)
+    rig.record_event("control", f"{caller.name} gave control back", actor=caller.name)
     rig.queue.wake()
     return Response(status_code=204)

@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
-
 from daq.contracts.machine import Machine
 from daq.contracts.service.base import Page
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.robot import Done, ResetRequest, RobotStatus, RobotSummary, StopResult
 from daq.owner.messages import Reset
-from server.api.dependencies import Arrived, CursorOf, LeaseHeader, Limit, Operator, RobotDep, ServicesDep, Viewer
+from server.api.dependencies import (
+    Arrived,
+    CursorOf,
+    Events,
+    LeaseHeader,
+    Limit,
+    Operator,
+    RobotDep,
+    Robots,
+    Viewer,
+)
 from server.problems import PROBLEMS
 from server.robot.orders import answer_of
+from server.routes import Router
 
-router = APIRouter(prefix="/robots", tags=["robots"], responses=PROBLEMS)
+router = Router(prefix="/robots", tags=["robots"], responses=PROBLEMS)
 
 
 @router.get("")
-async def list_robots(services: ServicesDep, _: Viewer) -> tuple[RobotSummary, ...]:
+async def list_robots(robots: Robots, _: Viewer) -> tuple[RobotSummary, ...]:
     """Lists the robots of this service."""
     return tuple(
         RobotSummary(
@@ -26,7 +35,7 @@ async def list_robots(services: ServicesDep, _: Viewer) -> tuple[RobotSummary, .
             connection=rig.robot.connection,
             arm=rig.robot.arm.arm if rig.robot.arm else "disconnected",
         )
-        for rig in services.robots()
+        for rig in robots
     )
 
 
@@ -43,31 +52,31 @@ async def get_machine(rig: RobotDep, _: Viewer) -> Machine:
 
 
 @router.post("/{robot}/connect")
-def connect_robot(rig: RobotDep, services: ServicesDep, caller: Operator) -> RobotStatus:
+def connect_robot(rig: RobotDep, caller: Operator) -> RobotStatus:
     """Connects the robot and keeps it connected. Moves nothing. 409 if another program has the port."""
     rig.keeper.connect()
-    services.record_event(rig.robot.name, "connection", "connected", actor=caller.name)
+    rig.record_event("connection", "connected", actor=caller.name)
     return rig.status()
 
 
 @router.post("/{robot}/disconnect")
-def disconnect_robot(rig: RobotDep, services: ServicesDep, caller: Operator, lease: LeaseHeader = None) -> Done:
+def disconnect_robot(rig: RobotDep, caller: Operator, lease: LeaseHeader = None) -> Done:
     """Disconnects, so that other programs can use the port. Refused while somebody else has control."""
     rig.control.require_free_of_others(lease)
     free = rig.keeper.disconnect()
-    services.record_event(rig.robot.name, "connection", "disconnected", actor=caller.name)
+    rig.record_event("connection", "disconnected", actor=caller.name)
     return Done(text="the port is free" if free else "the owner is still closing its trace; the port will be free soon")
 
 
 @router.post("/{robot}/stop", responses={200: {"description": "The outcome of the stop: read `confirmed`"}})
-async def stop_robot(rig: RobotDep, services: ServicesDep, caller: Viewer) -> StopResult:
+async def stop_robot(rig: RobotDep, caller: Viewer) -> StopResult:
     """Freezes the arm at its measured posture at once. Anybody who may see the robot may stop it, without control.
 
     Unless the answer is `confirmed`, use the emergency stop. Only a reset ends the freeze.
     """
     rig.queue.stop_asked(caller.name)  # first, so that nothing begins while the stop is under way, or if it is lost
     result = await rig.stop.stop()
-    services.record_event_later(rig.robot.name, "stop", result.text, actor=caller.name)
+    rig.record_event_later("stop", result.text, actor=caller.name)
     return result
 
 
@@ -75,7 +84,6 @@ async def stop_robot(rig: RobotDep, services: ServicesDep, caller: Viewer) -> St
 def reset_robot(
     request: ResetRequest,
     rig: RobotDep,
-    services: ServicesDep,
     caller: Operator,
     arrived: Arrived,
     lease: LeaseHeader = None,
@@ -86,18 +94,18 @@ def reset_robot(
     """
     rig.control.require_free_of_others(lease)
     text = str(answer_of(rig.robot, Reset, arrived, stop=request.stop, here=request.here).data["text"])
-    services.record_event(rig.robot.name, "reset", text, actor=caller.name)
+    rig.record_event("reset", text, actor=caller.name)
     return Done(text=text)
 
 
 @router.get("/{robot}/events")
 def list_events(
     rig: RobotDep,
-    services: ServicesDep,
+    events: Events,
     _: Viewer,
     experiment: str | None = None,
     limit: Limit = 50,
     cursor: CursorOf = None,
 ) -> Page[ServiceEvent]:
     """Lists events and who caused them, the newest first."""
-    return services.events.page(rig.robot.name, experiment, cursor, limit)
+    return events.page(rig.robot.name, experiment, cursor, limit)

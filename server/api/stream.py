@@ -16,11 +16,10 @@ from daq.contracts.service.live import JogCommand, LiveRequest, RefusedMessage, 
 from firmware_protocol.invalid import first_invalid
 from server.access.caller import Caller
 from server.access.limits import Bucket
-from server.audit.words import line_of
 from server.live.hub import Client
 from server.live.outbox import Outbox
 from server.problems import ProblemError, field_of
-from server.services import RobotServices
+from server.robot_services import RobotServices
 
 BASE_RATE = 50
 WAITING_MESSAGES = 64
@@ -152,18 +151,18 @@ def _past(rig: RobotServices, begin: float, points: int) -> str:
 
 
 def _noted_jog(command: JogCommand, rig: RobotServices, caller: Caller, origin: str, said: float) -> None:
-    """Jogs, and counts that in the audit log, which has the first of many commands and then a row a minute."""
+    """Jogs, and tells plug-ins who did."""
     outcome: Outcome = "done"
     detail = ""
     try:
         _jog(command, rig, caller, said)
     except (ProblemError, DaqError) as error:
-        outcome, detail = "refused", line_of(error)
+        outcome, detail = "refused", str(error)
         raise
     finally:
-        rig.audit.writer.count(
+        rig.jogged(
             AuditNote(
-                at=rig.audit.utc(),
+                at=rig.robot.clock.utc(),
                 actor=caller.name,
                 role=caller.role,
                 origin=origin,

@@ -1,4 +1,4 @@
-"""Routes of the service itself: health, readiness, metrics, and the caller's own role."""
+"""Routes of the service itself: health, readiness, and the caller's own role."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
-from fastapi import APIRouter, Request, Response
-from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
+from fastapi import Request, Response
 from sqlalchemy import func, select
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import SQLAlchemyError
@@ -22,11 +21,12 @@ from server.catalogue.room import room_of
 from server.database_errors import one_line
 from server.jobs.lanes import SHORT_LANE_WORKERS
 from server.problems import PROBLEMS
+from server.routes import Router
 from server.services import Services
 from server.store.tables import TraceRow
 
-plain = APIRouter(tags=["system"])
-router = APIRouter(tags=["system"], responses=PROBLEMS)
+plain = Router(tags=["system"])
+router = Router(tags=["system"], responses=PROBLEMS)
 VERSION = version("ma2000-daq")
 NOT_WELL = "not well: details need a token"
 
@@ -51,12 +51,6 @@ async def readyz(request: Request, services: ServicesDep, response: Response) ->
         response.status_code = 503
         return Health(status="not ready", version=VERSION, checks=problems)
     return Health(status="ok", version=VERSION, checks=problems)
-
-
-@plain.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
-def metrics(services: ServicesDep, _: Viewer) -> Response:
-    """Returns the metrics in the format of Prometheus."""
-    return Response(generate_latest(services.metrics.registry), media_type=CONTENT_TYPE_LATEST)
 
 
 @router.get("/me")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from fastapi import Response
 
 from daq.calibration import gain_experiment, gains_from_trace
 from daq.contracts.errors import SpecError
@@ -15,25 +15,26 @@ from daq.contracts.service.teaching import (
     StepRequest,
     TeachingStatus,
 )
-from daq.teaching import Program
 from daq.teaching.jog import require_step_speed
-from daq.teaching.program import Absolute, Instruction, Relative
+from daq.teaching.program import Absolute, Instruction, Program, Relative
 from daq.traces.reader import read_trace
 from server.api.dependencies import (
     Arrived,
+    Experiments,
     IdempotencyKey,
     Identity,
     LeaseHeader,
+    Motions,
     Operator,
     RobotDep,
-    ServicesDep,
     Turn,
     Viewer,
 )
 from server.api.experiments import submit_experiment
 from server.problems import PROBLEMS
+from server.routes import Router
 
-router = APIRouter(prefix="/robots/{robot}", tags=["teaching"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}", tags=["teaching"], responses=PROBLEMS)
 
 
 @router.get("/teaching")
@@ -106,7 +107,8 @@ def finish_teaching(rig: RobotDep, _: Operator, lease: LeaseHeader = None) -> Te
 def calibrate_gain(
     request: CalibrationRequest,
     rig: RobotDep,
-    services: ServicesDep,
+    experiments: Experiments,
+    motions: Motions,
     caller: Operator,
     response: Response,
     _turn: Turn,
@@ -117,7 +119,8 @@ def calibrate_gain(
     It is checked like any experiment; the same Idempotency-Key returns the same experiment (200).
     """
     spec = gain_experiment(tuple(sorted(set(request.joints))))
-    return submit_experiment(ExperimentRequest(spec=spec), rig, services, caller, response, None, idempotency_key)
+    request_of = ExperimentRequest(spec=spec)
+    return submit_experiment(request_of, rig, experiments, motions, caller, response, None, idempotency_key)
 
 
 @router.get("/traces/{trace}/gain")

@@ -6,7 +6,8 @@ import tempfile
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
@@ -19,20 +20,23 @@ from daq.traces.summary import joint_figures
 from server.api.dependencies import (
     CursorOf,
     Identity,
+    LanesDep,
     Limit,
     Operator,
     RobotDep,
-    ServicesDep,
+    Traces,
     Turn,
+    UploadsDep,
     Viewer,
     let_others_ask,
 )
 from server.api.upload import store_upload
 from server.catalogue.thinning import thinned
 from server.problems import PROBLEMS, TITLES
+from server.routes import Router
 from server.store.traces import TraceSearch
 
-router = APIRouter(prefix="/robots/{robot}/traces", tags=["traces"], responses=PROBLEMS)
+router = Router(prefix="/robots/{robot}/traces", tags=["traces"], responses=PROBLEMS)
 
 MCAP = "application/octet-stream"
 CSV = "text/csv"
@@ -48,7 +52,8 @@ _BINARY = {"schema": {"type": "string", "format": "binary"}}
 async def list_traces(
     connection: Request,
     rig: RobotDep,
-    services: ServicesDep,
+    traces: Traces,
+    lanes: LanesDep,
     caller: Viewer,
     q: Text = None,
     tag: Annotated[str | None, Query(max_length=40)] = None,
@@ -63,10 +68,10 @@ async def list_traces(
     """Lists traces, the newest first."""
     search = TraceSearch(q, tag, source, outcome, kind, since, until)
     if q is None:
-        return await services.traces.page.fetch(rig.robot.name, search, cursor, limit)
+        return await run_in_threadpool(traces.page, rig.robot.name, search, cursor, limit)
     let_others_ask(connection)
-    async with services.lanes.turn(caller.name):
-        return await services.traces.page.fetch(rig.robot.name, search, cursor, limit)
+    async with lanes.turn(caller.name):
+        return await run_in_threadpool(traces.page, rig.robot.name, search, cursor, limit)
 
 
 @router.post(
@@ -75,15 +80,17 @@ async def list_traces(
     responses={415: PROBLEMS[422] | {"description": TITLES[415]}},
     openapi_extra={"requestBody": {"required": True, "content": {MCAP: _BINARY, CSV: _BINARY}}},
 )
-async def upload_trace(request: Request, rig: RobotDep, services: ServicesDep, caller: Operator) -> CatalogueEntry:
+async def upload_trace(
+    request: Request, rig: RobotDep, uploads: UploadsDep, traces: Traces, caller: Operator
+) -> CatalogueEntry:
     """Imports a trace: MCAP of this project (application/octet-stream) or plain CSV (text/csv)."""
-    return await store_upload(request, rig, services, caller)
+    return await store_upload(request, rig, uploads, traces, caller)
 
 
 @router.get("/{trace}")
-def get_trace(trace: Identity, rig: RobotDep, services: ServicesDep, _: Viewer, _turn: Turn) -> TraceDetails:
+def get_trace(trace: Identity, rig: RobotDep, traces: Traces, _: Viewer, _turn: Turn) -> TraceDetails:
     """Returns one trace's record, figures and events."""
-    entry = services.traces.get(rig.robot.name, trace)
+    entry = traces.get(rig.robot.name, trace)
     read = read_trace(rig.catalogue.path_of(trace), rig.catalogue.limits)
     return TraceDetails(
         entry=entry,
@@ -95,18 +102,16 @@ def get_trace(trace: Identity, rig: RobotDep, services: ServicesDep, _: Viewer, 
 
 
 @router.patch("/{trace}")
-def change_trace(
-    trace: Identity, change: TraceChange, rig: RobotDep, services: ServicesDep, _: Operator
-) -> CatalogueEntry:
+def change_trace(trace: Identity, change: TraceChange, rig: RobotDep, traces: Traces, _: Operator) -> CatalogueEntry:
     """Changes the tags or the notes, which the catalogue keeps: the file stays as it was recorded."""
-    return services.traces.change(rig.robot.name, trace, change)
+    return traces.change(rig.robot.name, trace, change)
 
 
 @router.delete("/{trace}", status_code=204)
-def delete_trace(trace: Identity, rig: RobotDep, services: ServicesDep, caller: Operator) -> Response:
+def delete_trace(trace: Identity, rig: RobotDep, caller: Operator) -> Response:
     """Deletes a trace for good. Refused while a model or a job uses it."""
     path = rig.catalogue.remove(trace)
-    services.record_event(rig.robot.name, "trace", f"trace {trace} ({path.name}) was deleted", actor=caller.name)
+    rig.record_event("trace", f"trace {trace} ({path.name}) was deleted", actor=caller.name)
     return Response(status_code=204)
 
 

@@ -4,6 +4,8 @@ in a folder."""
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +14,19 @@ from fastapi.concurrency import run_in_threadpool
 
 from daq.contracts.service.jobs import ModelEntry
 from daq.contracts.service.traces import CatalogueEntry
+from daq.contracts.trace_limits import TraceLimits
 from model.machine_model.model_file import ModelFile
 from server.access.caller import Caller
+from server.access.lanes import Lanes
 from server.bounded.messages import Order, ReadModel, ReadUpload, UploadedTrace
-from server.bounded.workers import ExhaustedError
+from server.bounded.workers import ExhaustedError, Workers
 from server.catalogue.catalogue import UPLOAD
 from server.catalogue.room import require_room
 from server.problems import ProblemError, conflict
-from server.services import RobotServices, Services
+from server.robot_services import RobotServices
 from server.store.labels import trace_label
+from server.store.models import ModelStore
+from server.store.traces import TraceStore
 
 KINDS = {"application/octet-stream": ".mcap", "text/csv": ".csv"}
 LOOK_EVERY = 4 << 20
@@ -33,35 +39,55 @@ ADVICE = {
 }
 
 
-async def store_upload(request: Request, rig: RobotServices, services: Services, caller: Caller) -> CatalogueEntry:
+@dataclass(frozen=True)
+class Uploads:
+    """What takes in uploads: processes with limits, the lanes of those who send, the largest upload (MB) and the limits
+    of traces."""
+
+    workers: Workers
+    lanes: Lanes
+    most: int
+    limits: TraceLimits
+
+
+async def store_upload(
+    request: Request, rig: RobotServices, uploads: Uploads, traces: TraceStore, caller: Caller
+) -> CatalogueEntry:
     """Writes the body to a temporary file, then takes it in as a trace. Raises a 413, 415, 422, 409, 507."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind not in KINDS:
         allowed = " or ".join(KINDS)
         raise ProblemError(415, "not-a-trace", f"Content-Type {kind!r:.100} is not supported", f"send {allowed}")
-    most = services.settings.server.upload_size
-    line = f"an upload may have {most} MB (server.upload_size)"
+    line = f"an upload may have {uploads.most} MB (server.upload_size)"
     too_large = ProblemError(413, "too-large", line, "copy the file into the folder of traces instead")
     rig.catalogue.folder.mkdir(parents=True, exist_ok=True)
     await run_in_threadpool(require_room, rig.catalogue.folder)
     with tempfile.TemporaryDirectory(prefix=UPLOAD, dir=rig.catalogue.folder) as folder:
         path = Path(folder) / f"upload{KINDS[kind]}"
-        if await _write_body(request, path, most << 20, too_large) == 0:
+        if await _write_body(request, path, uploads.most << 20, too_large) == 0:
             raise ProblemError(422, "not-a-trace", "the body is empty", "send a trace")
-        async with services.lanes.turn(caller.name):  # not before: a body that never ends would keep it
-            return await run_in_threadpool(_take_in, path, rig, services, caller)
+        async with uploads.lanes.turn(caller.name):  # not before: a body that never ends would keep it
+            return await run_in_threadpool(_take_in, path, rig, uploads, traces, caller)
 
 
 async def store_model(
-    request: Request, name: str, rig: RobotServices, services: Services, caller: Caller
+    request: Request,
+    name: str,
+    rig: RobotServices,
+    uploads: Uploads,
+    models: ModelStore,
+    robots: Sequence[str],
+    caller: Caller,
 ) -> tuple[ModelEntry, bool]:
-    """Does the same with a model. Returns its entry, and whether it is new. Raises a 413, 422, 507."""
+    """Does the same with a model, which may name traces of these robots. Returns its entry, and whether it is new.
+    Raises a 413, 422, 507."""
     too_large = ProblemError(413, "too-large", f"a model may have {LARGEST_MODEL >> 20} MB", "send less")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.json"
         await _write_body(request, path, LARGEST_MODEL, too_large)
-        async with services.lanes.turn(caller.name):
-            return await run_in_threadpool(_keep, path, name, rig, services, caller)
+        async with uploads.lanes.turn(caller.name):
+            made = await run_in_threadpool(_read, ReadModel(path=path), uploads, "not-a-model")
+            return await run_in_threadpool(_keep, ModelFile.model_validate(made), name, rig, models, robots, caller)
 
 
 async def _write_body(request: Request, path: Path, largest: int, too_large: ProblemError) -> int:
@@ -78,9 +104,9 @@ async def _write_body(request: Request, path: Path, largest: int, too_large: Pro
     return size
 
 
-def _take_in(path: Path, rig: RobotServices, services: Services, caller: Caller) -> CatalogueEntry:
-    order = ReadUpload(path=path, folder=rig.catalogue.folder, limits=services.settings.traces.limits)
-    made = UploadedTrace.model_validate(_read(order, services, "not-a-trace"))
+def _take_in(path: Path, rig: RobotServices, uploads: Uploads, traces: TraceStore, caller: Caller) -> CatalogueEntry:
+    order = ReadUpload(path=path, folder=rig.catalogue.folder, limits=uploads.limits)
+    made = UploadedTrace.model_validate(_read(order, uploads, "not-a-trace"))
     if made.path.parent != path.parent:
         raise ProblemError(422, "not-a-trace", "upload: its reader gave an impossible answer", ADVICE["not-a-trace"])
     summary = made.summary
@@ -89,23 +115,24 @@ def _take_in(path: Path, rig: RobotServices, services: Services, caller: Caller)
     label = trace_label(summary.name, summary.kind, made.name, summary.created)
     if not rig.catalogue.move_in(made.path, rig.catalogue.folder / made.name, summary):
         raise conflict("trace-exists", f"{label} exists already", "it is the same trace: nothing needs to be done")
-    services.record_event(rig.robot.name, "trace", f"{label} was uploaded", actor=caller.name)
-    return services.traces.get(rig.robot.name, summary.trace_id)
+    rig.record_event("trace", f"{label} was uploaded", actor=caller.name)
+    return traces.get(rig.robot.name, summary.trace_id)
 
 
-def _keep(path: Path, name: str, rig: RobotServices, services: Services, caller: Caller) -> tuple[ModelEntry, bool]:
-    made = ModelFile.model_validate(_read(ReadModel(path=path), services, "not-a-model"))
+def _keep(
+    made: ModelFile, name: str, rig: RobotServices, models: ModelStore, robots: Sequence[str], caller: Caller
+) -> tuple[ModelEntry, bool]:
     # Everybody who may call the service sees the traces of all its robots, and of no other.
-    new = rig.models.keep(made, name, caller.name, robots=[one.robot.name for one in services.robots()])
+    new = rig.models.keep(made, name, caller.name, robots=robots)
     if new:
-        services.record_event(rig.robot.name, "model", f"model {name!r} was uploaded", actor=caller.name)
-    return services.models.get(rig.robot.name, made.identity), new
+        rig.record_event("model", f"model {name!r} was uploaded", actor=caller.name)
+    return models.get(rig.robot.name, made.identity), new
 
 
-def _read(order: Order, services: Services, kind: str) -> dict[str, Any]:
+def _read(order: Order, uploads: Uploads, kind: str) -> dict[str, Any]:
     """Reads the upload. Raises a 413 if this takes too much time or memory, and a 422 if it is not valid."""
     try:
-        answer = services.uploads.ask(order)
+        answer = uploads.workers.ask(order)
     except ExhaustedError as error:
         raise _too_much(str(error)) from error
     if answer.exhausted:

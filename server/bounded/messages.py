@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, TypeAdapter
 
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.frozen import FrozenRecord
+from daq.contracts.frozen import WHEN_USED, FrozenRecord
 from daq.contracts.machine import Machine
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.catalogue import TraceSummary
@@ -49,7 +49,7 @@ class WorkOutMotion(FrozenRecord):
 
 
 Order = ReadUpload | ReadModel | WorkOutMotion
-ORDER: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="kind")])
+ORDER: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="kind")], config=WHEN_USED)
 
 
 class UploadedTrace(FrozenRecord):

@@ -6,7 +6,7 @@ import math
 
 from daq.contracts.service.experiments import MotionMark, MotionPreview, MotionViolation
 from daq.safety import Violation, check_plan
-from daq.trajectories import plan, start_angles
+from daq.trajectories.planner import plan, start_angles
 from server.bounded.messages import WorkOutMotion
 
 

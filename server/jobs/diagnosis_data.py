@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from model.comparison.difference import differences
-from model.discrepancy.explanation.renderer import not_a_finding, where_with_summary
+from model.discrepancy.explanation.answer_words import not_a_finding
+from model.discrepancy.explanation.step_words import where_with_summary
 from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
 from model.discrepancy.localisation.statistics import chance_significance

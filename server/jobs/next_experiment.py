@@ -1,5 +1,5 @@
 """The experiments that a diagnosis may ask for: those of the library that the machine's limits allow and, where
-it is wanted, motions that are designed within them.
+it is wanted, experiments that are drawn within them.
 
 The service, `daq diagnose` and the diagnosing process of a blind trial use this.
 """
@@ -16,15 +16,18 @@ if TYPE_CHECKING:
     from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
 
 
+DRAWN = 40
+"""Experiments that are drawn for a question."""
+
+
 def experiment_chooser(machine: Machine, budget: float | None = None, *, design: bool = False) -> ExperimentChooser:
     """Returns the library of experiments, planned and checked for a machine. The caller runs those asked for.
 
     Args:
         budget: remaining robot time (s); None for no limit.
-        design: search for a motion of its own for each question, too.
+        design: draw experiments for each question, too.
     """
     from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
-    from model.discrepancy.experiment_design.search import MotionSearch
 
-    search = MotionSearch() if design else None
+    search = DRAWN if design else None
     return ExperimentChooser(offered_experiments(), lambda spec: planned(spec, machine), budget, search)

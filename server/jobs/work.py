@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from daq.contracts.trace import Trace
+    from model.blocks import Report
     from model.comparison.compare import Comparison
     from model.machine_model.model import Model
-    from model.reports.page import Report
     from model.simulation.prepared import Options
     from server.jobs.results import JobResult
 
@@ -197,7 +197,7 @@ class _Worker:
     def diagnose(self, request: DiagnoseRequest) -> Ended:
         """Does the same as `daq diagnose`."""
         from daq.contracts.machine import NoController
-        from model.discrepancy.explanation.headline import headline
+        from model.discrepancy.explanation.answer_words import headline
         from model.discrepancy.inverse_dynamics.efforts import recorded_and_predicted
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose

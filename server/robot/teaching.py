@@ -25,9 +25,9 @@ from daq.owner.messages import (
     RunProgram,
     TeachingText,
 )
-from daq.teaching import Program
 from daq.teaching.jog import DEAD_MAN, top_speed
 from daq.teaching.lead import PATIENCE
+from daq.teaching.program import Program
 from server.problems import ProblemError, conflict
 from server.robot.robot import ANSWER_WITHIN, Robot
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import AwareDatetime, Field, TypeAdapter
 
-from daq.contracts.frozen import FrozenRecord
+from daq.contracts.frozen import WHEN_USED, FrozenRecord
 from daq.contracts.service.queue import Role
 
 # ---- to the listener
@@ -90,5 +90,7 @@ class Stopped(FrozenRecord):
 
 
 Order = Begin | Known | Joined | Left | Owned
-ORDER: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="kind")])
-NEWS: TypeAdapter[Ready | Stopped] = TypeAdapter(Annotated[Ready | Stopped, Field(discriminator="kind")])
+ORDER: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="kind")], config=WHEN_USED)
+NEWS: TypeAdapter[Ready | Stopped] = TypeAdapter(
+    Annotated[Ready | Stopped, Field(discriminator="kind")], config=WHEN_USED
+)

@@ -30,8 +30,6 @@ UNKNOWN_WITHIN = 0.5
 """Time (s) for which a request with an unknown token waits for the database. One with a known token never waits."""
 BUSY_WITHIN = 0.4
 """Time (s) for which a read may wait for a lock of SQLite's."""
-ANSWERED_WITHIN = 2
-"""Time (s) for a database server to accept a connection, and to answer each statement."""
 log = logging.getLogger("server.stop")
 
 TOKENS = "SELECT digest, name, role FROM tokens WHERE revoked IS NULL"
@@ -147,7 +145,7 @@ class StopTokens:
 
 def reader_of(database_url: str, sqlite: Path | None) -> Callable[[], Callers]:
     """Returns a function that reads all tokens: from a SQLite file with the standard library, from another database as
-    the service does."""
+    its plug-in does."""
     read_both = partial(_of_file, sqlite) if sqlite is not None else _of_database(database_url)
     last: Callers = {}
 
@@ -160,7 +158,7 @@ def reader_of(database_url: str, sqlite: Path | None) -> Callable[[], Callers]:
     return read
 
 
-def _ended() -> datetime:
+def ended() -> datetime:
     """Returns the end (UTC, without zone, as the table has it) of the oldest session that still stops the robot."""
     return datetime.now(UTC).replace(tzinfo=None) - timedelta(seconds=STOPS_FOR)
 
@@ -169,35 +167,24 @@ def _of_file(file: Path) -> tuple[Callers, Callers | None]:
     """Reads tokens and sessions (None: these cannot be read) over a new connection. A suspended service that holds the
     write lock does not block readers (WAL)."""
     with closing(open_to_read(file, BUSY_WITHIN)) as connection:
-        tokens = _callers(connection.execute(TOKENS).fetchall())
+        tokens = callers_of(connection.execute(TOKENS).fetchall())
         try:
-            sessions = connection.execute(SESSIONS, {"ended": _ended().isoformat(" ", "microseconds")}).fetchall()
+            sessions = connection.execute(SESSIONS, {"ended": ended().isoformat(" ", "microseconds")}).fetchall()
         except sqlite3.Error as error:
             log.warning(NO_SESSIONS, error)
             return tokens, None
-    return tokens, _callers(sessions)
+    return tokens, callers_of(sessions)
 
 
-def _callers(rows: Iterable[Sequence[Any]]) -> Callers:
+def callers_of(rows: Iterable[Sequence[Any]]) -> Callers:
+    """Returns the callers of rows of digest, name and role."""
     return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
 
 
 def _of_database(url: str) -> Callable[[], tuple[Callers, Callers | None]]:
-    from sqlalchemy import create_engine, text
-    from sqlalchemy.exc import SQLAlchemyError
+    from server.store.databases import database_of
 
-    options = {"connect_timeout": ANSWERED_WITHIN, "options": f"-c statement_timeout={ANSWERED_WITHIN * 1000}"}
-    engine = create_engine(url, connect_args=options if url.startswith("postgresql") else {})
-
-    def read() -> tuple[Callers, Callers | None]:
-        with engine.connect() as connection:
-            tokens = _callers(connection.execute(text(TOKENS)).all())
-        try:
-            with engine.connect() as connection:  # a failed statement would end the transaction of the tokens
-                sessions = _callers(connection.execute(text(SESSIONS), {"ended": _ended()}).all())
-        except SQLAlchemyError as error:
-            log.warning(NO_SESSIONS, error)
-            return tokens, None
-        return tokens, sessions
-
+    read: Callable[[], tuple[Callers, Callers | None]] = database_of(url.partition(":")[0].partition("+")[0]).reader(
+        url
+    )
     return read

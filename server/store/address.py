@@ -13,10 +13,9 @@ from daq.config.settings import Settings
 from daq.contracts import exit_codes
 from daq.contracts.documents import shown
 from daq.contracts.errors import DaqError
+from server.store.databases import added_databases, database_of
 
-EXAMPLES = "sqlite:////srv/arm/service.sqlite or postgresql+psycopg://daq@localhost/daq"
-PACKAGES = {"psycopg": "ma2000-daq[postgresql]", "psycopg2": "psycopg2-binary", "MySQLdb": "mysqlclient"}
-"""What to install for a driver's module, where that has another name."""
+EXAMPLE = "sqlite:////srv/arm/service.sqlite"
 
 
 class StoreError(DaqError):
@@ -45,10 +44,15 @@ def parse_address(url: str | URL) -> URL:
     """
     try:
         parsed = make_url(url)
+        kind = parsed.get_backend_name()
+    except (ArgumentError, ValueError) as error:
+        raise _no_address(url) from error
+    if kind not in ("sqlite", *added_databases()):
+        raise _no_address(url)
+    try:
         parsed.get_dialect()
-    except (ArgumentError, NoSuchModuleError, ValueError) as error:
-        known = shown(str(url).rpartition("@")[2])
-        raise StoreError(f"server.database {known}: is not the address of a database; write {EXAMPLES}") from error
+    except NoSuchModuleError as error:
+        raise _no_address(url) from error
     except ModuleNotFoundError as error:
         raise _no_driver(parsed, error) from error
     return parsed
@@ -86,9 +90,14 @@ def open_engine(url: str | URL) -> Engine:
         raise StoreError(line) from error
 
 
+def _no_address(url: str | URL) -> StoreError:
+    known = shown(str(url).rpartition("@")[2])
+    return StoreError(f"server.database {known}: is not the address of a database; write {EXAMPLE}")
+
+
 def _no_driver(parsed: URL, error: ModuleNotFoundError) -> StoreError:
     module = error.name or parsed.drivername
-    package = PACKAGES.get(module, module)
+    package = database_of(parsed.get_backend_name()).packages.get(module, module)
     return StoreError(
         f"server.database {masked(parsed)}: its driver {module} is not installed: "
         f"`pip install '{package}'` where daq is installed"

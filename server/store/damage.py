@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import get_args
 
-from sqlalchemy import Connection, Engine, inspect, select, text
+from sqlalchemy import Connection, Engine, select, text
 from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.experiments import ExperimentState
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line
+from server.store.databases import database_of
 from server.store.schema import difference, expected_schema, schema_of
-from server.store.tables import ExperimentRow, JobRow, Table
+from server.store.tables import ExperimentRow, JobRow
 
 
 def require_sound(engine: Engine, place: str) -> None:
@@ -23,7 +24,7 @@ def require_sound(engine: Engine, place: str) -> None:
                 _require_whole(connection, place)
                 _require_schema(connection, place)
             else:
-                _require_columns(connection, place)
+                database_of(engine.dialect.name).require_columns(connection, place)
             for rows in (ExperimentRow, JobRow):
                 _require_known_states(connection, rows, place)
     except DatabaseError as error:
@@ -40,18 +41,6 @@ def _require_schema(connection: Connection, place: str) -> None:
     wrong = difference(schema_of(connection.exec_driver_sql), expected_schema())
     if wrong is not None:
         raise DamagedError(f"database {place}: {wrong}; {BRING_BACK}")
-
-
-def _require_columns(connection: Connection, place: str) -> None:
-    there = inspect(connection)
-    tables = set(there.get_table_names())
-    for name, table in Table.metadata.tables.items():
-        if name not in tables:
-            raise DamagedError(f"database {place}: table {name} is missing; {BRING_BACK}")
-        missing = {column.name for column in table.columns} - {str(one["name"]) for one in there.get_columns(name)}
-        if missing:
-            line = f"database {place}: table {name} has no column {', '.join(sorted(missing))}"
-            raise DamagedError(f"{line}; {BRING_BACK}")
 
 
 def _require_known_states(connection: Connection, rows: type[ExperimentRow | JobRow], place: str) -> None:

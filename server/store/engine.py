@@ -6,32 +6,23 @@ import os
 import sqlite3
 import threading
 import traceback
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from alembic import command
 from pydantic import ValidationError
 from sqlalchemy import URL, Engine, event, text
-from sqlalchemy.exc import DatabaseError, DBAPIError, OperationalError
+from sqlalchemy.exc import DatabaseError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
-from sqlalchemy.sql.dml import UpdateBase
-from sqlalchemy.sql.selectable import SelectBase
-from sqlalchemy.sql.util import find_tables
 
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
 from server.store.address import StoreError, masked, open_engine, parse_address
 from server.store.damage import require_sound
-from server.store.schema import migrations
+from server.store.schema import upgrade
 
 BUSY_TIMEOUT_MS = 5000
 """Time to wait for a lock: another process (`daq token`, a backup) may hold the write lock for a moment."""
-_ANY = ""
-"""Stands for every table."""
-MAPPED = 256 << 20
-"""Number of bytes of the file that are memory-mapped: a search through 100 000 traces takes a fifth less time."""
 
 
 def _require_not_emptied(file: Path) -> None:
@@ -68,18 +59,14 @@ class Store:
         self._writers = sessionmaker(self.engine.execution_options(writing=True), expire_on_commit=False)
         self._writing = threading.RLock()
         self._last = threading.local()
-        """The last statement that each thread has sent, and the tables that its transaction has changed so far."""
+        """The last statement that each thread has sent."""
         event.listen(self.engine, "before_cursor_execute", self._note_statement)
-        self._changes: Counter[str] = Counter()
-        """Number of transactions written so far that changed each table."""
 
     def migrate(self) -> None:
         """Migrates the tables to this version's. Raises StoreError, also for a database of a newer version."""
         try:
             with self.engine.connect() as connection:
-                for config in migrations().values():
-                    config.attributes["connection"] = connection
-                    command.upgrade(config, "head")
+                upgrade(connection)
                 connection.commit()
         except OperationalError as error:
             line = f"database {self.place}: cannot be opened: {line_of(error)}"
@@ -100,23 +87,8 @@ class Store:
     def writing(self) -> Iterator[Session]:
         """A session whose changes are on the disk when it ends, all of them or none. Raises DamagedError for rows that
         this program cannot have written; errors of the code within the block pass unchanged."""
-        with self._writing:
-            before = getattr(self._last, "changed", None)
-            self._last.changed = changed = set[str]()
-            try:
-                with self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
-                    yield session
-            except DBAPIError:  # a connection may break when the database has committed already
-                self._changes.update(changed)
-                raise
-            finally:
-                self._last.changed = before
-            self._changes.update(changed)
-
-    def changes_of(self, tables: Iterable[str]) -> int:
-        """Returns a number that grows with every transaction that has changed one of these tables: what was read before
-        may be out of date."""
-        return self._changes[_ANY] + sum(self._changes[table] for table in tables)
+        with self._writing, self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
+            yield session
 
     @contextmanager
     def _told_of_damage(self, is_damage: Callable[[Exception], bool] = lambda _error: True) -> Iterator[None]:
@@ -132,15 +104,7 @@ class Store:
             raise DamagedError(f"table {table}: a row cannot be read: {one_line(error)}; {BRING_BACK}") from error
 
     def _note_statement(self, *told: Any) -> None:
-        self._last.statement, compiled = told[2], getattr(told[4], "compiled", None)
-        changed: set[str] | None = getattr(self._last, "changed", None)
-        if changed is None:
-            return
-        statement = None if compiled is None else compiled.statement
-        if isinstance(statement, UpdateBase):
-            changed.update(table.name for table in find_tables(statement, include_crud=True))
-        elif not isinstance(statement, SelectBase) and not told[2].startswith("BEGIN"):
-            changed.add(_ANY)  # written as text: it may change anything
+        self._last.statement = told[2]
 
     def require_sound(self) -> None:
         """Raises DamagedError if tables, columns or states differ from those that this program writes."""
@@ -172,7 +136,6 @@ def _safe_and_shared(connection: sqlite3.Connection, _record: Any) -> None:
         "synchronous=FULL",
         "foreign_keys=ON",
         f"busy_timeout={BUSY_TIMEOUT_MS}",
-        f"mmap_size={MAPPED}",
     ):
         connection.execute(f"PRAGMA {pragma}")
 

@@ -23,7 +23,6 @@ from server.store.approvals import approval_of, approve, given_to, require_appro
 from server.store.engine import Store
 from server.store.labels import experiment_label
 from server.store.pages import Cursor, newest_first, page_of
-from server.store.remembered import Remembered
 from server.store.submitted import digest_of as digest_of_request
 from server.store.submitted import made_before, new_columns
 from server.store.tables import ExperimentRow
@@ -40,7 +39,6 @@ class ExperimentStore:
         self._store = store
         self._counting = threading.Lock()
         self._waiting: dict[str, int] = {}
-        self.page = Remembered(store, self._page, (ExperimentRow,))
 
     @contextmanager
     def _changing(self, *robots: str) -> Iterator[Session]:
@@ -95,7 +93,7 @@ class ExperimentStore:
         with self._store.reading() as session:
             return as_experiment(_row(session, robot, identity))
 
-    def _page(
+    def page(
         self,
         robot: str,
         states: Sequence[ExperimentState],

@@ -9,6 +9,7 @@ from pydantic import TypeAdapter
 from sqlalchemy import ColumnElement, String, cast, or_, select
 from sqlalchemy.orm import Session
 
+from daq.contracts.frozen import WHEN_USED
 from daq.contracts.service.base import Page
 from daq.contracts.service.jobs import (
     CompareRequest,
@@ -33,7 +34,7 @@ _FAILURES: dict[Event, JobFailure] = {
     Event.FAULT: "program-fault",
     Event.LOST: "lost",
 }
-_REQUEST: TypeAdapter[JobRequest] = TypeAdapter(JobRequest)
+_REQUEST: TypeAdapter[JobRequest] = TypeAdapter(JobRequest, config=WHEN_USED)
 
 
 def traces_of(request: JobRequest) -> tuple[str, ...]:

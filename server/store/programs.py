@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session, defer
 
 from daq.contracts.service.base import Wire
 from daq.contracts.service.teaching import ProgramEntry
-from daq.teaching import Program
+from daq.teaching.program import Program
 from server.problems import conflict, not_found
 from server.store.engine import Store
 from server.store.tables import ProgramRow

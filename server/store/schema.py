@@ -1,15 +1,18 @@
-"""What a SQLite database consists of, compared with what this program's migrations make."""
+"""Migrates a database's tables, and compares what a SQLite database consists of with what the migrations make.
+
+A migration is a module of a package, named by its number: `0001_tables`. Its `upgrade` takes a connection and makes of
+the tables before it its own.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
-from importlib import resources
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
-from alembic import command
-from alembic.config import Config
-from sqlalchemy import create_engine
+from sqlalchemy import Connection, create_engine, inspect, text
 
 from daq.plugins import plugins
 
@@ -18,26 +21,50 @@ Schema = Mapping[tuple[str, str], tuple[frozenset[str], str]]
 text of a trigger, the table of an index, and whether a table is virtual."""
 Execute = Callable[[str], Iterable[Sequence[Any]]]
 VERSION = "alembic_version"
-"""The table with the revision of the core's tables."""
+"""The table with the number of the core's last migration."""
+_VERSION_TABLE = """CREATE TABLE {0} (version_num VARCHAR(32) NOT NULL, CONSTRAINT {0}_pkc PRIMARY KEY (version_num))"""
 ORDER = ("trigger", "view", "index", "table")
 """The order in which objects can be removed."""
 
 
-def migrations() -> dict[str, Config]:
-    """Returns Alembic's configurations by the table in which each keeps its revision: those of this package first, then
-    those of plug-ins. Each goes its own way, so that a plug-in can be taken away."""
-    home = resources.files("server.store") / "migrations"
-    places = {VERSION: str(home / "versions")}
+class UnknownRevisionError(Exception):
+    """No migration of this program made the tables: they are of a newer version."""
+
+
+@cache
+def migrations() -> dict[str, dict[str, str]]:
+    """Returns the modules of the migrations by number, in their order, for each table that keeps the number of the last
+    one: those of this package first, then those of plug-ins. Each goes its own way, so that a plug-in can be taken
+    away."""
+    packages = {VERSION: "server.store.migrations"}
     for plugin in plugins():
-        places |= {f"{name}_version": str(resources.files(package)) for name, package in plugin.migrations.items()}
-    found = {}
-    for table, place in places.items():
-        config = found[table] = Config()
-        config.set_main_option("script_location", str(home))
-        config.set_main_option("path_separator", "newline")
-        config.set_main_option("version_locations", place)
-        config.attributes["version_table"] = table
-    return found
+        packages |= {f"{name}_version": package for name, package in plugin.migrations.items()}
+    return {table: _numbered(package) for table, package in packages.items()}
+
+
+def _numbered(package: str) -> dict[str, str]:
+    names = sorted(found.name for found in iter_modules(import_module(package).__path__) if found.name[0].isdigit())
+    return {name.partition("_")[0]: f"{package}.{name}" for name in names}
+
+
+def upgrade(connection: Connection, revisions: Mapping[str, str] | None = None) -> None:
+    """Migrates the tables to these revisions; without any, to the newest of all. Raises UnknownRevisionError."""
+    there = set(inspect(connection).get_table_names())
+    for table, modules in migrations().items():
+        last = next(reversed(modules)) if revisions is None else revisions.get(table, "")
+        found = connection.execute(text(f"SELECT version_num FROM {table}")).scalar() if table in there else None
+        for revision in {last, found or last} - {""}:
+            if revision not in modules:
+                raise UnknownRevisionError(f"{table} {revision}: tables of another version")
+        due = [revision for revision in modules if (found or "") < revision <= last]
+        for revision in due:
+            import_module(modules[revision]).upgrade(connection)
+        if due and table not in there:
+            connection.execute(text(_VERSION_TABLE.format(table)))
+        if due and found is None:
+            connection.execute(text(f"INSERT INTO {table} VALUES (:last)"), {"last": last})
+        elif due:
+            connection.execute(text(f"UPDATE {table} SET version_num = :last"), {"last": last})
 
 
 def revisions_of(execute: Execute) -> dict[str, str]:
@@ -48,17 +75,10 @@ def revisions_of(execute: Execute) -> dict[str, str]:
 
 
 def expected_schema(revisions: Mapping[str, str] | None = None) -> Schema:
-    """Returns the schema of a SQLite database with tables of these revisions; without any, of the newest of all."""
-    return _made(frozenset((dict.fromkeys(migrations(), "head") if revisions is None else revisions).items()))
-
-
-@cache
-def _made(revisions: frozenset[tuple[str, str]]) -> Schema:
+    """Returns the schema of a SQLite database with tables of these revisions; without any, of the newest of all. Raises
+    UnknownRevisionError."""
     with create_engine("sqlite://").connect() as connection:
-        for table, config in migrations().items():
-            if (revision := dict(revisions).get(table)) is not None:
-                config.attributes["connection"] = connection
-                command.upgrade(config, revision)
+        upgrade(connection, revisions)
         return schema_of(connection.exec_driver_sql)
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 from sqlalchemy import (
     JSON,
-    BigInteger,
     DateTime,
     Dialect,
     ForeignKey,
@@ -226,26 +225,6 @@ class TraceUseRow(Table):
     """`job ID` or `model ID`."""
 
 
-class ArchivedRow(Table):
-    """A trace that the archive has, whole, as it was read back. The row stays until the object is deleted, also if the
-    trace is deleted before that."""
-
-    __tablename__ = "archived_traces"
-    __table_args__ = (Index("archived_traces_by_robot", "robot", "deleting"),)
-
-    trace: Mapped[str] = mapped_column(String(64), primary_key=True)
-    robot: Mapped[str] = mapped_column(String(32))
-    object: Mapped[str] = mapped_column(String(400))
-    """The object's name in the bucket."""
-    size: Mapped[int] = mapped_column(BigInteger)
-    sha256: Mapped[str] = mapped_column(String(64))
-    archived: Mapped[datetime]
-    checked: Mapped[datetime]
-    """When the object was last read back and was what had been sent."""
-    fetched: Mapped[datetime | None]
-    deleting: Mapped[bool] = mapped_column(default=False)
-
-
 class EventRow(Table):
     """Something that happened, and who caused it."""
 
@@ -272,18 +251,6 @@ class SessionRow(Table):
     expires: Mapped[datetime] = mapped_column(index=True)
 
 
-class PersonRow(Table):
-    """Somebody who has signed in, by the name of their first session. `subject`: the provider's number for them."""
-
-    __tablename__ = "people"
-    __table_args__ = (UniqueConstraint("issuer", "subject"),)
-
-    name: Mapped[str] = mapped_column(String(64), primary_key=True)
-    issuer: Mapped[str] = mapped_column(String(500))
-    subject: Mapped[str] = mapped_column(String(255))
-    since: Mapped[datetime]
-
-
 class TokenRow(Table):
     """A token's hash; the token itself is shown only once, when it is made."""
 
@@ -295,31 +262,3 @@ class TokenRow(Table):
     digest: Mapped[str] = mapped_column(String(64), unique=True)
     created: Mapped[datetime]
     revoked: Mapped[datetime | None]
-
-
-class AuditRow(Table):
-    """One row of the audit log. Triggers refuse to change or delete it, and to insert one anywhere but at the end."""
-
-    __tablename__ = "audit"
-    __table_args__ = (
-        Index("audit_by_actor", "actor", "sequence"),
-        Index("audit_by_robot", "robot", "sequence"),
-    )
-
-    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    at: Mapped[datetime]
-    actor: Mapped[str | None]
-    role: Mapped[str | None] = mapped_column(String(16))
-    origin: Mapped[str]
-    action: Mapped[str] = mapped_column(String(64))
-    request: Mapped[str] = mapped_column(Text)
-    robot: Mapped[str | None] = mapped_column(String(64))
-    subject: Mapped[str | None]
-    outcome: Mapped[str] = mapped_column(String(16))
-    status: Mapped[int | None]
-    detail: Mapped[str] = mapped_column(Text)
-    content: Mapped[str | None] = mapped_column(Text)
-    request_id: Mapped[str | None] = mapped_column(String(16))
-    count: Mapped[int]
-    previous: Mapped[str] = mapped_column(String(64))
-    digest: Mapped[str] = mapped_column(String(64))

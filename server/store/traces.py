@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Protocol
 
 from sqlalchemy import Select, delete, or_, select, update
 from sqlalchemy.orm import Session
@@ -16,8 +17,7 @@ from server.problems import conflict, not_found
 from server.store.engine import Store
 from server.store.labels import label_of_row, trace_label, user_label
 from server.store.pages import Cursor, page_of
-from server.store.remembered import Remembered
-from server.store.tables import ArchivedRow, TraceRow, TraceTagRow, TraceUseRow
+from server.store.tables import TraceRow, TraceTagRow, TraceUseRow
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,25 @@ class TraceSearch:
     until: datetime | None = None
 
 
+class ArchivedTraces(Protocol):
+    """Which traces an archive has, as its plug-in tells within a transaction."""
+
+    def among(self, session: Session, traces: Collection[str]) -> set[str]:
+        """Returns those of these traces that the archive has."""
+        ...
+
+    def delete_later(self, session: Session, trace: str) -> None:
+        """Notes that a trace is deleted."""
+        ...
+
+
 class TraceStore:
     """Traces of all robots."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
-        self.page = Remembered(store, self._page, (TraceRow, TraceTagRow, ArchivedRow))
+        self.archived: ArchivedTraces | None = None
+        """What an archive has, of a plug-in; None where there is none."""
 
     def insert(self, new: NewTrace, is_there: Callable[[str], bool] = lambda _file: True) -> None:
         """Adds a trace. If its row exists and the row's file is gone, the row gets the new file, and keeps its tags and
@@ -108,35 +121,28 @@ class TraceStore:
 
     def files_of(self, robot: str, identities: Iterable[str]) -> dict[str, str]:
         """Returns the names of the files of traces, those that are in the table."""
-        names, found = list(identities), dict[str, str]()
+        query = select(TraceRow.id, TraceRow.file).where(TraceRow.robot == robot, TraceRow.id.in_(list(identities)))
         with self._store.reading() as session:
-            for first in range(0, len(names), 500):
-                part = TraceRow.id.in_(names[first : first + 500])
-                query = select(TraceRow.id, TraceRow.file).where(TraceRow.robot == robot, part)
-                found.update((row.id, row.file) for row in session.execute(query))
-        return found
+            return {row.id: row.file for row in session.execute(query)}
 
     def get(self, robot: str, identity: str) -> CatalogueEntry:
         """Returns a trace's entry. Raises a 404."""
         with self._store.reading() as session:
             row = _row(session, robot, identity)
-            archived = bool(_archived(session, [row.id]))
-            return _entry(row, _tags(session, [row.id]).get(row.id, ()), archived=archived)
+            return self._entry(session, row, _tags(session, [row.id]).get(row.id, ()))
 
     def is_archived(self, identity: str) -> bool:
         """Whether the archive has a trace."""
-        with self._store.reading() as session:
-            return bool(_archived(session, [identity]))
+        return identity in self.archived_of([identity])
 
     def archived_of(self, identities: Iterable[str]) -> set[str]:
         """Returns those of these traces that the archive has."""
-        names, found = list(identities), set[str]()
+        if self.archived is None:
+            return set()
         with self._store.reading() as session:
-            for first in range(0, len(names), 500):
-                found |= _archived(session, names[first : first + 500])
-        return found
+            return self.archived.among(session, list(identities))
 
-    def _page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
+    def page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a part of the list, newest first."""
         place = None if cursor is None else Cursor.parse(cursor)
         if any("\0" in one for one in (search.text, search.tag, search.kind) if one):  # which no database looks for
@@ -144,7 +150,7 @@ class TraceStore:
         with self._store.reading() as session:
             rows = list(session.scalars(_query(robot, search, place).limit(limit + 1)))
             tags = _tags(session, [row.id for row in rows])
-            archived = _archived(session, [row.id for row in rows])
+            archived = self._archived(session, [row.id for row in rows])
         return page_of(
             rows,
             limit,
@@ -165,7 +171,7 @@ class TraceStore:
             session.flush()
             tags = _tags(session, [row.id]).get(row.id, ())
             row.searched = _searched(row, tags)
-            return _entry(row, tags, archived=bool(_archived(session, [row.id])))
+            return self._entry(session, row, tags)
 
     def remove(self, robot: str, identity: str, also: Callable[[], None] = lambda: None) -> None:
         """Deletes the row. Raises a 404, and a 409 if a model or a job uses the trace.
@@ -179,11 +185,17 @@ class TraceStore:
             if users:
                 line = f"{label_of_row(row)} is used by {', '.join(user_label(session, user) for user in users)}"
                 raise conflict("trace-in-use", line, "delete those first")
-            # The archive's service deletes the object, when the store can be reached.
-            session.execute(update(ArchivedRow).filter_by(trace=identity).values(deleting=True))
+            if self.archived is not None:
+                self.archived.delete_later(session, identity)
             session.delete(row)
             session.flush()
             also()
+
+    def _archived(self, session: Session, identities: list[str]) -> set[str]:
+        return set() if self.archived is None else self.archived.among(session, identities)
+
+    def _entry(self, session: Session, row: TraceRow, tags: tuple[str, ...]) -> CatalogueEntry:
+        return _entry(row, tags, archived=bool(self._archived(session, [row.id])))
 
 
 def _row(session: Session, robot: str, identity: str) -> TraceRow:
@@ -199,11 +211,6 @@ def _tags(session: Session, identities: list[str]) -> dict[str, tuple[str, ...]]
     for row in session.scalars(query):
         found[row.trace] = (*found.get(row.trace, ()), row.tag)
     return found
-
-
-def _archived(session: Session, identities: list[str]) -> set[str]:
-    query = select(ArchivedRow.trace).where(ArchivedRow.trace.in_(identities), ArchivedRow.deleting.is_(False))
-    return set(session.scalars(query))
 
 
 def _query(robot: str, search: TraceSearch, place: Cursor | None) -> Select[TraceRow]:

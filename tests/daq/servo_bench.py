@@ -9,7 +9,9 @@ from daq.contracts.sample import SampleRow
 from daq.contracts.trace import Trace, TraceEvent
 from daq.driver import Controller
 from daq.link import Link
-from daq.runner import ArmControl, Consent, RunSetup, StopRequests, run_experiment
+from daq.runner.arm_control import ArmControl
+from daq.runner.experiment import RunSetup, StopRequests, run_experiment
+from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
 from mock_controller.servos.bench import Bench, Options

@@ -49,8 +49,9 @@ def test_in_the_figure_and_the_page_of_a_trace(tmp_path: Path, name: str) -> Non
 def test_in_a_report_and_its_figures(name: str) -> None:
     from matplotlib.figure import Figure
 
+    from model.blocks import Cell, Picture, Points, Report, Section, Table, Text
     from model.reports.figures import as_label, drawn
-    from model.reports.page import Cell, Picture, Points, Report, Section, Table, Text, html
+    from model.reports.page import html
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()

@@ -37,8 +37,6 @@ def test_a_malicious_trace_is_refused_in_one_line(daq: CommandLine, tmp_path: Pa
     [
         ("-1e308,0\n1e308,1", "", "row 2, column 'time': -1e+308 is too large, allowed is ±4e+09 s"),
         ("0,0\n1,1e308", "", "row 3, column 'position_1': 1e+308 is too large, allowed is ±1e+09 rad or m"),
-        ("nan,0", "", "row 2, column 'time': 'nan' is not a finite number"),
-        ("0,0\ninf,0", "", "row 3, column 'time': 'inf' is not a finite number"),
         ("0,0\n1e-320,0", "", "row 3, column 'time': 1e-320 does not increase after 0.0 by 1e-09 s at least"),
         ("-0.0,0\n0,0", "", "row 3, column 'time': 0.0 does not increase after -0.0"),
         ("0,\0", "", "row 2, column 'position_1'"),

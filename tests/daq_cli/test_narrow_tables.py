@@ -12,7 +12,7 @@ from daq.contracts.machine import load_machine
 from daq_cli.models.gap_text import gap_lines
 from model.comparison.agreement import JointAgreement, ModelAgreement
 from model.discrepancy.diagnosis import Gap, GapStage, GapWithout
-from model.fitting.result import FittedParameter
+from model.fitting.fitted import FittedParameter
 from model.validation.criterion import Fidelity, ParameterDistortion
 from model.validation.variation import Correlation, TimeDomain, Variation
 from tests.daq.traces.samples import write
@@ -36,13 +36,15 @@ def parameters() -> None:
 
 
 def agreement() -> None:
-    from daq_cli.models.agreement_table import print_agreement
+    from daq_cli.models.parameter_table import print_rows
+    from model.reports.motion import AGREEMENT, agreement_table
 
     sizes = {"rmse": 0.2154, "largest": 1.4, "floor": 0.001, "count": 0.0046, "share": 0.01}
     joints = tuple(JointAgreement(joint=j, unit="rad", **sizes) for j in range(1, 7))
     common = {"model": "m", "effects": (), "traces": ()}
     label = "a-model-with-quite-a-long-name-of-its-own.json"
-    print_agreement([ModelAgreement(label=label, in_sample=joints, held_out=joints, **common)])
+    models = [ModelAgreement(label=label, in_sample=joints, held_out=joints, **common)]
+    print_rows(agreement_table(models).only(*AGREEMENT))
 
 
 def validation() -> None:

@@ -18,8 +18,8 @@ from daq.contracts.service.problems import ProblemDetails
 from daq.contracts.service.queue import QueueStatus
 from daq.contracts.service.robot import RobotIdentity, RobotStatus, RobotSummary, StopResult
 from daq.contracts.service.teaching import TaughtPath, TeachingStatus
-from daq.teaching import RecordedPath
 from daq.teaching.program import Program, Wait
+from daq.teaching.recording import RecordedPath
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.robot.remote import companion
 from daq_cli.robot.remote.companion import Companion

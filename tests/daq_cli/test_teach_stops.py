@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from daq.teaching import RecordedPath
+from daq.teaching.recording import RecordedPath
 from daq.transport.mock_process import MockProcess
 from tests.daq_cli.board import ask
 from tests.daq_cli.invoke import CommandLine

@@ -36,7 +36,6 @@ from tests.daq_cli.invoke import CommandLine
         ("run ramp --duration soon", ("--duration", "number")),
         ("run nonsense", ("nonsense", "`daq run --help`")),
         ("nonsense", ("nonsense", "`daq --help`")),
-        ("audit --outcome maybe", ("'--outcome': 'maybe' is not one of 'done', 'refused', 'failed' (see",)),
         ("fit x.mcap --method maybe", ("'--method': 'maybe' is not one of 'least_squares', 'nelder_mead' (see",)),
         ("run spec missing.json", ("experiment missing.json", "cannot be read")),
         ("--config missing.toml run ramp", ("missing.toml", "no such file")),
@@ -107,31 +106,6 @@ def test_a_port_in_use_is_reported(daq: CommandLine) -> None:
     finally:
         os.close(master)
         os.close(slave)
-
-
-def test_a_memory_map_with_overlapping_registers_is_refused(daq: CommandLine) -> None:
-    from importlib import resources
-
-    text = resources.files("firmware_protocol").joinpath("memory_map.toml").read_text("utf-8")
-    lines = text.splitlines()
-    first = next(line for line in lines if line.startswith("low"))
-    low = [index for index, line in enumerate(lines) if line.startswith("low")]
-    lines[low[1]] = first
-    Path("map.toml").write_text("\n".join(lines))
-    Path("daq.toml").write_text('[robot]\nmemory_map = "map.toml"\n')
-    for words in (["config", "check"], ["run", "ramp"]):
-        said = daq(*words)
-        assert said.code == 2
-        assert "map.toml" in said.err
-        assert "Traceback" not in said.err
-
-
-@pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"no MCAP at all, but long enough to be looked at"])
-def test_a_file_that_is_no_trace_is_refused(daq: CommandLine, content: bytes) -> None:
-    Path("foreign.mcap").write_bytes(content)
-    for command in ("show", "plot", "export"):
-        daq("traces", command, "foreign.mcap").complains(2, "foreign.mcap")
-    assert Path("foreign.mcap").read_bytes() == content
 
 
 @pytest.mark.parametrize(

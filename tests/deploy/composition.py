@@ -22,7 +22,6 @@ import httpx
 import yaml
 
 from tests.repository.tracked import ROOT
-from tests.server.postgresql import programs, running_postgresql
 
 if TYPE_CHECKING:
     from tests.extras.lab.archive.store import ObjectStore
@@ -110,6 +109,8 @@ class Composition:
         given |= self.extra.get(name, {})
         # numba's own tests of what is compiled already: the tests' folder, which other tests have filled.
         given.pop("NUMBA_CACHE_DIR", None)
+        from tests.extras.lab.postgresql.server import programs
+
         path = f"{given.pop('PATH', '')}:{programs()}:{os.environ['PATH']}"
         return {**kept, **given, "PATH": path}
 
@@ -182,6 +183,8 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 def _database(here: Composition, name: str) -> Any:
     """Debian's PostgreSQL, with the user and the database that the image would make."""
+    from tests.extras.lab.postgresql.server import programs, running_postgresql
+
     given = here.services[name]["environment"]
     found = programs()
     assert found is not None

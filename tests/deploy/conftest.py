@@ -7,7 +7,6 @@ import httpx
 import pytest
 
 from tests.deploy.composition import FILE, Composition, as_processes
-from tests.server import postgresql
 from tests.server.polling import reset
 
 MOCK = "mock://?lock_step=1&seed=3"
@@ -17,7 +16,9 @@ MOCK = "mock://?lock_step=1&seed=3"
 @pytest.fixture(scope="package")
 def composed() -> Iterator[Composition]:
     """The composition, of which nothing runs yet."""
-    if postgresql.programs() is None:
+    from tests.extras.lab.postgresql.server import programs  # here: without the extras the tests are still collected
+
+    if programs() is None:
         pytest.skip("needs a PostgreSQL server: apt install postgresql")
     with as_processes({"service": {"DAQ_ROBOT__PORT": MOCK}}) as made:
         yield made

@@ -13,7 +13,7 @@ from ma2000.progress import told
 from tests.gallery.notebooks import executed, outputs_of
 
 ROOT = Path(__file__).parents[2]
-LONG = ("batch", "design", "diagnose", "feedforward", "fit", "fit_torques", "reproduce_thesis", "run", "validate")
+LONG = ("batch", "design", "diagnose", "fit", "fit_torques", "run", "validate")
 CALL = "ma2000.run(ma2000.ExperimentSpec.model_validate({'trajectory': {'kind': 'step'}, 'joints': [1], 'hold': 0.1})"
 
 HEARD = """

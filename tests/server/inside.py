@@ -76,7 +76,7 @@ def service_inside(
     if database is None:
         place_database(folder / "service" / "service.sqlite")
     services = Services(settings, clock)
-    gate = Gate(KnownTokens(services.tokens, clock), services.tickets, open_on_loopback=True, audit=services.audit)
+    gate = Gate(KnownTokens(services.tokens, clock), services.tickets, open_on_loopback=True, parts=services.parts)
     server = _Server(uvicorn.Config(make_app(services, gate), log_config=None, lifespan="on"))
     with socket.create_server(("127.0.0.1", 0)) as listener:
         thread = threading.Thread(target=server.run, args=([listener],), name="service")

@@ -33,7 +33,8 @@ from daq.owner.messages import Answer, ArmReport, Finished, Open, RunExperiment
 from daq.owner.owned_robot import OwnedRobot
 from daq.owner.speaker import Speaker
 from daq.owner.watched_controller import WatchedController
-from daq.runner import ArmControl, require_not_stopped
+from daq.runner.arm_control import ArmControl
+from daq.runner.preparation import require_not_stopped
 from daq.teaching.controller_arm import ControllerArm
 from firmware_protocol import commands as c
 from server.experiments.order import Waiting
@@ -44,7 +45,7 @@ from server.robot.control import ControlService
 from server.robot.robot import Robot, RobotPlace
 from server.robot.stop import StopService
 from server.robot.teaching import TeachingService
-from server.services import RobotServices
+from server.robot_services import RobotServices
 from tests.server.clocks import HandClock
 
 MACHINE = load_machine("ma2000")
@@ -458,7 +459,7 @@ class Scene:
             jobs=None,
             models=None,
             unattended=True,
-            audit=None,
+            jogged=None,
         )
 
     def _stopped_here(self) -> StopResult:

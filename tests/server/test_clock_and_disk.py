@@ -15,9 +15,9 @@ import pytest
 from sqlalchemy.exc import OperationalError
 
 from server.api import upload
-from server.bounded.messages import UploadedTrace
+from server.api.upload import Uploads
+from server.bounded.messages import Order
 from server.catalogue.catalogue import Catalogue
-from server.services import RobotServices, Services
 from server.store.events import EventStore
 from tests.server.inside import WrongClock, service_inside
 from tests.server.polling import until
@@ -170,8 +170,8 @@ def test_a_look_into_the_folder_while_a_trace_is_uploaded_takes_nothing_away(
         catalogues.append(self)
         return path_of(self, identity)
 
-    def then_looked(path: Path, one: RobotServices, found: Services) -> UploadedTrace:
-        made = read(path, one, found)
+    def then_looked(order: Order, uploads: Uploads, kind: str) -> dict[str, Any]:
+        made = read(order, uploads, kind)
         catalogues[0].bring_up_to_date()
         return made
 

@@ -126,8 +126,7 @@ def lead(
     import sys
 
     from daq.contracts.experiment import parse_joints
-    from daq.teaching import RecordedPath
-    from daq.teaching.recording import save_path
+    from daq.teaching.recording import RecordedPath, save_path
 
     if seconds is not None and not 0 < seconds <= LONGEST_LEAD:
         raise SpecError(f"lead: --seconds {seconds:g}: allowed are above 0 to {LONGEST_LEAD:g}")
@@ -162,7 +161,7 @@ def play(
     from pydantic import ValidationError
 
     from daq.contracts.documents import read_text
-    from daq.teaching import RecordedPath, playback
+    from daq.teaching.recording import RecordedPath, playback
     from daq_cli.robot.experiment import RunOptions, carry_out
 
     try:

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from daq.client import HeldControl, Robot
     from daq.contracts.service.robot import StopResult
     from daq.contracts.service.teaching import TeachingStatus
-    from daq.teaching import RecordedPath
     from daq.teaching.program import Program
+    from daq.teaching.recording import RecordedPath
 
     Controlled = AbstractContextManager[tuple[Robot, HeldControl]]
 
@@ -129,7 +129,7 @@ class RemoteTeaching:
 
     def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
         """Records until `seconds` are over, or Enter is pressed."""
-        from daq.teaching import RecordedPath
+        from daq.teaching.recording import RecordedPath
 
         with taught(self.held) as (robot, control, stopped):
             before = robot.teaching().path

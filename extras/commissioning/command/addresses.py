@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from firmware_protocol.memory_map import MemoryMap
-    from model.reports.page import Block
+    from model.blocks import Block
 
 FROM = ("found", "assumed", "by hand")
 """Where an address comes from: evidence at the arm, a place that agrees with everything seen, or a person who has
@@ -20,7 +20,7 @@ def address_blocks(findings: dict[str, Any], path: Path) -> list[Block]:
     findings: those of `daq memory find`. Raises what a damaged file leads to: KeyError, ValueError, TypeError.
     """
     from daq.config.robot_files import load_memory_map
-    from model.reports.page import Cell, Table, Text
+    from model.blocks import Cell, Table, Text
 
     proved = [
         str(one["joint"]) for one in findings.get("proved_by_command", []) if one["proved"] and not one["problem"]

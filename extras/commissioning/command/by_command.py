@@ -194,7 +194,7 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     from daq.contracts.machine import SampledPid
     from daq_cli.app.progress import shown_progress
     from model.comparison.compare import compare
-    from model.discrepancy.explanation.headline import headline
+    from model.discrepancy.explanation.answer_words import headline
     from model.discrepancy.options import DiagnosisOptions
     from model.discrepancy.workflow import diagnose
     from model.reports.diagnosis_report import LABELS, diagnosis_report

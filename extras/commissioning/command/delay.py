@@ -76,7 +76,7 @@ def _checked(robot: HeldArm, machine: Machine, joint: int) -> _Way:
     from daq.runner.preparation import require_allowed, require_still
     from daq.safety import check_move_to_start
     from daq.teaching.controller_arm import ControllerArm
-    from daq.trajectories import plan_move
+    from daq.trajectories.move import plan_move
 
     arm = ControllerArm(robot.controller, robot.control, machine, robot.end_cause, every_period=False)
     row, own = arm.next_sample(), machine.calibration(joint)

@@ -12,7 +12,8 @@ from daq.contracts.errors import SafetyError, SpecError
 from daq.contracts.limp import GAINS_UNKNOWN, require_drive
 from daq.driver import Controller
 from daq.owner.session import PortSession, port_session
-from daq.runner import ArmControl, Consent, MissingConsentError, StoppedError, require_not_stopped
+from daq.runner.arm_control import ArmControl, StoppedError
+from daq.runner.preparation import Consent, MissingConsentError, require_not_stopped
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, console
 

@@ -17,7 +17,7 @@ from extras.commissioning.command.steps import STEPS
 from firmware_protocol.memory_map import JOINTS
 
 if TYPE_CHECKING:
-    from model.reports.page import Block, Report
+    from model.blocks import Block, Report
 
 SHEET = "acceptance.html"
 NO_REASON = "no reason was given"
@@ -101,7 +101,7 @@ def write_sheet(record: Record) -> Path:
 
 def acceptance_sheet(record: Record) -> Report:
     """The page of everything that is done, and what is open."""
-    from model.reports.page import Cell, Report, Section, Table
+    from model.blocks import Cell, Report, Section, Table
 
     sections = tuple(
         Section(step.title, tuple(_blocks(record, step.name, step.does))) for step in STEPS if step.name in record.steps
@@ -142,7 +142,7 @@ def _answer(record: Record) -> str:
 
 def _blocks(record: Record, name: str, does: str) -> list[Block]:
     """What a section shows: the result of a step that is done, or why it was left out."""
-    from model.reports.page import Text
+    from model.blocks import Text
 
     result = record.steps[name]
     when = _when(str(result["done"]))
@@ -167,7 +167,7 @@ def _when(iso: str) -> str:
 
 def _tables(result: dict[str, Any]) -> list[Block]:
     """What a step found: a table of its single values, and one with a row for each joint."""
-    from model.reports.page import Cell, Table
+    from model.blocks import Cell, Table
 
     joints = {name: one for name, one in result.items() if name.startswith("joint_") and isinstance(one, dict)}
     single = {name: one for name, one in result.items() if name not in joints and name not in NOT_SHOWN}
@@ -211,7 +211,7 @@ def _shown(value: Any, interval: bool = False) -> str:
 
 
 def _pictures(record: Record, name: str, result: dict[str, Any]) -> list[Block]:
-    from model.reports.page import Picture
+    from model.blocks import Picture
 
     if name == "memory" and (record.folder / FINDINGS).exists():
         try:

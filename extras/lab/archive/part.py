@@ -9,14 +9,15 @@ from prometheus_client import Counter
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from extras.lab.archive.archived import ArchivedStore
 from extras.lab.archive.bucket import Bucket, open_bucket
 from extras.lab.archive.service import ArchiveContext, ArchiveService
 from extras.lab.archive.settings import ArchiveSettings
 from server.catalogue.room import of_robots
 from server.parts import Attention, Part
 from server.problems import conflict
-from server.services import RobotServices, Services
-from server.store.archived import ArchivedStore
+from server.robot_services import RobotServices
+from server.services import Services
 
 
 class Archives(Part, Collector):
@@ -27,12 +28,12 @@ class Archives(Part, Collector):
         self._services = services
         self._settings = services.settings.section(ArchiveSettings)
         self._bucket = open_bucket(self._settings)
+        self._archived = ArchivedStore(services.store)
+        services.traces.archived = self._archived  # also where there is no bucket any more: what it has is known
         self._of: dict[str, ArchiveService] = {}
-        registry = services.metrics.registry
         moved = "Traces sent to the archive or fetched from it, and attempts that failed."
-        self._moved = Counter("daq_archive_transfers", moved, ("robot", "direction", "result"), registry=registry)
-        self._size = Counter("daq_archive_bytes", "Sizes of these traces.", ("robot", "direction"), registry=registry)
-        registry.register(self)
+        self._moved = Counter("daq_archive_transfers", moved, ("robot", "direction", "result"), registry=None)
+        self._size = Counter("daq_archive_bytes", "Sizes of these traces.", ("robot", "direction"), registry=None)
 
     def of(self, robot: str) -> ArchiveService:
         """Returns the archive of a robot. Raises a 409 where there is none."""
@@ -91,7 +92,7 @@ class Archives(Part, Collector):
             waiting.add_metric((name, "send"), status.waiting)
             waiting.add_metric((name, "fetch"), status.fetching)
             local.add_metric((name,), status.local_bytes)
-        yield from (reached, traces, waiting, local)
+        yield from (reached, traces, waiting, local, *self._moved.collect(), *self._size.collect())
 
     def _lines(self, robot: str) -> list[str]:
         return self._of[robot].warnings(self._services.settings.traces.warn_at)
@@ -104,9 +105,9 @@ class Archives(Part, Collector):
                 settings=self._settings,
                 bucket=bucket,
                 catalogue=rig.catalogue,
-                archived=ArchivedStore(self._services.store),
+                archived=self._archived,
                 clock=self._services.clock,
-                tell=partial(self._services.record_event, name, "archive"),
+                tell=partial(self._services.event_log.record, name, "archive"),
                 fetched=rig.jobs.look,
                 count=partial(self._count, name),
             )

@@ -24,6 +24,7 @@ from daq.contracts.errors import DaqError
 from daq.contracts.service.archive import ArchiveStatus, TraceArchive, Transfer
 from daq.traces import disk
 from daq.traces.room import RESERVE
+from extras.lab.archive.archived import Archived, ArchivedStore, Local
 from extras.lab.archive.attempts import Attempts
 from extras.lab.archive.bucket import PIECE, ArchiveError, Bucket, Content, DamagedError, RefusedError
 from extras.lab.archive.health import FIRST_PAUSE, LONGEST_PAUSE, Health
@@ -33,7 +34,6 @@ from extras.lab.archive.transfers import Transfers
 from server.catalogue.catalogue import UPLOAD, Catalogue
 from server.clock import Clock
 from server.problems import ProblemError
-from server.store.archived import Archived, ArchivedStore, Local
 
 ROUND = 600.0
 """Time (s) between two looks for traces to send and copies to drop, beside those that are told of."""

@@ -8,19 +8,17 @@ from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
-from alembic.script import ScriptDirectory
-from alembic.util import CommandError
 from sqlalchemy.exc import DatabaseError
 
-from daq.contracts.service.audit import AuditNote
+from daq_cli.app.database import computers_user
 from extras.lab.backup.places import BackupError
-from server.audit.chain import Head
-from server.audit.log import AuditLog
+from server.access.commands import note_command
 from server.database_errors import line_of, one_line, open_to_read
 from server.store.address import file_address
 from server.store.engine import BUSY_TIMEOUT_MS, Store
 from server.store.schema import (
     VERSION,
+    UnknownRevisionError,
     difference,
     expected_schema,
     foreign,
@@ -74,7 +72,7 @@ def keep_own_objects(database: Path, revision: str | None) -> tuple[str, ...]:
             strange = foreign(found, own)
             for kind, name in strange:
                 remove(connection.execute, kind, name)
-    except CommandError as error:
+    except UnknownRevisionError as error:
         raise BackupError(f"database {database.name}: {one_line(error)}: the backup is damaged") from error
     except sqlite3.Error as error:
         raise BackupError(f"database {database.name}: is damaged: {error}") from error
@@ -151,18 +149,19 @@ def head_of_audit(database: Path) -> str:
     with suppress(sqlite3.Error), closing(open_to_read(database)) as connection:
         row = connection.execute("SELECT sequence, digest FROM audit ORDER BY sequence DESC LIMIT 1").fetchone()
         if row is not None:
-            return str(Head(*row))
+            return f"{row[0]}:{row[1]}"
     return "nothing"
 
 
-def add_to_audit(database: Path, note: AuditNote) -> None:
-    """Adds a row to a database's audit log; one without tables stays as it is. Raises BackupError."""
+def note_restored(database: Path, at: datetime, command: str, archive: str, detail: str) -> None:
+    """Notes the restore in a database's audit log; one without tables stays as it is. Raises BackupError."""
     with closing(sqlite3.connect(database)) as connection:
         if not _has_table(connection, "audit"):
             return
     store = Store(file_address(database))
     try:
-        AuditLog(store).append([note])
+        with store.writing() as session:
+            note_command(session, at, computers_user(), "restore", command, archive, detail)
     except DatabaseError as error:
         raise BackupError(f"database {database.name}: its audit log cannot be written: {line_of(error)}") from error
     finally:
@@ -176,6 +175,5 @@ def _has_table(connection: sqlite3.Connection, name: str) -> bool:
 
 def require_known(revision: str | None) -> None:
     """Raises BackupError for tables that no migration of this program makes."""
-    known = {script.revision for script in ScriptDirectory.from_config(migrations()[VERSION]).walk_revisions()}
-    if revision is not None and revision not in known:
+    if revision is not None and revision not in migrations()[VERSION]:
         raise BackupError(f"the backup's tables are of another version ({revision}): install that version first")

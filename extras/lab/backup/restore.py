@@ -19,11 +19,11 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from daq.traces import disk
 from daq.traces.layout import PART_SUFFIX, SUFFIX
 from extras.lab.backup.database import (
-    add_to_audit,
     forget_what_may_have_ended,
     head_of_audit,
     hold_queue,
     keep_own_objects,
+    note_restored,
     require_known,
     revision_of,
     robots_of_traces,
@@ -31,7 +31,6 @@ from extras.lab.backup.database import (
 from extras.lab.backup.manifest import Entry, Manifest, Progress, check, opened, pieces, verify
 from extras.lab.backup.places import DATABASE, BackupError, Places, is_trace
 from extras.lab.backup.write import RESERVE
-from server.audit.command import by_command, computers_user
 from server.jobs.mailbox import REQUEST
 from server.store.lock import sole_use
 
@@ -153,8 +152,7 @@ class _Staged:
         ended = head_of_audit(self._places.database)
         detail = f"a backup of {manifest.created:%Y-%m-%d %H:%M:%S %Z} takes the place of a log that ended with {ended}"
         command = f"daq restore {self._archive.name}"
-        note = by_command(self._now, computers_user(), "restore", command, self._archive.name, detail)
-        add_to_audit(self._staged(DATABASE), note)
+        note_restored(self._staged(DATABASE), self._now, command, self._archive.name, detail)
 
     def move_in(self) -> None:
         """Moves every file into its place, and writes the folders to the disk."""

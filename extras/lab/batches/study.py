@@ -166,7 +166,7 @@ def _simulated(study: SimulateStudy, model: Model, trace: Trace) -> tuple[Column
 
 
 def _diagnosed(study: DiagnoseStudy, model: Model, trace: Trace) -> tuple[Columns, str]:
-    from model.discrepancy.explanation.headline import headline
+    from model.discrepancy.explanation.answer_words import headline
     from model.discrepancy.options import DiagnosisOptions
     from model.discrepancy.workflow import diagnose
 

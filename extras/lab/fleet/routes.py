@@ -5,26 +5,42 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 
 from daq.contracts.errors import SpecError
 from daq.contracts.service.fleet import FleetComparison, FleetExperimentRequest, FleetExperiments
 from extras.lab.fleet.comparison import Arm, Comparisons
-from server.api.dependencies import IdempotencyKey, Operator, ServicesDep, Turn, Viewer
+from server.api.dependencies import (
+    ClockDep,
+    Experiments,
+    IdempotencyKey,
+    Motions,
+    Operator,
+    Robots,
+    Traces,
+    Turn,
+    Viewer,
+    part,
+)
 from server.api.experiments import require_possible
 from server.api.presets import with_preset
+from server.bounded.workers import Workers
 from server.catalogue.room import require_room
 from server.jobs.mailbox import RESULT
 from server.problems import PROBLEMS, ProblemError
-from server.services import RobotServices, Services
+from server.robot_services import RobotServices, robot_named
+from server.routes import Router
 
-router = APIRouter(prefix="/fleet", tags=["fleet"], responses=PROBLEMS)
+router = Router(prefix="/fleet", tags=["fleet"], responses=PROBLEMS)
 
 
 @router.post("/experiments", status_code=201)
 def submit_fleet_experiment(
     body: FleetExperimentRequest,
-    services: ServicesDep,
+    robots: Robots,
+    experiments: Experiments,
+    motions: Motions,
+    clock: ClockDep,
     caller: Operator,
     _turn: Turn,
     idempotency_key: IdempotencyKey = None,
@@ -34,15 +50,13 @@ def submit_fleet_experiment(
     It begins where its robot's queue lets it: a paused queue stays paused. With the same Idempotency-Key each robot
     gets it once.
     """
-    rigs = _chosen(services, body.robots)
+    rigs = _chosen(robots, body.robots)
     body = body.model_copy(update={"request": with_preset(body.request)})
-    new = [
-        rig for rig in rigs if services.experiments.made_before(rig.robot.name, body.request, idempotency_key) is None
-    ]
+    new = [rig for rig in rigs if experiments.made_before(rig.robot.name, body.request, idempotency_key) is None]
     for rig in new:
-        _require_possible(services, rig, body)
+        _require_possible(motions, rig, body)
     names = [rig.robot.name for rig in rigs]
-    made = services.experiments.submit_to_each(names, body.request, services.clock.utc(), caller.name, idempotency_key)
+    made = experiments.submit_to_each(names, body.request, clock.utc(), caller.name, idempotency_key)
     for rig, (experiment, is_new) in zip(rigs, made, strict=True):  # no queue begins before every one has it
         if is_new:
             rig.queue.submitted(experiment, caller.name)
@@ -52,7 +66,9 @@ def submit_fleet_experiment(
 
 @router.get("/comparison")
 def compare_fleet(
-    services: ServicesDep,
+    robots: Robots,
+    traces: Traces,
+    comparisons: Annotated[Comparisons, part(Comparisons)],
     _: Viewer,
     _turn: Turn,
     experiment: Annotated[str | None, Query(max_length=400, description="Its name; else the most fitted one.")] = None,
@@ -63,26 +79,26 @@ def compare_fleet(
         Arm(
             rig.robot.name,
             partial(rig.jobs.result_file, name=RESULT),
-            partial(services.traces.get, rig.robot.name),
+            partial(traces.get, rig.robot.name),
         )
-        for rig in services.robots()
+        for rig in robots
     ]
-    return services.part(Comparisons).compare(arms, experiment, days)
+    return comparisons.compare(arms, experiment, days)
 
 
-def _chosen(services: Services, names: tuple[str, ...] | None) -> list[RobotServices]:
+def _chosen(robots: list[RobotServices], names: tuple[str, ...] | None) -> list[RobotServices]:
     """Returns the robots of these names; all of them for None. Raises a 404 and a 422."""
     if names is None:
-        return services.robots()
+        return robots
     if len(set(names)) < len(names):
         raise ProblemError(422, "not-valid", "robots: one is named twice", "name each robot once")
-    return [services.robot(name) for name in names]
+    return [robot_named(robots, name) for name in names]
 
 
-def _require_possible(services: Services, rig: RobotServices, body: FleetExperimentRequest) -> None:
+def _require_possible(motions: Workers, rig: RobotServices, body: FleetExperimentRequest) -> None:
     """Raises the problem of one robot, which its name begins."""
     try:
-        require_possible(services, rig, body.request.spec)
+        require_possible(motions, rig, body.request.spec)
         require_room(rig.catalogue.folder)
     except SpecError as error:
         raise SpecError(f"robot {rig.robot.name}: {error}; nothing was queued") from error

@@ -34,8 +34,7 @@ class Notifications(Part, Collector):
     def __init__(self, services: Services) -> None:
         settings = services.settings.section(NotificationSettings)
         told = "Notifications sent, attempts that failed, and messages given up, by destination."
-        counter = Counter("daq_notifications", told, ("destination", "result"), registry=services.metrics.registry)
-        services.metrics.registry.register(self)
+        self._told = counter = Counter("daq_notifications", told, ("destination", "result"), registry=None)
         self._services, self._clock, self._faults = services, services.clock, Faults()
         self.notifier = Notifier(
             destinations_of(settings),
@@ -79,6 +78,7 @@ class Notifications(Part, Collector):
 
     def collect(self) -> Iterable[Metric]:
         """Returns how many messages wait."""
+        yield from self._told.collect()
         waiting = GaugeMetricFamily("daq_notifications_waiting", "Notifications that wait.", labels=("destination",))
         with suppress(SQLAlchemyError, DamagedError):  # no figures while the database cannot be read
             for destination, count in self.notifier.waiting().items():

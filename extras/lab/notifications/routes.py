@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
+from typing import Annotated
 
 from daq.contracts.service.notifications import NotificationStatus
 from extras.lab.notifications.part import Notifications
-from server.api.dependencies import ServicesDep, Viewer
+from server.api.dependencies import Viewer, part
 from server.problems import PROBLEMS
+from server.routes import Router
 
-router = APIRouter(tags=["system"], responses=PROBLEMS)
+router = Router(tags=["system"], responses=PROBLEMS)
 
 
 @router.get("/notifications")
-def get_notifications(services: ServicesDep, _: Viewer) -> NotificationStatus:
+def get_notifications(notifications: Annotated[Notifications, part(Notifications)], _: Viewer) -> NotificationStatus:
     """Returns how far the messages to each webhook and each person with e-mail are. The configuration alone says who
     is told; no request can add or change an address."""
-    return services.part(Notifications).notifier.status()
+    return notifications.notifier.status()

@@ -1,12 +1,12 @@
 """Which experiment to make next: the one on which the remaining candidates would differ most, for its robot time.
 
-It is a preset or a motion that was designed for these candidates. Candidates that no motion tells apart are answered as
-one class of effects, with the measurement that would.
+It is a preset, or the best of experiments that were drawn at random. Candidates that no motion tells apart are answered
+as one class of effects, with the measurement that would tell them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -18,13 +18,14 @@ from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
 from daq.contracts.progress import Cancel, Never, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
+from model.design.drawn_experiments import CALLED, drawn_experiment
+from model.design.information import Planner
 from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, same_answer
 from model.discrepancy.candidates.decision import Decision
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import UNWRITTEN, DifferencePlace, Inseparable, NextExperiment, PlacedEffect, Verdict
 from model.discrepancy.experiment_design.inseparable import classes_of, notes_on
-from model.discrepancy.experiment_design.prediction import NOISE_SEED, Imagined, Planner, Prediction, imagine
-from model.discrepancy.experiment_design.search import MotionSearch, designed_motions
+from model.discrepancy.experiment_design.prediction import NOISE_SEED, Imagined, Prediction, imagine
 from model.discrepancy.experiment_design.separation import LEAST, Pair, Separations, recorded_by, separations
 from model.discrepancy.grounds import Note
 from model.discrepancy.localisation.phases import PHASES, AskedMotion
@@ -40,6 +41,12 @@ SETTLING = 5
 """Steps of each search that runs a rival's fit to convergence."""
 LONGEST_DESIGN = 20.0
 """Longest designed motion, s of robot time."""
+DURATIONS = (0.1, 0.2, 0.4, 0.8)
+"""Durations of drawn experiments, as shares of the longest."""
+SEED = 1
+"""Seed of the draws."""
+OTHER_NOISE = 3
+"""Seed of the readings' noise with which the best draws are judged once more: among many, some promise too much."""
 
 
 @dataclass(frozen=True)
@@ -54,13 +61,13 @@ class Asked:
 
 @dataclass(frozen=True)
 class ExperimentChooser:
-    """The experiments that may be asked for. budget: s of robot time that are left; None for no limit. search: how much
-    to search for a motion of its own for each question; None for none."""
+    """The experiments that may be asked for. budget: s of robot time that are left; None for no limit. search: how many
+    experiments are drawn at random for each question, too; None for none."""
 
     experiments: tuple[OfferedExperiment, ...]
     plan: Planner
     budget: float | None = None
-    search: MotionSearch | None = None
+    search: int | None = None
 
     def after(
         self,
@@ -137,27 +144,39 @@ def best_experiment(rivals: Sequence[CandidateFit], chooser: ExperimentChooser, 
 def judge_experiments(
     rivals: Sequence[CandidateFit], chooser: ExperimentChooser, pairs: Sequence[Pair], cancel: Cancel
 ) -> tuple[list[Separations], int]:
-    """The experiments of the chooser that can be run, and motions that were designed for the pairs, with their
-    separations; and how many were judged. Pairs that nothing told apart are searched for once more, by themselves.
+    """The experiments of the chooser that can be run, and the best of those that were drawn, with their separations;
+    and how many were judged. Raises CancelledError when asked to end."""
 
-    Raises CancelledError when asked to end.
-    """
-    judged = []
-    for experiment in chooser.experiments:
+    def judged(experiment: OfferedExperiment, noise_seed: int = NOISE_SEED) -> Separations | None:
+        """None where it cannot be run, or an arm like a rival would not follow what was drawn."""
         stop_if(cancel)
-        there = chooser.imagine(experiment, rivals[0].fit.point)
-        found = None if there is None else separations(rivals, experiment, recorded_by(rivals, there))
-        if found is not None:
-            judged.append(found)
-    tried = len(judged)
-    wanted = list(pairs)
-    while chooser.search is not None and wanted:
-        longest = min(LONGEST_DESIGN, chooser.budget or LONGEST_DESIGN)
-        designed, count = designed_motions(rivals, wanted, chooser.imagine, chooser.search, longest, cancel)
-        judged, tried = [*judged, *designed], tried + count
-        left = [p for p in wanted if all(j.sizes[p] < LEAST for j in judged)]
-        wanted = left if len(left) < len(wanted) else []
-    return judged, tried
+        there = chooser.imagine(experiment, rivals[0].fit.point, noise_seed)
+        if there is None:
+            return None
+        own = recorded_by(rivals, there)
+        is_drawn = experiment not in chooser.experiments
+        return None if is_drawn and not all(p.is_followed for p in own) else separations(rivals, experiment, own)
+
+    offered = [found for one in chooser.experiments if (found := judged(one)) is not None]
+    drawn = [found for one in _drawn(rivals, chooser) if (found := judged(one)) is not None]
+    tried = len(offered) + len(drawn)
+    for wanted in (pairs, *([pair] for pair in pairs)) if drawn else ():
+        best = max(drawn, key=lambda one: one.worth(wanted))
+        again = judged(best.experiment, OTHER_NOISE)
+        if again is not None and all(best.experiment != one.experiment for one in offered):
+            sizes = {pair: min(size, again.sizes[pair]) for pair, size in best.sizes.items()}
+            offered.append(replace(best, sizes=sizes))
+    return offered, tried
+
+
+def _drawn(rivals: Sequence[CandidateFit], chooser: ExperimentChooser) -> Iterator[OfferedExperiment]:
+    machine = rivals[0].fit.point.model.machine
+    longest = min(LONGEST_DESIGN, chooser.budget or LONGEST_DESIGN)
+    for number in range(chooser.search or 0):
+        kind, turn = number % len(CALLED), number // len(CALLED)
+        duration = longest * DURATIONS[turn % len(DURATIONS)]
+        spec = drawn_experiment(machine, number, duration, SEED).model_copy(update={"name": f"designed-{number}"})
+        yield OfferedExperiment(f"designed-{number}", f"{CALLED[kind]} that were drawn for these candidates", spec)
 
 
 def most_information(point: Point, chooser: ExperimentChooser, done: Sequence[ExperimentSpec]) -> Asked:

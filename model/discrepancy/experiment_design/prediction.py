@@ -6,27 +6,23 @@ far as that allows, and its initial posture is unknown anew.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from daq.contracts.errors import DaqError
-from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
+from daq.contracts.experiment import ExperimentSpec
 from model import layout as at
 from model.arrays import Floats
-from model.design.information import imagined_trace
+from model.design.information import Planner, falls_behind, imagined_trace
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point
 from model.drives.sensor import sensed_angle
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
-
-Planner = Callable[[ExperimentSpec], Floats]
-"""Plans an experiment: set points (k, joints of the machine) in rad, one row a control period. It raises a DaqError
-(one line) for an experiment that may not be carried out. Given by the caller: planning belongs to `daq`."""
 
 NOISE_SEED = 2
 """Seed of the readings' noise in an imagined run: without noise, friction would hold where the real arm creeps."""
@@ -52,11 +48,6 @@ class Imagined:
         """s"""
         inputs = self.observation.records[0].inputs
         return len(inputs) * inputs.period
-
-
-Imaginer = Callable[[OfferedExperiment, Point, int], Imagined | None]
-"""An experiment as a diagnosis with a point's model would see it, with noise of a seed; None where it cannot be run or
-takes too long."""
 
 
 def imagine(model: Model, spec: ExperimentSpec, plan: Planner, noise_seed: int = NOISE_SEED) -> Imagined | None:
@@ -102,6 +93,13 @@ class Prediction:
         own = self.there.observation.imagined(self.begun, self.there.noise)
         observation = own.with_drive_as_input(self.point.observation.drive_is_input)
         return replace(self, there=replace(self.there, observation=observation))
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether set points would not pause on an arm that has made the record: a margin is kept."""
+        record = self.there.observation.records[0]
+        set_points = record.inputs.set_points
+        return falls_behind(self.point.model.machine, set_points, set_points - record.measured) is None
 
     def shown(self, values: Floats | None = None) -> Floats:
         """The simulation that is given the record, (N,) in deviations of a reading; at other values (p,) than the

@@ -1,8 +1,8 @@
-"""Notes in words. A part of the renderer."""
+"""Notes in words."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from model.discrepancy.diagnosis import Inseparable
@@ -16,11 +16,8 @@ Values = Mapping[str, Any]
 
 def note_words(note: Note) -> str:
     """The note as a clause."""
-    return WORDS[note.kind](note.values)
-
-
-def _cutoff(v: Values) -> str:
-    return f"torques are compared below {v['cutoff']:g} Hz; faster effects are not seen"
+    words = WORDS[note.kind]
+    return words.format_map(note.values) if isinstance(words, str) else words(note.values)
 
 
 def _drive_at_limit(v: Values) -> str:
@@ -30,22 +27,6 @@ def _drive_at_limit(v: Values) -> str:
         f"the recorded drive stands at its largest value ({shares}), where less may act than is recorded: how much "
         "less is found beside all else, and nothing is concluded from it"
     ) + (f"; a record tells nothing of joint {unknown}, which is not examined there" if unknown else "")
-
-
-def _drive_timing(v: Values) -> str:
-    late = ", ".join(f"{samples:.2g}" for samples in v["late"])
-    return (
-        f"drives are taken to act {late} samples of their record late: up to {v['samples']:g} samples are how a drive "
-        "is formed and held, which no record tells, and are not named as a delay"
-    )
-
-
-def _errors_follow_record(v: Values) -> str:
-    return (
-        "the gap and the sizes in reasons are of the closed loop; the map, and the errors by which held-out traces "
-        "decide, are of a simulation whose controller is given the simulated reading moved "
-        f"{v['share']:g} of the way to the recorded one"
-    )
 
 
 def _larger_noise(v: Values) -> str:
@@ -62,60 +43,20 @@ def _larger_noise(v: Values) -> str:
     )
 
 
-def _names_excluded(_: Values) -> str:
-    return (
-        "a group has fewer names than the fitted traces leave: the held-out ones, fitted to in turn, exclude the others"
-    )
-
-
-def _no_experiment_left(v: Values) -> str:
-    return (
-        f"no experiment within the limits{within(v['budget'])} is left that could tell {' from '.join(v['candidates'])}"
-    )
-
-
-def _not_exchanged(v: Values) -> str:
-    why = v.get("why", "they are too short for the cutoff that they bear")
-    return (
-        "held-out traces were a check alone, and were not fitted to in turn, which would show whether they lead to the "
-        f"same answer: {why}"
-    )
-
-
-def _not_looked_for(v: Values) -> str:
-    return "not looked for: " + "; ".join(f"{effect_name(name)} ({why})" for name, why in v["effects"].items())
-
-
 def _not_separable(v: Values) -> str:
     pairs = "; ".join(f"{one} and {other} ({most:.1f} at most)" for one, other, most in v["pairs"])
     limits = f"the limits{within(v['budget'])}"
     return f"no experiment within {limits} separates these by {v['least']:g} standard deviations: {pairs}"
 
 
-def _nothing_held_out(_: Values) -> str:
-    return "no held-out trace was given: nothing here has been shown on data it was not fitted to"
-
-
-def _one_class(v: Values) -> str:
-    return class_words(Inseparable.model_validate({k: v[k] for k in Inseparable.model_fields}), v["budget"])
-
-
-def _positions_of_links(_: Values) -> str:
-    return "positions are taken to be those of the links, behind the transmission"
-
-
-def _resting_left_out(_: Values) -> str:
-    return "samples at which a joint rests are left out: friction holds it with whatever torque that takes"
-
-
 def _shakes_above_cutoff(v: Values) -> str:
-    def of(joint: Values) -> str:
-        return f"joint {joint['joint']} at {plain(joint['frequency'], 2)} Hz ({plain(joint['factor'], 2)} times)"
-
+    joints = ", ".join(
+        f"joint {j['joint']} at {plain(j['frequency'], 2)} Hz ({plain(j['factor'], 2)} times)" for j in v["joints"]
+    )
     return (
-        f"joints shake faster than torques are compared: {', '.join(map(of, v['joints']))}, in brackets their "
-        f"acceleration above {v['cutoff']:g} Hz over that below. What makes them shake is not looked for: a gear that "
-        "gives or has play, a delay, or gains that are too high for these; a record with lower gains would tell"
+        f"joints shake faster than torques are compared: {joints}, in brackets their acceleration above "
+        f"{v['cutoff']:g} Hz over that below. What makes them shake is not looked for: a gear that gives or has play, "
+        "a delay, or gains that are too high for these; a record with lower gains would tell"
     )
 
 
@@ -129,10 +70,6 @@ def _size_at_bound(v: Values) -> str:
 
 def _stated_numbers_moved(v: Values) -> str:
     numbers = v["numbers"]
-    listed = ", ".join(
-        f"{n['name']} {_rounded(n['value'], n['unit'])} ({n['deviations']:.2g} deviations; {n['expected']:.4g} stated)"
-        for n in numbers
-    )
     if v.get("named"):
         named = "; ".join(
             f"{n['name']} is {_rounded(n['value'], n['unit'])} and not {_rounded(n['expected'], n['unit'])} "
@@ -140,6 +77,10 @@ def _stated_numbers_moved(v: Values) -> str:
             for n in numbers
         )
         return f"what is named differs from what the machine file states: {named}"
+    listed = ", ".join(
+        f"{n['name']} {_rounded(n['value'], n['unit'])} ({n['deviations']:.2g} deviations; {n['expected']:.4g} stated)"
+        for n in numbers
+    )
     subject, own = ("this number", "its") if len(numbers) == 1 else ("these numbers", "their")
     return (
         f"{subject} came out more than {v['limit']:g} of {own} stated deviations from what is expected: {listed}. The "
@@ -155,32 +96,14 @@ def _times(value: float, stated: float) -> str:
     return ", next to nothing" if value < 0.005 * stated else f", {value / stated:.2g} times as much"
 
 
-def _suspicion_dropped(v: Values) -> str:
-    return (
-        f"{effect_on(v['effect'], v['joints'])} has evidence of {v['evidence']:.0f}, but the held-out traces, fitted "
-        "to in turn, neither show it nor raise a suspicion: it is not suspected"
-    )
-
-
-def _taken_out_again(v: Values) -> str:
-    return f"{effect_name(v['effect'])}, step {v['step']}, was taken out again: the others explain it"
-
-
-def _tolerances_fitted_first(v: Values) -> str:
-    traces = "1 trace" if v["traces"] == 1 else f"{v['traces']} traces"
-    return (
-        "numbers that may be a little off on a sound machine (tolerance parameters) were fitted first, to "
-        f"{traces}, within what the machine file states"
-    )
-
-
 def _tolerance_source(v: Values) -> str:
-    match v["source"]:
-        case "stated":
-            stated = "parameters may be off by what the machine file states"
-            known = v.get("fitted", 0)
-            return f"{stated}; an earlier fit, to other records, knows {known} of them better" if known else stated
-        case "fitted-before":
+    match v["source"], v.get("fitted", 0):
+        case "stated", 0:
+            return "parameters may be off by what the machine file states"
+        case "stated", known:
+            better = f"an earlier fit, to other records, knows {known} of them better"
+            return f"parameters may be off by what the machine file states; {better}"
+        case "fitted-before", _:
             return f"the machine file states no deviations; fitted bodies are taken to be known to {v['share']:.0%}"
         case _:
             return "the machine file states no deviations; masses, centres and inertias are free"
@@ -196,54 +119,71 @@ def _torque_left(v: Values) -> str:
     )
 
 
-def _traces_contradict(v: Values) -> str:
-    effects = " and ".join(effect_on(one["effect"], one["joints"]) for one in v["effects"])
-    return (
-        f"{effects} would explain the traces that were given to be fitted to, but not those held out, which are fitted "
-        "to here: what is missing is something else, which none of the effects that were tried describes"
-    )
-
-
-def _traces_exchanged(_: Values) -> str:
-    return (
-        "the traces that were given to be fitted to show nothing plain that has a name: this is what those held out "
-        "show, which are fitted to here, while the others are held out in turn"
-    )
-
-
-def _unfinished_record(v: Values) -> str:
-    called = v.get("file") or f"trace {v['trace']}"
-    return f"{called} was not recorded to its end ({v['outcome']}); the {v['seconds']:.1f} s that there are were used"
+def _on_joints(effects: Sequence[Values]) -> str:
+    return " and ".join(effect_on(one["effect"], one["joints"]) for one in effects)
 
 
 def _rounded(value: float, unit: str) -> str:
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 
-WORDS: dict[NoteKind, Callable[[Values], str]] = {
-    "cutoff": _cutoff,
+WORDS: dict[NoteKind, str | Callable[[Values], str]] = {
+    "cutoff": "torques are compared below {cutoff:g} Hz; faster effects are not seen",
     "drive-at-limit": _drive_at_limit,
-    "drive-timing": _drive_timing,
-    "errors-follow-record": _errors_follow_record,
+    "drive-timing": lambda v: (
+        f"drives are taken to act {', '.join(f'{samples:.2g}' for samples in v['late'])} samples of their record late: "
+        f"up to {v['samples']:g} samples are how a drive is formed and held, which no record tells, and are not named "
+        "as a delay"
+    ),
+    "errors-follow-record": "the gap and the sizes in reasons are of the closed loop; the map, and the errors by which "
+    "held-out traces decide, are of a simulation whose controller is given the simulated reading moved {share:g} of "
+    "the way to the recorded one",
     "larger-noise": _larger_noise,
-    "names-excluded": _names_excluded,
-    "no-experiment-left": _no_experiment_left,
-    "not-exchanged": _not_exchanged,
-    "not-looked-for": _not_looked_for,
+    "names-excluded": "a group has fewer names than the fitted traces leave: the held-out ones, fitted to in turn, "
+    "exclude the others",
+    "no-experiment-left": lambda v: (
+        f"no experiment within the limits{within(v['budget'])} is left that could tell {' from '.join(v['candidates'])}"
+    ),
+    "not-exchanged": lambda v: (
+        "held-out traces were a check alone, and were not fitted to in turn, which would show whether they lead to the "
+        f"same answer: {v.get('why', 'they are too short for the cutoff that they bear')}"
+    ),
+    "not-looked-for": lambda v: (
+        "not looked for: " + "; ".join(f"{effect_name(name)} ({why})" for name, why in v["effects"].items())
+    ),
     "not-separable": _not_separable,
-    "nothing-held-out": _nothing_held_out,
-    "one-class": _one_class,
-    "positions-of-links": _positions_of_links,
-    "resting-left-out": _resting_left_out,
+    "nothing-held-out": "no held-out trace was given: nothing here has been shown on data it was not fitted to",
+    "one-class": lambda v: class_words(
+        Inseparable.model_validate({name: v[name] for name in Inseparable.model_fields}), v["budget"]
+    ),
+    "positions-of-links": "positions are taken to be those of the links, behind the transmission",
+    "resting-left-out": "samples at which a joint rests are left out: friction holds it with whatever torque that "
+    "takes",
     "shakes-above-cutoff": _shakes_above_cutoff,
     "size-at-bound": _size_at_bound,
     "stated-numbers-moved": _stated_numbers_moved,
-    "suspicion-dropped": _suspicion_dropped,
-    "taken-out-again": _taken_out_again,
-    "tolerances-fitted-first": _tolerances_fitted_first,
+    "suspicion-dropped": lambda v: (
+        f"{effect_on(v['effect'], v['joints'])} has evidence of {v['evidence']:.0f}, but the held-out traces, fitted "
+        "to in turn, neither show it nor raise a suspicion: it is not suspected"
+    ),
+    "taken-out-again": lambda v: (
+        f"{effect_name(v['effect'])}, step {v['step']}, was taken out again: the others explain it"
+    ),
+    "tolerances-fitted-first": lambda v: (
+        "numbers that may be a little off on a sound machine (tolerance parameters) were fitted first, to "
+        f"{v['traces']} trace{'' if v['traces'] == 1 else 's'}, within what the machine file states"
+    ),
     "tolerance-source": _tolerance_source,
     "torque-left": _torque_left,
-    "traces-contradict": _traces_contradict,
-    "traces-exchanged": _traces_exchanged,
-    "unfinished-record": _unfinished_record,
+    "traces-contradict": lambda v: (
+        f"{_on_joints(v['effects'])} would explain the traces that were given to be fitted to, but not those held out, "
+        "which are fitted to here: what is missing is something else, which none of the effects that were tried "
+        "describes"
+    ),
+    "traces-exchanged": "the traces that were given to be fitted to show nothing plain that has a name: this is what "
+    "those held out show, which are fitted to here, while the others are held out in turn",
+    "unfinished-record": lambda v: (
+        f"{v.get('file') or 'trace ' + v['trace']} was not recorded to its end ({v['outcome']}); the "
+        f"{v['seconds']:.1f} s that there are were used"
+    ),
 }

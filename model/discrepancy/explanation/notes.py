@@ -12,6 +12,8 @@ from model.machine_model.record_verdict import FAR_OFF
 
 
 class _Expected(Protocol):
+    """A number of a fit: `Unknown`, or a number that torques determine."""
+
     @property
     def name(self) -> str: ...
     @property

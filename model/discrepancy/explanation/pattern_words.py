@@ -1,176 +1,91 @@
-"""Patterns of a residual in words that go on from “joint 2 …”. A part of the renderer."""
+"""Patterns of a residual in words that go on from “joint 2 …”."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from string import Formatter
 
 from model.discrepancy.grounds import Pattern, PatternKind
 from model.discrepancy.numbers import ReadingUnits, plain
 
-Numbers = Mapping[str, float]
+WORDS: dict[PatternKind, str] = {
+    "bends_with_position": "is off by a curve over its position that spans {span:size} on {travel:place} of travel",
+    "drives_otherwise": "gets {ratio:3} times the {drive_unit} that its controller's gain gives for the same error",
+    "fails_at_high_drive": "is off by {above:size} rms where more than {drive:drive} are asked for, and by "
+    "{elsewhere:size} elsewhere",
+    "goes_with_position": "is off by {at_low:signed} below {low:place} and by {at_high:signed} above {high:place}, "
+    "moving or at rest",
+    "goes_with_weight": "is off by {at_low:signed} where gravity takes {low:torque} and by {at_high:signed} where it "
+    "takes {high:torque}",
+    "grows_with_time": "{first:lag} in motion during the first third of the record and {last:lag} during the last",
+    "is_off": "is off by {rms:size} rms without it",
+    "jolts": "is off in single moments, by up to {largest:size}: {part:percent} % of the record hold half of what the "
+    "effect explains, all in motion",
+    "lags_after_turns": "{after:lag} {delay:2} s after {turns:turns} and {before:lag} before",
+    "lags_alike": "{slow:lag} in slow motion and {fast:lag} in fast{always}",
+    "lags_always": "{lag:lag} whenever it moves",
+    "lags_one_way": "{forward:lag} moving forwards and {backward:lag} backwards",
+    "lags_under_drive": "{at_high:lag} where its motor takes over {high:drive} and {at_low:lag} under {low:drive}",
+    "lags_under_load": "{at_high:lag} where it carries over {high:torque} and {at_low:lag} under {low:torque}",
+    "lags_when_slow": "{slow:lag} in slow motion but {fast:lag} when it moves fast",
+    "lags_with_speed": "shows a {seconds:sense} that grows with speed, {at_slow:size} at {slow:speed} and "
+    "{at_fast:size} at {fast:speed}",
+    "late_at_changes": "is off by {changing:size} rms within {within:g} s of changes of speed and by {steady:size} in "
+    "steady motion",
+    "stays_off": "is off by {offset:signed} throughout",
+    "sticks": "{starting:lag} in the first {within:g} s of each motion and {running:lag} later",
+    "stops_short": "is off by {below:size} rms while its drive is below {drive:drive} and by {above:size} above it",
+    "swings_with_position": "swings by {amplitude:size} with its position, {cycles:cycles}, in either direction",
+    "swings_with_time": "swings by {amplitude:size} at {frequency:3} Hz, whatever its set points",
+    "swings_with_time_and_at_rest": "swings by {amplitude:size} at {frequency:3} Hz, whatever its set points, also at "
+    "rest",
+}
+"""By kind, with the pattern's numbers. After the colon is how a number is written: see `_Number`."""
+
+
+@dataclass(frozen=True)
+class _Number:
+    """A number of a pattern. behind: the same as a lag, with the verb for its sign."""
+
+    value: float
+    units: ReadingUnits
+    behind: str = ""
+
+    def __format__(self, how: str) -> str:
+        value, u = self.value, self.units
+        ways: dict[str, Callable[[], str]] = {
+            "size": lambda: u.size(value),
+            "signed": lambda: u.signed(value),
+            "place": lambda: u.place(value),
+            "speed": lambda: u.speed(value),
+            "cycles": lambda: u.cycles(value),
+            "lag": lambda: self.behind,
+            "drive": lambda: f"{plain(value)} {u.drive_unit}",
+            "torque": lambda: f"{plain(value)} {u.torque_unit}",
+            "percent": lambda: plain(100 * value),
+            "sense": lambda: "lag" if value > 0 else "lead",
+            "turns": lambda: f"each of {round(value)} reversals" if round(value) > 1 else "its reversal",
+            "2": lambda: plain(value),
+            "3": lambda: plain(value, 3),
+        }
+        return ways[how]() if how in ways else format(value, how)
 
 
 def pattern_words(pattern: Pattern, units: ReadingUnits) -> str:
     """What the joint does: “lags by 0.13° in slow motion and by 0.15° in fast, always against the motion”."""
-    return WORDS[pattern.kind](pattern.numbers, units)
+    words, n = WORDS[pattern.kind], dict(pattern.numbers)
+    if pattern.kind == "lags_with_speed":
+        n |= {f"at_{pace}": n["seconds"] * n[pace] for pace in ("slow", "fast")}
+    lags = [name for _, name, how, _ in Formatter().parse(words) if name and how == "lag"]
+    behind = dict(zip(lags, units.behind(n[lags[0]], n[lags[-1]]), strict=False)) if lags else {}
+    numbers = {name: _Number(value, units, behind.get(name, "")) for name, value in n.items()}
+    return words.format(**numbers, drive_unit=units.drive_unit, always=_always(n, units))
 
 
-def _bends_with_position(n: Numbers, u: ReadingUnits) -> str:
-    return f"is off by a curve over its position that spans {u.size(n['span'])} on {u.place(n['travel'])} of travel"
-
-
-def _drives_otherwise(n: Numbers, u: ReadingUnits) -> str:
-    return f"gets {plain(n['ratio'], 3)} times the {u.drive_unit} that its controller's gain gives for the same error"
-
-
-def _fails_at_high_drive(n: Numbers, u: ReadingUnits) -> str:
-    return (
-        f"is off by {u.size(n['above'])} rms where more than {plain(n['drive'])} {u.drive_unit} are asked for, and by "
-        f"{u.size(n['elsewhere'])} elsewhere"
-    )
-
-
-def _goes_with_position(n: Numbers, u: ReadingUnits) -> str:
-    return (
-        f"is off by {u.signed(n['at_low'])} below {u.place(n['low'])} and by {u.signed(n['at_high'])} above "
-        f"{u.place(n['high'])}, moving or at rest"
-    )
-
-
-def _goes_with_weight(n: Numbers, u: ReadingUnits) -> str:
-    unit = u.torque_unit
-    return (
-        f"is off by {u.signed(n['at_low'])} where gravity takes {plain(n['low'])} {unit} and by "
-        f"{u.signed(n['at_high'])} where it takes {plain(n['high'])} {unit}"
-    )
-
-
-def _grows_with_time(n: Numbers, u: ReadingUnits) -> str:
-    first, last = u.behind(n["first"], n["last"])
-    return f"{first} in motion during the first third of the record and {last} during the last"
-
-
-def _is_off(n: Numbers, u: ReadingUnits) -> str:
-    return f"is off by {u.size(n['rms'])} rms without it"
-
-
-def _jolts(n: Numbers, u: ReadingUnits) -> str:
-    return (
-        f"is off in single moments, by up to {u.size(n['largest'])}: {plain(100 * n['part'])} % of the record hold "
-        "half of what the effect explains, all in motion"
-    )
-
-
-def _lags_after_turns(n: Numbers, u: ReadingUnits) -> str:
-    after, before = u.behind(n["after"], n["before"])
-    turns = round(n["turns"])
-    reversals = f"each of {turns} reversals" if turns > 1 else "its reversal"
-    return f"{after} {plain(n['delay'])} s after {reversals} and {before} before"
-
-
-def _lags_alike(n: Numbers, u: ReadingUnits) -> str:
-    slow, fast = u.behind(n["slow"], n["fast"])
-    return f"{slow} in slow motion and {fast} in fast{_always(n['slow'], n['fast'], u)}"
-
-
-def _lags_always(n: Numbers, u: ReadingUnits) -> str:
-    return f"{u.behind(n['lag'], n['lag'])[0]} whenever it moves"
-
-
-def _lags_one_way(n: Numbers, u: ReadingUnits) -> str:
-    forward, backward = u.behind(n["forward"], n["backward"])
-    return f"{forward} moving forwards and {backward} backwards"
-
-
-def _lags_under_drive(n: Numbers, u: ReadingUnits) -> str:
-    high, low = u.behind(n["at_high"], n["at_low"])
-    unit = u.drive_unit
-    return f"{high} where its motor takes over {plain(n['high'])} {unit} and {low} under {plain(n['low'])} {unit}"
-
-
-def _lags_under_load(n: Numbers, u: ReadingUnits) -> str:
-    high, low = u.behind(n["at_high"], n["at_low"])
-    unit = u.torque_unit
-    return f"{high} where it carries over {plain(n['high'])} {unit} and {low} under {plain(n['low'])} {unit}"
-
-
-def _lags_when_slow(n: Numbers, u: ReadingUnits) -> str:
-    slow, fast = u.behind(n["slow"], n["fast"])
-    return f"{slow} in slow motion but {fast} when it moves fast"
-
-
-def _lags_with_speed(n: Numbers, u: ReadingUnits) -> str:
-    seconds, slow, fast = n["seconds"], n["slow"], n["fast"]
-    return (
-        f"shows a {'lag' if seconds > 0 else 'lead'} that grows with speed, {u.size(seconds * slow)} at "
-        f"{u.speed(slow)} and {u.size(seconds * fast)} at {u.speed(fast)}"
-    )
-
-
-def _late_at_changes(n: Numbers, u: ReadingUnits) -> str:
-    return (
-        f"is off by {u.size(n['changing'])} rms within {n['within']:g} s of changes of speed and by "
-        f"{u.size(n['steady'])} in steady motion"
-    )
-
-
-def _stays_off(n: Numbers, u: ReadingUnits) -> str:
-    return f"is off by {u.signed(n['offset'])} throughout"
-
-
-def _sticks(n: Numbers, u: ReadingUnits) -> str:
-    starting, running = u.behind(n["starting"], n["running"])
-    return f"{starting} in the first {n['within']:g} s of each motion and {running} later"
-
-
-def _stops_short(n: Numbers, u: ReadingUnits) -> str:
-    return (
-        f"is off by {u.size(n['below'])} rms while its drive is below {plain(n['drive'])} {u.drive_unit} and by "
-        f"{u.size(n['above'])} above it"
-    )
-
-
-def _swings_with_position(n: Numbers, u: ReadingUnits) -> str:
-    return f"swings by {u.size(n['amplitude'])} with its position, {u.cycles(n['cycles'])}, in either direction"
-
-
-def _swings_with_time(n: Numbers, u: ReadingUnits) -> str:
-    return f"swings by {u.size(n['amplitude'])} at {plain(n['frequency'], 3)} Hz, whatever its set points"
-
-
-def _swings_at_rest_too(n: Numbers, u: ReadingUnits) -> str:
-    return f"{_swings_with_time(n, u)}, also at rest"
-
-
-def _always(slow: float, fast: float, units: ReadingUnits) -> str:
-    """What two lags have in common, where they have a common sign that can be read."""
+def _always(n: Mapping[str, float], units: ReadingUnits) -> str:
+    """What the lags in slow and in fast motion have in common, where they have a common sign that can be read."""
+    slow, fast = n.get("slow", 0.0), n.get("fast", 0.0)
     if units.unread(slow) or units.unread(fast) or (slow >= 0) != (fast >= 0):
         return ""
     return f", always {'against' if slow >= 0 else 'with'} the motion"
-
-
-WORDS: dict[PatternKind, Callable[[Numbers, ReadingUnits], str]] = {
-    "bends_with_position": _bends_with_position,
-    "drives_otherwise": _drives_otherwise,
-    "fails_at_high_drive": _fails_at_high_drive,
-    "goes_with_position": _goes_with_position,
-    "goes_with_weight": _goes_with_weight,
-    "grows_with_time": _grows_with_time,
-    "is_off": _is_off,
-    "jolts": _jolts,
-    "lags_after_turns": _lags_after_turns,
-    "lags_alike": _lags_alike,
-    "lags_always": _lags_always,
-    "lags_one_way": _lags_one_way,
-    "lags_under_drive": _lags_under_drive,
-    "lags_under_load": _lags_under_load,
-    "lags_when_slow": _lags_when_slow,
-    "lags_with_speed": _lags_with_speed,
-    "late_at_changes": _late_at_changes,
-    "stays_off": _stays_off,
-    "sticks": _sticks,
-    "stops_short": _stops_short,
-    "swings_with_position": _swings_with_position,
-    "swings_with_time": _swings_with_time,
-    "swings_with_time_and_at_rest": _swings_at_rest_too,
-}

@@ -2,6 +2,7 @@
 
 Every pattern compares the residual of a joint (measured − simulated without the effect) with a shape; its share is the
 part of the residual's mean square that the shape takes off. The numbers are those that a person would read off a plot.
+`daq/contracts/effects.toml` says which patterns each effect shows.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from daq.contracts.effects import effect_names
 from model.arrays import Floats, Mask
 from model.discrepancy.explanation.samples import Samples
 from model.discrepancy.grounds import Pattern, PatternKind
@@ -25,24 +27,21 @@ FULL = 0.6
 """Share of the largest drive from which the drive counts as high."""
 LOW = 0.15
 """Share of the largest drive below which the drive counts as low."""
+LEAST = 0.2
+"""Time that a record must have of each of two states that are compared, s; half of it at starts and turns."""
 
-FindPattern = Callable[[Samples, Mapping[str, float]], Pattern | None]
+Known = Mapping[str, float]
+FindPattern = Callable[[Samples, Known], Pattern | None]
 """Finds a pattern in samples, given the effect's parameters by part; None where the record cannot show it."""
 
 
-def lags_alike(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def lags_alike(s: Samples, _: Known) -> Pattern | None:
     """The same distance behind in either direction, slow or fast."""
-    lag = _lag(s)
-    share = _share(s, s.direction * s.moving)
-    slow, fast = s.moving & (np.abs(s.speed) < CREEPING_SPEED), s.moving & (np.abs(s.speed) >= CREEPING_SPEED)
-    if min(slow.sum(), fast.sum()) >= s.rate / 5:
-        return _pattern("lags_alike", share, slow=_mean(lag, slow), fast=_mean(lag, fast))
-    if s.moving.sum() < s.rate / 5:
-        return None
-    return _pattern("lags_always", share, lag=_mean(lag, s.moving))
+    shape = s.direction * s.moving
+    return _lags("lags_alike", s, shape, _paces(s)) or _lags("lags_always", s, shape, {"lag": s.moving})
 
 
-def lags_with_speed(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def lags_with_speed(s: Samples, _: Known) -> Pattern | None:
     """Behind in proportion to speed."""
     fastest = float(np.quantile(np.abs(s.speed[s.moving]), 0.95)) if s.moving.any() else 0.0
     if fastest < CREEPING_SPEED:
@@ -51,169 +50,130 @@ def lags_with_speed(s: Samples, _: Mapping[str, float]) -> Pattern | None:
     return _pattern("lags_with_speed", _share(s, s.speed), seconds=seconds, slow=0.5 * CREEPING_SPEED, fast=fastest)
 
 
-def lags_when_slow(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def lags_when_slow(s: Samples, _: Known) -> Pattern | None:
     """Further behind the slower it moves."""
-    slow = s.moving & (np.abs(s.speed) < CREEPING_SPEED)
-    fast = s.moving & ~slow
-    if min(slow.sum(), fast.sum()) < s.rate / 5:
-        return None
-    lag = _lag(s)
-    return _pattern("lags_when_slow", _share(s, s.direction * slow), slow=_mean(lag, slow), fast=_mean(lag, fast))
+    paces = _paces(s)
+    return _lags("lags_when_slow", s, s.direction * paces["slow"], paces)
 
 
-def lags_after_turns(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def lags_after_turns(s: Samples, _: Known) -> Pattern | None:
     """Behind after each change of direction, and not before it."""
-    after = (s.since_turn < TURNING) & s.moving
-    turns = int(np.sum(s.since_turn[1:] < s.since_turn[:-1]))
-    before = _before_turns(s)
-    if turns == 0 or after.sum() < s.rate / 10 or not before.any():
+    turned = s.since_turn[1:] < s.since_turn[:-1]
+    near = np.concatenate([[False], turned])
+    before = _spread(near[::-1], round(TURNING * s.rate))[::-1] & s.moving & (s.since_turn >= TURNING)
+    if not turned.any() or ((s.since_turn < TURNING) & s.moving).sum() < LEAST / 2 * s.rate or not before.any():
         return None
-    lag, begin = _lag(s), _worst_after_turn(s)
-    then = after & (s.since_turn >= begin) & (s.since_turn < begin + SLICE)
-    return _pattern(
-        "lags_after_turns",
-        _share(s, s.direction * then),
-        after=_mean(lag, then),
-        before=_mean(lag, before),
-        delay=begin + SLICE / 2,
-        turns=turns,
-    )
+    slices = {
+        begin: s.moving & (s.since_turn >= begin) & (s.since_turn < begin + SLICE)
+        for begin in np.arange(0.0, TURNING - SLICE / 2, SLICE / 2)
+    }
+    begin = max(slices, key=lambda one: abs(_mean(_lag(s), slices[one])))
+    groups = {"after": slices[begin], "before": before}
+    numbers = {"delay": begin + SLICE / 2, "turns": turned.sum()}
+    return _lags("lags_after_turns", s, s.direction * slices[begin], groups, 0.0, **numbers)
 
 
-def lags_one_way(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def lags_one_way(s: Samples, _: Known) -> Pattern | None:
     """More behind in one direction than in the other."""
     forward, backward = (s.moving & (s.direction == d) for d in (1, -1))
-    if min(forward.sum(), backward.sum()) < s.rate / 5:
-        return None
-    lag, share = _lag(s), _share(s, np.where(s.moving, 1.0, 0.0))
-    return _pattern("lags_one_way", share, forward=_mean(lag, forward), backward=_mean(lag, backward))
+    return _lags("lags_one_way", s, s.moving.astype(np.float64), {"forward": forward, "backward": backward})
 
 
-def sticks(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def sticks(s: Samples, _: Known) -> Pattern | None:
     """Behind where motion begins, and not later."""
-    starting = s.moving & _within_start(s.moving, round(STARTING * s.rate))
-    running = s.moving & ~starting
-    if min(starting.sum(), running.sum()) < s.rate / 10:
-        return None
-    lag, share = _lag(s), _share(s, s.direction * starting)
-    return _pattern("sticks", share, starting=_mean(lag, starting), running=_mean(lag, running), within=STARTING)
+    begun = s.moving.copy()
+    begun[1:] &= ~s.moving[:-1]
+    starting = s.moving & _spread(begun, round(STARTING * s.rate))
+    groups = {"starting": starting, "running": s.moving & ~starting}
+    return _lags("sticks", s, s.direction * starting, groups, LEAST / 2, within=STARTING)
 
 
-def stops_short(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def stops_short(s: Samples, _: Known) -> Pattern | None:
     """Off where the drive is small."""
-    largest = float(np.abs(s.drive).max())
-    if largest == 0.0:
-        return None
-    low = np.abs(s.drive) < LOW * largest
-    if min(low.sum(), (~low).sum()) < s.rate / 5:
-        return None
+    limit = LOW * float(np.abs(s.drive).max())
+    low = np.abs(s.drive) < limit
     share = _share(s, s.direction * low)
-    return _pattern("stops_short", share, drive=LOW * largest, below=_rms(s.without[low]), above=_rms(s.without[~low]))
+    return _sizes("stops_short", s, share, {"below": low, "above": ~low}, drive=limit) if limit > 0.0 else None
 
 
-def fails_at_high_drive(s: Samples, known: Mapping[str, float]) -> Pattern | None:
+def fails_at_high_drive(s: Samples, known: Known) -> Pattern | None:
     """Off where much drive is asked for."""
     largest = float(np.abs(s.expected_drive).max())
     limit = min(known.get("voltage", FULL * largest), 0.999 * largest)
     high = _spread(np.abs(s.expected_drive) > limit, round(0.2 * s.rate))
     if not high.any() or high.all():
         return None
-    above, elsewhere = _rms(s.without[high]), _rms(s.without[~high])
-    return _pattern("fails_at_high_drive", _energy(s, high), drive=limit, above=above, elsewhere=elsewhere)
+    groups = {"above": high, "elsewhere": ~high}
+    return _sizes("fails_at_high_drive", s, _energy(s, high), groups, 0.0, drive=limit)
 
 
-def late_at_changes(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def late_at_changes(s: Samples, _: Known) -> Pattern | None:
     """Off where speed changes, and not in steady motion."""
     change = _spread(np.abs(s.acceleration) > 0.3 * np.abs(s.acceleration).max(), round(NEAR_CHANGE * s.rate))
-    steady = s.moving & ~change
-    if min(change.sum(), steady.sum()) < s.rate / 5:
-        return None
-    near, far = _rms(s.without[change]), _rms(s.without[steady])
-    return _pattern("late_at_changes", _energy(s, change), within=NEAR_CHANGE, changing=near, steady=far)
+    groups = {"changing": change, "steady": s.moving & ~change}
+    return _sizes("late_at_changes", s, _energy(s, change), groups, within=NEAR_CHANGE)
 
 
-def goes_with_weight(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def goes_with_weight(s: Samples, _: Known) -> Pattern | None:
     """Pushed off as gravity pulls."""
-    low, high = np.quantile(s.gravity, [0.1, 0.9])
-    if high - low < 1e-6:
-        return None
-    few, many = s.gravity <= low, s.gravity >= high
-    at_low, at_high = _mean(s.without, few), _mean(s.without, many)
-    return _pattern("goes_with_weight", _share(s, s.gravity), low=low, high=high, at_low=at_low, at_high=at_high)
+    return _ends("goes_with_weight", s, s.gravity, s.gravity)
 
 
-def goes_with_position(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def goes_with_position(s: Samples, _: Known) -> Pattern | None:
     """Off in proportion to the joint's position."""
-    low, high = np.quantile(s.asked, [0.1, 0.9])
-    if high - low < 1e-6:
-        return None
-    at_low, at_high = _mean(s.without, s.asked <= low), _mean(s.without, s.asked >= high)
-    share = _share(s, s.asked - s.asked.mean())
-    return _pattern("goes_with_position", share, low=low, high=high, at_low=at_low, at_high=at_high)
+    return _ends("goes_with_position", s, s.asked, s.asked - s.asked.mean())
 
 
-def bends_with_position(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def bends_with_position(s: Samples, _: Known) -> Pattern | None:
     """Off by a curve over its position."""
     reach = float(np.ptp(s.asked))
     if reach < 1e-6:
         return None
     place = (s.asked - s.asked.min()) / reach
-    basis = np.stack([np.cos(k * np.pi * place) for k in range(1, 5)], axis=1)
-    curve = _fitted(s.without, basis)
-    return _pattern("bends_with_position", _share(s, *basis.T), span=float(np.ptp(curve)), travel=reach)
+    basis = [np.cos(k * np.pi * place) for k in range(1, 5)]
+    return _pattern("bends_with_position", _share(s, *basis), span=np.ptp(_fitted(s, *basis)), travel=reach)
 
 
-def swings_with_position(s: Samples, known: Mapping[str, float]) -> Pattern | None:
+def swings_with_position(s: Samples, known: Known) -> Pattern | None:
     """Swings a fixed number of times a turn."""
-    cycles = known.get("cycles")
-    if cycles is None:
+    if (cycles := known.get("cycles")) is None:
         return None
-    sine, cosine = np.sin(cycles * s.asked), np.cos(cycles * s.asked)
-    curve = _fitted(s.without, np.stack([sine, cosine], axis=1))
-    share = _share(s, sine, cosine)
-    return _pattern("swings_with_position", share, amplitude=float(curve.max()), cycles=cycles)
+    basis = [f(cycles * s.asked) for f in (np.sin, np.cos)]
+    amplitude = _fitted(s, *basis).max()
+    return _pattern("swings_with_position", _share(s, *basis), amplitude=amplitude, cycles=cycles)
 
 
-def swings_with_time(s: Samples, known: Mapping[str, float]) -> Pattern | None:
+def swings_with_time(s: Samples, known: Known) -> Pattern | None:
     """Swings at a fixed frequency, perhaps at rest too."""
-    frequency = known.get("frequency")
-    if frequency is None:
+    if (frequency := known.get("frequency")) is None:
         return None
-    sine, cosine = (f(2 * np.pi * frequency * s.time) for f in (np.sin, np.cos))
-    curve = _fitted(s.without, np.stack([sine, cosine], axis=1))
-    at_rest = ~s.moving
+    basis = [f(2 * np.pi * frequency * s.time) for f in (np.sin, np.cos)]
+    curve, at_rest = _fitted(s, *basis), ~s.moving
     rests = at_rest.sum() > s.rate and _rms(curve[at_rest]) > 0.5 * _rms(curve)
     kind: PatternKind = "swings_with_time_and_at_rest" if rests else "swings_with_time"
-    return _pattern(kind, _share(s, sine, cosine), amplitude=float(curve.max()), frequency=frequency)
+    return _pattern(kind, _share(s, *basis), amplitude=curve.max(), frequency=frequency)
 
 
-def grows_with_time(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def grows_with_time(s: Samples, _: Known) -> Pattern | None:
     """Further off the longer it has worked."""
     third = s.time.max() / 3
-    first, last = s.moving & (s.time < third), s.moving & (s.time > 2 * third)
-    if min(first.sum(), last.sum()) < s.rate / 5:
-        return None
-    lag, share = _lag(s), _share(s, s.time * s.speed, s.time * s.direction * s.moving)
-    return _pattern("grows_with_time", share, first=_mean(lag, first), last=_mean(lag, last))
+    groups = {"first": s.moving & (s.time < third), "last": s.moving & (s.time > 2 * third)}
+    return _lags("grows_with_time", s, (s.time * s.speed, s.time * s.direction * s.moving), groups)
 
 
-def lags_under_load(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def lags_under_load(s: Samples, _: Known) -> Pattern | None:
     """Further behind the more it carries."""
     load = np.abs(s.gravity)
-    if not s.moving.any() or np.ptp(load[s.moving]) < 1e-6:
-        return None
-    return _lag_against("lags_under_load", s, load, _share(s, s.direction * s.moving * load))
+    return _lags_against("lags_under_load", s, load, s.direction * s.moving * load)
 
 
-def lags_under_drive(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def lags_under_drive(s: Samples, _: Known) -> Pattern | None:
     """Further behind the more its motor works."""
     work = np.abs(s.drive)
-    if work.max() == 0.0 or not s.moving.any():
-        return None
-    return _lag_against("lags_under_drive", s, work, _share(s, s.direction * work))
+    return _lags_against("lags_under_drive", s, work, s.direction * work)
 
 
-def drives_otherwise(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def drives_otherwise(s: Samples, _: Known) -> Pattern | None:
     """The drive for an error differs from what the controller's gain gives."""
     if not np.any(s.drive):
         return None
@@ -221,65 +181,22 @@ def drives_otherwise(s: Samples, _: Mapping[str, float]) -> Pattern | None:
     return _pattern("drives_otherwise", min(1.0, 20 * abs(ratio - 1)), ratio=ratio)
 
 
-def jolts(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def jolts(s: Samples, _: Known) -> Pattern | None:
     """Off in single moments."""
-    gone = s.without**2 - s.left**2
-    ranked = np.sort(gone)[::-1]
+    ranked = np.sort(s.without**2 - s.left**2)[::-1]
     total = float(ranked[ranked > 0].sum())
     if total <= 0.0 or not s.moving.any():
         return None
-    needed = int(np.searchsorted(np.cumsum(ranked), 0.5 * total)) + 1
-    largest, part = float(np.abs(s.without[s.moving]).max()), needed / len(ranked)
-    return _pattern("jolts", float(max(0.0, 1 - 10 * needed / len(ranked))), largest=largest, part=part)
+    needed, count = int(np.searchsorted(np.cumsum(ranked), 0.5 * total)) + 1, len(ranked)
+    largest = np.abs(s.without[s.moving]).max()
+    return _pattern("jolts", max(0.0, 1 - 10 * needed / count), largest=largest, part=needed / count)
 
 
-def stays_off(s: Samples, _: Mapping[str, float]) -> Pattern | None:
+def stays_off(s: Samples, _: Known) -> Pattern | None:
     """Off by the same throughout."""
-    return _pattern("stays_off", _share(s, np.ones(len(s.without))), offset=float(s.without.mean()))
+    return _pattern("stays_off", _share(s, np.ones(len(s.without))), offset=s.without.mean())
 
 
-def is_off(s: Samples) -> Pattern:
-    """Off, without a pattern that the record could show."""
-    return _pattern("is_off", 0.0, rms=_rms(s.without))
-
-
-INERTIA = (goes_with_weight, late_at_changes, lags_with_speed)
-PATTERNS: dict[str, tuple[FindPattern, ...]] = {
-    "viscous_friction": (lags_with_speed,),
-    "coulomb_friction": (lags_alike,),
-    "load_dependent_friction": (lags_under_load, lags_alike),
-    "gravity_torque_friction": (lags_under_load, lags_alike),
-    "stribeck_friction": (lags_when_slow, lags_alike),
-    "stiction": (sticks, stops_short, lags_when_slow),
-    "direction_dependent_friction": (lags_one_way,),
-    "direction_dependent_viscous_friction": (lags_one_way, lags_with_speed),
-    "weakened_magnet": (lags_under_drive, goes_with_weight, lags_with_speed),
-    "resistance_drift": (grows_with_time, lags_under_drive),
-    "resistance_rise": (grows_with_time, lags_under_drive),
-    "motor_inductance": (late_at_changes,),
-    "dead_zone": (lags_alike, stops_short, lags_when_slow),
-    "amplifier_threshold": (stops_short, lags_when_slow, lags_alike),
-    "supply_limit": (fails_at_high_drive,),
-    "torque_ripple": (swings_with_position,),
-    "gear_loss": (lags_under_drive, lags_alike),
-    "direction_dependent_gear_loss": (lags_under_drive, lags_alike),
-    "backlash": (lags_after_turns,),
-    "joint_compliance": (late_at_changes, goes_with_weight),
-    "payload": INERTIA,
-    "link_mass": INERTIA,
-    "centre_of_mass": INERTIA,
-    "base_tilt": (goes_with_weight, bends_with_position, stays_off),
-    "spring_torque": (goes_with_position,),
-    "one_sided_spring": (goes_with_position, bends_with_position),
-    "periodic_disturbance": (swings_with_time,),
-    "potentiometer_gain": (goes_with_position, lags_with_speed, goes_with_weight),
-    "potentiometer_offset": (stays_off, goes_with_weight, bends_with_position),
-    "potentiometer_nonlinearity": (bends_with_position,),
-    "input_delay": (late_at_changes,),
-    "wrong_gain": (drives_otherwise, lags_with_speed),
-    "lost_set_points": (jolts, late_at_changes),
-}
-"""The patterns of each effect of the shared list, in the order in which an engineer would look for them."""
 GENERAL: tuple[FindPattern, ...] = (
     lags_alike,
     lags_with_speed,
@@ -299,18 +216,71 @@ GENERAL: tuple[FindPattern, ...] = (
     stays_off,
 )
 """Patterns that any effect may show, such as one of the user's own."""
+PATTERNS = {f.__name__: f for f in (*GENERAL, drives_otherwise, jolts, swings_with_position, swings_with_time)}
+"""All, by the names that `effects.toml` has."""
+
+
+def patterns_of(effect: str, s: Samples, known: Known) -> list[Pattern]:
+    """The patterns of an effect that a record can show, in the order in which an engineer would look for them."""
+    entry = effect_names().get(effect)
+    finders = GENERAL if entry is None else [PATTERNS[name] for name in entry.shows]
+    return [found for find in finders if (found := find(s, known)) is not None]
+
+
+def is_off(s: Samples) -> Pattern:
+    """Off, without a pattern that the record could show."""
+    return _pattern("is_off", 0.0, rms=_rms(s.without))
 
 
 def _pattern(kind: PatternKind, share: float, **numbers: float) -> Pattern:
     return Pattern(kind=kind, share=share, numbers={name: float(value) for name, value in numbers.items()})
 
 
-def _lag_against(kind: PatternKind, s: Samples, effort: Floats, share: float) -> Pattern:
+def _lags(
+    kind: PatternKind,
+    s: Samples,
+    shape: Floats | tuple[Floats, ...],
+    groups: Mapping[str, Mask],
+    least: float = LEAST,
+    **numbers: float,
+) -> Pattern | None:
+    """The mean lag of each group of samples; None where one has fewer than `least` s of them."""
+    if min(group.sum() for group in groups.values()) < least * s.rate:
+        return None
+    lags = {name: _mean(_lag(s), group) for name, group in groups.items()}
+    return _pattern(kind, _share(s, *(shape if isinstance(shape, tuple) else (shape,))), **lags, **numbers)
+
+
+def _lags_against(kind: PatternKind, s: Samples, effort: Floats, shape: Floats) -> Pattern | None:
     """The lag in the highest and in the lowest quarter of an effort in motion."""
+    if not s.moving.any() or np.ptp(effort[s.moving]) < 1e-6:
+        return None
     low, high = np.quantile(effort[s.moving], [0.25, 0.75])
-    lag = _lag(s)
-    at_high, at_low = _mean(lag, s.moving & (effort >= high)), _mean(lag, s.moving & (effort <= low))
-    return _pattern(kind, share, high=high, low=low, at_high=at_high, at_low=at_low)
+    most, least = (_mean(_lag(s), s.moving & group) for group in (effort >= high, effort <= low))
+    return _pattern(kind, _share(s, shape), high=high, low=low, at_high=most, at_low=least)
+
+
+def _sizes(
+    kind: PatternKind, s: Samples, share: float, groups: Mapping[str, Mask], least: float = LEAST, **numbers: float
+) -> Pattern | None:
+    """The size of the residual in each group of samples; None where one has fewer than `least` s of them."""
+    if min(group.sum() for group in groups.values()) < least * s.rate:
+        return None
+    return _pattern(kind, share, **numbers, **{name: _rms(s.without[group]) for name, group in groups.items()})
+
+
+def _ends(kind: PatternKind, s: Samples, quantity: Floats, shape: Floats) -> Pattern | None:
+    """The mean residual in the lowest and in the highest tenth of a quantity."""
+    low, high = np.quantile(quantity, [0.1, 0.9])
+    if high - low < 1e-6:
+        return None
+    at_low, at_high = (_mean(s.without, group) for group in (quantity <= low, quantity >= high))
+    return _pattern(kind, _share(s, shape), low=low, high=high, at_low=at_low, at_high=at_high)
+
+
+def _paces(s: Samples) -> dict[str, Mask]:
+    slow = np.abs(s.speed) < CREEPING_SPEED
+    return {"slow": s.moving & slow, "fast": s.moving & ~slow}
 
 
 def _lag(s: Samples) -> Floats:
@@ -330,10 +300,11 @@ def _coefficient(signal: Floats, shape: Floats) -> float:
     return float(signal @ shape) / max(float(shape @ shape), 1e-300)
 
 
-def _fitted(signal: Floats, basis: Floats) -> Floats:
-    """The part of a signal (m,) that a basis (m, b) explains beside a constant, without the constant."""
+def _fitted(s: Samples, *shapes: Floats) -> Floats:
+    """The part of the residual that shapes explain beside a constant, without the constant."""
+    basis = np.stack(shapes, axis=1)
     centred = basis - basis.mean(axis=0)
-    weights, *_ = np.linalg.lstsq(centred, signal - signal.mean(), rcond=None)
+    weights, *_ = np.linalg.lstsq(centred, s.without - s.without.mean(), rcond=None)
     return np.asarray(centred @ weights)
 
 
@@ -357,25 +328,3 @@ def _spread(mask: Mask, reach: int) -> Mask:
     for step in range(1, reach + 1):
         result[step:] |= mask[:-step]
     return result
-
-
-def _within_start(moving: Mask, reach: int) -> Mask:
-    """Within `reach` samples after motion began."""
-    started = moving.copy()
-    started[1:] &= ~moving[:-1]
-    return _spread(started, reach)
-
-
-def _worst_after_turn(s: Samples) -> float:
-    """s after a change of direction from which, for `SLICE`, the joint is furthest behind or ahead on average."""
-    begins = np.arange(0.0, TURNING - SLICE / 2, SLICE / 2)
-    lag = _lag(s)
-    means = [abs(_mean(lag, s.moving & (s.since_turn >= b) & (s.since_turn < b + SLICE))) for b in begins]
-    return float(begins[int(np.argmax(means))])
-
-
-def _before_turns(s: Samples) -> Mask:
-    """Moving, within `TURNING` before a change of direction."""
-    turned = np.zeros(len(s.moving), dtype=bool)
-    turned[1:] = s.since_turn[1:] < s.since_turn[:-1]
-    return np.asarray(_spread(turned[::-1], round(TURNING * s.rate))[::-1] & s.moving & (s.since_turn >= TURNING))

@@ -10,7 +10,7 @@ import numpy as np
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import Candidate, FoundValue
-from model.discrepancy.explanation.patterns import GENERAL, PATTERNS, is_off
+from model.discrepancy.explanation.patterns import is_off, patterns_of
 from model.discrepancy.explanation.samples import Left, Motions, Samples, motions
 from model.discrepancy.grounds import ErrorFall, NamedEffect, Pattern, Reason
 from model.discrepancy.localisation.dependence import drive_units
@@ -70,8 +70,7 @@ def clearest_pattern(
     effect: str, samples: Samples, parameters: Mapping[str, FoundValue], joint: int | None = None
 ) -> Pattern:
     """The first of an effect's patterns that is clear in a record; if none is, the clearest."""
-    values = by_part(parameters.values(), joint)
-    found = [p for find in PATTERNS.get(effect, GENERAL) if (p := find(samples, values)) is not None]
+    found = patterns_of(effect, samples, by_part(parameters.values(), joint))
     if not found:
         return is_off(samples)
     return next((p for p in found if p.share > CLEAR), max(found, key=lambda p: p.share))

@@ -20,7 +20,9 @@ from daq.contracts.experiment import ExperimentSpec, Multisine
 from daq.contracts.machine import load_machine
 from daq.driver import Controller
 from daq.link import Link, LinkTimeoutError, RequestRefusedError
-from daq.runner import ArmControl, Consent, RunSetup, StopRequests, run_experiment
+from daq.runner.arm_control import ArmControl
+from daq.runner.experiment import RunSetup, StopRequests, run_experiment
+from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
 from firmware_protocol.codes import Capability
 from firmware_protocol.commands import FineSetPoints, Hello, Sample, StatusFlag, Stop

@@ -2,8 +2,8 @@
 
 import pytest
 
-from daq.link.timing import LinkTiming, copies_of, reply_opcode
-from firmware_protocol.commands import Hello, ReadStatus, Request, Sample, Status, Stop, Stopped
+from daq.link.timing import LinkTiming, copies_of
+from firmware_protocol.commands import Hello, ReadStatus, Request, Sample, Stop
 from firmware_protocol.scale import LineScale
 
 LINE = LinkTiming(bytes_per_second=11520.0, period_s=0.03)
@@ -29,10 +29,6 @@ def test_a_greeting_and_a_stop_are_repeated_more_often_than_anything_else() -> N
 
 def test_only_a_stop_is_written_twice_at_once() -> None:
     assert (copies_of(Stop()), copies_of(ReadStatus())) == (2, 1)
-
-
-def test_a_request_is_answered_by_its_own_kind_of_reply() -> None:
-    assert (reply_opcode(Stop()), reply_opcode(ReadStatus())) == (Stopped.OPCODE, Status.OPCODE)
 
 
 def test_a_shared_wire_is_given_the_time_of_its_own_answers() -> None:

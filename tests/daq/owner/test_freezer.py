@@ -10,7 +10,7 @@ import pytest
 from daq.driver import StopConfirmation
 from daq.owner import freezer as module
 from daq.owner.freezer import Freezer
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 
 
 class SlowControl:

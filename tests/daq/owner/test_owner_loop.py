@@ -14,7 +14,7 @@ from daq.link import LinkState
 from daq.owner import long_orders
 from daq.owner.loop import serve
 from daq.owner.messages import BEGINS_WITHIN, Answer, Reset, RunProgram
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 from firmware_protocol.commands import StatusFlag
 
 SILENT = NoSampleError("mock://: no whole sample")

@@ -20,7 +20,7 @@ from daq.owner.quick_orders import carry_out
 from daq.owner.speaker import Speaker
 from daq.owner.stop_socket import StopAnswer, request_stop, stop_listener
 from daq.owner.watched_controller import WatchedController
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 from daq.safety import State
 from firmware_protocol.commands import ReadStatus, Release, Request, Stop, to_frame
 from firmware_protocol.framing import Frame

@@ -6,8 +6,7 @@ from typing import Any, cast
 import pytest
 
 from daq.driver import Controller, StopConfirmation
-from daq.runner import ArmControl, StoppedError
-from daq.runner.arm_control import stop_line
+from daq.runner.arm_control import ArmControl, StoppedError, stop_line
 from daq.safety import Event, State
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from daq.driver import GainsNotTakenError
-from daq.runner import StoppedError
+from daq.runner.arm_control import StoppedError
 from daq.traces.reader import read_trace
 from tests.daq.runner.rig import SHORT, Rig
 

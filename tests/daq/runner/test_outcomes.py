@@ -11,7 +11,8 @@ import pytest
 
 from daq.contracts.experiment import ExperimentSpec, Pause
 from daq.driver import BoardSnapshot
-from daq.runner import RunFaultError, StoppedError
+from daq.runner.arm_control import StoppedError
+from daq.runner.experiment import RunFaultError
 from daq.traces.reader import read_trace
 from daq.traces.verify import verify
 from tests.daq.runner.rig import LONG_RAMP, SHORT, Rig, rig

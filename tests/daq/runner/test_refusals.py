@@ -12,8 +12,7 @@ from daq.contracts.errors import DaqError, SafetyError, SpecError, TraceError
 from daq.contracts.experiment import ExperimentSpec, Pause, Ramp
 from daq.contracts.machine import Machine
 from daq.driver import Controller
-from daq.runner import Consent, MissingConsentError
-from daq.runner.preparation import recorded_joints
+from daq.runner.preparation import Consent, MissingConsentError, recorded_joints
 from firmware_protocol.scale import LineScale
 from tests.daq.runner.rig import SHORT, Rig
 

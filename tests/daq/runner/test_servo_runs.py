@@ -14,7 +14,9 @@ from daq.contracts.machine import Machine, SampledPid
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import Trace, TraceEvent
 from daq.driver import Controller
-from daq.runner import ArmControl, Consent, RunResult, RunSetup, StopRequests, run_experiment
+from daq.runner.arm_control import ArmControl
+from daq.runner.experiment import RunResult, RunSetup, StopRequests, run_experiment
+from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
 from firmware_protocol.dynamixel.control_table import HardwareError, Table
 from mock_controller.servos.bench import Options

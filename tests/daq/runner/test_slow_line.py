@@ -12,7 +12,7 @@ from daq.contracts.trace import EventKind
 from daq.driver import EVERY_JOINT, Controller
 from daq.runner.follower import Follower
 from daq.safety import Event
-from daq.trajectories import Plan, make_plan
+from daq.trajectories.set_points import Plan, make_plan
 from tests.daq.runner.rig import Rig, rig
 
 LINES = pytest.mark.parametrize(("baud", "every"), [(38400, 2), (19200, 3), (9600, 5)], ids=str)

@@ -5,7 +5,7 @@ from pathlib import Path
 from daq.contracts.limp import GAINS_UNKNOWN
 from daq.contracts.machine import load_machine
 from daq.driver import Controller
-from daq.runner import ArmControl
+from daq.runner.arm_control import ArmControl
 from tests.daq.driver.test_what_the_map_leaves_out import GAINS, MOCK, without
 from tests.daq.runner.rig import Rig
 

@@ -6,7 +6,7 @@ import pytest
 
 from daq.client import Client
 from daq.contracts.errors import SpecError
-from daq.runner import Consent
+from daq.runner.preparation import Consent
 
 
 @pytest.mark.parametrize("word", [0, 1, "true", "yes", None, 1.0])

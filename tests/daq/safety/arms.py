@@ -7,7 +7,7 @@ import numpy as np
 from daq.contracts.limits import Limits
 from daq.contracts.machine import load_machine
 from daq.contracts.sample import SampleRow
-from daq.trajectories import Plan, make_plan
+from daq.trajectories.set_points import Plan, make_plan
 
 MA2000 = load_machine("ma2000")
 LIMITS = MA2000.limits

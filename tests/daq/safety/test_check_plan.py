@@ -12,8 +12,10 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.limits import JointLimits, Limits
 from daq.safety import check_move_to_start, check_plan, largest_step, unchecked
 from daq.safety.violation import TOLERANCE
-from daq.trajectories import make_plan, plan, plan_move, start_angles
 from daq.trajectories.kinematics import link_ends
+from daq.trajectories.move import plan_move
+from daq.trajectories.planner import plan, start_angles
+from daq.trajectories.set_points import make_plan
 from tests.daq.safety.arms import COUNT, LIMITS, MA2000, REST, limits, plan_of
 
 

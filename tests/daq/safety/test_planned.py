@@ -8,7 +8,7 @@ import pytest
 from daq.contracts.errors import SafetyError
 from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.safety.planned import planned
-from daq.trajectories import plan, start_angles
+from daq.trajectories.planner import plan, start_angles
 from tests.daq.safety.arms import MA2000
 
 

@@ -7,7 +7,8 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.machine import Machine
 from daq.safety import check_move_to_start, check_plan
-from daq.trajectories import plan, plan_move, start_angles
+from daq.trajectories.move import plan_move
+from daq.trajectories.planner import plan, start_angles
 from tests.daq.sliding_axis import slide_and_turn
 
 

@@ -13,8 +13,8 @@ from daq.contracts.errors import DaqError
 from daq.contracts.experiment import Gain
 from daq.contracts.machine import load_machine
 from daq.contracts.sample import SampleRow
-from daq.runner import StoppedError
-from daq.teaching import TeachingError
+from daq.runner.arm_control import StoppedError
+from daq.teaching.arm import TeachingError
 from firmware_protocol.commands import StatusFlag
 
 MA2000 = load_machine("ma2000")

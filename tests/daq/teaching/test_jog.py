@@ -8,9 +8,18 @@ from hypothesis import strategies as st
 
 from daq.contracts.errors import SpecError
 from daq.contracts.sample import SampleRow
-from daq.runner import StoppedError
-from daq.teaching import DEAD_MAN, JOG_SPEED, JogCommand, Jogger, TeachingError, jog
-from daq.teaching.jog import SLIDE_JOG_SPEED, require_step_speed, top_speed
+from daq.runner.arm_control import StoppedError
+from daq.teaching.arm import TeachingError
+from daq.teaching.jog import (
+    DEAD_MAN,
+    JOG_SPEED,
+    SLIDE_JOG_SPEED,
+    JogCommand,
+    Jogger,
+    jog,
+    require_step_speed,
+    top_speed,
+)
 from daq_cli.robot.pendant import Pendant
 from tests.daq.sliding_axis import slide_and_turn
 from tests.daq.teaching.stand_in import CALIBRATIONS, MA2000, PERIOD, REST, StandIn
@@ -61,12 +70,6 @@ def test_a_jog_with_samples_far_apart_goes_to_the_limit_and_no_further(every: in
     told = driven(arm, {4: JOG_SPEED}, held_until=560, periods=560)
     assert arm.position[3] == pytest.approx(1.56, abs=0.01)
     assert len(told) == 1
-
-
-def test_several_joints_are_jogged_at_once() -> None:
-    arm = StandIn()
-    driven(arm, {1: 0.2, 3: -0.1}, held_until=100, periods=100)
-    assert arm.position[2] - REST[2] == pytest.approx(-0.1 * 100 * PERIOD, abs=0.02)
 
 
 def test_it_stops_when_the_key_is_no_longer_refreshed() -> None:

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
-from daq.runner import StoppedError
-from daq.teaching import RecordedPath, TeachingError, lead_by_nose
+from daq.runner.arm_control import StoppedError
+from daq.teaching.arm import TeachingError
+from daq.teaching.lead import lead_by_nose
+from daq.teaching.recording import RecordedPath
 from tests.daq.teaching.stand_in import CALIBRATIONS, MA2000, REST, StandIn
 
 LIMITS = MA2000.limits

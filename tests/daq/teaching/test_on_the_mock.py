@@ -8,10 +8,15 @@ import pytest
 from daq.contracts.errors import SafetyError
 from daq.contracts.sample import SampleRow
 from daq.driver import Controller
-from daq.runner import ArmControl, StoppedError
-from daq.teaching import JogCommand, Program, RecordedPath, TeachingError, jog, lead_by_nose, plan_program, run_program
+from daq.runner.arm_control import ArmControl, StoppedError
+from daq.teaching.arm import TeachingError
 from daq.teaching.controller_arm import ControllerArm
+from daq.teaching.jog import JogCommand, jog
+from daq.teaching.lead import lead_by_nose
 from daq.teaching.performer import FollowingPerformer
+from daq.teaching.program import Program
+from daq.teaching.program_plan import plan_program, run_program
+from daq.teaching.recording import RecordedPath
 from tests.control_port import told_by
 from tests.daq.servo_bench import pan_tilt
 from tests.daq.teaching.stand_in import MA2000

@@ -9,20 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.contracts.errors import SpecError
-from daq.teaching import (
-    PlannedInstruction,
-    Program,
-    TeachingError,
-    check_program,
-    load_program,
-    parse_program,
-    plan_program,
-    program_text,
-    run_program,
-    save_program,
-)
-from daq.teaching.program import require_program_file
-from daq.trajectories import Plan
+from daq.teaching.arm import TeachingError
+from daq.teaching.program import Program, load_program, parse_program, program_text, require_program_file, save_program
+from daq.teaching.program_plan import PlannedInstruction, check_program, plan_program, run_program
+from daq.trajectories.set_points import Plan
 from tests.daq.teaching.stand_in import MA2000, REST
 
 PATH = {"joints": [1], "times": [0, 0.5, 1.0], "positions": [[3.0], [3.1], [3.0]]}

@@ -10,8 +10,8 @@ from pydantic import ValidationError
 
 from daq.contracts.errors import SpecError
 from daq.safety import check_plan
-from daq.teaching import RecordedPath, playback
-from daq.trajectories import plan, start_angles
+from daq.teaching.recording import RecordedPath, playback
+from daq.trajectories.planner import plan, start_angles
 from tests.daq.teaching.stand_in import MA2000, REST
 
 

@@ -6,10 +6,14 @@ import pytest
 
 from daq.contracts.sample import SampleRow
 from daq.driver import Controller
-from daq.runner import ArmControl
-from daq.teaching import JogCommand, Program, RecordedPath, jog, lead_by_nose, plan_program
+from daq.runner.arm_control import ArmControl
 from daq.teaching.controller_arm import ControllerArm
+from daq.teaching.jog import JogCommand, jog
+from daq.teaching.lead import lead_by_nose
 from daq.teaching.performer import FollowingPerformer
+from daq.teaching.program import Program
+from daq.teaching.program_plan import plan_program
+from daq.teaching.recording import RecordedPath
 from tests.daq.teaching.stand_in import MA2000
 
 

@@ -1,12 +1,10 @@
-"""A figure looks as it was judged by eye once: sizes, colours and strokes, and every text in its place."""
+"""What a figure and its page say of their trace, and where its labels and limits lie."""
 
 import dataclasses
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from daq.contracts.figure import figure_of
@@ -34,53 +32,11 @@ def figure(trace: Trace) -> Figure:
     return figure_of(trace)
 
 
-@pytest.mark.parametrize(("joints", "inches"), [(1, (6.3, 7.1)), (2, (6.8, 7.1)), (3, (9.9, 7.1)), (6, (9.9, 13.4))])
-def test_a_figure_grows_with_its_joints(tmp_path: Path, joints: int, inches: tuple[float, float]) -> None:
-    with TraceWriter(tmp_path / "a.mcap", record(), tuple(range(1, joints + 1))) as writer:
-        for tick in range(3):
-            writer.sample(row(tick, joints))
-        made = read_trace(writer.close("complete"))
-    assert tuple(figure_of(made, made.joints).get_size_inches()) == pytest.approx(inches)
-
-
-def test_every_stroke_is_as_it_was_judged(figure: Figure) -> None:
-    panel = figure.axes[1]
-    assert [
-        (line.get_color(), line.get_linewidth(), line.get_linestyle(), line.get_zorder(), line.get_drawstyle())
-        for line in panel.lines
-    ] == [
-        ("#B00020", 0.8, "-", 1, "default"),
-        ("#8a8a8a", 0.8, ":", 1, "default"),
-        ("#555555", 1.0, "--", 2, "steps-post"),
-        ("#D55E00", 1.3, "-", 2, "default"),
-    ]
-    error = figure.axes[4].lines[2]
-    assert (error.get_color(), error.get_linewidth(), error.get_zorder()) == ("#8a8a8a", 0.7, 1)
-    assert list(np.asarray(error.get_ydata())) == [0.0, 0.0]
-    (gap,) = panel.patches
-    assert (to_hex(gap.get_facecolor()), gap.get_linewidth(), gap.get_zorder()) == ("#f3d9a4", 0.0, 0)
-    low, high = panel.get_xlim()
-    assert (low, high) == pytest.approx((-0.0124, 1.2524)), "a hundredth of the time on either side"
-
-
-def test_every_text_has_its_size_and_place(figure: Figure) -> None:
-    panel = figure.axes[1]
-    texts = [*panel.texts, panel.title, *figure.texts]
-    assert [
-        (t.get_text(), t.get_fontsize(), t.get_horizontalalignment(), t.get_color(), t.get_position())
-        for t in panel.texts
-    ] == [("stop", 6.5, "center", "#B00020", (0, 2)), ("pause", 6.5, "center", "#8a8a8a", (0, 2))]
+def test_a_figure_says_which_trace_it_shows_and_with_which_gains(figure: Figure) -> None:
     title, foot = figure.texts
-    assert (title.get_fontsize(), title.get_horizontalalignment(), title.get_position()[0]) == (11, "left", 0.01)
-    assert (foot.get_fontsize(), foot.get_horizontalalignment(), foot.get_position()[0]) == (7.5, "left", 0.01)
     assert title.get_text() == "ramp, ma2000, mock controller: stopped"
     assert foot.get_text() == ("2026-11-21 05:14:42 UTC   trace ab12cd34ef56   60 samples, 3 missing   ma2000-daq/test")
     assert figure.axes[0].get_title("right") == "P 2 · I 0 · D 0"
-    assert figure.axes[1].get_title("right") == ""
-    assert all(text.get_color() != "red" for text in texts)
-    legend = figure.axes[0].get_legend()
-    assert legend is not None
-    assert (legend.get_frame_on(), legend.handlelength, legend.get_texts()[0].get_fontsize()) == (False, 2.2, 8)
     assert [axes.get_legend() for axes in figure.axes[1:]] == [None] * 8
 
 

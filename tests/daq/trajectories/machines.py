@@ -4,7 +4,8 @@ import numpy as np
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
-from daq.trajectories import Plan, plan, start_angles
+from daq.trajectories.planner import plan, start_angles
+from daq.trajectories.set_points import Plan
 
 MA2000 = load_machine("ma2000")
 PERIOD = 0.02

@@ -7,7 +7,7 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Path
-from daq.trajectories import Plan
+from daq.trajectories.set_points import Plan
 from tests.daq.trajectories.machines import PERIOD, UNIT, motion
 
 

@@ -18,10 +18,6 @@ def ends(*angles: float) -> np.ndarray:
     return link_ends(MA2000, np.array([angles + (0.0,) * (6 - len(angles))]))[0]
 
 
-def test_shoulder_at_90_degrees_is_the_arm_straight_up() -> None:
-    assert ends(0.3, math.pi / 2, 0.0)[2] == pytest.approx([0, 0, A2 + A3], abs=1e-12)
-
-
 @given(angle, angle, angle)
 def test_major_axes_agree_with_plane_geometry(waist: float, shoulder: float, elbow: float) -> None:
     radius = A2 * math.cos(shoulder) + A3 * math.cos(shoulder + elbow)

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import NoController
-from daq.trajectories import control_period, make_plan, plan, plan_move, representable_angles, start_angles
+from daq.trajectories.move import plan_move
+from daq.trajectories.planner import plan, start_angles
+from daq.trajectories.set_points import control_period, make_plan, representable_angles
 from firmware_protocol.errors import UnitsError
 from tests.daq.trajectories.machines import MA2000, PERIOD, motion, planned
 
@@ -87,14 +89,6 @@ def test_marks_are_in_order_and_within_the_plan(spec: ExperimentSpec) -> None:
     assert indices == sorted(indices)
     assert (made.marks[0].kind, indices[0]) == ("start", 0)
     assert (made.marks[-1].kind, indices[-1]) == ("end", len(made) - 1)
-
-
-@settings(max_examples=100)
-@given(specs())
-def test_the_same_experiment_gives_the_same_plan_to_the_bit(spec: ExperimentSpec) -> None:
-    one, other = (plan(spec, MA2000, start_angles(spec, MA2000)) for _ in range(2))
-    assert np.array_equal(one.angles, other.angles)
-    assert one.marks == other.marks
 
 
 @settings(max_examples=100)

@@ -7,11 +7,6 @@ from daq.contracts.errors import SpecError
 from tests.daq.trajectories.machines import PERIOD, UNIT, motion, planned
 
 
-def test_default_ramp_is_80_posture_units_on_joints_1_to_3() -> None:
-    plan = planned()
-    assert (plan.postures[-1] - plan.postures[0]).tolist() == [80, 80, 80, 0, 0, 0]
-
-
 def test_increments_are_equal_but_the_last_which_is_the_rest_of_the_line() -> None:
     plan = motion(joints=(1,))
     increments = np.diff(plan.angles[:, 0])

@@ -17,8 +17,9 @@ from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
 from daq_cli.models.acquire_loop import Diagnose, LoopEnd, diagnose_and_acquire
 from daq_cli.robot.local import LocalRobot
+from model.design.information import Planner
 from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment
-from model.discrepancy.experiment_design.next_experiment import ExperimentChooser, Planner
+from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
 from model.machine_model.model import base_model
 from tests.daq_cli.invoke import CommandLine
 

@@ -1,6 +1,5 @@
 """What cannot give a model is refused in one line that says what, where and what is allowed; no file is written."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -21,26 +20,6 @@ def fitting(*traces: object) -> tuple[object, ...]:
     return ("fit", *traces, "--machine", SINGLE_AXIS, "-o", "out.json")
 
 
-def test_a_trace_with_a_value_that_is_no_number_is_refused(daq: CommandLine, tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "nan.csv")
-    path.write_text(path.read_text().replace("0.100000,", "0.100000,nan,", 1).replace(",nan,", ",nan,", 1))
-    lines = path.read_text().splitlines()
-    row = next(k for k, line in enumerate(lines) if "nan" in line)
-    lines[row] = ",".join([lines[row].split(",")[0], "nan", *lines[row].split(",")[3:]])
-    path.write_text("\n".join(lines) + "\n")
-    refused(daq, *fitting(path), says=(f"row {row + 1}", "'nan' is not a finite number"))
-
-
-def test_a_model_with_a_joint_that_the_trace_lacks_is_refused(daq: CommandLine, tmp_path: Path) -> None:
-    one = write_csv(tmp_path / "one.csv")
-    refused(daq, "fit", one, "--machine", "ma2000", "-o", "out.json", says=("joint 2 is not in it",))
-
-
-def test_degrees_instead_of_radians_are_named(daq: CommandLine, tmp_path: Path) -> None:
-    degrees = write_csv(tmp_path / "degrees.csv", scale=57.29577951308232)
-    refused(daq, *fitting(degrees), says=("joint 1 reaches 74", "degrees?", "rad"))
-
-
 def test_a_machine_without_inertia_is_refused(daq: CommandLine, tmp_path: Path) -> None:
     text = SINGLE_AXIS.read_text().replace("value = 0.8, unit", "value = 0.0, unit")
     text = text.replace("value = 0.004, unit", "value = 0.0, unit")
@@ -48,29 +27,6 @@ def test_a_machine_without_inertia_is_refused(daq: CommandLine, tmp_path: Path) 
     trace = write_csv(tmp_path / "good.csv")
     words = ("fit", trace, "--machine", tmp_path / "weightless.toml", "-o", "out.json")
     refused(daq, *words, says=("joint 1 has no inertia",))
-
-
-@pytest.mark.parametrize("command", ["simulate", "validate"])
-def test_a_model_of_a_newer_version_is_refused(daq: CommandLine, tmp_path: Path, command: str) -> None:
-    trace = write_csv(tmp_path / "good.csv")
-    newer = tmp_path / "newer.json"
-    newer.write_text(json.dumps({"format": 99, "machine": {}}))
-    refused(daq, command, newer, trace, says=("newer.json", "format 99", "up to 1"))
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("{", ("not JSON",)),
-        ("[]", ("neither a model",)),
-        ('{"machine": {}}', ("no version",)),
-        ('{"format": 1, "machine": {}}', ("machine.version",)),
-    ],
-)
-def test_a_file_that_is_no_model_is_refused(daq: CommandLine, tmp_path: Path, text: str, says: tuple[str, ...]) -> None:
-    (tmp_path / "model.json").write_text(text)
-    trace = write_csv(tmp_path / "good.csv")
-    refused(daq, "simulate", tmp_path / "model.json", trace, says=("model.json", *says))
 
 
 @pytest.mark.parametrize(
@@ -128,12 +84,6 @@ def test_a_trace_that_says_too_little_is_refused(
 )
 def test_wrong_options_are_refused_before_a_trace_is_read(daq: CommandLine, words: str, says: tuple[str, ...]) -> None:
     refused(daq, *words.split(), says=says)
-
-
-def test_the_same_trace_twice_is_refused(daq: CommandLine, tmp_path: Path) -> None:
-    trace = write_csv(tmp_path / "good.csv")
-    imported = Path(daq("traces", "import", trace, "--folder", tmp_path).out.strip())
-    refused(daq, *fitting(imported, imported), says=("more than once",))
 
 
 def test_a_comparison_needs_two_models(daq: CommandLine, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from extras.commissioning.person.terminal_operator import Lines, TerminalOperato
 from extras.commissioning.potentiometer import Interval, Potentiometer
 from firmware_protocol.commands import ReadStatus, Status, StatusFlag, Stop, Stopped
 from firmware_protocol.memory_map import default_memory_map
-from model.reports.page import Text
+from model.blocks import Text
 from tests.daq_cli.invoke import CommandLine
 
 MOCK = "mock://?lock_step=1&seed=3"

@@ -11,8 +11,8 @@ import pytest
 from daq.contracts.errors import SafetyError
 from daq.contracts.machine import load_machine
 from daq.owner.stop_socket import request_stop
-from daq.runner import StoppedError
-from daq.teaching import TeachingError
+from daq.runner.arm_control import StoppedError
+from daq.teaching.arm import TeachingError
 from daq.transport import MockPort, parse_port_url
 from daq.transport.mock_process import MockProcess, start_mock
 from daq_cli.app.consent import ConsentPrompt

@@ -16,7 +16,7 @@ needs.require()
 
 from daq.contracts.machine import load_machine  # noqa: E402
 from daq.driver import Controller  # noqa: E402
-from daq.runner import ArmControl  # noqa: E402
+from daq.runner.arm_control import ArmControl  # noqa: E402
 from tests.daq.runner.rig import SHORT, Rig  # noqa: E402
 
 ROOT = Path(__file__).parents[3]

@@ -9,8 +9,9 @@ from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import Trace, TraceEvent
 from daq.driver import Controller
-from daq.runner import Consent, RunSetup, StopRequests, run_experiment
 from daq.runner.arm_control import ArmControl
+from daq.runner.experiment import RunSetup, StopRequests, run_experiment
+from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from daq.trajectories import plan, start_angles
+from daq.trajectories.planner import plan, start_angles
 from daq.trajectories.presets import PRESETS
 from model.discrepancy.excitation import own_frequencies
 from tests.daq.trajectories.machines import MA2000

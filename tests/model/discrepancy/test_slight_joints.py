@@ -3,7 +3,7 @@
 import pytest
 
 from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, Step
-from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.slight_joints import with_slight_joints
 from tests.model.discrepancy.answers import an_answer

@@ -108,7 +108,7 @@ def test_compiled_modules_take_nothing_by_name_at_run_time() -> None:
 def test_the_simulation_does_not_depend_on_reports_and_fits() -> None:
     reached = dependencies("model.simulation.kernel")
     assert {"model.dynamics.recursive", "model.drives.amplifier", "model.layout"} <= set(reached)
-    others = [m for m in reached if m.startswith(("model.reports", "model.fitting", "model.thesis", "daq."))]
+    others = [m for m in reached if m.startswith(("model.reports", "model.fitting", "extras.thesis", "daq."))]
     assert set(others) == {"daq.contracts", "daq.contracts.file_lock"}, "the lock of the cache alone"
 
 

@@ -3,8 +3,8 @@
 import xml.etree.ElementTree as ET
 from typing import Any
 
+from model.fitting.fitted import FittedParameter, JointError
 from model.fitting.identifiability import Combination, IdentifiabilityReport
-from model.fitting.result import FittedParameter, JointError
 from model.fitting.shown import doubt_of, html_of, known_of, text_of
 
 NAMES = ("value", "deviation", "low", "high", "expected", "expected_deviation", "at_bound")

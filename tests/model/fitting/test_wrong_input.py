@@ -11,7 +11,7 @@ from daq.contracts.trace import Trace
 from model.fitting.fit import fit
 from model.fitting.options import FitOptions, Prior
 from model.fitting.result import load_result
-from tests.model.fitting.imagined import arm, changed, set_points, trace
+from tests.model.fitting.imagined import arm, changed, trace
 
 SOME = FitOptions(parameters=("load.mass",), sensor_bend=False, replicas=0, rounds=1)
 
@@ -37,21 +37,11 @@ def test_the_same_trace_twice(good: Trace) -> None:
     assert "more than once" in refused([good, good])
 
 
-def test_a_trace_without_motion_is_refused() -> None:
-    still = trace(arm(), points=np.tile(set_points(0, 0.02), (150, 1)))
-    assert "no motion" in refused([still])
-
-
 def test_a_value_that_is_not_finite_is_refused(good: Trace) -> None:
     position = good.position.copy()
     position[17, 1] = np.nan
     with pytest.raises(TraceError, match="not finite at sample 17"):
         fit(arm(), [changed(good, position=position)], SOME)
-
-
-def test_a_trace_of_two_samples_is_refused(good: Trace) -> None:
-    names = ("time", "position", "set_point", "error", "drive", "tick")
-    assert "2 samples" in refused([changed(good, **{n: getattr(good, n)[:2] for n in names})])
 
 
 def test_a_trace_without_one_joint_is_refused(good: Trace) -> None:
@@ -70,25 +60,6 @@ def test_no_set_points(good: Trace) -> None:
     assert "set points" in refused([changed(good, set_point=None)])
 
 
-def test_more_parameters_than_samples(good: Trace) -> None:
-    names = ("time", "position", "set_point", "error", "drive", "tick")
-    short = changed(good, **{n: getattr(good, n)[60:76] for n in names})
-    assert "16 samples for 26 parameters" in refused([short], FitOptions(parameters=("*",)))
-
-
-def test_a_bound_the_wrong_way_round(good: Trace) -> None:
-    text = refused([good], SOME.model_copy(update={"bounds": {"load.mass": (2.0, 1.0)}}))
-    assert "lower bound 2 kg is not below the upper bound 1 kg" in text
-
-
-def test_a_bound_beyond_what_is_possible(good: Trace) -> None:
-    assert "leave what is possible" in refused([good], SOME.model_copy(update={"bounds": {"load.mass": (-3.0, 1.5)}}))
-
-
-def test_a_start_outside_the_bounds(good: Trace) -> None:
-    assert "outside 2 to 3" in refused([good], SOME.model_copy(update={"bounds": {"load.mass": (2.0, 3.0)}}))
-
-
 @pytest.mark.parametrize(
     "options",
     [
@@ -104,12 +75,6 @@ def test_an_unknown_parameter_name_is_refused(good: Trace, options: FitOptions) 
 
 def test_nothing_left_to_fit(good: Trace) -> None:
     assert "nothing to fit" in refused([good], FitOptions(held=("*",)))
-
-
-def test_a_trace_of_another_machine(good: Trace) -> None:
-    other = arm().machine.model_copy(update={"name": "other"})
-    text = refused([changed(good, record=good.record.model_copy(update={"machine": other}))])
-    assert "made on other" in text
 
 
 def test_a_result_of_a_newer_version(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from daq_cli.models.diagnosis_text import answer_text
-from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.workflow import diagnose

@@ -6,12 +6,13 @@ from dataclasses import replace
 import pytest
 
 from daq.contracts.machine import NoController
+from model.blocks import Picture, Points, Report, Table, Text
 from model.comparison.compare import Comparison
 from model.discrepancy.diagnosis import Acquired, Diagnosis, Inseparable, PlacedEffect
 from model.discrepancy.grounds import ControllerProof, Note
 from model.reports.diagnosis_report import diagnosis_page, diagnosis_report
 from model.reports.diagnosis_words import TORQUES, compared, gap
-from model.reports.page import Picture, Points, Report, Table, Text, html
+from model.reports.page import html
 from tests.model.discrepancy.answers import EFFECT, an_answer
 
 

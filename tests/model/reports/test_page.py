@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
+from model.blocks import Report, Section, Table, Text, cells
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.comparison.compare import Comparison, TraceSignals
 from model.reports.comparison_report import comparison_report
-from model.reports.page import Report, Section, Table, Text, cells, html, write_report
+from model.reports.page import html, write_report
 
 
 def _agreement(name: str, held: bool, rmse: float) -> TraceAgreement:
@@ -60,7 +61,7 @@ def test_the_same_result_gives_the_same_page(page: str) -> None:
 
 
 def test_errors_are_shown_in_degrees_and_counts_beside_the_noise_floor(page: str) -> None:
-    for text in ("0.2292 °", "2.00", "0.0573 °", "0.50", "held out"):
+    for text in ("0.2292°", "2.00", "0.0573°", "0.50", "held out"):
         assert text in page
 
 

@@ -10,12 +10,12 @@ from daq.contracts.machine import Machine, load_machine
 from daq_cli.commands.compare import _print_result
 from daq_cli.commands.validate import _print_in_time
 from daq_cli.models.gap_text import gap_lines
+from model.blocks import Table
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.comparison.compare import Comparison
 from model.discrepancy.diagnosis import Gap, GapStage
 from model.reports.comparison_report import comparison_report
 from model.reports.gap import gap_section
-from model.reports.page import Table
 from model.reports.validation_report import validation_report
 from model.units import joint_unit, squared, with_unit
 from model.validation.criterion import Fidelity, ParameterDistortion

@@ -9,8 +9,7 @@ from daq.client import Client, ControlLostError, HeldControl, Robot, ServiceErro
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.service.live import SampleMessage
-from daq.teaching import Program
-from daq.teaching.program import Wait
+from daq.teaching.program import Program, Wait
 from daq.traces.reader import read_trace
 from tests.server.service import Service
 

@@ -10,7 +10,7 @@ import pytest
 from fastapi import FastAPI
 
 import hatch_build
-from server.page import FOLDER, NOT_BUILT, is_built, page_router
+from server.page import FOLDER, NOT_BUILT, Page, is_built
 
 LATER_ON_LIVE = ("Arm3d", "scene")
 """Parts that the Live page loads by itself once it is there."""
@@ -34,7 +34,7 @@ def folder(tmp_path: Path) -> Path:
 def get(folder: Path, path: str, **headers: str) -> httpx.Response:
     """The answer of a server of the page in `folder`."""
     app = FastAPI(docs_url=None)  # the page has its own
-    app.include_router(page_router(folder))
+    app.routes.append(Page(folder))
 
     async def asked() -> httpx.Response:
         transport = httpx.ASGITransport(app)

@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 
-from daq.teaching import Program
-from daq.teaching.program import Absolute, Wait, load_program
+from daq.teaching.program import Absolute, Program, Wait, load_program
 from server.database_errors import DamagedError
 from server.problems import ProblemError
 from server.store.engine import Store

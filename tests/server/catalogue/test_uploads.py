@@ -1,7 +1,6 @@
 """Files that are made to harm their reader: each is one line, and the service goes on as if nothing had been."""
 
 import contextlib
-import hashlib
 import json
 import os
 import resource
@@ -139,7 +138,7 @@ def _send(service: Service, model: dict[str, Any], name: str) -> httpx.Response:
 
 
 def test_no_upload_changes_the_model_of_somebody_else(service: Service) -> None:
-    """The same numbers with another lineage are another model; who sent which is in the audit log."""
+    """The same numbers with another lineage are another model."""
     plain = _model() | {"values": {"link1.mass": 0.731}}  # numbers that no other test has sent to this service
     first = _send(service, plain, "theirs")
     kept = service.robot.get(f"/models/{first.json()['id']}/model.json").content
@@ -151,12 +150,6 @@ def test_no_upload_changes_the_model_of_somebody_else(service: Service) -> None:
     assert service.robot.get(f"/models/{first.json()['id']}/model.json").content == kept
     details = service.robot.get(f"/models/{first.json()['id']}").json()
     assert {one["name"] for one in details["parameters"]} == set(Model.model_validate(plain).by_name)
-    rows = service.client.get(f"{service.url}/api/v1/audit", params={"action": "upload_model"}).json()["items"]
-    assert [row["subject"] for row in rows[:3]] == [one.json()["id"] for one in (again, other, first)]
-    assert json.loads(rows[0]["content"]) == {
-        "sha256": hashlib.sha256(first.request.content).hexdigest(),
-        "size": len(first.request.content),
-    }
     for one in (first, other):
         assert service.robot.delete(f"/models/{one.json()['id']}").status_code == 204
 

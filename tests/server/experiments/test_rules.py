@@ -15,7 +15,7 @@ from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.robot import RobotIdentity
 from daq.owner.messages import ArmReport
-from daq.trajectories import plan, start_angles
+from daq.trajectories.planner import plan, start_angles
 from server.experiments.length import LONGEST, least_length, points_of
 from server.experiments.order import Waiting, next_due
 from server.experiments.schedule import Plan, first, following, is_due, zone_here

@@ -103,11 +103,3 @@ def test_a_client_that_names_no_robot_is_told_the_names(fleet: FleetService) -> 
         with pytest.raises(SpecError, match="left, right"):
             client.robot()
         assert client.robot("right").status().robot == "right"
-
-
-def test_metrics_tell_the_robots_apart(fleet: FleetService) -> None:
-    told = fleet.client.get(f"{fleet.url}/metrics").text
-    for name in ("left", "right"):
-        assert f'daq_connected{{robot="{name}"}} 1.0' in told
-        assert f'daq_samples_total{{robot="{name}"}}' in told
-        assert f'daq_disk_free_bytes{{folder="traces/{name}"}}' in told

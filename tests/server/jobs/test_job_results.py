@@ -9,7 +9,7 @@ from pydantic import TypeAdapter
 
 from model.comparison.compare import TraceSignals
 from model.discrepancy.diagnosis import Where
-from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.thresholds import THRESHOLDS
 from model.effects.library import library
 from server.jobs import headlines

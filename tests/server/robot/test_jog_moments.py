@@ -67,7 +67,7 @@ def test_over_the_socket_it_is_not_that_at_which_the_command_before_it_was_done(
             teaching=teaching,
             require_motion=lambda _lease: None,
             hub=SimpleNamespace(shown=lambda _topics: []),
-            audit=SimpleNamespace(writer=SimpleNamespace(count=lambda _note: None), utc=clock.utc),
+            jogged=lambda _note: None,
         ),
     )
 

@@ -14,7 +14,7 @@ from daq.contracts.machine import load_machine
 from daq.contracts.service.robot import Activity
 from daq.owner import long_orders
 from daq.owner.messages import WAITS_AT_MOST, Answer, ArmReport, MoveGripper, Reset
-from daq.runner import StoppedError
+from daq.runner.arm_control import StoppedError
 from server.problems import ProblemError
 from server.robot.orders import answer_of
 from server.robot.robot import ANSWER_WITHIN, ORDERS_AT_ONCE, Robot, RobotPlace

@@ -9,10 +9,9 @@ import pytest
 
 from daq.contracts.machine import load_machine
 from daq.owner.messages import Answer, Finish, JogBegin, JogDrive, RunProgram
-from daq.teaching import Program
 from daq.teaching.jog import DEAD_MAN
 from daq.teaching.lead import PATIENCE
-from daq.teaching.program import Relative
+from daq.teaching.program import Program, Relative
 from server.problems import ProblemError, conflict
 from server.robot.robot import Robot, RobotPlace
 from server.robot.teaching import LEAD_ENDS_WITHIN, TeachingService, Word

@@ -28,7 +28,7 @@ from daq.owner.stop_socket import FOLDER_VARIABLE
 from server.access.caller import LOCAL, Caller
 from server.access.digest import digest_of
 from server.access.origin import beside
-from server.access.sessions import Person, SessionStore
+from server.access.sessions import SessionStore
 from server.access.stop_gate import StopGate, TokensCannotBeReadError
 from server.access.tokens import KnownTokens, TokenStore
 from server.listening import ListenError, listening
@@ -340,8 +340,7 @@ def test_a_fault_in_the_sessions_takes_nobody_s_token(tmp_path: Path, alone: boo
     file = tmp_path / "service.sqlite"
     store = migrated_store(file)
     token = TokenStore(store).add("anna", "viewer", HandClock().utc())
-    person = Person("https://id", "1", "bert", "viewer")
-    _, bert = SessionStore(store).begin(person, datetime.now(UTC), timedelta(hours=1))
+    _, bert = SessionStore(store).begin(lambda _session: "bert", "viewer", datetime.now(UTC), timedelta(hours=1))
     known, unread = (reader_of(store.url, file if alone else None) for _ in range(2))
     everybody = {digest_of(token): Caller("anna", "viewer"), bert.token: bert}
     assert known() == everybody

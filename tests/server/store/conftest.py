@@ -1,4 +1,4 @@
-"""Databases of both kinds, new for each test."""
+"""A database, new for each test."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,20 +7,6 @@ import pytest
 
 from server.store.engine import Store
 from tests.server.migrated import migrated_store
-from tests.server.postgresql import PostgresServer, programs, running_postgresql
-
-
-@pytest.fixture(scope="package")
-def postgresql() -> Iterator[PostgresServer]:
-    """A PostgreSQL server with a migrated database `template`."""
-    found = programs()
-    if found is None:
-        pytest.skip("PostgreSQL is not installed")
-    with running_postgresql(found) as server:
-        made = Store(server.database())
-        made.migrate()
-        made.close()
-        yield server
 
 
 @pytest.fixture
@@ -31,13 +17,7 @@ def sqlite_store(tmp_path: Path) -> Iterator[Store]:
     made.close()
 
 
-@pytest.fixture(params=["sqlite", "postgresql"])
-def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Store]:
-    """A new database of each kind."""
-    if request.param == "sqlite":
-        yield request.getfixturevalue("sqlite_store")
-        return
-    server: PostgresServer = request.getfixturevalue("postgresql")
-    made = Store(server.database(template="made1"))
-    yield made
-    made.close()
+@pytest.fixture
+def store(sqlite_store: Store) -> Store:
+    """The same; plug-ins have other kinds (tests/extras/lab/postgresql)."""
+    return sqlite_store

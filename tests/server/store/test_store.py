@@ -1,32 +1,23 @@
 """The database: catalogue and cursors do what they say."""
 
-import asyncio
-import threading
-from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from sqlalchemy import event, select, text, update
-from sqlalchemy.exc import OperationalError
-from sqlalchemy.orm import Session
+from sqlalchemy import text
 
 from daq.config.service import ServiceSettings
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.service.base import Page
-from daq.contracts.service.experiments import Experiment, ExperimentRequest
-from daq.contracts.service.traces import CatalogueEntry, TraceChange
+from daq.contracts.service.experiments import ExperimentRequest
+from daq.contracts.service.traces import TraceChange
 from server.experiments.states import Event
 from server.problems import ProblemError
 from server.stopping.tokens import reader_of
 from server.store.address import address_of
 from server.store.engine import Store, StoreError
-from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
 from server.store.lock import sqlite_file
 from server.store.pages import Cursor
-from server.store.remembered import Remembered
-from server.store.tables import ArchivedRow, TraceTagRow
 from server.store.traces import TraceSearch, TraceStore
 from tests.server.store.rows import new_trace
 
@@ -187,118 +178,6 @@ def test_the_spec_comes_back_as_it_was_submitted(store: Store) -> None:
     spec = ExperimentSpec.model_validate({"trajectory": {"kind": "sine", "amplitude": {1: 0.1}}, "joints": [1]})
     made, _ = experiments.submit("ma2000", ExperimentRequest(spec=spec), NOW, "anna")
     assert experiments.get("ma2000", made.id).spec == spec
-
-
-def test_a_list_is_read_again_once_its_tables_were_changed_also_while_it_was_read(store: Store) -> None:
-    read: list[str] = []
-
-    def page(name: str) -> Page[str]:
-        read.append(name)
-        if len(read) == 2:
-            _tag(store, "meanwhile")  # by another thread, as far as the reader knows
-        return Page(items=(f"{name} {len(read)}",), next=None)
-
-    TraceStore(store).insert(new_trace(1))
-    listed = Remembered(store, page, (TraceTagRow,))
-    assert [listed("a").items, listed("a").items] == [("a 1",), ("a 1",)]
-    _tag(store, "first")
-    assert listed("a").items == ("a 2",)
-    assert listed("a").items == ("a 3",)
-    assert listed("b").items == ("b 4",)
-    assert listed("a").items == ("a 3",)
-    EventStore(store).add("ma2000", "stop", "stopped", NOW, None, None)
-    with store.writing() as session:
-        session.execute(select(TraceTagRow))
-    assert listed("a").items == ("a 3",), "neither is a change of its table"
-    with store.writing() as session:
-        session.execute(text("UPDATE traces SET notes = ''"))
-    assert listed("a").items == ("a 5",), "a statement as text may have changed anything"
-    with suppress(KeyError), store.writing() as session:
-        session.execute(update(TraceTagRow).values(tag="never written"))
-        raise KeyError
-    assert listed("a").items == ("a 5",)
-    with pytest.raises(OperationalError):
-        _write_without_an_answer(store)
-    assert listed("a").items == ("a 6",), "the answer to a commit may be lost, but not what was committed"
-
-
-def _write_without_an_answer(store: Store) -> None:
-    with store.writing() as session:
-        session.execute(update(TraceTagRow).values(tag="written"))
-        event.listen(session, "after_commit", _broken)
-
-
-def _broken(_session: Session) -> None:
-    raise OperationalError("COMMIT", {}, ConnectionError("the connection is broken"))
-
-
-def _tag(store: Store, tag: str) -> None:
-    TraceStore(store).change("ma2000", new_trace(1).id, TraceChange(tags=(tag,)))
-
-
-def test_lists_show_every_change_at_once(store: Store) -> None:
-    """Of each table from which the lists of traces and experiments are made."""
-    traces, experiments = TraceStore(store), ExperimentStore(store)
-
-    def listed() -> tuple[Page[CatalogueEntry], Page[Experiment]]:
-        found = traces.page("ma2000", TraceSearch(), None, 10), experiments.page("ma2000", (), None, None, 10)
-        assert found == (
-            traces.found("ma2000", TraceSearch(), None, 10),
-            ExperimentStore(store).page("ma2000", (), None, None, 10),
-        ), "as they are without memory"
-        return found
-
-    seen = [listed()]
-
-    def changed() -> None:
-        seen.append(listed())
-        assert seen[-1] not in seen[:-1]
-
-    traces.insert(new_trace(1))
-    changed()
-    _tag(store, "tagged")
-    changed()
-    traces.change("ma2000", new_trace(1).id, TraceChange(notes="noted"))
-    changed()
-    with store.writing() as session:
-        session.add(
-            ArchivedRow(
-                trace=new_trace(1).id, robot="ma2000", object="1", size=1, sha256="0" * 64, archived=NOW, checked=NOW
-            )
-        )
-    changed()
-    traces.mark_missing("ma2000", ["1.mcap"], missing=True)
-    changed()
-    made, _ = experiments.submit("ma2000", ExperimentRequest(), NOW, "anna")
-    changed()
-    experiments.change("ma2000", made.id, "anna", 3, None)
-    changed()
-
-
-def test_those_who_ask_for_a_part_at_once_wait_for_one_read(store: Store) -> None:
-    read: list[int] = []
-    going_on = threading.Event()
-
-    def page(name: str) -> Page[str]:
-        read.append(len(read))
-        going_on.wait()
-        return Page(items=(name,), next=None)
-
-    async def ask() -> None:
-        listed = Remembered(store, page, (TraceTagRow,))
-        first = [asyncio.ensure_future(listed.fetch("a")) for _ in range(5)]
-        while not read:
-            await asyncio.sleep(0)
-        await asyncio.to_thread(_tag, store, "meanwhile")
-        later = [asyncio.ensure_future(listed.fetch("a")) for _ in range(5)]
-        await asyncio.sleep(0)
-        first[0].cancel()
-        going_on.set()
-        assert {one.items for one in await asyncio.gather(*first[1:], *later)} == {("a",)}
-
-    TraceStore(store).insert(new_trace(1))
-    asyncio.run(ask())
-    assert len(read) == 2, "whoever asks after a change waits for a read that began after it"
 
 
 def test_the_search_follows_every_change_of_a_text(store: Store) -> None:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from alembic import op
+from sqlalchemy import Connection
 
 from extras.lab.notifications.tables import NotificationTable
 
-revision = "0001"
-down_revision = None
-branch_labels = None
-depends_on = None
 
-
-def upgrade() -> None:
+def upgrade(connection: Connection) -> None:
     """Makes the table."""
-    NotificationTable.metadata.create_all(op.get_bind(), checkfirst=False)
+    NotificationTable.metadata.create_all(connection, checkfirst=False)

@@ -9,11 +9,11 @@ from typing import Any
 from daq.traces.csv_table import import_csv
 from daq.traces.naming import trace_path
 from daq.traces.store import write_trace
+from extras.lab.archive.archived import ArchivedStore
 from extras.lab.archive.bucket import Bucket
 from extras.lab.archive.service import ArchiveContext, ArchiveService
 from server.catalogue.catalogue import Catalogue
 from server.clock import SystemClock
-from server.store.archived import ArchivedStore
 from server.store.experiments import ExperimentStore
 from server.store.traces import TraceStore
 from tests.extras.lab.archive.store import CREDENTIALS, settings_of
@@ -47,7 +47,7 @@ class Bench:
         self.folder = folder
         self.store = migrated_store(folder / "service.sqlite")
         self.traces = TraceStore(self.store)
-        self.archived = ArchivedStore(self.store)
+        self.traces.archived = self.archived = ArchivedStore(self.store)
         self.catalogue = Catalogue(folder / "traces", ROBOT, self.traces, ExperimentStore(self.store))
         self.catalogue.folder.mkdir(exist_ok=True)
         self.clock = TurnedClock()

@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.service.experiments import ExperimentRequest
-from daq.contracts.service.fleet import FleetExperimentRequest
+from daq.contracts.service.fleet import FleetExperimentRequest, FleetExperiments
 from extras.lab.fleet.routes import submit_fleet_experiment
 from server.access.caller import LOCAL
 from server.problems import ProblemError
@@ -37,6 +37,11 @@ def services(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Servic
         yield made
 
 
+def _submit(services: Services, body: FleetExperimentRequest) -> FleetExperiments:
+    given = services.robots(), services.experiments, services.motions, services.clock
+    return submit_fleet_experiment(body, *given, LOCAL, None, "k1")
+
+
 def test_an_experiment_that_cannot_be_written_for_one_robot_is_queued_on_none(
     services: Services, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -47,7 +52,7 @@ def test_an_experiment_that_cannot_be_written_for_one_robot_is_queued_on_none(
 
     monkeypatch.setattr("server.store.experiments.new_columns", full)
     with pytest.raises(OperationalError):
-        submit_fleet_experiment(FleetExperimentRequest(request=RAMP), services, LOCAL, None, "k1")
+        _submit(services, FleetExperimentRequest(request=RAMP))
     assert _queued(services) == {"left": 0, "right": 0}
     assert services.experiments.in_order("left") == []
 
@@ -55,8 +60,8 @@ def test_an_experiment_that_cannot_be_written_for_one_robot_is_queued_on_none(
 def test_with_one_key_each_robot_gets_an_experiment_once(services: Services) -> None:
     body = FleetExperimentRequest(request=RAMP)
     services.robot("right").queue.submit(RAMP, "anna", "k1")
-    first = submit_fleet_experiment(body, services, LOCAL, None, "k1")
-    assert submit_fleet_experiment(body, services, LOCAL, None, "k1") == first
+    first = _submit(services, body)
+    assert _submit(services, body) == first
     assert [one.robot for one in first.experiments] == ["left", "right"]
     assert _queued(services) == {"left": 1, "right": 1}
     services.robot("right").queue.submit(OTHER, "anna", "k2")

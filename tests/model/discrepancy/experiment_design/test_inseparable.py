@@ -6,9 +6,8 @@ import pytest
 
 from daq.contracts.effects import effect_names
 from model.discrepancy.diagnosis import PlacedEffect
-from model.discrepancy.experiment_design.inseparable import LAWS, SHOWS, classes_of, notes_on, shared_law
-from model.discrepancy.explanation.class_words import LAWS as LAW_WORDS
-from model.discrepancy.explanation.class_words import MEASUREMENTS, called, class_words
+from model.discrepancy.experiment_design.inseparable import classes_of, notes_on, shared_law
+from model.discrepancy.explanation.class_words import LAWS, MEASUREMENTS, class_headline, class_words
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.grounds import Measurement, Note, SharedLaw
 
@@ -21,22 +20,23 @@ SPEED = (placed("viscous_friction", 1), placed("weakened_magnet", 1))
 
 
 def test_every_law_and_measurement_is_defined_and_has_words() -> None:
-    assert set(LAWS) == set(LAW_WORDS) == set(get_args(SharedLaw))
-    assert set(SHOWS) == set(MEASUREMENTS) == set(get_args(Measurement))
+    assert set(LAWS) == set(get_args(SharedLaw))
+    assert set(MEASUREMENTS) == set(get_args(Measurement))
 
 
 def test_laws_and_measurements_speak_of_effects_that_there_are() -> None:
-    named = set().union(*(law.effects for law in LAWS.values()), *SHOWS.values())
+    named = set().union(*(law.effects for law in LAWS.values()), *(one.shows for one in MEASUREMENTS.values()))
     assert named <= set(effect_names())
     for law in LAWS.values():
-        assert any(SHOWS[m] & law.effects for m in law.told_by)
+        assert any(set(MEASUREMENTS[m].shows) & set(law.effects) for m in law.told_by)
 
 
 def test_two_torques_in_proportion_to_speed_are_one_class_that_a_current_tells() -> None:
     (found,) = classes_of(SPEED, {(0, 1): (1.2, "designed-1-7")}, 110)
     assert (found.shares, found.told_by) == ("torque-with-speed", ("current-clamp", "coast-with-drive-open"))
     assert (found.separation, found.experiment, found.tried, found.needed) == (1.2, "designed-1-7", 110, 3.0)
-    assert called(found) == "a torque in proportion to speed on joint 1: viscous friction or weakened magnet"
+    words = "a torque in proportion to speed on joint 1: viscous friction or weakened magnet"
+    assert class_headline(found, "torque-with-speed") == words
     assert class_words(found, 60.0) == (
         "viscous friction on joint 1 and weakened magnet on joint 1 are a torque in proportion to speed, which no "
         "motion that was tried tells apart: of 110 motions within the limits and 60 s, the best sets two of them 1.2 "

@@ -25,7 +25,6 @@ from model.discrepancy.experiment_design.next_experiment import (
     most_information,
     rivals_of,
 )
-from model.discrepancy.experiment_design.search import MotionSearch
 from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
@@ -133,8 +132,7 @@ def test_candidates_that_no_motion_separates_are_one_class_with_what_would_tell_
     moved = [r.fit.point.value(SPEED_LAWS[r.hypothesis.name]) for r in rivals]
     assert moved[0] > 1.2 * arm.parameter(coefficient).value
     assert moved[1] > 1.02 * arm.parameter(SPEED_LAWS["weakened_magnet"]).value
-    search = MotionSearch(drawn=6, changed=4)
-    asked = best_experiment(rivals, ExperimentChooser((EXPERIMENTS["diagnostic-b"],), plan, search=search))
+    asked = best_experiment(rivals, ExperimentChooser((EXPERIMENTS["diagnostic-b"],), plan, search=6))
     assert asked.experiment is None
     (untold,) = asked.inseparable
     assert {(m.effect, m.joints) for m in untold.members} == {(effect, (2,)) for effect in SPEED_LAWS}

@@ -1,7 +1,7 @@
 """How near the best candidate came to being named: by the evidence that it needed itself."""
 
 from model.discrepancy.diagnosis import Candidate
-from model.discrepancy.explanation.renderer import best_tried
+from model.discrepancy.explanation.answer_words import best_tried
 
 
 def tried(evidence: float, **fields: float) -> Candidate:

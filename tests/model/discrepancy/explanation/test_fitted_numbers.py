@@ -2,11 +2,11 @@
 
 from daq.contracts.machine import load_machine
 from daq_cli.models.diagnosis_text import WIDTH, answer_text
+from model.blocks import Table
 from model.discrepancy.diagnosis import Diagnosis, FoundValue
 from model.discrepancy.explanation.fitted_numbers import most_moved, stated_beside, stated_numbers
 from model.machine_model.model import Model, base_model
 from model.reports.diagnosis_report import diagnosis_report
-from model.reports.page import Table
 from tests.model.discrepancy.steps import step
 
 GIVEN = base_model(load_machine("examples/pan_tilt.toml"))

@@ -3,8 +3,7 @@
 import pytest
 
 from model.discrepancy.diagnosis import Diagnosis, Inseparable, PlacedEffect, SignalError, Suspicion
-from model.discrepancy.explanation.headline import headline
-from model.discrepancy.explanation.renderer import summary
+from model.discrepancy.explanation.answer_words import headline, summary
 from model.discrepancy.grounds import Note, Refusal
 from tests.model.discrepancy.answers import an_answer
 

@@ -8,8 +8,8 @@ import pytest
 from model.discrepancy.diagnosis import FoundValue
 from model.discrepancy.explanation.pattern_words import pattern_words
 from model.discrepancy.explanation.patterns import lags_after_turns, lags_alike, swings_with_position
-from model.discrepancy.explanation.renderer import step_with_sentences
 from model.discrepancy.explanation.samples import Samples
+from model.discrepancy.explanation.step_words import step_with_sentences
 from model.discrepancy.grounds import Reason
 from model.discrepancy.numbers import ReadingUnits, from_to, plain
 from tests.model.discrepancy.steps import step

@@ -19,16 +19,12 @@ from model.discrepancy.diagnosis import (
     Where,
     WorstPlace,
 )
-from model.discrepancy.explanation.effect_words import WORDS
+from model.discrepancy.explanation.answer_words import what_is_left
+from model.discrepancy.explanation.effect_words import called
 from model.discrepancy.explanation.patterns import PATTERNS
 from model.discrepancy.explanation.reasons import reason
-from model.discrepancy.explanation.renderer import (
-    reason_text,
-    step_with_sentences,
-    what_is_left,
-    where_with_summary,
-    with_sentences,
-)
+from model.discrepancy.explanation.renderer import with_sentences
+from model.discrepancy.explanation.step_words import reason_text, step_with_sentences, where_with_summary
 from model.discrepancy.grounds import ControllerProof, Reason, Refusal
 from model.discrepancy.numbers import plain
 from model.discrepancy.verdict import worse_held_out
@@ -130,9 +126,11 @@ def put_in(arm: Model, name: str, joint: int) -> tuple[Model, tuple[int, ...], d
 
 
 def test_every_effect_of_the_shared_list_has_its_entry() -> None:
-    assert set(WORDS) == set(PATTERNS) == set(effect_names())
     assert set(SIZES) == set(effect_names())
-    for name, entry in WORDS.items():
+    for name, entry in effect_names().items():
+        assert entry.called
+        assert entry.shows
+        assert set(entry.shows) <= set(PATTERNS)
         assert entry.size is None or entry.size in {p.name for p in effect(name).parameters}
 
 
@@ -150,7 +148,7 @@ def test_a_reason_says_what_the_record_shows(arm: Model, name: str) -> None:
     )
     assert said is not None, text
     assert int(said[1]) == found.joint
-    assert WORDS[name].called in said[3]
+    assert called(name) in said[3]
     if joints:
         assert found.joint == 2
     if name in SAYS:

@@ -11,7 +11,7 @@ import pytest
 from daq.contracts.machine import load_machine
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Candidate, Diagnosis, FoundValue, SignalError, Step, Suspicion, Verdict
-from model.discrepancy.explanation.method_words import method_words
+from model.discrepancy.explanation.answer_words import method_words
 from model.discrepancy.grounds import Refusal, RefusalKind
 from model.discrepancy.inverse_dynamics import both_ways, looks
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques

@@ -13,7 +13,7 @@ from daq.contracts.progress import CancelledError
 from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
-from model.discrepancy.explanation.renderer import refusal_words
+from model.discrepancy.explanation.step_words import refusal_words
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.holdout import relative_torque_error

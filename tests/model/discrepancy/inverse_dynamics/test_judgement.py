@@ -7,7 +7,7 @@ import pytest
 
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
-from model.discrepancy.explanation.renderer import refusal_words
+from model.discrepancy.explanation.step_words import refusal_words
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.inverse_dynamics import repeats

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from daq.contracts.trace import Trace
-from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.machine_model.model import base_model

@@ -6,7 +6,7 @@ import pytest
 
 from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import Diagnosis
-from model.discrepancy.explanation.headline import headline
+from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.effects.library import find_named_effect, library

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from daq.contracts.progress import Never, silent
+from model.discrepancy.explanation.answer_words import what_is_left
 from model.discrepancy.explanation.note_words import note_words
-from model.discrepancy.explanation.renderer import what_is_left
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.judged_controller import judge_controller

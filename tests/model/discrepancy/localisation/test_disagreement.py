@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
-from model.discrepancy.explanation.renderer import where_with_summary
+from model.discrepancy.explanation.step_words import where_with_summary
 from model.discrepancy.localisation.disagreement import _beyond, locate
 from model.discrepancy.localisation.phases import CREEP, HOLD, RAMP_START, REVERSAL, STEADY_RAMP, AskedMotion
 from model.discrepancy.localisation.residuals import Residuals

@@ -1255,28 +1255,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/audit": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * List Audit
-         * @description Lists who asked for which change, from where, and what became of it, the newest first. Needs the role operator.
-         *
-         *     Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
-         */
-        get: operations["list_audit"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/v1/robots/{robot}/live/frame": {
         parameters: {
             query?: never;
@@ -1311,46 +1289,6 @@ export interface paths {
          * @description Issues a ticket for one WebSocket (`?ticket=…`), since browsers cannot send a token with it.
          */
         post: operations["create_ticket"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/login": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Login Ways
-         * @description Returns how people sign in: by a token always, and by OpenID Connect where it is configured. Needs no token.
-         */
-        get: operations["get_login_ways"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/logout": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Log Out
-         * @description Ends the caller's session; a token stays. Returns where the provider's own session is left.
-         */
-        post: operations["log_out"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1461,6 +1399,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/audit": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Audit
+         * @description Lists who asked for which change, from where, and what became of it, the newest first. Needs the role operator.
+         *
+         *     Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
+         */
+        get: operations["list_audit"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/fleet/experiments": {
         parameters: {
             query?: never;
@@ -1519,6 +1479,46 @@ export interface paths {
         get: operations["get_notifications"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/login": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Login Ways
+         * @description Returns how people sign in: by a token always, and by OpenID Connect where it is configured. Needs no token.
+         */
+        get: operations["get_login_ways"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/logout": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Log Out
+         * @description Ends the caller's session; a token stays. Returns where the provider's own session is left.
+         */
+        post: operations["log_out"];
         delete?: never;
         options?: never;
         head?: never;
@@ -8723,45 +8723,6 @@ export interface operations {
             };
         };
     };
-    list_audit: {
-        parameters: {
-            query?: {
-                /** @description Only rows with this name of a token. */
-                actor?: string | null;
-                /** @description Only rows with this robot. */
-                robot?: string | null;
-                /** @description Only rows with this action. */
-                action?: string | null;
-                /** @description Only rows with this subject. */
-                subject?: string | null;
-                /** @description Only rows with this outcome. */
-                outcome?: ("done" | "refused" | "failed") | null;
-                /** @description Only rows from this moment on. */
-                since?: string | null;
-                /** @description Only rows before this moment. */
-                until?: string | null;
-                /** @description Length of this part of the list. */
-                limit?: number;
-                /** @description `next` of the previous part. */
-                cursor?: string | null;
-            };
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Page_AuditEntry_"];
-                };
-            };
-        };
-    };
     get_live_frame: {
         parameters: {
             query?: {
@@ -8803,46 +8764,6 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Ticket"];
-                };
-            };
-        };
-    };
-    get_login_ways: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["LoginWays"];
-                };
-            };
-        };
-    };
-    log_out: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["SignedOut"];
                 };
             };
         };
@@ -8986,6 +8907,45 @@ export interface operations {
             };
         };
     };
+    list_audit: {
+        parameters: {
+            query?: {
+                /** @description Only rows with this name of a token. */
+                actor?: string | null;
+                /** @description Only rows with this robot. */
+                robot?: string | null;
+                /** @description Only rows with this action. */
+                action?: string | null;
+                /** @description Only rows with this subject. */
+                subject?: string | null;
+                /** @description Only rows with this outcome. */
+                outcome?: ("done" | "refused" | "failed") | null;
+                /** @description Only rows from this moment on. */
+                since?: string | null;
+                /** @description Only rows before this moment. */
+                until?: string | null;
+                /** @description Length of this part of the list. */
+                limit?: number;
+                /** @description `next` of the previous part. */
+                cursor?: string | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Page_AuditEntry_"];
+                };
+            };
+        };
+    };
     submit_fleet_experiment: {
         parameters: {
             query?: never;
@@ -9054,6 +9014,46 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["NotificationStatus"];
+                };
+            };
+        };
+    };
+    get_login_ways: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LoginWays"];
+                };
+            };
+        };
+    };
+    log_out: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SignedOut"];
                 };
             };
         };

@@ -11,7 +11,7 @@ export interface Seen {
   readonly jobs: readonly Job[];
   /** The newest first. */
   readonly events: readonly ServiceEvent[];
-  /** The newest rows of the audit log, the newest first; null for whoever may not read it. */
+  /** The newest rows of the audit log, the newest first; null where there is nothing to show. */
   readonly audit: readonly AuditEntry[] | null;
   /** Who is told what, and how far that is. */
   /** Null where nobody can be told. */

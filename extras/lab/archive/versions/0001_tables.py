@@ -1,0 +1,12 @@
+"""The table, as `tables.py` has it. After a release it is written out, and a change is a migration of its own."""
+
+from __future__ import annotations
+
+from sqlalchemy import Connection
+
+from extras.lab.archive.tables import ArchiveTable
+
+
+def upgrade(connection: Connection) -> None:
+    """Makes the table."""
+    ArchiveTable.metadata.create_all(connection, checkfirst=False)

@@ -1,0 +1,20 @@
+"""The audit log: rows that nobody can change through the service, each chained to the one before it."""
+
+from daq.plugins import Command, Plugin
+
+PLUGIN = Plugin(
+    commands=(
+        Command(
+            "audit",
+            "Show who asked the service for what; check the log of it.",
+            "extras.lab.audit.command",
+            about="service",
+            needs="server",
+            group="Service",
+        ),
+    ),
+    migrations={"audit": "extras.lab.audit.versions"},
+    noted=("extras.lab.audit.log:append_command",),
+    parts=("extras.lab.audit.part:AuditPart",),
+    routes=("extras.lab.audit.routes:router",),
+)

@@ -1,0 +1,211 @@
+"""Writes the audit log on a thread of its own, so that nobody waits for a disk who must not."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
+from pathlib import Path
+
+from pydantic import ValidationError
+from sqlalchemy.exc import DatabaseError
+
+from daq.contracts.service.audit import AuditNote
+from extras.lab.audit.log import AuditLog
+from extras.lab.audit.repeats import Repeats
+from server.database_errors import is_value, one_line
+
+AT_ONCE = 200
+"""Number of rows in one transaction."""
+MOST_WAITING = 50_000
+"""Number of notes (about 1 kB each) that wait in memory while the database cannot be written; further ones are only in
+the service's log, and a row says how many."""
+AGAIN_AFTER = 1.0
+"""Time (s) after which a failed write is tried again."""
+LOOK_EVERY = 5.0
+"""Time (s) between two looks at the repeated requests."""
+log = logging.getLogger("server.audit")
+
+
+class AuditWriter:
+    """Takes notes from any thread, and never lets it wait, except for those that come after its end.
+
+    Notes that cannot be written wait in memory. If they still wait when the service ends, they are kept in the file
+    `kept`, and written when it starts again.
+    """
+
+    def __init__(
+        self, audit: AuditLog, kept: Path, clock: Callable[[], float] = time.monotonic, again_after: float = AGAIN_AFTER
+    ) -> None:
+        self.waiting = 0
+        """Number of notes that are not in the database yet, without those that are counted."""
+        self.written = 0
+        """Number of rows written since the service started."""
+        self._audit = audit
+        self._kept = kept
+        self._clock = clock
+        self._again_after = again_after
+        self._changed = threading.Condition()
+        self._notes: deque[tuple[AuditNote, Future[None] | None]] = deque()
+        self._repeats = Repeats()
+        self._left_out = 0
+        self._trouble = ""
+        self._closing = self._closed = False
+        self._take_in()
+        self._thread: threading.Thread | None = None
+        """Started with the first note, so that a service that cannot start leaves none."""
+
+    def note(self, note: AuditNote) -> Future[None]:
+        """Adds a note. The future ends when its row is on the disk."""
+        written: Future[None] = Future()
+        with self._changed:
+            if self._closed:
+                self._keep([note.model_dump_json()], "a")
+            else:
+                self._put(note, written)
+                self._changed.notify()
+        return written
+
+    def count(self, note: AuditNote) -> None:
+        """Adds a note of what is asked again and again: the first has a row at once, the others are counted."""
+        with self._changed:
+            first = self._repeats.take(note, self._clock())
+            if first is not None:
+                self._put(first, None)
+                self._changed.notify()
+
+    def flush(self, within: float) -> bool:
+        """Waits until all notes so far are written. Returns False if that takes more than `within` s."""
+        with self._changed:
+            return self._changed.wait_for(lambda: not self.waiting, within)
+
+    def close(self, within: float) -> None:
+        """Writes what is left, within this time (s), and keeps the rest in a file."""
+        with self._changed:
+            self._closing = True
+            for note in self._repeats.rest():
+                self._put(note, None)
+            self._changed.notify()
+        if self._thread is not None:
+            self._thread.join(within)
+        self._keep_rest()
+
+    def _put(self, note: AuditNote, written: Future[None] | None) -> None:
+        if len(self._notes) >= MOST_WAITING:
+            self._left_out += 1
+            log.error("audit: too many rows wait: only here: %s", note.model_dump_json(exclude_none=True))
+            return
+        self._notes.append((note, written))
+        self.waiting = len(self._notes)
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, name="audit", daemon=True)
+            self._thread.start()
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._notes or self._closing, LOOK_EVERY)
+                for note in self._repeats.due(self._clock()):
+                    self._put(note, None)
+                some = [self._notes[n] for n in range(min(AT_ONCE, len(self._notes)))]
+                if not some:
+                    if self._closing:
+                        return
+                    continue
+            if not self._write([note for note, _ in some]):
+                with self._changed:
+                    if self._changed.wait_for(lambda: self._closing, self._again_after):
+                        return
+                continue
+            with self._changed:
+                for _ in some:
+                    self._notes.popleft()
+                self.waiting = len(self._notes)
+                if self._taken_in and not self.waiting:
+                    self._forget_kept()
+                self._changed.notify_all()
+            for _, written in some:
+                if written is not None and written.set_running_or_notify_cancel():
+                    written.set_result(None)
+
+    def _write(self, notes: Sequence[AuditNote]) -> bool:
+        """Writes rows. Returns whether they are written: errors are told once, and the rows wait."""
+        left_out, many = self._left_out, list(notes)
+        if left_out:
+            line = f"{left_out} rows are only in the service's log: too many waited for the database"
+            many.append(notes[-1].model_copy(update=_OF_SERVICE | {"action": "rows_left_out", "detail": line}))
+        try:
+            self._append(many)
+        except Exception as error:
+            if (line := one_line(error)) != self._trouble:
+                log.exception("audit: %s rows are not written yet", len(notes))
+            self._trouble = line
+            return False
+        self._left_out -= left_out
+        self._trouble = ""
+        return True
+
+    def _append(self, notes: Sequence[AuditNote]) -> None:
+        try:
+            head = self._audit.append(notes)
+        except DatabaseError as error:
+            if not is_value(error):
+                raise
+            # One of them has what this database cannot hold. It shall not keep the others out.
+            for note in notes:
+                log.warning("audit: a row without its words: %s", note.model_dump_json(exclude_none=True))
+            head = self._audit.append([note.model_copy(update=_WITHOUT_WORDS) for note in notes])
+        self.written += len(notes)
+        log.debug("audit: %s", head)
+
+    def _take_in(self) -> None:
+        """Takes in what the service could not write before it ended."""
+        with suppress(FileNotFoundError):
+            for line in self._kept.read_text("utf-8").splitlines():
+                try:
+                    self._notes.append((AuditNote.model_validate_json(line), None))
+                except ValidationError:  # the power failed while the line was written
+                    log.warning("audit: %s: a line cannot be read: %.200s", self._kept, line)
+        self._taken_in = bool(self._notes)
+        if self._notes and self._write([note for note, _ in self._notes]):
+            self._notes.clear()
+            self._forget_kept()
+        self.waiting = len(self._notes)
+
+    def _forget_kept(self) -> None:
+        """Removes the file, since what it had has rows now. If that fails, the next start writes them again."""
+        self._taken_in = False
+        with suppress(OSError):
+            self._kept.unlink(missing_ok=True)
+
+    def _keep_rest(self) -> None:
+        with self._changed:
+            self._closed = True  # from now on, the stop listener's last stops go to the file as well
+            if self._notes:
+                self._keep([note.model_dump_json() for note, _ in self._notes], "w")
+
+    def _keep(self, lines: Sequence[str], mode: str) -> None:
+        try:
+            self._kept.parent.mkdir(parents=True, exist_ok=True)
+            with self._kept.open(mode, encoding="utf-8") as stream:
+                stream.writelines(f"{line}\n" for line in lines)
+                stream.flush()
+                os.fsync(stream.fileno())
+        except OSError as error:
+            for line in lines:
+                log.error("audit: %s: only here: %s", error.strerror, line)  # noqa: TRY400 - the line says it all
+
+
+_OF_SERVICE: dict[str, object] = {
+    **dict.fromkeys(("actor", "role", "robot", "subject", "content", "request_id", "status")),
+    **{"origin": "service", "request": "", "outcome": "failed", "count": 1},
+}
+_WITHOUT_WORDS: dict[str, object] = {
+    **dict.fromkeys(("actor", "role", "robot", "subject", "content", "request_id")),
+    **{"origin": "unknown", "request": "", "detail": "its words could not be written: the service's log has them"},
+}

@@ -1,0 +1,160 @@
+"""Set points that correct those of a recorded attempt: iterative learning, from trace to trace.
+
+The error of the attempt is known; what is needed besides is how readings answer changes of set points. A model gives
+that, or the attempt itself, as a loop of second order. Either has to be only roughly right, since the next attempt
+shows what is left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from daq.contracts.errors import TraceError
+from daq.contracts.experiment import ExperimentSpec, Feedforward, TrackingError
+from daq.contracts.machine import Machine
+from daq.contracts.trace import Trace
+from extras.motion.arm_in_loop import arm_in_loop
+from extras.motion.best_set_points import Task, best_set_points, rounded_set_points
+from extras.motion.estimated_response import estimated_loop
+from extras.motion.inverse import require_same
+from extras.motion.motion import Motion, Planner, and_rest, computed_experiment, gains_for, motion_of
+from extras.motion.response import REACH, Response
+from extras.motion.tracking import errors_of
+from model.arrays import Floats
+from model.machine_model.model import Model
+from model.simulation.inputs import RunInputs, inputs_of
+
+CAUTION = 0.1
+"""Weight of a set point's squared change beside the squared error."""
+LEAST_EXPLAINED = 0.9
+"""Least share of a joint's motion that its estimated loop must explain."""
+MOST_MISSING = 0.02
+"""Largest share of missing samples; a few are bridged by straight lines."""
+WORSE = 1.1
+"""Ratio to the error of the attempt before from which learning counts as diverging; less is noise."""
+FINEST = 0.3
+"""Error (rms), in posture units, below which it is that of their rounding: nothing is left to be learned. An error of
+up to twice that may grow by chance, which is no divergence."""
+
+
+def learn(
+    trace: Trace,
+    machine: Machine,
+    plan: Planner,
+    model: Model | None = None,
+    share: float = 1.0,
+) -> ExperimentSpec:
+    """The experiment that corrects the set points of a recorded attempt at a motion.
+
+    Args:
+        trace: of the plain experiment, or of one with computed set points.
+        model: gives the response to set points; None: it is estimated from the trace.
+        share: of the correction that is made.
+
+    Raises TraceError for a trace that nothing can be learned from, and where the error has grown since the attempt that
+    the trace itself learned from; SpecError as `feedforward` does.
+    """
+    if model is not None:
+        require_same(model, machine)
+    asked = asked_of(trace, machine)
+    motion = motion_of(asked, machine, plan)
+    inputs = inputs_of(trace, machine)
+    if len(inputs) != len(motion):
+        raise TraceError(f"{_called(trace)}: has {len(inputs)} periods, the motion {len(motion)}: repeat the run")
+    sent, reached = motion.scale.postures(inputs.set_points), motion.scale.postures(_bridged(inputs, trace))
+    before = errors_of(motion.joints, motion.miss(reached))
+    _require_converging(trace, before, motion)
+    responses = _responses(motion, inputs, sent, reached, trace, model)
+    found, predicted = sent.copy(), reached.copy()
+    wanted, now, shown = (and_rest(one).T for one in (motion.wanted, sent, reached))
+    for column, joint in zip(motion.columns, motion.joints, strict=True):
+        allowed, count = motion.allowed[column], len(motion)
+        came_late = np.abs(np.diff(now[column])).max() > allowed.step + 0.5
+        if before[joint].rms <= FINEST * abs(motion.scale.unit[column]) and not came_late:
+            continue
+        task = Task(wanted[column], wanted[column], now[column], shown[column], CAUTION)
+        corrected = now[column] + share * (best_set_points(task, responses[column], allowed) - now[column])
+        rounded = rounded_set_points(corrected, responses[column], allowed, motion.effective[column])
+        found[:, column] = rounded[:count]
+        predicted[:, column] += responses[column].applied(rounded - now[column])[:count]
+    source = Feedforward(
+        asked=asked.as_asked,
+        model=None if model is None else model.identity,
+        learned_from=trace.record.trace_id,
+        expected=errors_of(motion.joints, motion.miss(predicted)),
+        before=before,
+    )
+    return computed_experiment(motion, found, gains_for(motion, trace.record.gains), source)
+
+
+def _require_converging(trace: Trace, reached: Mapping[int, TrackingError], motion: Motion) -> None:
+    """Raises TraceError where an attempt that was learned has a larger error than the one it was learned from."""
+    spec = trace.record.spec
+    if spec is None or spec.feedforward is None or spec.feedforward.learned_from is None:
+        return
+    for column, joint in zip(motion.columns, motion.joints, strict=True):
+        before, now = spec.feedforward.before.get(joint), reached[joint].rms
+        if before is None or now <= 2 * FINEST * abs(motion.scale.unit[column]) or now <= WORSE * before.rms:
+            continue
+        raise TraceError(
+            f"{_called(trace)}: learning does not converge: the error of joint {joint} grew from "
+            f"{math.degrees(before.rms):.3f}° to {math.degrees(now):.3f}°; learn from "
+            f"{spec.feedforward.learned_from} again, with a smaller share of the correction"
+        )
+
+
+def asked_of(trace: Trace, machine: Machine) -> ExperimentSpec:
+    """The experiment whose motion a trace attempted. Raises TraceError for a trace that is no whole attempt on this
+    machine."""
+    record, called = trace.record, _called(trace)
+    if record.spec is None or record.machine is None:
+        raise TraceError(f"{called}: does not say which experiment it is of: learn from one that `daq run` recorded")
+    if record.machine.name != machine.name or record.machine.controller != machine.controller:
+        raise TraceError(f"{called}: is of {record.machine.name}, or of another controller than that of {machine.name}")
+    if record.outcome != "complete":
+        raise TraceError(f"{called}: ended as {record.outcome or 'unfinished'}: learn from a complete one")
+    if record.every != 1:
+        raise TraceError(f"{called}: has a sample only every {record.every} periods: learning needs each")
+    for kind, what in (("pause", "its set points paused"), ("missed_set_point", "the controller missed set points")):
+        if any(event.kind == kind for event in trace.events):
+            raise TraceError(f"{called}: {what}, so it does not show what its set points do: repeat the run")
+    if trace.missing > MOST_MISSING * len(trace):
+        raise TraceError(f"{called}: lacks {trace.missing} of {len(trace) + trace.missing} samples: repeat the run")
+    return record.spec.plain
+
+
+def _called(trace: Trace) -> str:
+    return f"trace {trace.record.trace_id}"
+
+
+def _bridged(inputs: RunInputs, trace: Trace) -> Floats:
+    """Readings (k, n) rad of every period, with straight lines where samples are missing."""
+    readings = inputs.readings.copy()
+    periods = np.arange(len(readings))
+    for column in readings.T:
+        known = ~np.isnan(column)
+        if not known.any():
+            raise TraceError(f"{_called(trace)}: has no readings")
+        column[~known] = np.interp(periods[~known], periods[known], column[known])
+    return readings
+
+
+def _responses(
+    motion: Motion, inputs: RunInputs, sent: Floats, reached: Floats, trace: Trace, model: Model | None
+) -> dict[int, Response]:
+    if model is not None:
+        arm = arm_in_loop(model, sent[0], len(motion) + REACH, trace.record.gains)
+        return dict(enumerate(arm.responses(and_rest(sent))))
+    found = {}
+    for column, joint in zip(motion.columns, motion.joints, strict=True):
+        loop = estimated_loop(sent[:, column], reached[:, column], inputs.period)
+        if loop.explained < LEAST_EXPLAINED:
+            raise TraceError(
+                f"{_called(trace)}: joint {joint} does not follow its set points ({100 * loop.explained:.0f} % of its "
+                "motion is explained): nothing can be learned from it; is it blocked, or is the motion too small?"
+            )
+        found[column] = loop.response(len(motion) + REACH, inputs.period)
+    return found

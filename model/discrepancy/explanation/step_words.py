@@ -1,0 +1,212 @@
+"""A step of an answer in words: where it looked, what speaks for its effect, and why that was refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+from model.discrepancy.diagnosis import UNWRITTEN, FoundValue, Phase, Step, Where
+from model.discrepancy.explanation.effect_words import called, shape_in_torques, size_on, size_words
+from model.discrepancy.explanation.pattern_words import pattern_words
+from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal, RefusalKind
+from model.discrepancy.numbers import from_to, plain
+from model.effects.names import capitalised, joints_in_words
+
+NOISE_UNKNOWN = 1e6
+"""Ratio of a residual to its noise, above which that noise is none: the machine file takes positions for exact, as one
+made of a URDF does, and what rounding leaves is no measure."""
+NOTICEABLE = 0.98
+"""Ratio of the errors with and without an effect, above which the effect hardly changes the error."""
+ALL = 0.95
+"""Share of the evidence; with a margin above it, the next best candidate has next to no evidence."""
+LEAST_SHOWN = 5e-4
+"""Least share of a mean square that is not shown as 0.0 %."""
+PHASES: Mapping[Phase, str] = {
+    "ramp_start": "as motion starts",
+    "steady_ramp": "in steady motion",
+    "reversal": "after reversals",
+    "creep": "in slow motion",
+    "hold": "at rest",
+}
+
+
+def sentence(words: str) -> str:
+    """A clause as a sentence."""
+    return f"{capitalised(words)}."
+
+
+def where_with_summary(where: Where) -> Where:
+    """The place with its summary."""
+    if where.worst is None and where.summary != UNWRITTEN:
+        return where
+    return where.model_copy(update={"summary": sentence(_place(where))})
+
+
+def _place(where: Where) -> str:
+    """Where simulation and measurement disagree most, as a clause."""
+    worst, largest = where.worst, where.largest
+    if worst is None:
+        return "no joint moves"
+    phase = PHASES[worst.phase]
+    if where.joint is None or worst.rms is None:
+        return (
+            f"no joint is off by more than noise; the largest residual is that of joint {worst.joint}, "
+            f"{worst.ratio:.2f} times its noise {phase}"
+        )
+    if not worst.whole_record and worst.floor is not None:
+        return f"joint {worst.joint}, {phase}: {worst.rms:.2g} {worst.unit} rms against a floor of {worst.floor:.2g}"
+    times = f"{plain(worst.ratio)} times its noise"
+    if worst.ratio >= NOISE_UNKNOWN:
+        times = "and the machine file states no noise of the sensors to compare it with"
+    seen = f"joint {worst.joint}, mostly {phase}: {plain(worst.rms, 3)} {worst.unit} rms, {times}"
+    if largest is None or largest.rms is None:
+        return seen
+    return f"{seen}; more is left of joint {largest.joint}, {plain(largest.rms, 3)} {largest.unit} rms"
+
+
+def step_with_sentences(step: Step) -> Step:
+    """The step with its reason, its place, and why it was refused."""
+    where = where_with_summary(step.where)
+    if step.proof is not None:
+        where = where.model_copy(update={"summary": sentence(_proof(step))})
+    refused = step.rejected_because if step.refusal is None else refusal_words(step.refusal)
+    return step.model_copy(update={"where": where, "reason": reason_text(step), "rejected_because": refused})
+
+
+def reason_text(step: Step) -> str:
+    """What speaks for the effect of a step, in one to three sentences, with the numbers of the step as it is now."""
+    reason, effect = step.reason_data, step.effect or ""
+    if step.proof is not None:
+        return sentence(f"{_proof(step)}; this needs no model of the arm")
+    if reason is None:
+        return step.reason
+    if reason.pattern is None or reason.units is None:
+        return sentence(_torque_reason(step, effect, reason))
+    others = [j for j in step.main_joints if j != reason.joint]
+    alike = f" (and likewise {joints_in_words(others)})" if others else ""
+    size = size_on(reason.joint or 0, effect, step.parameters)
+    named = called(effect) + ("" if size is None else f", {size_words(size)}")
+    seen = f"joint {reason.joint} {pattern_words(reason.pattern, reason.units)}{alike}"
+    sentences = [sentence(f"{seen}: {named}{_taken_off(reason)}")]
+    if reason.rival is not None:
+        sentences.append(sentence(_beaten(reason.rival, step)))
+    if step.where.joint is None or (step.joints and step.where.joint not in step.joints):
+        sentences.append("What shows it is the pattern over the whole record, not one place.")
+    if step.slight_joints:
+        sentences.append(sentence(_slight(step, effect)))
+    return " ".join(sentences)
+
+
+def _proof(step: Step) -> str:
+    """What the controller's own recorded numbers prove, as a clause."""
+    assert step.proof is not None
+    joint, samples, of = step.joints[0], step.proof.samples, step.proof.of
+    if step.effect != ControllerEffect.WRONG_GAIN:
+        lost = "the recorded error is not set point − position"
+        return f"joint {joint}: {lost} in {samples} samples, so set points were lost"
+    ratio = 1 + next(iter(step.parameters.values())).value
+    power = f"the recorded power is {ratio:.3f} times the gain times the recorded error"
+    return f"joint {joint}: {power} ({samples} of {of} samples)"
+
+
+def _torque_reason(step: Step, effect: str, reason: Reason) -> str:
+    """What speaks for an effect in a balance of torques."""
+    several = len(step.joints) > 1
+    place = f"{joints_in_words(step.joints)}: " if step.joints else ""
+    sizes = (_torque_size(v, several=several, slides=reason.slides) for v in step.parameters.values())
+    seen = f"{place}{shape_in_torques(effect, slides=reason.slides)} ({', '.join(sizes)})"
+    if reason.removed is None:
+        return seen
+    return f"{seen}; it takes {percent_gone(reason.removed, 0)} off the mean square on records not fitted to"
+
+
+def _torque_size(value: FoundValue, *, several: bool, slides: bool) -> str:
+    on = f" of {joints_in_words(value.joints)}" if several and value.joints else ""
+    unit = "" if value.unit == "1" else f" {value.unit}"
+    if value.part == "cycles":  # rad of phase per rad (m): cycles a turn, or 2π times those a metre
+        unit = f" rad/m, {plain(value.value / (2 * math.pi), 3)} a metre" if slides else " a turn"
+    return f"{value.part}{on} {plain(value.value, 3)}{unit}"
+
+
+def _taken_off(reason: Reason) -> str:
+    if reason.rms is None:
+        return ""
+    before, after, unit = reason.rms.before, reason.rms.after, reason.rms.unit
+    if after > NOTICEABLE * before:
+        return f", which hardly changes its rms error: it stays near {plain(after)} {unit}"
+    first, last = from_to(before, after)
+    return f", which takes its rms error from {first} to {last} {unit}"
+
+
+def _beaten(rival: NamedEffect, step: Step) -> str:
+    """How far the next best candidate is behind."""
+    if step.margin >= ALL * step.evidence:
+        return f"no other fitted candidate has a twentieth of its evidence of {step.evidence:.0f}"
+    name = called(rival.effect, rival.joints)
+    if rival.evidence > step.evidence:  # it was ranked first, but came to less when its fit was taken to its end
+        return (
+            f"its completed fit has evidence of {step.evidence:.0f}, less than the {rival.evidence:.0f} of {name}: "
+            "these traces do not tell which of the two it is"
+        )
+    return f"the next best, {name}, has evidence of {rival.evidence:.0f}, and this has {step.evidence:.0f}"
+
+
+def _slight(step: Step, effect: str) -> str:
+    """Where the effect of a step is slight, and what that may be."""
+    sizes = [size_on(joint, effect, step.parameters) for joint in step.slight_joints]
+    shown = ", ".join(size_words(v) for v in sizes if v is not None)
+    return (
+        f"on {joints_in_words(step.slight_joints)} it is slight{f' ({shown})' if shown else ''}, which may be what the "
+        "law leaves of the same effect on another joint"
+    )
+
+
+def _falls_too_little(share: float) -> str:
+    change = "does not fall"
+    if abs(share) >= LEAST_SHOWN:
+        change = f"falls by only {share:.1%}" if share > 0.0 else f"grows by {-share:.1%}"
+    return f"on records not fitted to, the mean square {change}"
+
+
+def _only_resembles(joints: Sequence[int]) -> str:
+    disagree = f"{joints_in_words(joints)} still {'disagrees' if len(joints) == 1 else 'disagree'} beyond noise"
+    return f"it only resembles what is missing: with all that was found, {disagree}"
+
+
+REFUSALS: Mapping[RefusalKind, str | Callable[[Refusal], str]] = {
+    "contradicts-file": "with it, a number of the machine comes out {deviations:.1f} stated deviations from what its "
+    "file says, which it did not without",
+    "diverges": "with it, the simulation of the held-out traces does not stay finite",
+    "error-grows": "the error on the held-out traces grows, by {share:.0%} of what is beyond noise there",
+    "error-rises": "the error on the held-out traces rises: its sum of squares by {rise:.0f} ± {deviation:.0f} "
+    "variances of a reading",
+    "falls-too-little": lambda refusal: _falls_too_little(refusal.numbers["share"]),
+    "found-one-way": "a search in the held-out traces, which are fitted to in turn, does not find it",
+    "leaves-more-than-noise": "it takes {share:.0%} of the mean square on records not fitted to, and leaves "
+    "{noises:.0f} times the noise: of what something else makes, any law takes a part",
+    "only-resembles": lambda refusal: _only_resembles(refusal.joints),
+    "superfluous": "a later effect explains what it explained",
+    "worse-than-given": "with it, the mean square on the held-out traces is {share:.0%} larger than with the model as "
+    "given: the fit has followed something that these traces do not have",
+}
+
+
+def refusal_words(refusal: Refusal) -> str:
+    """Why an effect was not taken into the model, as a clause."""
+    words = REFUSALS[refusal.kind]
+    return words.format(**refusal.numbers) if isinstance(words, str) else words(refusal)
+
+
+def removed_words(share: float) -> str:
+    """The share of the held-out variance beyond noise that a step removed: all of it, where the error is below its
+    floor. A clause."""
+    if share < 0:
+        return f"the held-out variance beyond noise has grown by {-100 * share:.1f} %"
+    return f"{percent_gone(share, 1)} of the held-out variance beyond noise is gone"
+
+
+def percent_gone(share: float, places: int) -> str:
+    """A share in percent; “all” for all of it. A share below all is never rounded up to 100 %."""
+    if share >= 1.0:
+        return "all"
+    return f"{min(100 * share, 100 - 10**-places):.{places}f} %".replace("-", "−")

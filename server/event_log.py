@@ -1,0 +1,69 @@
+"""Events of all robots: each is written to the log and the database, counted, and sent to live clients."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime
+
+from daq.contracts.service.events import ServiceEvent
+from daq.contracts.service.live import EventMessage
+from server.clock import Clock
+from server.live.hub import Hub
+from server.store.events import EventStore
+from server.store.waiting_events import WaitingEvents
+
+log = logging.getLogger("server")
+
+
+class EventLog:
+    """Records events.
+
+    `hubs`: those of the robots' live clients, by name, as soon as there are any. `counted`: hears of the robot and kind
+    of each event.
+    """
+
+    def __init__(self, store: EventStore, counted: Callable[[str, str], None], clock: Clock) -> None:
+        self.hubs: dict[str, Hub] = {}
+        self._counted = counted
+        self._clock = clock
+        self._waiting = WaitingEvents(store, self._publish)
+        self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
+
+    def record(
+        self,
+        robot: str,
+        kind: str,
+        text: str,
+        *,
+        actor: str | None = None,
+        experiment: str | None = None,
+        at: datetime | None = None,
+    ) -> None:
+        """Records an event. `at`: when it happened; now by default.
+
+        Never raises, even if the database fails: the request that caused the event has already been carried out. Its
+        row is written as soon as the database can be.
+        """
+        log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
+        self._counted(robot, kind)
+        self._waiting.add(robot, kind, text, at or self._clock.utc(), actor, experiment)
+        if (hub := self.hubs.get(robot)) is not None:
+            hub.look()
+
+    def record_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
+        """Does the same on a thread, for callers that must not wait for the disk."""
+        self._later.submit(self.record, robot, kind, text, actor=actor, at=self._clock.utc())
+
+    def settle(self) -> None:
+        """Takes nothing more to be recorded later, and waits until that is done."""
+        self._later.shutdown()
+
+    def close(self, seconds: float) -> None:
+        """Writes the rows that wait, within this time."""
+        self._waiting.close(seconds)
+
+    def _publish(self, robot: str, event: ServiceEvent) -> None:
+        if (hub := self.hubs.get(robot)) is not None:
+            hub.publish("events", EventMessage(event=event))

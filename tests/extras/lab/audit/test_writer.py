@@ -1,0 +1,113 @@
+"""The thread that writes the log: nobody waits for it, and nothing is lost without a word."""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from sqlalchemy import text
+
+from daq.contracts.service.audit import AuditEntry
+from extras.lab.audit.log import AuditLog, AuditSearch
+from extras.lab.audit.repeats import COUNTED_FOR, MOST_KEYS, Repeats
+from extras.lab.audit.writer import AuditWriter
+from server.store.engine import Store
+from tests.extras.lab.audit.notes import made_note
+
+WITHIN = 60.0
+
+
+def rows(store: Store) -> list[AuditEntry]:
+    return list(AuditLog(store).page(AuditSearch(), None, 500).items)[::-1]
+
+
+@contextmanager
+def writing(store: Store, folder: Path) -> Iterator[AuditWriter]:
+    writer = AuditWriter(AuditLog(store), folder / "waiting.jsonl", again_after=0.01)
+    yield writer
+    writer.close(WITHIN)
+
+
+@contextmanager
+def away(store: Store) -> Iterator[None]:
+    """While this lasts, the table cannot be written."""
+    with store.writing() as session:
+        session.execute(text("ALTER TABLE audit RENAME TO audit_away"))
+    yield
+    with store.writing() as session:
+        session.execute(text("ALTER TABLE audit_away RENAME TO audit"))
+
+
+def test_a_note_has_a_row_when_its_future_ends(store: Store, tmp_path: Path) -> None:
+    with writing(store, tmp_path) as writer:
+        writer.note(made_note(1)).result(WITHIN)
+        assert [row.number for row in rows(store)] == [1]
+
+
+def test_while_the_database_is_away_nobody_waits_and_the_rows_come_later(sqlite_store: Store, tmp_path: Path) -> None:
+    with writing(sqlite_store, tmp_path) as writer:
+        with away(sqlite_store):
+            noted = [writer.note(made_note(n)) for n in range(3)]
+            assert not writer.flush(0.05)
+            assert writer.waiting == 3
+        for one in noted:
+            one.result(WITHIN)
+        assert [row.subject for row in rows(sqlite_store)] == [f"{n:012x}" for n in range(3)]
+    assert AuditLog(sqlite_store).first_misfit()[1] is None
+
+
+def test_what_could_not_be_written_before_the_end_is_written_after_the_next_start(
+    sqlite_store: Store, tmp_path: Path
+) -> None:
+    with away(sqlite_store):
+        with writing(sqlite_store, tmp_path) as writer:
+            writer.note(made_note(1))
+        late = made_note(2, action="stop_robot")
+        writer.note(late)  # of the stop listener, which ends last
+    with (tmp_path / "waiting.jsonl").open("a", encoding="utf-8") as stream:
+        stream.write('{"half a li')  # the power failed
+    with writing(sqlite_store, tmp_path):
+        pass
+    assert [row.action for row in rows(sqlite_store)] == ["submit_experiment", "stop_robot"]
+    assert not (tmp_path / "waiting.jsonl").exists()
+
+
+def test_rows_that_find_no_room_in_memory_are_in_the_log_and_counted(
+    sqlite_store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("extras.lab.audit.writer.MOST_WAITING", 2)
+    with writing(sqlite_store, tmp_path) as writer, caplog.at_level(logging.ERROR, "server.audit"):
+        with away(sqlite_store):
+            for n in range(5):
+                writer.note(made_note(n))
+        assert writer.flush(WITHIN)
+    assert [row.action for row in rows(sqlite_store)] == ["submit_experiment"] * 2 + ["rows_left_out"]
+    assert rows(sqlite_store)[-1].detail.startswith("3 rows are only in the service's log")
+    assert sum("too many rows wait: only here" in record.message for record in caplog.records) == 3
+
+
+def test_a_note_that_the_database_cannot_hold_keeps_no_other_out(store: Store, tmp_path: Path) -> None:
+    with writing(store, tmp_path) as writer:
+        writer.note(made_note(1, detail="a \x00 character")).result(WITHIN)
+        writer.note(made_note(2)).result(WITHIN)
+    assert [row.number for row in rows(store)] == [1, 2]
+    assert AuditLog(store).first_misfit()[1] is None
+
+
+def test_repeats_are_counted_for_a_minute_and_forgotten_when_they_end() -> None:
+    repeats, note = Repeats(), made_note(1, action="attend_queue")
+    assert repeats.take(note, 0.0) is note
+    assert [repeats.take(made_note(n, action="attend_queue"), float(n)) for n in range(2, 6)] == [None] * 4
+    assert repeats.due(COUNTED_FOR - 1) == []
+    (counted,) = repeats.due(COUNTED_FOR)
+    assert (counted.count, counted.at) == (4, made_note(5).at)
+    assert repeats.due(2 * COUNTED_FOR) == []
+    assert repeats.take(note, 2 * COUNTED_FOR) is note
+
+
+def test_repeats_of_very_many_kinds_are_counted_together() -> None:
+    repeats = Repeats()
+    taken = [repeats.take(made_note(1, origin=str(n)), 0.0) for n in range(2 * MOST_KEYS)]
+    assert sum(one is not None for one in taken) == MOST_KEYS + 1
+    assert sum(one.count for one in repeats.rest()) == MOST_KEYS - 1
