@@ -458,6 +458,7 @@ class Scene:
             hub=None,
             jobs=None,
             models=None,
+            events=SimpleNamespace(record=lambda *_, **__: None),
             unattended=True,
             jogged=None,
         )

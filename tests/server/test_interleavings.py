@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import greenlet
 import pytest
@@ -26,7 +26,6 @@ from tests.server.interleaved import RULE, Actor, Scene, World, moved
 
 SOON, ALL = 300, 2500
 """Seeds of each scene: in every run of the tests, and in the slow one."""
-SERVICES: Any = SimpleNamespace(record_event=lambda *_, **__: None)
 
 
 @pytest.fixture(autouse=True)
@@ -87,16 +86,16 @@ class People:
 
     def reset(self, *, here: bool = False, stop: int | None = None) -> None:
         request = ResetRequest(stop=self.seen() if stop is None else stop, here=here)
-        self.ask(lambda arrived: robots.reset_robot(request, self.rig, SERVICES, LOCAL, arrived, self.lease))
+        self.ask(lambda arrived: robots.reset_robot(request, self.rig, LOCAL, arrived, self.lease))
 
     # ---- what moves
 
     def take_control(self) -> None:
-        self.lease = queue_routes.take_control(ControlRequest(), self.rig, SERVICES, LOCAL).lease
+        self.lease = queue_routes.take_control(ControlRequest(), self.rig, LOCAL).lease
 
     def give_back(self) -> None:
         lease, self.lease = self.lease, None
-        queue_routes.give_control_back(self.rig, SERVICES, LOCAL, lease)
+        queue_routes.give_control_back(self.rig, LOCAL, lease)
 
     def jog(self) -> None:
         request = JogRequest(velocities={1: 0.1})
@@ -108,7 +107,7 @@ class People:
 
     def grip(self, *, while_stopped: bool = False) -> None:
         request = GripperRequest(closed=True, while_stopped=while_stopped)
-        self.ask(lambda arrived: controller.set_gripper(request, self.rig, SERVICES, LOCAL, arrived, self.lease))
+        self.ask(lambda arrived: controller.set_gripper(request, self.rig, LOCAL, arrived, self.lease))
 
     def resume(self) -> None:
         self.ask(lambda arrived: queue_routes.resume_queue(QueueResume(), self.rig, arrived, LOCAL))
