@@ -53,7 +53,7 @@ AT_REST = 40
 """ADC counts of error within which an arm holds."""
 RECORDING_FROM = 100
 """The board's tick from which on there is a record: in lock-step the way to the start takes it a few."""
-ACQUISITION, OWNER, WORKER = b"daq.acquisition", b"server.owner", b"spawn_main"
+ACQUISITION, OWNER, WORKER = b"daq.owner", b"server.owner", b"spawn_main"
 PORT = "mock://?pty=1&lock_step=1&seed=3"
 LENGTHS_S = (1.0, 40.0)
 """Lengths of the service's experiments, in the arm's time."""

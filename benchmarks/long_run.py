@@ -25,12 +25,12 @@ import numpy as np
 from benchmarks.figures import Figure, quantile, show
 from benchmarks.mock_control import MockControl
 from benchmarks.mock_process import started_mock
-from daq.acquisition.messages import Finished, Job
-from daq.acquisition.parent import Acquisition
 from daq.contracts.experiment import ExperimentSpec, Sine
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
 from daq.driver.tick_time import TickTime
+from daq.owner.client import OwnerOnDemand
+from daq.owner.messages import Finished, Open
 from daq.traces.reader import read_trace
 
 BAUD = 115200
@@ -87,17 +87,13 @@ def record(minutes: float, folder: Path) -> Recorded:
         board = BoardRecord(control)
         fetching = threading.Thread(target=board.fetch_until_over)
         fetching.start()
-        job = Job(url=f"{mock.url}?baud={BAUD}", machine=machine, limits=machine.limits, spec=spec, folder=folder)
-        with Acquisition(job) as acquisition:
-            *_, last = acquisition
+        url = f"{mock.url}?baud={BAUD}"
+        with OwnerOnDemand(Open(url=url, machine=machine, limits=machine.limits, folder=folder)) as owner:
+            last = owner.run(spec)
         board.over()
         fetching.join()
         counts, clock = control.ask("counts"), control.ask("state")["clock"]
-    match last:
-        case Finished():
-            return Recorded(read_trace(last.trace), last, board.periods, counts, clock)
-        case _:
-            raise RuntimeError(f"no run: {last}")
+    return Recorded(read_trace(last.trace), last, board.periods, counts, clock)
 
 
 def wrong_samples(trace: Trace, board: dict[int, dict[str, Any]], machine: Machine) -> tuple[int, int]:

@@ -32,10 +32,10 @@ from typing import Any
 from benchmarks.figures import Figure, at_most, quantile, show
 from benchmarks.mock_control import MockControl
 from benchmarks.own_environment import environment_of
-from daq.acquisition.guardian import Guardian
-from daq.acquisition.stop_socket import FOLDER_VARIABLE, StopAnswer, request_stop, stop_listener
 from daq.driver import Controller
 from daq.link import RequestRefusedError
+from daq.owner.guardian import Guardian
+from daq.owner.stop_socket import FOLDER_VARIABLE, StopAnswer, request_stop, stop_listener
 
 URL = "mock://?pty=1&baud=115200"
 FAULTS = "&fault=flip:rate=0.005&fault=drop:rate=0.005"

@@ -8,9 +8,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from daq.acquisition.stop_socket import FOLDER_VARIABLE
 from daq.child import Child, last_words
 from daq.contracts.errors import DaqError, SpecError
+from daq.owner.stop_socket import FOLDER_VARIABLE
 from daq.transport import MockPort, parse_port_url
 from ma2000.running import MOCK
 

@@ -1,23 +1,23 @@
-"""Runs an experiment in an acquisition process of its own, as `daq run` does."""
+"""Runs an experiment in a process of its own, as `daq run` does."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from daq.acquisition.messages import Failed, Finished, Job, Progress
-from daq.acquisition.parent import Acquisition
 from daq.config.robot_files import load_memory_map
 from daq.contracts.consent import require_word
 from daq.contracts.documents import read_text
-from daq.contracts.errors import DaqError
+from daq.contracts.errors import DaqError, OrderFailedError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.progress import Progress as ToldProgress
-from daq.contracts.progress import silent
 from daq.contracts.trace import Trace
+from daq.owner.client import OwnerOnDemand, end_of
+from daq.owner.messages import Open, Progress, Report, RunExperiment
 from daq.traces.reader import read_trace
 from daq.trajectories.presets import preset
 from daq.transport import parse_port_url
@@ -82,34 +82,34 @@ def run(
     parse_port_url(port)  # an invalid port is refused without starting a process
     if memory_map is not None:
         load_memory_map(memory_map)
-    job = Job(
+    opening = Open(
         url=port,
         machine=machine,
         limits=machine.limits,
-        spec=spec,
         folder=Path(folder),
         memory_map=None if memory_map is None else read_text(memory_map, f"memory map {memory_map}"),
-        moves_real_arm=require_word(moves_real_arm),
     )
-    with told(progress, spec.trajectory.kind) as tell, Acquisition(job) as process:
-        try:
-            end = _end_of(process, tell)
-        except KeyboardInterrupt as interrupt:
-            process.stop()
-            stopped = _end_of(process, silent)
-            if isinstance(stopped, Finished):
-                interrupt.add_note(f"the arm was stopped; recorded until then: {stopped.trace}")
-            raise
-    if isinstance(end, Failed):
-        raise RunError(end.message, end.exit_code)
-    return Run(end.trace, end.outcome, end.samples, end.missing, end.reason)
+    real = require_word(moves_real_arm)
+    try:
+        with told(progress, spec.trajectory.kind) as tell, OwnerOnDemand(opening) as owner:
+            return _run(owner, spec, tell, moves_real_arm=real)
+    except OrderFailedError as error:
+        raise RunError(str(error), error.exit_code) from error
 
 
-def _end_of(process: Acquisition, progress: ToldProgress) -> Finished | Failed:
-    """Hears the reports of a run to its last."""
-    for report in process:
+def _run(owner: OwnerOnDemand, spec: ExperimentSpec, tell: ToldProgress, *, moves_real_arm: bool) -> Run:
+    """Raises OrderFailedError."""
+
+    def heard(report: Report) -> None:
         if isinstance(report, Progress):
-            progress(report.fraction, report.text)
-        elif isinstance(report, Finished | Failed):
-            return report
-    raise AssertionError("an acquisition always ends with a report")
+            tell(report.fraction, report.text)
+
+    asked = owner.begin(RunExperiment, spec=spec, moves_real_arm=moves_real_arm)
+    try:
+        end = end_of(owner.answer_to(asked, heard))
+    except KeyboardInterrupt as interrupt:
+        owner.halt()
+        with suppress(OrderFailedError):
+            interrupt.add_note(f"the arm was stopped; recorded until then: {end_of(owner.answer_to(asked)).trace}")
+        raise
+    return Run(end.trace, end.outcome, end.samples, end.missing, end.reason)

@@ -99,7 +99,8 @@ def begin(stream: TextIO | None = None, level: int = logging.INFO) -> None:
     handler = logging.StreamHandler(stream)
     handler.setFormatter(PlainLines() if stream.isatty() else JsonLines())
     logging.basicConfig(level=logging.WARNING, handlers=[handler], force=True)
-    logging.getLogger("server").setLevel(level)
+    for ours in ("server", "daq"):
+        logging.getLogger(ours).setLevel(level)
     logging.captureWarnings(True)
     if not stream.isatty():
         sys.stderr = StandardError(stream)

@@ -11,7 +11,7 @@ from starlette.types import Receive, Scope, Send
 from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.experiments import ExperimentState
 from daq.contracts.service.jobs import Job
-from server.owner.messages import Report
+from daq.owner.messages import Report
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from daq.contracts.errors import DaqError
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.live import JobMessage
 from daq.contracts.service.robot import RobotStatus
+from daq.owner.messages import Answer
 from daq.plugins import named, plugins
 from daq.trajectories.set_points import control_period
 from server.access.caller import Caller
@@ -44,7 +45,6 @@ from server.jobs.service import JobContext, JobService
 from server.jobs.shared_workers import SharedWorkers
 from server.live.history import History
 from server.live.hub import Hub
-from server.owner.messages import Answer
 from server.parts import Attention, Part
 from server.problems import ProblemError
 from server.queue.context import QueueContext

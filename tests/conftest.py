@@ -18,15 +18,15 @@ SKIPS_ARE_ERRORS = os.environ.get("CI", "").lower() in ("1", "true")
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 DETERMINISTIC = (
-    "daq/acquisition/test_freezer.py",
-    "daq/acquisition/test_guardian.py",
+    "daq/owner/test_freezer.py",
+    "daq/owner/test_guardian.py",
     "mock/process/test_control.py",
     "mock/process/test_options.py",
     "server/robot/test_control.py",
     "server/access/test_gate.py",
     "server/jobs/test_job_service.py",
     "server/robot/test_jog_moments.py",
-    "server/owner/test_owner_inbox.py",
+    "daq/owner/test_owner_inbox.py",
     "server/queue/test_queue_service.py",
     "server/queue/test_queue_holds.py",
     "server/experiments/test_rules.py",

@@ -8,7 +8,7 @@ import pytest
 TESTS = Path(__file__).parent
 AGAINST_THE_CLOCK = (
     "contract",
-    "daq/acquisition",
+    "daq/owner",
     "daq_cli",
     "daq/client",
     "daq/transport",

@@ -38,3 +38,11 @@ class SafetyError(DaqError):
     """Something was refused because it is not safe now. Nothing moved."""
 
     exit_code = exit_codes.REFUSED
+
+
+class OrderFailedError(SafetyError):
+    """The process or the service that has the robot did not carry out an order; it has the exit code reported."""
+
+    def __init__(self, message: str, exit_code: int) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code  # type: ignore[misc]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -52,15 +51,3 @@ class ConsentPrompt:
         """Raises SafetyError for a real arm at `url` unless the operator agreed, or agrees when asked."""
         if lacks_consent(identity, self.given) and not self.agreed(url):
             raise SafetyError(f"{url} is a real arm: {self.refused} only with the operator's consent (--yes)")
-
-    def attempt(self, url: str, action: Callable[[bool], T], missing: type[SafetyError]) -> T:
-        """Calls `action` with the consent given so far; if it raises `missing` and a person then agrees, once more.
-
-        So the port is not occupied while the question is on the screen, and a stop gets through.
-        """
-        try:
-            return action(self.given)
-        except missing:
-            if not self.agreed(url):
-                raise
-        return action(True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import zip_longest
 
-from daq.acquisition.stop_socket import StopAnswer, StopAttempt, request_stop
+from daq.owner.stop_socket import StopAnswer, StopAttempt, request_stop
 
 _asked: list[StopAttempt] | None = None
 

@@ -35,7 +35,8 @@ from daq_cli.models.model_input import (
 )
 from daq_cli.models.record_doubts import DespiteDoubtsOption, end_if_doubted
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
-from daq_cli.robot.access import RobotAccess, robot_of
+from daq_cli.robot.access import robot_of
+from daq_cli.robot.operations import RobotAccess
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

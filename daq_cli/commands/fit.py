@@ -30,7 +30,8 @@ from daq_cli.models.model_input import (
 from daq_cli.models.parameter_table import print_on_the_edge, print_parameters, print_rows, print_undetermined
 from daq_cli.models.record_doubts import DespiteDoubtsOption, end_if_doubted, print_record, stop_if_doubted
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
-from daq_cli.robot.access import RobotAccess, robot_of
+from daq_cli.robot.access import robot_of
+from daq_cli.robot.operations import RobotAccess
 from model.record_check.finding import doubts_in
 
 if TYPE_CHECKING:

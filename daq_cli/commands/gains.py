@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from daq.contracts.limp import limp_line
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption, console, print_json
 from daq_cli.app.quantities import parse_gains
 from daq_cli.robot.access import robot_of
 from firmware_protocol.requests import SetGains
-
-if TYPE_CHECKING:
-    from daq.contracts.experiment import Gain
 
 app = typer.Typer(add_completion=False, help="Show or set the controller's PID gains.", no_args_is_help=True)
 
@@ -42,10 +40,9 @@ def set_gains(
     for joint, gain in wanted.items():
         SetGains(joint, *gain)  # raises outside its range: all or nothing is written
     consent = ConsentPrompt(yes, what="its gains will change", refused="its gains change")
-    if limp := robot_of(context).set_gains(wanted, consent, _print_written):
+    found = robot_of(context).set_gains(wanted, consent)
+    for joint in wanted:
+        p, i, d = found[joint]
+        print(f"joint {joint}: P {p}  I {i}  D {d}, read back")
+    if limp := limp_line(found):
         console().print(limp)
-
-
-def _print_written(joint: int, gain: Gain) -> None:
-    p, i, d = gain
-    print(f"joint {joint}: P {p}  I {i}  D {d}, read back")

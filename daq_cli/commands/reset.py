@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from daq_cli.app.context import JsonOption, console, print_json
+from daq_cli.app.context import JsonOption, print_json
 from daq_cli.robot.access import robot_of
 
 app = typer.Typer(add_completion=False)
@@ -23,10 +23,8 @@ def reset(
 ) -> None:
     """End the freeze of a stop. Set points stay where the stop put them, or with --here become the present posture."""
     robot = robot_of(context)
-    done = robot.reset(adopt_posture=here)
+    text = robot.reset(adopt_posture=here)
     if json:
-        print_json({"server": robot.call.server, "here": here, "text": done.text})
+        print_json({"server": robot.call.server, "here": here, "text": text})
         return
-    if done.limp:
-        console().print(done.limp)
-    print(done.text)
+    print(text)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from daq.contracts.service.archive import ArchiveStatus, TraceArchive
     from daq.contracts.trace import Trace, TraceRecord
     from daq.traces.salvage import Salvaged
-    from daq_cli.robot.access import RobotAccess
+    from daq_cli.robot.operations import RobotAccess
 
 app = typer.Typer(add_completion=False, help="List, show, plot, convert and verify traces.", no_args_is_help=True)
 

@@ -17,7 +17,7 @@ from server.jobs.next_experiment import experiment_chooser
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
     from daq.contracts.trace import Trace
-    from daq_cli.robot.access import RobotAccess
+    from daq_cli.robot.operations import RobotAccess
     from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment
     from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
 

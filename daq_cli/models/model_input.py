@@ -18,7 +18,7 @@ from daq_cli.app.output_file import check_folder
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
-    from daq_cli.robot.access import RobotAccess
+    from daq_cli.robot.operations import RobotAccess
     from model.machine_model.model import Model
 
 TracesArgument = Annotated[

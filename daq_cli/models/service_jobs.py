@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from daq.client import Robot
     from daq.contracts.service.jobs import Job
     from daq.contracts.trace import Trace
-    from daq_cli.robot.access import RobotAccess
+    from daq_cli.robot.operations import RobotAccess
     from model.discrepancy.diagnosis import Diagnosis
     from model.discrepancy.options import DiagnosisOptions
     from model.fitting.options import FitOptions

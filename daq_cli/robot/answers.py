@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from daq.contracts.errors import SafetyError
-
 if TYPE_CHECKING:
     from daq.contracts.experiment import Gain
     from daq.contracts.status import StatusReport
@@ -21,14 +19,6 @@ class RobotState:
     headline: str
     gains: Mapping[int, Gain] = field(default_factory=dict)
     """P, I and D by joint; may be empty where no joint is limp."""
-
-
-@dataclass(frozen=True)
-class ResetDone:
-    """The result of a reset in one line and, from a local board, the joints that nothing holds."""
-
-    text: str
-    limp: str = ""
 
 
 @dataclass(frozen=True)
@@ -52,9 +42,12 @@ class ImportedTrace:
     notes: str = ""
 
 
-class AcquisitionFailedError(SafetyError):
-    """An acquisition that left no trace; it has the exit code that was reported."""
-
-    def __init__(self, message: str, exit_code: int) -> None:
-        super().__init__(message)
-        self.exit_code = exit_code  # type: ignore[misc]
+def headline(found: StatusReport) -> str:
+    """The state of a robot in one line."""
+    if found.identity is None:
+        problem = f": {found.connection_problem}" if found.connection_problem else ""
+        return f"{found.robot}: {found.connection}{problem}"
+    kind = "mock" if found.identity.simulated else "REAL ARM"
+    tick = "" if found.sample is None else f", tick {found.sample.tick}, {found.sample.age * 1e3:.0f} ms old"
+    cause = f" ({found.cause})" if found.cause else ""
+    return f"{kind}{tick}, {found.arm}{cause}; {found.activity}; link {found.link.state}"

@@ -12,16 +12,15 @@ from typing import TYPE_CHECKING
 import typer
 
 from daq.contracts import exit_codes
-from daq.contracts.errors import SafetyError, SpecError
+from daq.contracts.errors import OrderFailedError, SafetyError, SpecError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import print_json
-from daq_cli.robot.answers import AcquisitionFailedError
 
 if TYPE_CHECKING:
-    from daq.acquisition.messages import Finished
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import Machine
-    from daq_cli.robot.access import RobotAccess
+    from daq.owner.messages import Finished
+    from daq_cli.robot.operations import RobotAccess
 
 
 @dataclass(frozen=True)
@@ -92,12 +91,12 @@ def _schedule(robot: RobotAccess, spec: ExperimentSpec, cron: str, *, as_json: b
 def acquire_complete(
     robot: RobotAccess, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt
 ) -> Finished:
-    """Runs `spec` for a use that needs the whole record. Raises AcquisitionFailedError for an incomplete one, too."""
+    """Runs `spec` for a use that needs the whole record. Raises OrderFailedError for an incomplete one, too."""
     finished = robot.acquire(spec, machine, folder, consent)
     if finished.outcome != "complete":
         why = f"{finished.outcome}: {finished.reason}" if finished.reason else finished.outcome
         code = exit_codes.OF_OUTCOME[finished.outcome]
-        raise AcquisitionFailedError(f"{why}; the run is not complete, so its trace is not used", code)
+        raise OrderFailedError(f"{why}; the run is not complete, so its trace is not used", code)
     return finished
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 
-from daq.acquisition.stop_socket import StopAnswer
 from daq.contracts.errors import DaqError
+from daq.owner.stop_socket import StopAnswer
 from daq_cli.app.context import Invocation
 
 
@@ -24,7 +24,7 @@ def stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:
     left = [(name, url) for name, url in ports if not url.startswith("mock://") and _device(url) not in asked]
     if not left:
         return []
-    from daq.acquisition.port_stop import stop_at_port
+    from daq.owner.port_stop import stop_at_port
 
     with ThreadPoolExecutor(len(left)) as pool:  # a line that does not answer delays no other arm's stop
         return list(pool.map(lambda one: stop_at_port(*one), left))

@@ -1,32 +1,92 @@
-"""Teaching at this computer's port, which this process holds meanwhile: jogging, programs, leading by hand."""
+"""Teaching at this computer's port, by an owner of its own: jogging, programs, leading by hand."""
 
 from __future__ import annotations
 
 import select
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from concurrent.futures import Future
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 
-from daq.contracts.errors import SafetyError, SpecError
-from daq.contracts.limp import GAINS_UNKNOWN, require_drive
+from daq.config.robot_files import load_memory_map
+from daq.contracts.limp import GAINS_UNKNOWN
+from daq.contracts.machine import Machine
+from daq.owner.client import OwnerOnDemand, done
+from daq.owner.messages import (
+    Answer,
+    Finish,
+    JogBegin,
+    JogDrive,
+    LeadBegin,
+    LiveSample,
+    MoveGripper,
+    Report,
+    RunProgram,
+    TeachingText,
+)
+from daq.teaching.program import Program
+from daq.teaching.recording import RecordedPath
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, console
 from daq_cli.app.keyboard import open_keyboard
-from daq_cli.robot.pendant import HELP, Pendant, StatusLine, announce_lead
+from daq_cli.robot.own_owner import owned
+from daq_cli.robot.pendant import Pendant, StatusLine, announce_lead, drive_with_keys
 
-if TYPE_CHECKING:
-    from daq.acquisition.owned import OwnedRobot
-    from daq.contracts.machine import Machine
-    from daq.contracts.sample import SampleRow
-    from daq.teaching.controller_arm import ControllerArm
-    from daq.teaching.jog import JogCommand
-    from daq.teaching.program import Program
-    from daq.teaching.program_plan import PlannedInstruction
-    from daq.teaching.recording import RecordedPath
+LOOK_EVERY = 0.1
+"""Time (s) between two looks whether a lead is to end."""
 
-Made = TypeVar("Made")
+
+@dataclass
+class _Seen:
+    """The lines and samples that an owner has reported. tell: prints a line"""
+
+    tell: Callable[[str], object]
+    first: LiveSample | None = None
+    newest: LiveSample | None = None
+
+    def hear(self, report: Report) -> None:
+        """Takes a report."""
+        if isinstance(report, TeachingText):
+            self.tell(report.text)
+        elif isinstance(report, LiveSample):
+            self.first, self.newest = self.first or report, report
+
+    @property
+    def periods(self) -> int:
+        """Control periods from the first sample to the newest."""
+        return 0 if self.first is None or self.newest is None else self.newest.tick - self.first.tick
+
+
+@dataclass
+class _Driven:
+    """`Driven` by an owner that jogs."""
+
+    owner: OwnerOnDemand
+    jogging: Future[Answer]
+    line: StatusLine
+    seen: _Seen = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.seen = _Seen(self.line.tell)
+
+    def jog(self, velocities: Mapping[int, float]) -> None:
+        self.owner.tell(JogDrive(velocities=dict(velocities), said=time.monotonic()))
+
+    def set_gripper(self, *, closed: bool) -> None:
+        answer = self.owner.answer_to(self.owner.begin(MoveGripper, closed=closed), self.seen.hear)
+        if answer.problem:
+            self.line.tell(answer.problem)
+
+    def set_points(self) -> Mapping[int, float] | None:
+        newest = self.seen.newest
+        return None if newest is None else dict(zip(newest.joints, newest.set_point, strict=True))
+
+    def wait(self, seconds: float) -> None:
+        self.owner.hear(self.seen.hear, seconds)
+        if self.jogging.done():
+            done(self.owner.answer_to(self.jogging, self.seen.hear))
 
 
 @dataclass(frozen=True)
@@ -39,92 +99,43 @@ class LocalTeaching:
 
     def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
         """Drives until the pendant has ended."""
-        from daq.teaching.jog import jog as jog_arm
-
-        with open_keyboard() as keyboard, self.owned(self._arm) as (robot, arm):
-            line.tell(HELP)
-
-            def commands(row: SampleRow) -> JogCommand | None:
-                command = pendant.command(keyboard.pressed(), robot.controller.clock.now())
-                if pendant.gripper is not None and robot.end_cause() is None:
-                    robot.controller.set_gripper(closed=pendant.gripper)
-                    pendant.gripper = None
-                if pendant.keep:
-                    pendant.keep = False
-                    keep(dict(zip(arm.joints, row.set_point, strict=True)))
-                line.show(pendant)
-                return command
-
-            jog_arm(arm, self.machine, self.machine.limits, commands, lambda: pendant.ended, line.tell)
+        with open_keyboard() as keyboard, self._owned() as owner:
+            jogging = owner.begin(JogBegin)
+            drive_with_keys(_Driven(owner, jogging, line), keyboard, pendant, keep, line)
+            owner.tell(Finish())
+            done(owner.answer_to(jogging))
 
     def perform(self, program: Program) -> str:
-        """Plans and checks the program from the arm's present posture first. Raises SafetyError."""
-        from daq.teaching.performer import FollowingPerformer
-        from daq.teaching.program_plan import check_program, plan_program, run_program
-
-        machine = self.machine
-
-        def checked(robot: OwnedRobot) -> list[PlannedInstruction]:
-            here = self._arm(robot).next_sample()
-            planned = plan_program(program, machine, here.set_point)
-            against = check_program(planned, machine, machine.limits)
-            if against:
-                raise SafetyError(f"program refused: {against[0]}; nothing moved")
-            return planned
-
-        with self.owned(checked) as (robot, planned):
-            tell = console().print
-            performer = FollowingPerformer(
-                robot.controller, robot.control, machine, machine.limits, robot.end_cause, tell
-            )
-            run_program(planned, machine, performer, tell)
-            performer.finish()
-        return f"done: {len(planned)} instructions"
+        """Has the program planned and checked from the arm's present posture, and carried out."""
+        with self._owned() as owner:
+            performing = owner.begin(RunProgram, program=program.model_dump(mode="json"))
+            return str(done(owner.answer_to(performing, _Seen(console().print).hear)).data["text"])
 
     def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
-        """Records until `seconds` are over, or Enter is pressed."""
-        from daq.teaching.lead import lead_by_nose
-
-        with self.owned(self._arm) as (robot, arm):
-            begun = robot.controller.clock.now()
-
-            def ended() -> bool:
-                if seconds is not None:
-                    return robot.controller.clock.now() - begun >= seconds
-                return bool(select.select([sys.stdin], [], [], 0)[0])
-
-            announce_lead(seconds)
-            lead_by_nose(arm, self.machine, self.machine.limits, tuple(joints), ended, keep)
+        """Records until `seconds` of the arm's time are over, or Enter is pressed."""
+        with self._owned() as owner:
+            seen, leading = _Seen(console().print), owner.begin(LeadBegin, joints=tuple(joints))
+            while seen.first is None and not leading.done():
+                owner.hear(seen.hear, LOOK_EVERY)
+            if not leading.done():
+                announce_lead(seconds)
+            while not leading.done():
+                if (
+                    bool(select.select([sys.stdin], [], [], 0)[0])
+                    if seconds is None
+                    else seen.periods * owner.identity.period >= seconds
+                ):
+                    owner.tell(Finish())
+                    break
+                owner.hear(seen.hear, LOOK_EVERY)
+            answer = owner.answer_to(leading, seen.hear)
+            if "path" in answer.data:
+                keep(RecordedPath.model_validate(answer.data["path"]))
+            done(answer)
 
     @contextmanager
-    def owned(self, prepare: Callable[[OwnedRobot], Made]) -> Iterator[tuple[OwnedRobot, Made]]:
-        """The robot, whose port this process owns. If a real arm needs consent and a person can be asked, it asks.
-
-        `prepare` makes checks before anything moves; if it refuses, set points and gains stay as they were.
-        """
-        from daq.acquisition.owned import owned_robot
-        from daq.config.robot_files import load_memory_map
-        from daq.runner.preparation import Consent, MissingConsentError
-
-        robot, memory_map = self.call.settings.robot.name, load_memory_map(self.call.settings.robot.memory_map)
-        with ExitStack() as held:
-
-            def hold(moves_real_arm: bool) -> OwnedRobot:
-                return held.enter_context(owned_robot(robot, self.call.port, memory_map, Consent(moves_real_arm)))
-
-            owned = self.consent.for_gains_of(memory_map).attempt(self.call.port, hold, MissingConsentError)
-            try:
-                gains = owned.controller.gains()
-                require_drive(gains)
-                if not gains:
-                    console().print(GAINS_UNKNOWN)
-                prepared = prepare(owned)
-            except (SafetyError, SpecError):
-                held.close()  # without the error, which would freeze the arm
-                raise
-            yield owned, prepared
-
-    def _arm(self, robot: OwnedRobot) -> ControllerArm:
-        from daq.teaching.controller_arm import ControllerArm
-
-        return ControllerArm(robot.controller, robot.control, self.machine, robot.end_cause)
+    def _owned(self) -> Iterator[OwnerOnDemand]:
+        with owned(self.call, self.machine, self.consent, moves=True, live=True) as owner:
+            if not load_memory_map(self.call.settings.robot.memory_map).has_gains:
+                console().print(GAINS_UNKNOWN)
+            yield owner

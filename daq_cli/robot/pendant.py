@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
@@ -12,13 +13,15 @@ from daq.contracts.joint_text import slides, speed_text
 from daq.contracts.machine import Machine
 from daq.teaching.jog import JOG_SPEED, SLIDE_JOG_SPEED, JogCommand, top_speed
 from daq_cli.app.context import console
-from daq_cli.app.keyboard import LEFT, RIGHT
+from daq_cli.app.keyboard import LEFT, RIGHT, Keyboard
 
 if TYPE_CHECKING:
     from daq.teaching.program import Program
     from daq.teaching.recording import RecordedPath
 
 HELP = "1-6 joint   ← → drive while held   + - speed   o c gripper   p keep this posture   q end   Ctrl-C stop"
+KEYS_EVERY = 0.05
+"""Time (s) between two reads of the keyboard."""
 FASTER, SLOWER = 1.25, 0.8
 
 
@@ -104,6 +107,42 @@ class StatusLine:
 def announce_lead(seconds: float | None) -> None:
     """Says that the arm may be led now, and until when."""
     console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
+
+
+class Driven(Protocol):
+    """An arm that keys drive."""
+
+    def jog(self, velocities: Mapping[int, float]) -> None:
+        """Drives joints (rad/s, m/s) for a moment."""
+
+    def set_gripper(self, *, closed: bool) -> None:
+        """Closes or opens the gripper."""
+
+    def set_points(self) -> Mapping[int, float] | None:
+        """Those of the newest sample (rad, m); None where there is none."""
+
+    def wait(self, seconds: float) -> None:
+        """Waits. Raises a DaqError when the arm is no longer driven, such as after a stop."""
+
+
+def drive_with_keys(
+    arm: Driven, keyboard: Keyboard, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine
+) -> None:
+    """Drives an arm until the pendant has ended. Each press drives for a moment, so that the arm holds after it."""
+    line.tell(HELP)
+    while not pendant.ended:
+        now = time.monotonic()
+        command = pendant.command(keyboard.pressed(), now)
+        if command is not None and command.time == now:  # only a new command is sent, not an older one again
+            arm.jog(command.velocities)
+        if pendant.gripper is not None:
+            arm.set_gripper(closed=pendant.gripper)
+            pendant.gripper = None
+        if pendant.keep and (here := arm.set_points()) is not None:
+            pendant.keep = False
+            keep(here)
+        line.show(pendant)
+        arm.wait(KEYS_EVERY)
 
 
 class Teaching(Protocol):

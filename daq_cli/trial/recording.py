@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from daq.acquisition.messages import Finished, Job
-from daq.acquisition.parent import Acquisition
+from daq.contracts.errors import OrderFailedError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine
+from daq.owner.client import OwnerOnDemand
+from daq.owner.messages import Open
 from daq_cli.trial.mock_side import TrialStageError
 
 
@@ -34,20 +35,18 @@ def record(seed: int, run: str, spec: ExperimentSpec, machine: Machine, folder: 
     """
     noise = int(sha256(f"noise {seed} {run}".encode()).hexdigest()[:7], 16)
     with tempfile.TemporaryDirectory(prefix="trial-") as place:
-        job = Job(
+        opening = Open(
             url=f"mock://?lock_step=1&secret={seed}&seed={noise}",
             machine=machine,
             limits=machine.limits,
-            spec=spec,
             folder=Path(place),
             robot=f"trial-{secrets.token_hex(4)}",  # its stop socket: runs go on beside each other
         )
-        finished = None
-        with Acquisition(job) as process:
-            for report in process:
-                finished = report
-        if not isinstance(finished, Finished):
-            raise TrialStageError(f"nothing was recorded: {getattr(finished, 'message', 'no report')}")
+        try:
+            with OwnerOnDemand(opening) as owner:
+                finished = owner.run(spec)
+        except OrderFailedError as error:
+            raise TrialStageError(f"nothing was recorded: {error}") from error
         kept = folder / f"{secrets.token_hex(6)}.mcap"
         shutil.move(finished.trace, kept)
     period = machine.controller.period.value if machine.controller.kind != "none" else 0.0

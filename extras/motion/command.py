@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from daq.contracts.experiment import ExperimentSpec, Feedforward, TrackingError
     from daq.contracts.machine import Machine
     from daq.contracts.trace import Trace
-    from daq_cli.robot.access import RobotAccess
+    from daq_cli.robot.operations import RobotAccess
 
 app = typer.Typer(add_completion=False, help="Follow a motion closely.", no_args_is_help=True)
 

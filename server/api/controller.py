@@ -8,8 +8,8 @@ from fastapi import Path
 
 from daq.contracts.errors import SpecError
 from daq.contracts.service.robot import GripperRequest, JointGains, OutputRequest, ProcessState
+from daq.owner.messages import Answer, MoveGripper, ReadGains, ReadProcess, WriteGains, WriteOutput
 from server.api.dependencies import Arrived, LeaseHeader, Operator, RobotDep, Viewer
-from server.owner.messages import Answer, MoveGripper, ReadGains, ReadProcess, WriteGains, WriteOutput
 from server.problems import PROBLEMS
 from server.robot.orders import answer_of
 from server.routes import Router

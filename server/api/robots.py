@@ -6,6 +6,7 @@ from daq.contracts.machine import Machine
 from daq.contracts.service.base import Page
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.robot import Done, ResetRequest, RobotStatus, RobotSummary, StopResult
+from daq.owner.messages import Reset
 from server.api.dependencies import (
     Arrived,
     CursorOf,
@@ -17,7 +18,6 @@ from server.api.dependencies import (
     Robots,
     Viewer,
 )
-from server.owner.messages import Reset
 from server.problems import PROBLEMS
 from server.robot.orders import answer_of
 from server.routes import Router

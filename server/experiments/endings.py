@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from daq.contracts import exit_codes
 from daq.contracts.labels import Outcome
+from daq.owner.messages import Answer
 from server.experiments.states import Event
-from server.owner.messages import Answer
 
 _OF_OUTCOME: dict[Outcome, Event] = {
     "complete": Event.COMPLETED,

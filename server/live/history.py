@@ -9,7 +9,7 @@ import numpy as np
 
 from daq.contracts.service.live import HistoryMessage, RecordEventMessage
 from daq.contracts.trace import Floats
-from server.owner.messages import LiveSample
+from daq.owner.messages import LiveSample
 
 SIGNALS = ("set_point", "position", "error", "drive")
 DIGITS = 5

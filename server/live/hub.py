@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 
 from pydantic import BaseModel
 
-from daq.acquisition.messages import EventHappened, Progress
 from daq.contracts.service.live import (
     LinkMessage,
     ProgressMessage,
@@ -22,11 +21,11 @@ from daq.contracts.service.live import (
     Topic,
 )
 from daq.contracts.service.robot import RobotStatus
+from daq.owner.messages import ArmReport, EventHappened, LiveSample, Opened, Progress, Report, TeachingText
 from firmware_protocol.codes import StatusFlag
 from server.clock import Clock
 from server.live.history import DIGITS, History
 from server.live.outbox import Outbox
-from server.owner.messages import ArmReport, LiveSample, Opened, Report, TeachingText
 
 LOOK_EVERY = 1.0
 """Longest time (s) between two reads of the status, when nothing has announced a change."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from daq.contracts.service.experiments import ExperimentState, Reviewer
+from daq.owner.messages import Answer
 from server.clock import Clock
-from server.owner.messages import Answer
 from server.robot.control import ControlService
 from server.robot.robot import Robot
 from server.store.experiments import ExperimentStore

@@ -11,7 +11,7 @@ import math
 import threading
 from collections.abc import Callable
 
-from server.owner.messages import ArmReport
+from daq.owner.messages import ArmReport
 from server.queue.readiness import why_paused
 
 LOOK_FIRST = "look at the arm, then resume the queue"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from daq.contracts.consent import lacks_consent
 from daq.contracts.service.experiments import Reviewer
 from daq.contracts.service.robot import RobotIdentity
-from server.owner.messages import ArmReport
+from daq.owner.messages import ArmReport
 
 
 @dataclass(frozen=True)

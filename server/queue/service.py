@@ -9,17 +9,16 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
-from daq.acquisition.messages import EventHappened, Progress
 from daq.contracts.consent import lacks_consent
 from daq.contracts.errors import DaqError
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState, Schedule
 from daq.contracts.service.queue import QueueStatus
+from daq.owner.messages import Answer, ArmReport, EventHappened, HaltRun, Opened, Progress, Report, RunExperiment
 from server.database_errors import is_locked
 from server.experiments.endings import Ending, ending_of
 from server.experiments.order import next_due
 from server.experiments.review import Given, Review
 from server.experiments.states import Event, IllegalEventError, advance
-from server.owner.messages import Answer, ArmReport, HaltRun, Opened, Report, RunExperiment
 from server.problems import ProblemError, conflict
 from server.queue.attendance import Attendance
 from server.queue.context import QueueContext

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from daq.contracts.errors import ReachError
-from server.owner.messages import Answer
+from daq.owner.messages import Answer
 from server.problems import ProblemError, conflict, of_exit_code
 from server.robot.robot import ANSWER_WITHIN, Robot
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
@@ -10,11 +11,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from daq.acquisition.messages import EventHappened, Progress
-from daq.acquisition.stop_socket import StopAnswer
 from daq.contracts.errors import ReachError
 from daq.contracts.machine import Machine
 from daq.contracts.service.robot import ConnectionState, RobotIdentity
+from daq.owner.client import OwnerProcess
+from daq.owner.messages import (
+    Answer,
+    ArmReport,
+    CannotOpen,
+    EventHappened,
+    LiveSample,
+    Open,
+    Opened,
+    Order,
+    Progress,
+    Report,
+    TeachingText,
+)
+from daq.owner.stop_socket import StopAnswer
 from daq.transport import (
     PortBusyError,
     SerialPort,
@@ -25,18 +39,6 @@ from daq.transport import (
     terminal_at,
 )
 from server.clock import Clock
-from server.owner.messages import (
-    Answer,
-    ArmReport,
-    CannotOpen,
-    LiveSample,
-    Open,
-    Opened,
-    Order,
-    Report,
-    TeachingText,
-)
-from server.robot.owner_process import OwnerProcess
 from server.stopping.arm import Reach
 
 OPEN_WITHIN = 60.0
@@ -45,8 +47,13 @@ ANSWER_WITHIN = 5.0
 """Time (s) to wait for the answer to an order that moves nothing."""
 ORDERS_AT_ONCE = 8
 """Number of quick orders that may wait for answers, so that a silent robot blocks no more of the service's threads."""
+PROGRAM = (sys.executable, "-m", "server.owner")
 log = logging.getLogger("server.robot")
 T = TypeVar("T")
+
+
+def _start_owner(opening: Open, report: Callable[[Report], None], ended: Callable[[str], None]) -> OwnerProcess:
+    return OwnerProcess(opening, report, ended, PROGRAM)
 
 
 @dataclass(frozen=True)
@@ -75,7 +82,7 @@ class Robot:
     """
 
     def __init__(
-        self, place: RobotPlace, clock: Clock, start_owner: Callable[..., OwnerProcess] = OwnerProcess
+        self, place: RobotPlace, clock: Clock, start_owner: Callable[..., OwnerProcess] = _start_owner
     ) -> None:
         self.place = place
         self.clock = clock
@@ -224,6 +231,8 @@ class Robot:
             folder=place.folder,
             robot=place.name,
             memory_map=place.memory_map,
+            watched=True,
+            live=True,
         )
         try:
             self._owner = self._start_owner(opening, self._on_report, self._on_end)
@@ -248,14 +257,7 @@ class Robot:
         _notify_each(self.listeners, report)
 
     def _set_opened(self, report: Opened) -> None:
-        identity = RobotIdentity(
-            simulated=report.simulated,
-            protocol=report.protocol,
-            period=report.period,
-            boots=report.boots,
-            samples=report.samples,
-            compact=report.compact,
-        )
+        identity = report.identity
         port = parse_port_url(self.place.url)
         with self._lock:
             self._identity = identity

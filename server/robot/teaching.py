@@ -14,10 +14,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.joint_text import speed_unit
 from daq.contracts.service.robot import Activity
 from daq.contracts.service.teaching import TaughtPath, TeachingLine, TeachingStatus
-from daq.teaching.jog import DEAD_MAN, top_speed
-from daq.teaching.lead import PATIENCE
-from daq.teaching.program import Program
-from server.owner.messages import (
+from daq.owner.messages import (
     Answer,
     Finish,
     HaltRun,
@@ -28,6 +25,9 @@ from server.owner.messages import (
     RunProgram,
     TeachingText,
 )
+from daq.teaching.jog import DEAD_MAN, top_speed
+from daq.teaching.lead import PATIENCE
+from daq.teaching.program import Program
 from server.problems import ProblemError, conflict
 from server.robot.robot import ANSWER_WITHIN, Robot
 
@@ -93,7 +93,7 @@ class TeachingService:
     def perform(self, word: Word, program: Program, activity: Literal["program", "step"] = "program") -> None:
         """Begins a taught program. Raises a 409 while something else is taught, or without control."""
         with self._changed:
-            self._begin(word, activity, RunProgram, program=program, activity=activity)
+            self._begin(word, activity, RunProgram, program=program.model_dump(mode="json"), activity=activity)
 
     def lead(self, word: Word, joints: tuple[int, ...]) -> None:
         """Begins leading by hand. Raises a 409 while something else is taught, or without control."""

@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from daq.acquisition.port_stop import stop_at_port
-from daq.acquisition.stop_socket import StopAnswer, request_stop
 from daq.contracts.service.robot import FleetStopResult, StopResult
+from daq.owner.port_stop import stop_at_port
+from daq.owner.stop_socket import StopAnswer, request_stop
 from daq.transport import SerialPort, Terminal, TransportError, parse_port_url, require_same
 
 SILENT = "the process that owns the port did not answer"

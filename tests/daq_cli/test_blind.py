@@ -319,7 +319,7 @@ def test_hashes_prints_the_tables_of_a_registration(daq: CommandLine) -> None:
 STAGE_MODULES = (
     "daq_cli.trial",
     "daq_cli.commands.blind",
-    "daq.acquisition",
+    "daq.owner",
     "server.jobs.next_experiment",
     "mock_controller",
 )

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from daq.acquisition.messages import Finished
 from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
+from daq.owner.messages import Finished
 from daq_cli.robot.local import LocalRobot
 from tests.daq.traces.samples import record, write
 from tests.daq_cli.invoke import CommandLine

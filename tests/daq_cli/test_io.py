@@ -1,12 +1,10 @@
 """`daq io`: outputs and gripper of a real arm need the operator's word, stay as they are after a stop, and are told."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 
-from daq.acquisition.port_stop import stop_at_port
-from daq.driver import Controller
+from daq.owner.port_stop import stop_at_port
 from daq.transport.mock_process import MockProcess
 from tests.daq_cli.board import ask
 from tests.daq_cli.invoke import CommandLine
@@ -54,24 +52,10 @@ def test_a_real_arm_is_switched_when_a_person_agrees(
 def test_a_stop_gets_through_while_a_person_is_asked_and_nothing_is_switched_then(
     daq: CommandLine, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], _told: str
 ) -> None:
-    held: list[str] = []
-    connect, close = Controller.connect, Controller.close
-
-    def opened(url: str, *more: Any) -> Controller:
-        held.append(url)
-        return connect(url, *more)
-
-    def closed(controller: Controller) -> None:
-        close(controller)
-        held.pop()
-
     def stopped_meanwhile(_question: str) -> bool:
-        assert held == [], "whoever thinks holds no port"
-        assert stop_at_port("arm", port).confirmed
+        assert stop_at_port("arm", port).confirmed, "whoever thinks holds no port"
         return True
 
-    monkeypatch.setattr(Controller, "connect", opened)
-    monkeypatch.setattr(Controller, "close", closed)
     asked_operator(monkeypatch, stopped_meanwhile)
     daq("--port", port, "io", *words).complains(4, "the arm has been stopped", "nothing was switched")
     assert daq("--port", port, "io", "show").out.endswith(UNTOUCHED)

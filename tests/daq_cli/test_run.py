@@ -51,9 +51,9 @@ def test_a_run_is_recorded_and_printed_for_people(daq: CommandLine, port: str) -
 
 
 def test_late_set_points_are_told_once(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    from daq.acquisition.messages import Finished
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line
+    from daq.owner.messages import Finished
     from daq_cli.robot.experiment import print_result
     from daq_cli.robot.run_display import run_display
     from tests.daq.traces.samples import write

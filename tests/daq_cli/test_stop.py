@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 import serial
 
-from daq.acquisition.stop_socket import StopAnswer, StopSocket, stop_listener
 from daq.driver import Controller
+from daq.owner.stop_socket import StopAnswer, StopSocket, stop_listener
 from daq.transport.mock_process import MockProcess
 from tests.daq_cli.board import ask
 from tests.daq_cli.invoke import CommandLine

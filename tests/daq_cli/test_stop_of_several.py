@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from daq.acquisition.stop_socket import StopAnswer
+from daq.owner.stop_socket import StopAnswer
 from tests.daq_cli.invoke import CommandLine
 
 TWO = "".join(f'[robots.{name}]\nport = "tcp://127.0.0.1:{port}"\n' for name, port in (("left", 1), ("right", 2)))
@@ -22,7 +22,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str]]:
         found.append((robot, url))
         return StopAnswer(robot=robot, port=url, delivered=True, confirmed=True, tick=7)
 
-    monkeypatch.setattr("daq.acquisition.port_stop.stop_at_port", stop)
+    monkeypatch.setattr("daq.owner.port_stop.stop_at_port", stop)
     return found
 
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from daq.acquisition.port_stop import stop_at_port
 from daq.driver import Controller
+from daq.owner.port_stop import stop_at_port
 from daq.transport import MockPort, parse_port_url
 from daq.transport.mock_process import MockProcess, start_mock
 from tests.daq_cli.board import ask, held

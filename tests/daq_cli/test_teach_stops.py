@@ -92,7 +92,7 @@ def test_a_stopped_lead_keeps_the_path_and_says_which_joints_are_limp(
     assert len(RecordedPath.model_validate_json(Path("path.json").read_text()).times) >= 2
     assert "JOINTS 2, 3 ARE LIMP" in status.out
     assert jog.code == 4
-    assert "JOINTS 2, 3 ARE LIMP" in reset.err
+    assert "JOINTS 2, 3 ARE LIMP" in reset.out
     assert "holds its posture" not in reset.out
     assert stiff.code == 0, stiff.err
 

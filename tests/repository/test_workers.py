@@ -86,7 +86,6 @@ def test_after():
 
 WAITING = """
 import os, sys, threading
-from pathlib import Path
 import pytest
 
 @pytest.fixture

@@ -14,10 +14,10 @@ import httpx
 import pytest
 import uvicorn
 
-from daq.acquisition.stop_socket import FOLDER_VARIABLE
 from daq.config.section import Section
 from daq.config.service import ServiceSettings
 from daq.config.settings import RobotSettings, TraceSettings, settings_type
+from daq.owner.stop_socket import FOLDER_VARIABLE
 from server.access.gate import Gate
 from server.access.tokens import KnownTokens
 from server.app import make_app

@@ -19,26 +19,26 @@ from typing import Any, ClassVar, cast
 
 import greenlet
 
-from daq.acquisition.freezer import Freezer
-from daq.acquisition.guardian import EndCause, Guardian
-from daq.acquisition.speaker import Speaker
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.contracts.service.robot import RobotIdentity, StopResult
 from daq.driver import Controller
 from daq.driver.set_point_watch import SetPointWatch
 from daq.link import LinkState, RequestRefusedError, StopCameFirstError
+from daq.owner import long_orders
+from daq.owner.freezer import Freezer
+from daq.owner.guardian import EndCause, Guardian
+from daq.owner.inbox import Inbox
+from daq.owner.messages import Answer, ArmReport, Finished, Open, RunExperiment
+from daq.owner.owned_robot import OwnedRobot
+from daq.owner.speaker import Speaker
+from daq.owner.watched_controller import WatchedController
 from daq.runner.arm_control import ArmControl
 from daq.runner.preparation import require_not_stopped
 from daq.teaching.controller_arm import ControllerArm
 from firmware_protocol import commands as c
 from server.experiments.order import Waiting
 from server.experiments.review import Review
-from server.owner import long_orders
-from server.owner.inbox import Inbox
-from server.owner.messages import Answer, ArmReport, Finished, RunExperiment
-from server.owner.owned_robot import OwnedRobot
-from server.owner.watched_controller import WatchedController
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
 from server.robot.control import ControlService
@@ -384,6 +384,14 @@ class Scene:
 
     # ---- what is made
 
+    def owned_on_demand(self) -> OwnedRobot:
+        """The robot of an owner that a command has started: it has heard of no stop yet."""
+        opening = Open(url="wire", machine=MACHINE, limits=MACHINE.limits, folder=Path())
+        control = ArmControl(self.controller)
+        guardian = Guardian(cast(Any, SimpleNamespace(problem="")), None, lambda _cause: control.stop("a stop"))  # type: ignore[arg-type, return-value]
+        guardian._thread = cast(Any, SimpleNamespace(is_alive=lambda: True))
+        return OwnedRobot(opening, self.controller, control, guardian, self.inbox, cast(Any, None))
+
     def _make_owner(self) -> None:
         self.control = ArmControl(self.controller)
         freezer = Freezer("arm", "wire")
@@ -393,10 +401,9 @@ class Scene:
         self.guardian._thread = cast(Any, SimpleNamespace(is_alive=lambda: True))
         self.inbox = InboxHere(self.world, self._spawn_cancel)
         self.owned = OwnedRobot(
-            "arm",
-            MACHINE,
-            MACHINE.limits,
-            Path(),
+            Open(
+                url="wire", machine=MACHINE, limits=MACHINE.limits, folder=Path(), robot="arm", watched=True, live=True
+            ),
             self.controller,
             self.control,
             self.guardian,
@@ -409,7 +416,7 @@ class Scene:
         self.world.spawn(f"cancel {len(self.world.actors)}", lambda: self._end(EndCause.CANCELLED))
 
     def _own(self) -> None:
-        from server.owner.owner import serve
+        from daq.owner.loop import serve
 
         serve(self.owned)
 
@@ -451,6 +458,7 @@ class Scene:
             hub=None,
             jobs=None,
             models=None,
+            events=SimpleNamespace(record=lambda *_, **__: None),
             unattended=True,
             jogged=None,
         )

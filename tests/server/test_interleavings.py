@@ -1,24 +1,24 @@
 """No order of what people, queue, owner and board do moves the arm after a confirmed stop that nobody has released."""
 
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import greenlet
 import pytest
 
-from daq.acquisition import guardian
 from daq.contracts.errors import DaqError
 from daq.contracts.service.queue import ControlRequest, QueueResume
 from daq.contracts.service.robot import GripperRequest, ResetRequest
 from daq.contracts.service.teaching import JogRequest, StepRequest
-from daq_cli.robot.local import LocalRobot
+from daq.owner import guardian, long_orders, loop, owned_robot, quick_orders
+from daq.owner.messages import Reset
+from daq.owner.quick_orders import carry_out
 from server.access.caller import LOCAL
 from server.api import controller, robots, teaching
 from server.api import queue as queue_routes
-from server.owner import long_orders, owned_robot, owner, quick_orders
 from server.problems import ProblemError
 from server.queue.service import Review
 from server.robot import control
@@ -26,19 +26,18 @@ from tests.server.interleaved import RULE, Actor, Scene, World, moved
 
 SOON, ALL = 300, 2500
 """Seeds of each scene: in every run of the tests, and in the slow one."""
-SERVICES: Any = SimpleNamespace(record_event=lambda *_, **__: None)
 
 
 @pytest.fixture(autouse=True)
 def virtual(monkeypatch: pytest.MonkeyPatch) -> None:
     """Time passes by the world's clock, and no thread is made."""
-    for module in (guardian, long_orders, owned_robot, owner, quick_orders):
+    for module in (guardian, long_orders, owned_robot, loop, quick_orders):
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: World.present.now))
     no_thread = SimpleNamespace(start=lambda: None)
     monkeypatch.setattr(
         control, "threading", SimpleNamespace(Condition=threading.Condition, Thread=lambda **_: no_thread)
     )
-    monkeypatch.setattr(owner, "_moved", moved)
+    monkeypatch.setattr(loop, "_moved", moved)
     monkeypatch.setattr(Review, "of", lambda *_: RULE)
 
 
@@ -87,16 +86,16 @@ class People:
 
     def reset(self, *, here: bool = False, stop: int | None = None) -> None:
         request = ResetRequest(stop=self.seen() if stop is None else stop, here=here)
-        self.ask(lambda arrived: robots.reset_robot(request, self.rig, SERVICES, LOCAL, arrived, self.lease))
+        self.ask(lambda arrived: robots.reset_robot(request, self.rig, LOCAL, arrived, self.lease))
 
     # ---- what moves
 
     def take_control(self) -> None:
-        self.lease = queue_routes.take_control(ControlRequest(), self.rig, SERVICES, LOCAL).lease
+        self.lease = queue_routes.take_control(ControlRequest(), self.rig, LOCAL).lease
 
     def give_back(self) -> None:
         lease, self.lease = self.lease, None
-        queue_routes.give_control_back(self.rig, SERVICES, LOCAL, lease)
+        queue_routes.give_control_back(self.rig, LOCAL, lease)
 
     def jog(self) -> None:
         request = JogRequest(velocities={1: 0.1})
@@ -108,7 +107,7 @@ class People:
 
     def grip(self, *, while_stopped: bool = False) -> None:
         request = GripperRequest(closed=True, while_stopped=while_stopped)
-        self.ask(lambda arrived: controller.set_gripper(request, self.rig, SERVICES, LOCAL, arrived, self.lease))
+        self.ask(lambda arrived: controller.set_gripper(request, self.rig, LOCAL, arrived, self.lease))
 
     def resume(self) -> None:
         self.ask(lambda arrived: queue_routes.resume_queue(QueueResume(), self.rig, arrived, LOCAL))
@@ -162,21 +161,18 @@ def _moving(seed: int) -> Scene:
     return scene
 
 
-@contextmanager
-def at_the_port(scene: Scene) -> Iterator[Any]:
-    """The scene's controller, to commands."""
-    yield scene.controller
-
-
 def command_line(seed: int) -> Scene:
-    """Commands at the port itself, which others stop meanwhile: both resets, a run."""
+    """Commands at the port, one after the other, which others stop meanwhile: both resets, a run."""
     scene = Scene(seed, stopped=True)
     scene.inbox.closing.set()  # no service owns this port
-    people, local = People(scene), LocalRobot(cast(Any, None))
-    local._connected = lambda: at_the_port(scene)  # type: ignore[method-assign]
-    people.does("reset", lambda: local.reset(adopt_posture=False))
-    people.does("reset here", lambda: local.reset(adopt_posture=True))
-    people.does("another computer", scene.stop_elsewhere)
+    people = People(scene)
+
+    def reset(*, here: bool) -> None:
+        cast(Actor, greenlet.getcurrent()).named = None  # it acts on the stop that it sees
+        carry_out(scene.owned_on_demand(), Reset(number=0, asked=scene.world.clock.now, stop=None, here=here))
+
+    people.does("reset", *[lambda: reset(here=False), lambda: reset(here=True)] * 2)
+    people.does("another computer", scene.stop_elsewhere, scene.stop_elsewhere)
     people.does("run", lambda: scene.controller.set_points({1: 1}), lambda: scene.controller.set_points({1: 2}))
     return scene
 

@@ -66,7 +66,6 @@ def test_what_is_wrong_with_the_configuration_is_a_line_of_json() -> None:
 def test_a_log_that_cannot_be_written_does_not_end_the_program() -> None:
     program = """
 import os, sys
-from server import logs
 logs.begin()
 os.close(2)
 print("lost", file=sys.stderr)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,23 +12,23 @@ from typing import TYPE_CHECKING
 from daq.contracts.errors import SpecError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from daq_cli.robot.answers import ImportChoice, ImportedTrace, ResetDone, RobotState
+from daq_cli.robot.answers import ImportChoice, ImportedTrace, RobotState, headline
+from daq_cli.robot.operations import RobotAccess
 from daq_cli.robot.remote.connection import connected_status, controlled, remote_robot
 
 if TYPE_CHECKING:
-    from daq.acquisition.messages import Finished
-    from daq.acquisition.stop_socket import StopAnswer
-    from daq.client import Robot
-    from daq.contracts.experiment import ExperimentSpec, Gain
+    from daq.client import HeldControl, Robot
+    from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import Machine
-    from daq.contracts.service.robot import ProcessState, RobotStatus
+    from daq.owner.messages import Finished
+    from daq.owner.stop_socket import StopAnswer
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
     from daq_cli.robot.pendant import Teaching
 
 
 @dataclass
-class RemoteRobot:
+class RemoteRobot(RobotAccess):
     """`RobotAccess` through a service."""
 
     call: Invocation
@@ -52,39 +52,17 @@ class RemoteRobot:
         with remote_robot(self.call) as robot:
             found = robot.status()
             gains = robot.gains().gains if found.limp else {}
-        return RobotState(report_of(found, self.server), _headline(found), gains)
+        report = report_of(found, self.server)
+        return RobotState(report, headline(report), gains)
 
-    def gains(self) -> Mapping[int, Gain]:
-        """The gains that the service has read."""
-        with remote_robot(self.call) as robot:
-            return robot.gains().gains
+    def _asked(self) -> AbstractContextManager[Robot]:
+        return remote_robot(self.call)
 
-    def set_gains(
-        self, wanted: Mapping[int, Gain], consent: ConsentPrompt, written: Callable[[int, Gain], None]
-    ) -> str:
-        """Writes gains. The service refuses a joint off its set point."""
-        from daq.contracts.limp import limp_line
-
-        with controlled(self.call, consent) as (_, control):
-            found = control.set_gains(wanted).gains
-        for joint in wanted:
-            written(joint, found[joint])
-        return limp_line(found)
-
-    def process(self) -> ProcessState:
-        """The signals that the service reads now."""
-        with remote_robot(self.call) as robot:
-            return robot.process()
-
-    def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
+    @contextmanager
+    def _changed(self, consent: ConsentPrompt) -> Iterator[HeldControl]:
         """Takes the control of the robot for a moment."""
         with controlled(self.call, consent) as (_, control):
-            return control.set_output(output, on=on, while_stopped=while_stopped)
-
-    def set_gripper(self, *, closed: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
-        """Takes the control of the robot for a moment."""
-        with controlled(self.call, consent) as (_, control):
-            return control.set_gripper(closed=closed, while_stopped=while_stopped)
+            yield control
 
     def stop(self, reached: set[str]) -> list[StopAnswer]:
         """Stops the robots of the service."""
@@ -92,11 +70,6 @@ class RemoteRobot:
         from daq_cli.robot.remote.stop import stop_at_server
 
         return stop_at_server(self.call)
-
-    def reset(self, *, adopt_posture: bool) -> ResetDone:
-        """Has the service end the stop."""
-        with remote_robot(self.call) as robot:
-            return ResetDone(robot.reset(here=adopt_posture).text)
 
     def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
         """Queues the experiment at the service."""
@@ -171,13 +144,3 @@ def kept_program(robot: Robot, name: str) -> Program:
     if not is_program_name(name):
         raise SpecError(f"program {name!r}: there is no such file, and the service has no program of this name")
     return robot.programs.get(Program, name)[0]
-
-
-def _headline(found: RobotStatus) -> str:
-    if found.identity is None:
-        problem = f": {found.connection_problem}" if found.connection_problem else ""
-        return f"{found.robot}: {found.connection}{problem}"
-    kind = "mock" if found.identity.simulated else "REAL ARM"
-    tick = "" if found.sample is None else f", tick {found.sample.tick}, {found.sample.age * 1e3:.0f} ms old"
-    cause = f" ({found.cause})" if found.cause else ""
-    return f"{kind}{tick}, {found.arm}{cause}; {found.activity}; link {found.link.state}"

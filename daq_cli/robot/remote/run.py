@@ -7,22 +7,21 @@ from typing import TYPE_CHECKING
 
 from daq.client import Robot, ServiceNotReachedError
 from daq.contracts import exit_codes
-from daq.contracts.errors import SafetyError, TraceError
+from daq.contracts.errors import OrderFailedError, SafetyError, TraceError
 from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.live import EventMessage, LiveMessage, ProgressMessage, QueueMessage, RecordEventMessage
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.stop_keys import StopKeys
-from daq_cli.robot.answers import AcquisitionFailedError
 from daq_cli.robot.remote.companion import Companion
 from daq_cli.robot.remote.connection import connected_status, require_consent
 from daq_cli.robot.run_display import RunDisplay, run_display
 
 if TYPE_CHECKING:
-    from daq.acquisition.messages import Finished
     from daq.client import LiveStream
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.service.experiments import Experiment
     from daq.contracts.service.robot import RobotStatus
+    from daq.owner.messages import Finished
 
 EXIT_CODES = {
     "failed": exit_codes.REFUSED,
@@ -39,7 +38,7 @@ FAILED_POLLS = 5
 def acquire_remotely(robot: Robot, server: str, spec: ExperimentSpec, folder: Path, consent: ConsentPrompt) -> Finished:
     """Queues `spec`, follows it to its end, and downloads its trace into `folder`.
 
-    Ctrl-C cancels it, or stops the arm while it runs. Raises AcquisitionFailedError, and ServiceError if the service
+    Ctrl-C cancels it, or stops the arm while it runs. Raises OrderFailedError, and ServiceError if the service
     refuses.
     """
     status = connected_status(robot)
@@ -78,7 +77,7 @@ class _Follower:
         self._record_ended = False
 
     def follow(self, stream: LiveStream) -> Experiment:
-        """Waits for the end of the experiment. Raises AcquisitionFailedError when the service is lost meanwhile."""
+        """Waits for the end of the experiment. Raises OrderFailedError when the service is lost meanwhile."""
         ended: Experiment | None = None
         try:
             while ended is None:
@@ -105,7 +104,7 @@ class _Follower:
             except ServiceNotReachedError as error:
                 if attempt == FAILED_POLLS - 1:
                     line = f"{error}; experiment {self._experiment} and its trace stay at the service"
-                    raise AcquisitionFailedError(line, error.exit_code) from error
+                    raise OrderFailedError(line, error.exit_code) from error
         raise AssertionError("the last attempt returns or raises")
 
     def _look(self, wait: float) -> Experiment | None:
@@ -142,11 +141,11 @@ def _waiting(message: QueueMessage) -> str:
 
 
 def _finished(robot: Robot, ended: Experiment, folder: Path) -> Finished:
-    from daq.acquisition.messages import Finished
+    from daq.owner.messages import Finished
 
     if ended.outcome is None or ended.trace is None:
         line = f"experiment {ended.id} {ended.state}: {ended.reason or 'no reason is known'}"
-        raise AcquisitionFailedError(line, EXIT_CODES.get(ended.state, exit_codes.PROGRAM_FAULT))
+        raise OrderFailedError(line, EXIT_CODES.get(ended.state, exit_codes.PROGRAM_FAULT))
     details = robot.traces.get(ended.trace)
     try:
         folder.mkdir(parents=True, exist_ok=True)

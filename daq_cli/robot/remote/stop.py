@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import sys
 
-from daq.acquisition.stop_socket import StopAnswer
 from daq.client import Client
 from daq.client.stopping import NoSuchRobot
 from daq.contracts.errors import DaqError
 from daq.contracts.service.robot import FleetStopResult, StopResult
+from daq.owner.stop_socket import StopAnswer
 from daq_cli.app.context import Invocation
 from daq_cli.robot.remote.connection import TOKEN_VARIABLE
 

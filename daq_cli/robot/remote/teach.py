@@ -16,7 +16,7 @@ from daq.contracts.errors import DaqError, SafetyError
 from daq_cli.app.context import console
 from daq_cli.app.keyboard import open_keyboard
 from daq_cli.app.stop_keys import StopKeys, StopThread
-from daq_cli.robot.pendant import HELP, Pendant, StatusLine, announce_lead
+from daq_cli.robot.pendant import Pendant, StatusLine, announce_lead, drive_with_keys
 
 if TYPE_CHECKING:
     from daq.client import HeldControl, Robot
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 LOOK_EVERY = 0.1
 """Time (s) between two checks of the state of a program or a lead."""
-KEYS_EVERY = 0.05
-"""Time (s) between two reads of the keyboard."""
 
 
 class StoppedAtServerError(DaqError):
@@ -87,6 +85,29 @@ class Stopped(StopThread):
 
 
 @dataclass(frozen=True)
+class _Driven:
+    """`Driven` with control of a service's robot."""
+
+    robot: Robot
+    control: HeldControl
+    stopped: Stopped
+
+    def jog(self, velocities: Mapping[int, float]) -> None:
+        self.control.jog(velocities)
+
+    def set_gripper(self, *, closed: bool) -> None:
+        self.control.set_gripper(closed=closed)
+
+    def set_points(self) -> Mapping[int, float] | None:
+        sample = self.robot.status().sample
+        return None if sample is None else dict(zip(sample.joints, sample.set_point, strict=True))
+
+    def wait(self, seconds: float) -> None:
+        time.sleep(seconds)
+        self.stopped.raise_if_answered()
+
+
+@dataclass(frozen=True)
 class RemoteTeaching:
     """`Teaching` with control of a service's robot. Raises StoppedAtServerError after Ctrl-C."""
 
@@ -95,22 +116,7 @@ class RemoteTeaching:
     def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
         """Each press drives for 0.3 s at most, so that the arm holds when the connection is lost."""
         with open_keyboard() as keyboard, taught(self.held) as (robot, control, stopped):
-            line.tell(HELP)
-            while not pendant.ended:
-                stopped.raise_if_answered()
-                typed = keyboard.pressed()
-                now = time.monotonic()
-                command = pendant.command(typed, now)
-                if command is not None and command.time == now:  # only a new command is sent, not an older one again
-                    control.jog(command.velocities)
-                if pendant.gripper is not None:
-                    control.set_gripper(closed=pendant.gripper)
-                    pendant.gripper = None
-                if pendant.keep and (sample := robot.status().sample) is not None:
-                    pendant.keep = False
-                    keep(dict(zip(sample.joints, sample.set_point, strict=True)))
-                line.show(pendant)
-                time.sleep(KEYS_EVERY)
+            drive_with_keys(_Driven(robot, control, stopped), keyboard, pendant, keep, line)
             control.finish()
 
     def perform(self, program: Program) -> str:

@@ -12,10 +12,10 @@ from extras.commissioning.computing_delay import ComputingDelay, Effect, computi
 from firmware_protocol.commands import Block, ReadBlock
 
 if TYPE_CHECKING:
-    from daq.acquisition.owned import OwnedRobot
     from daq.contracts.machine import Machine
     from daq.driver import Controller
     from daq.teaching.controller_arm import ControllerArm
+    from extras.commissioning.command.held_arm import HeldArm
 
 STEP = 2
 """Posture units by which the set point is moved: half a degree of a major axis, and 8 counts of its error."""
@@ -38,15 +38,14 @@ def delay(bench: Bench) -> dict[str, Any]:
 
     A stop, Ctrl-C and every fault freeze the arm where it is; it returns to its posture only after the last set point.
     """
-    from daq_cli.robot.local_teaching import LocalTeaching
+    from extras.commissioning.command.held_arm import held_arm
     from extras.commissioning.command.machine_text import with_controller
 
     bench.configure()
     joint, period = bench.joints[0], 1e-3 * float(bench.record.steps["period"]["period_ms"])
     call, shown = bench.configured, []
     machine = call.settings.machine()
-    teaching = LocalTeaching(call, machine, bench.consent)
-    with teaching.owned(lambda robot: _checked(robot, machine, joint)) as (robot, (arm, there, away)):
+    with held_arm(call, bench.consent, lambda robot: _checked(robot, machine, joint)) as (robot, (arm, there, away)):
         watch = _Watch(robot.controller, arm, bench.memory_map()["error"].low[joint - 1], joint, period)
         with arm.driven():
             for k in range(TIMES):
@@ -72,7 +71,7 @@ class _Way(NamedTuple):
     away: int
 
 
-def _checked(robot: OwnedRobot, machine: Machine, joint: int) -> _Way:
+def _checked(robot: HeldArm, machine: Machine, joint: int) -> _Way:
     """Checks before anything moves: the machine file, the following errors, the limits. Raises SafetyError."""
     from daq.runner.preparation import require_allowed, require_still
     from daq.safety import check_move_to_start

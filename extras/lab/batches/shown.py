@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from daq_cli.app.context import console, print_json, printable
 from daq_cli.models.model_input import load_effects, read_model
-from daq_cli.robot.access import RobotAccess
+from daq_cli.robot.operations import RobotAccess
 
 if TYPE_CHECKING:
     from daq.traces.query import TraceQuery

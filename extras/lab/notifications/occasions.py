@@ -8,7 +8,7 @@ from datetime import datetime
 from daq.contracts.service.experiments import ExperimentState
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.notifications import Notification, NotificationKind
-from server.owner.messages import ArmReport, Report
+from daq.owner.messages import ArmReport, Report
 
 
 def kind_of_end(state: ExperimentState) -> NotificationKind:

@@ -15,13 +15,13 @@ from sqlalchemy.exc import SQLAlchemyError
 from daq.contracts.service.experiments import ENDS, ExperimentState
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.notifications import Notification, Topic
+from daq.owner.messages import Report
 from extras.lab.notifications.destinations import destinations_of
 from extras.lab.notifications.occasions import Faults, of_experiment, of_job, of_pause
 from extras.lab.notifications.outbox import Outbox
 from extras.lab.notifications.service import Notifier
 from extras.lab.notifications.settings import NotificationSettings
 from server.database_errors import DamagedError
-from server.owner.messages import Report
 from server.parts import Part
 from server.services import Services
 

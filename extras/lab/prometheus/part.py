@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from daq.contracts.service.jobs import Job
+from daq.owner.messages import Report
 from extras.lab.prometheus.counts import Counts
 from extras.lab.prometheus.state import StateMetrics
-from server.owner.messages import Report
 from server.parts import Part
 from server.services import Services
 

@@ -18,7 +18,6 @@ from tests.control_port import told_by
 OWNER = """
 import json, sys
 from daq.transport import parse_port_url
-from daq.transport.mock_process import start_mock
 mock = start_mock(parse_port_url("mock://?lock_step=1"))
 print(mock._process.pid, flush=True)
 sys.stdin.read()

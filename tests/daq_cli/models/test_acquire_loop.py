@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from daq.acquisition.messages import Finished
 from daq.contracts.errors import ReachError, SafetyError, SpecError, TraceError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
+from daq.owner.messages import Finished
 from daq.traces.reader import read_trace
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from daq.acquisition.stop_socket import request_stop
 from daq.contracts.errors import SafetyError
 from daq.contracts.machine import load_machine
+from daq.owner.stop_socket import request_stop
 from daq.runner.arm_control import StoppedError
 from daq.teaching.arm import TeachingError
 from daq.transport import MockPort, parse_port_url

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +14,6 @@ from tests.server.test_interleavings import (
     ALL,
     SOON,
     People,
-    at_the_port,
     checked,
     command_line,
     virtual,  # noqa: F401 - a fixture
@@ -30,7 +30,7 @@ def _commissioning(seed: int) -> Scene:
 
 @pytest.mark.parametrize("seeds", [SOON, pytest.param(ALL, marks=pytest.mark.slow)])
 def test_nothing_moves_after_a_confirmed_stop(seeds: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(by_command, "connected", lambda bench: at_the_port(bench.scene))
+    monkeypatch.setattr(by_command, "connected", lambda bench: nullcontext(bench.scene.controller))
     monkeypatch.setattr(by_command, "replace", lambda consent, **_: consent)
     interleavings, motions = checked(_commissioning, seeds)
     assert interleavings > 0.9 * seeds

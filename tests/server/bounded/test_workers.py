@@ -12,7 +12,6 @@ from server.jobs.yielding import NICENESS
 
 FOREVER = """
 import os, sys
-from server.jobs.service import worker_processes
 
 if __name__ == "__main__":
     workers = worker_processes(1)

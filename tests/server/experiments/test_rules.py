@@ -14,12 +14,12 @@ from daq.contracts.experiment import ExperimentSpec, Trajectory
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.robot import RobotIdentity
+from daq.owner.messages import ArmReport
 from daq.trajectories.planner import plan, start_angles
 from server.experiments.length import LONGEST, least_length, points_of
 from server.experiments.order import Waiting, next_due
 from server.experiments.schedule import Plan, first, following, is_due, zone_here
 from server.experiments.states import Event, IllegalEventError, advance, after_restart
-from server.owner.messages import ArmReport
 from server.problems import ProblemError
 from server.queue.readiness import Circumstances, what_is_missing
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from daq.acquisition.stop_socket import FOLDER_VARIABLE
 from daq.config.service import ServiceSettings
 from daq.config.settings import FleetRobotSettings, Settings, TraceSettings
+from daq.owner.stop_socket import FOLDER_VARIABLE
 from server.access.caller import LOCAL
 from server.api.system import get_system
 from server.clock import SystemClock

@@ -6,10 +6,10 @@ from collections.abc import Awaitable, Callable
 import pytest
 
 from daq.contracts.service.live import TeachingMessage, Topic
+from daq.owner.messages import LiveSample
 from server.live.history import History
 from server.live.hub import MANY, Client, Hub
 from server.live.outbox import Outbox
-from server.owner.messages import LiveSample
 from tests.server.clocks import HandClock
 
 TOPICS: set[Topic] = {"samples", "teaching"}

@@ -13,13 +13,13 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
+from daq.owner.messages import LiveSample
 from server.access.caller import LOCAL
 from server.access.gate import MOST_SOCKETS
 from server.api.stream import stream
 from server.live.history import History
 from server.live.hub import Hub
 from server.live.outbox import DROP_AFTER, THIN_AFTER, THIN_BEYOND, Outbox
-from server.owner.messages import LiveSample
 from tests.server.clocks import HandClock
 from tests.server.live.watching import frames, messages, watching
 from tests.server.polling import reset

@@ -16,7 +16,7 @@ from daq.contracts.labels import Outcome
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, Schedule, ScheduleRequest
 from daq.contracts.service.robot import RobotIdentity
-from server.owner.messages import Answer, ArmReport, Finished
+from daq.owner.messages import Answer, ArmReport, Finished
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
 from server.robot.control import ControlService

@@ -10,7 +10,7 @@ from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.service.experiments import ExperimentRequest, ScheduleRequest
-from server.owner.messages import Answer
+from daq.owner.messages import Answer
 from server.problems import ProblemError
 from server.queue.due_runs import DueRuns
 from tests.server.meanwhile import raising

@@ -4,18 +4,18 @@ from datetime import timedelta
 
 import pytest
 
-from daq.acquisition.messages import EventHappened, Progress
 from daq.contracts.experiment import ExperimentSpec, SlowRamp
 from daq.contracts.service.experiments import ExperimentRequest
+from daq.contracts.service.robot import RobotIdentity
 from daq.contracts.trace import TraceEvent
-from server.owner.messages import Opened
+from daq.owner.messages import EventHappened, Opened, Progress
 from server.problems import ProblemError
 from server.queue.attendance import ATTENDANCE, Attendance
 from tests.server.clocks import HandClock
 from tests.server.queue.bench import CALM, REAL, SPEC, Bench, done
 
 LOOK = "look at the arm, then resume the queue"
-OPENED = Opened(simulated=True, protocol=2, period=0.02, boots=1)
+OPENED = Opened(identity=RobotIdentity(simulated=True, protocol=2, period=0.02, boots=1))
 
 
 def test_what_becomes_of_an_experiment_is_told_with_its_number_and_whoever_asked_for_it(bench: Bench) -> None:

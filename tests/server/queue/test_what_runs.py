@@ -3,8 +3,8 @@
 import pytest
 
 from daq.contracts.service.experiments import ExperimentRequest
+from daq.owner.messages import Answer, HaltRun
 from server.experiments.states import Event
-from server.owner.messages import Answer, HaltRun
 from server.problems import ProblemError
 from server.queue.attendance import ATTENDANCE
 from tests.server.meanwhile import raising

@@ -11,10 +11,10 @@ import pytest
 
 from daq.contracts.errors import DaqError, ReachError
 from daq.contracts.machine import load_machine
+from daq.owner.client import OwnerGoneError, OwnerProcess
+from daq.owner.messages import Open, ReadGains, Report, TeachingText
 from daq.transport import ReconnectDelay
-from server.owner.messages import Open, ReadGains, Report, TeachingText
 from server.robot.keeper import Keeper
-from server.robot.owner_process import OwnerGoneError, OwnerProcess
 from server.robot.robot import Robot, RobotPlace
 from tests.daq.servo_bench import pan_tilt
 from tests.server.clocks import HandClock

@@ -9,7 +9,7 @@ import pytest
 
 from daq.contracts.machine import load_machine
 from daq.contracts.service.robot import ArmState, StopResult
-from server.owner.messages import Answer, ArmReport
+from daq.owner.messages import Answer, ArmReport
 from server.problems import ProblemError
 from server.robot.robot import Robot, RobotPlace
 from server.robot.stop import StopService

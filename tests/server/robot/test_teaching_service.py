@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from daq.contracts.machine import load_machine
+from daq.owner.messages import Answer, Finish, JogBegin, JogDrive, RunProgram
 from daq.teaching.jog import DEAD_MAN
 from daq.teaching.lead import PATIENCE
 from daq.teaching.program import Program, Relative
-from server.owner.messages import Answer, Finish, JogBegin, JogDrive, RunProgram
 from server.problems import ProblemError, conflict
 from server.robot.robot import Robot, RobotPlace
 from server.robot.teaching import LEAD_ENDS_WITHIN, TeachingService, Word
@@ -70,7 +70,9 @@ def test_a_command_that_was_held_up_begins_nothing(robot: Asked, teaching: Teach
 def test_a_step_is_asked_for_as_one(robot: Asked, teaching: TeachingService) -> None:
     program = Program(name="step", machine="ma2000", instructions=(Relative(angles={1: 0.1}),))
     teaching.perform(Word(robot.clock.monotonic()), program, "step")
-    assert robot.orders == [RunProgram(number=0, asked=robot.clock.monotonic(), program=program, activity="step")]
+    assert robot.orders == [
+        RunProgram(number=0, asked=robot.clock.monotonic(), program=program.model_dump(mode="json"), activity="step")
+    ]
 
 
 def test_nothing_begins_once_the_control_has_lapsed_while_a_jog_came_to_its_end(

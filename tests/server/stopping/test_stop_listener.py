@@ -21,10 +21,10 @@ import httpx
 import pytest
 from sqlalchemy import text
 
-from daq.acquisition.stop_socket import FOLDER_VARIABLE
 from daq.client import Client
 from daq.config.service import ServiceSettings
 from daq.contracts.service.robot import StopResult
+from daq.owner.stop_socket import FOLDER_VARIABLE
 from server.access.caller import LOCAL, Caller
 from server.access.digest import digest_of
 from server.access.origin import beside

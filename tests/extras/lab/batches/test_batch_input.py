@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from daq.contracts.service.jobs import DiagnoseStudy
-from daq_cli.robot.access import RobotAccess
+from daq_cli.robot.operations import RobotAccess
 from extras.lab.batches import command
 from extras.lab.batches.shown import Asked
 from extras.lab.batches.study import Study

@@ -11,13 +11,13 @@ import pytest
 from sqlalchemy import text
 
 from daq.contracts.service.notifications import Notification
+from daq.owner.messages import ArmReport
 from extras.lab.notifications.delivery import DeliveryError, Message
 from extras.lab.notifications.destinations import Destination
 from extras.lab.notifications.occasions import Faults
 from extras.lab.notifications.outbox import PAUSES, Outbox, pause_after
 from extras.lab.notifications.service import Notifier, message_of
 from server.clock import SystemClock
-from server.owner.messages import ArmReport
 from server.store.engine import Store
 
 NOW = datetime(2026, 3, 1, 8, tzinfo=UTC)

@@ -1,1 +1,0 @@
-"""The acquisition process: owner of the port, writer of the trace, listener for stop."""

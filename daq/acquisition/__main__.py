@@ -1,5 +1,0 @@
-"""`python -m daq.acquisition`."""
-
-from daq.acquisition.process import main
-
-raise SystemExit(main())

@@ -1,0 +1,5 @@
+"""`python -m daq.owner`."""
+
+from daq.owner.process import main
+
+raise SystemExit(main())

@@ -1,0 +1,303 @@
+"""The client's side of the owner of a port: starts the process, sends orders, receives reports."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import logging
+import select
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import Any, Self
+
+from daq.contracts import exit_codes
+from daq.contracts.errors import DaqError, OrderFailedError
+from daq.contracts.experiment import ExperimentSpec
+from daq.owner.messages import (
+    REPORT,
+    Answer,
+    CannotOpen,
+    Close,
+    Finished,
+    Freeze,
+    HaltRun,
+    Open,
+    Opened,
+    Order,
+    Report,
+    RunExperiment,
+)
+from daq.owner.stop_socket import StopAnswer
+
+GRACE = 4.0
+"""Time (s) for the process to freeze the arm and close its trace when the service ends. If it needs longer it finishes
+alone, as the unit in deploy/ allows."""
+OWN_GRACE = 8.0
+"""Time (s) for the same on demand, where nobody waits any more: a second of samples, a stop that the link may have to
+repeat, a slow disk."""
+STOPS_WITHIN = 1.0
+"""Time (s) for the answer to a stop, as at the stop socket."""
+PROGRAM = (sys.executable, "-m", "daq.owner")
+log = logging.getLogger("daq.owner")
+
+
+class OwnerGoneError(DaqError):
+    """The process that owned the port ended before it answered."""
+
+    exit_code = exit_codes.NOT_REACHED
+
+    def __init__(self, line: str, why: str = "") -> None:
+        super().__init__(line)
+        self.why = why or line
+
+
+class OwnerProcess:
+    """A running owner. `report` and `ended` are called on a thread of its own; `ended` is called once, last."""
+
+    def __init__(
+        self,
+        opening: Open,
+        report: Callable[[Report], None],
+        ended: Callable[[str], None],
+        program: Sequence[str] | None = None,
+    ) -> None:
+        self._process = subprocess.Popen(
+            program or PROGRAM,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C in the terminal is the client's to handle
+        )
+        self._report = report
+        self._ended = ended
+        self._writing = threading.Lock()
+        self._numbers = itertools.count(1)
+        self._asked: dict[int, Future[Answer]] = {}
+        self._gone = False
+        self.halted = False
+        self.send(opening)
+        self._thread = threading.Thread(target=self._listen, name="owner-reports", daemon=True)
+        self._thread.start()
+
+    @property
+    def pid(self) -> int:
+        """The process number, which is also in the name of its stop socket."""
+        return self._process.pid
+
+    def send(self, order: Order) -> None:
+        """Writes an order. It is lost if the process has ended, which `ended` reports."""
+        with self._writing:
+            self._write(order)
+        if self.halted:
+            self.halt()
+
+    def halt(self) -> None:
+        """Stops what runs, now or later: a stop follows every order that is sent after it.
+
+        May be called from a signal handler, again and again: it waits for nobody.
+        """
+        self.halted = True
+        if self._writing.acquire(blocking=False):  # otherwise the stop follows what is being written
+            try:
+                self._write(HaltRun(here=True))
+            finally:
+                self._writing.release()
+
+    def ask(self, kind: Callable[..., Any], **fields: object) -> Future[Answer]:
+        """Sends a request; the future has its answer, or OwnerGoneError."""
+        number = next(self._numbers)
+        future: Future[Answer] = Future()
+        future.set_running_or_notify_cancel()
+        with self._writing:
+            if self._gone:
+                future.set_exception(OwnerGoneError("the robot is not connected"))
+                return future
+            self._asked[number] = future
+        self.send(kind(number=number, **fields))
+        return future
+
+    def stop(self) -> StopAnswer | None:
+        """Stops the arm through the pipe of orders, for which no file need be there. Returns None without an answer
+        within STOPS_WITHIN. Call it on a thread that may wait."""
+        assert self._process.stdin is not None
+        try:
+            if not select.select([], [self._process.stdin], [], 0)[1]:
+                return None  # full, since the process does not read: writing would wait for it
+            return StopAnswer.from_data(self.ask(Freeze).result(STOPS_WITHIN).data)
+        except (OwnerGoneError, OSError, ValueError):  # a time-out is an OSError
+            return None
+
+    def close(self, patience: float = GRACE) -> bool:
+        """Frees the port. Returns whether the process has ended within `patience` s."""
+        self.send(Close())
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+        self._thread.join(patience)
+        return not self._thread.is_alive()
+
+    def kill(self) -> None:
+        """Ends a process that does not end by itself. Its arm holds the last set point."""
+        self._process.kill()
+        self._thread.join()
+
+    def _write(self, order: Order) -> None:
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError, ValueError):
+            self._process.stdin.write(order.model_dump_json().encode() + b"\n")
+            self._process.stdin.flush()
+
+    def _listen(self) -> None:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            if not line.endswith(b"\n"):
+                break  # half a line of a killed process
+            try:
+                self._hear(REPORT.validate_json(line))
+            except Exception:  # no report of ours, or a listener's fault; the end is reported below
+                log.exception("owner process %s: %.200r", self.pid, line)
+        code = self._process.wait()
+        self._process.stdout.close()
+        with self._writing:
+            self._gone = True
+            with contextlib.suppress(OSError):
+                self._process.stdin.close()
+            left, self._asked = self._asked, {}
+        why = f"signal {-code}" if code < 0 else f"exit code {code}"
+        for future in left.values():
+            future.set_exception(OwnerGoneError(f"the process that owned the port has ended ({why})", why))
+        log.info("owner process %s ended: %s", self.pid, why)
+        self._ended(why)
+
+    def _hear(self, report: Report) -> None:
+        if isinstance(report, Answer):
+            future = self._asked.pop(report.number, None)
+            if future is not None:
+                future.set_result(report)
+        else:
+            self._report(report)
+
+
+class OwnerOnDemand:
+    """An owner for as long as the block is entered, and the robot that it has opened. For one thread, except `halt`.
+
+    Leaving the block ends what runs with a stop.
+    """
+
+    def __init__(self, opening: Open) -> None:
+        self._opening = opening
+        self._heard: SimpleQueue[Report | Future[Answer] | str] = SimpleQueue()
+
+    def __enter__(self) -> Self:
+        """Raises OrderFailedError when the robot is not reached."""
+        self._process = OwnerProcess(self._opening, self._heard.put, self._heard.put)
+        try:
+            while not isinstance(report := self._heard.get(), Opened):
+                _require_opening(report)
+        except BaseException:
+            self._close()
+            raise
+        self.identity = report.identity
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._close()
+
+    @property
+    def pid(self) -> int:
+        """Its process number."""
+        return self._process.pid
+
+    def halt(self) -> None:
+        """Stops what runs, now or later. May be called from a signal handler, again and again."""
+        self._process.halt()
+
+    def begin(self, kind: Callable[..., Any], **fields: object) -> Future[Answer]:
+        """Gives an order, whose answer `answer_to` waits for. Raises OrderFailedError after `halt`."""
+        if self._process.halted:
+            raise OrderFailedError("stopped before it began (by Ctrl-C); nothing moved", exit_codes.STOPPED)
+        return self._process.ask(kind, asked=time.monotonic(), **fields)
+
+    def tell(self, order: Order) -> None:
+        """Gives an order that has no answer."""
+        self._process.send(order)
+
+    def answer_to(self, asked: Future[Answer], heard: Callable[[Report], None] = lambda _report: None) -> Answer:
+        """Waits for an answer, also one with a problem, while `heard` is called with every report.
+
+        Raises OrderFailedError when the process has ended.
+        """
+        asked.add_done_callback(self._heard.put)
+        while (report := self._heard.get()) is not asked:
+            self._pass_on(report, heard)
+        try:
+            return asked.result()
+        except OwnerGoneError as error:
+            raise _gone(error.why) from error
+
+    def hear(self, heard: Callable[[Report], None], within: float) -> None:
+        """Calls `heard` with every report that comes `within` s. Raises OrderFailedError for a process at fault."""
+        until = time.monotonic() + within
+        while (left := until - time.monotonic()) > 0:
+            with contextlib.suppress(Empty):
+                self._pass_on(self._heard.get(timeout=left), heard)
+
+    def _pass_on(self, report: Report | Future[Answer] | str, heard: Callable[[Report], None]) -> None:
+        if isinstance(report, CannotOpen):
+            _require_opening(report)
+        elif not isinstance(report, Future | str):
+            heard(report)
+
+    def ask(self, kind: Callable[..., Any], **fields: object) -> dict[str, Any]:
+        """Gives an order and returns its answer's data. Raises OrderFailedError."""
+        return done(self.answer_to(self.begin(kind, **fields))).data
+
+    def run(
+        self,
+        spec: ExperimentSpec,
+        heard: Callable[[Report], None] = lambda _report: None,
+        *,
+        moves_real_arm: bool = False,
+    ) -> Finished:
+        """Runs an experiment. Raises OrderFailedError when there is no trace."""
+        return end_of(self.answer_to(self.begin(RunExperiment, spec=spec, moves_real_arm=moves_real_arm), heard))
+
+    def _close(self) -> None:
+        if not self._process.close(OWN_GRACE):
+            self._process.kill()
+
+
+def _require_opening(report: object) -> None:
+    """Raises OrderFailedError when the process has said that it ends, or has ended."""
+    if isinstance(report, CannotOpen):
+        raise OrderFailedError(report.problem, report.exit_code)
+    if isinstance(report, str):
+        raise _gone(report)
+
+
+def _gone(why: str) -> OrderFailedError:
+    line = f"the process that owned the port has ended without a word ({why})"
+    left = "the arm holds its last set point; `daq traces salvage` finishes what was recorded"
+    return OrderFailedError(f"{line}: {left}", exit_codes.PROGRAM_FAULT)
+
+
+def done(answer: Answer) -> Answer:
+    """The answer to an order that was carried out. Raises OrderFailedError."""
+    if answer.problem:
+        raise OrderFailedError(answer.problem, answer.exit_code)
+    return answer
+
+
+def end_of(answer: Answer) -> Finished:
+    """The end of a run that has left a trace. Raises OrderFailedError for one that has left none."""
+    finished = done(answer).finished
+    assert finished is not None
+    return finished

@@ -1,0 +1,194 @@
+"""Whoever may end a run from outside: a signal, the stop socket, the parent process. One thread listens to all three.
+
+A stop never waits for the acquisition loop: the guardian has it written to the line itself. It listens from before the
+port is opened until nothing can move any more.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import select
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable
+from enum import Enum
+from types import TracebackType
+from typing import Self
+
+from daq.owner.stop_socket import StopAnswer, StopSocket
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_CLOSE = b"\0"
+"""Byte in the wake-up pipe that ends the guardian's thread; every other byte is the number of a signal."""
+CANCEL = b"cancel\n"
+"""What a parent says that is a service; anything else is a stop too."""
+LOOK_EVERY = 0.25
+"""s between two looks whether the stop socket's file is still there."""
+CLIENT_PATIENCE = 0.1
+"""s that a client may take to accept its answer, a line that fits into any socket's buffer."""
+
+
+class EndCause(Enum):
+    """Why a run is ended from outside: what stands behind "stopped:"."""
+
+    STOP = "on request, by daq stop or through the service"
+    """Through the stop socket, which does not tell who asks."""
+    PARENT = "by Ctrl-C, or by the program that started the run"
+    CANCELLED = "by the service: what ran was cancelled, or nobody had the control any more"
+    SIGNAL = "by a signal"
+    ORPHANED = "the process that started this run is gone"
+    DEAF = "this run could no longer be stopped from outside"
+
+
+class Guardian:
+    """Listens until closed. Every request to end is kept in `cause` (the first one stays), then calls `freeze`.
+
+    freeze: sends STOP to the controller and says what became of it; called on any thread, must not take longer than a
+            stop's answer may
+    parent: descriptor of the parent's pipe: any byte is a stop, its end the loss of the parent
+
+    Signals are written to the wake-up pipe by Python's own handler, at once, whatever the main thread is doing. Enter
+    and leave it on the main thread.
+    """
+
+    def __init__(self, listener: StopSocket, parent: int | None, freeze: Callable[[str], StopAnswer]) -> None:
+        self._listener = listener
+        self._parent = parent
+        self._freeze = freeze
+        self._thread = threading.Thread(target=self._guard, name="guardian", daemon=True)
+        self._handlers: dict[int, object] = {}
+        self._wakeup_before = -1
+        self._closing = False
+        self._cause: EndCause | None = None
+        self._answered = -math.inf
+        """When the newest request to end was carried out (monotonic clock, s); infinite while one is under way."""
+        self._under_way = 0
+        self._lock = threading.Lock()
+        """Held for moments only: of cause and time of the newest request together."""
+
+    @property
+    def cause(self) -> EndCause | None:
+        """Why the run is to end; None while nobody wants it to."""
+        if self._cause is None and not self._closing and not self._thread.is_alive():
+            return EndCause.DEAF
+        return self._cause
+
+    @property
+    def unheard(self) -> str:
+        """Why no other process of this user can stop this run; empty where one can."""
+        return self._listener.problem
+
+    def stop(self) -> StopAnswer:
+        """A stop that came neither by the socket nor by a signal; for any thread."""
+        return self._end(EndCause.STOP)
+
+    def forget(self, asked: float) -> bool:
+        """For an explicit reset, asked for at this moment (monotonic clock, s): what ended the work before ends nothing
+        any more. False, and nothing is forgotten, for a request that is `outdated`."""
+        with self._lock:
+            if self.outdated(asked):
+                return False
+            self._cause = None
+            return True
+
+    def outdated(self, asked: float) -> bool:
+        """Whether what was asked for at this moment (monotonic clock, s) was asked before the newest request to end had
+        been carried out: whoever asked did not know of that."""
+        return self._answered >= asked
+
+    def __enter__(self) -> Self:
+        self._wake_read, self._wake_write = os.pipe()
+        os.set_blocking(self._wake_write, False)
+        self._wakeup_before = signal.set_wakeup_fd(self._wake_write, warn_on_full_buffer=False)
+        for number in SIGNALS:
+            self._handlers[number] = signal.signal(number, lambda _number, _frame: None)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._closing = True
+        with contextlib.suppress(BlockingIOError):  # a full pipe wakes it as well
+            os.write(self._wake_write, _CLOSE)
+        self._thread.join()
+        with contextlib.suppress(OSError):
+            while self._listener.fileno() >= 0:  # until nobody waits: the link is still there
+                self._serve(self._listener.socket.accept()[0])
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)  # type: ignore[arg-type]
+        signal.set_wakeup_fd(self._wakeup_before)
+        os.close(self._wake_read)
+        os.close(self._wake_write)
+
+    def _guard(self) -> None:
+        try:
+            self._listen()
+        except BaseException:
+            # Nobody can stop this run any more: it does not go on.
+            self._end(EndCause.DEAF)
+            raise
+
+    def _end(self, cause: EndCause) -> StopAnswer:
+        with self._lock:
+            self._answered = math.inf
+            self._under_way += 1
+            self._cause = self._cause or cause
+        try:
+            return self._freeze(cause.value)
+        finally:
+            with self._lock:
+                self._under_way -= 1
+                if not self._under_way:
+                    self._answered = time.monotonic()
+
+    def _listen(self) -> None:
+        watched = select.poll()
+        for descriptor in (self._wake_read, self._listener.fileno(), *([] if self._parent is None else [self._parent])):
+            watched.register(descriptor, select.POLLIN)
+        while not self._closing:
+            ready = {descriptor for descriptor, _ in watched.poll(LOOK_EVERY * 1000)}
+            if self._wake_read in ready and os.read(self._wake_read, 4096).strip(_CLOSE):
+                self._end(EndCause.SIGNAL)
+            if self._listener.fileno() in ready:
+                self._answer_client()
+            if self._parent in ready and self._parent is not None and not self._parent_speaks():
+                watched.unregister(self._parent)
+            self._keep_heard(watched)
+
+    def _keep_heard(self, watched: select.poll) -> None:
+        """Listens at another socket if the file of this one is gone."""
+        before = self._listener.renew()
+        if before is None:
+            return
+        watched.unregister(before)
+        watched.register(self._listener.fileno(), select.POLLIN)
+        with before, contextlib.suppress(OSError):
+            while True:  # until nobody waits who has found it while it was there
+                self._serve(before.accept()[0])
+
+    def _parent_speaks(self) -> bool:
+        assert self._parent is not None
+        said = os.read(self._parent, 4096)
+        by = EndCause.CANCELLED if said.startswith(CANCEL) else EndCause.PARENT
+        self._end(by if said else EndCause.ORPHANED)
+        return bool(said)
+
+    def _answer_client(self) -> None:
+        try:
+            connection, _ = self._listener.socket.accept()
+        except (BlockingIOError, ConnectionError):  # it has gone away meanwhile: it asked for a stop all the same
+            self._end(EndCause.STOP)
+            return
+        self._serve(connection)
+
+    def _serve(self, connection: socket.socket) -> None:
+        with connection:
+            answer = self._end(EndCause.STOP).to_json()
+            connection.settimeout(CLIENT_PATIENCE)
+            with contextlib.suppress(OSError):
+                connection.sendall(answer)

@@ -1,0 +1,189 @@
+"""The owner's main loop: it carries out a waiting order, or else reads the next sample, and restores a lost link.
+
+An arm that is not watched is left alone between two orders.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+
+from daq.contracts import exit_codes
+from daq.contracts.errors import DaqError, ReachError
+from daq.driver import ControllerRestartedError, HardwareFaultError, NoSampleError
+from daq.link import LinkError, LinkState
+from daq.owner import long_orders
+from daq.owner.guardian import EndCause
+from daq.owner.messages import BEGINS_WITHIN, Answer, JogBegin, LeadBegin, Long, Quick, RunExperiment
+from daq.owner.owned_robot import OwnedRobot
+from daq.owner.quick_orders import require_current
+from daq.owner.watched_controller import is_frozen
+from daq.safety import Event, State
+from firmware_protocol.commands import StatusFlag
+from firmware_protocol.errors import ProtocolError
+
+LOOK_EVERY = 0.1
+"""Time (s) between two looks whether somebody ends this process, if nothing else is to be done."""
+LEAVING = (EndCause.SIGNAL, EndCause.ORPHANED, EndCause.DEAF)
+"""Causes that end not only the work but this process."""
+
+
+@dataclass
+class _BetweenAttempts:
+    """Waits between two attempts to reconnect, and refuses orders meanwhile."""
+
+    robot: OwnedRobot
+
+    def wait(self, timeout: float) -> bool:
+        """Returns True if the client wants the port back, or somebody ends this process."""
+        until = time.monotonic() + timeout
+        while not _leaving(self.robot):
+            self.robot.tell_arm()
+            order = self.robot.inbox.take(max(0.0, min(1.0, until - time.monotonic())))
+            if order is not None:
+                _refuse(self.robot, order, _being_tried(self.robot), ReachError.exit_code)
+            elif time.monotonic() >= until:
+                return _leaving(self.robot)
+        return True
+
+
+def serve(robot: OwnedRobot) -> None:
+    """Runs until the client wants the port back. Faults of this program freeze the arm and are raised."""
+    watched = robot.opening.watched
+    if watched:
+        _notice_a_stop_before_us(robot)
+    last: int | None = None
+    with robot.control.frozen_on_error():
+        while not _leaving(robot):
+            between_samples = robot.controller.period_s if robot.controller.link.lock_step else 0.0
+            order = robot.inbox.take(between_samples if watched else LOOK_EVERY)
+            try:
+                if order is not None:
+                    _carry_out(robot, order)
+                    last = None
+                elif not watched:
+                    continue
+                elif _is_away(robot):
+                    last = None
+                    _come_back(robot)
+                else:
+                    last = _watch(robot, last)
+            except ControllerRestartedError as error:
+                robot.control.handle(Event.TRIP, str(error))
+                robot.controller.hello()
+                last = None
+            except HardwareFaultError as error:
+                _trip_once(robot, str(error))
+                with suppress(LinkError):  # the next turn meets it
+                    robot.number_stop()  # no sample comes, and the stop is released by its number
+                last = None
+            except (LinkError, NoSampleError) as error:
+                _link_lost(robot, str(error))
+            robot.tell_arm()
+
+
+def _watch(robot: OwnedRobot, last: int | None) -> int:
+    """Reads the next sample of an arm that nobody moves. Returns its tick."""
+    every = robot.controller.line_rate().every
+    snapshot = robot.controller.next_snapshot(None if last is None else last + every - 1)
+    if is_frozen(snapshot) and robot.control.arm.state is State.IDLE:
+        robot.control.stop("on the board, by somebody else")
+    robot.number_stop()
+    return snapshot.tick
+
+
+def _carry_out(robot: OwnedRobot, order: Long | Quick) -> None:
+    if isinstance(order, Quick):
+        answer = long_orders.answered_quickly(robot, order)
+        # Before the answer, since a client that knows of a reset may resume the queue at once. Even if the state equals
+        # that of the last report: the service may have noted a stop since, which this process has never reported.
+        robot.tell_arm(anew=True)
+        robot.speaker.ended(answer)
+        return
+    try:
+        if _is_away(robot):
+            raise ReachError(_being_tried(robot))
+        require_current(robot, order, BEGINS_WITHIN)
+        robot.activity = order.activity
+        robot.tell_arm()  # at once, so that the service refuses orders that are not possible meanwhile
+        answer = _moved(robot, order)
+    except DaqError as error:
+        answer = Answer(number=order.number, problem=str(error), exit_code=error.exit_code)
+    except ProtocolError as error:
+        answer = Answer(number=order.number, problem=str(error), exit_code=exit_codes.WRONG_INPUT)
+    robot.activity = "none"
+    robot.inbox.done()
+    robot.tell_arm()
+    robot.speaker.ended(answer)
+    if robot.opening.watched and not _is_away(robot):
+        robot.read_gains()
+
+
+def _moved(robot: OwnedRobot, order: Long) -> Answer:
+    if isinstance(order, RunExperiment):
+        return long_orders.run(robot, order)
+    if isinstance(order, JogBegin):
+        return long_orders.jog_until_finished(robot, order)
+    if isinstance(order, LeadBegin):
+        return long_orders.lead(robot, order)
+    return long_orders.perform(robot, order)
+
+
+def _trip_once(robot: OwnedRobot, why: str) -> None:
+    """A damaged drive is reported with every sample: the arm is frozen at the first."""
+    if robot.control.arm.state is not State.FAULT:
+        robot.control.handle(Event.TRIP, why)
+
+
+def _link_lost(robot: OwnedRobot, why: str) -> None:
+    if robot.control.arm.connected:
+        robot.control.handle(Event.LINK_LOST, why)
+
+
+def _is_away(robot: OwnedRobot) -> bool:
+    """Whether the link is lost, or the robot was silent for so long that it counts as lost."""
+    return robot.controller.link.state is LinkState.LOST or not robot.control.arm.connected
+
+
+def _being_tried(robot: OwnedRobot) -> str:
+    return f"{robot.controller.link.url}: the link is lost; the service tries to reconnect"
+
+
+def _come_back(robot: OwnedRobot) -> None:
+    """Tries to restore the link. A stop that could not be delivered is delivered before anything else."""
+    _link_lost(robot, "link lost")
+    try:
+        if robot.controller.link.state is LinkState.LOST:
+            robot.controller.link.reconnect(_BetweenAttempts(robot))
+        else:
+            _answers_again(robot)
+    except (LinkError, NoSampleError):
+        return
+    robot.control.handle(Event.CONNECTED)
+    robot.controller.hello()
+    robot.read_gains()
+    _notice_a_stop_before_us(robot)
+
+
+def _answers_again(robot: OwnedRobot) -> None:
+    """Reads a sample of a robot that was silent, to check that it answers. Raises LinkError, NoSampleError."""
+    if (cause := robot.control.halted) is not None:
+        robot.control.stop(cause)
+    with suppress(HardwareFaultError):  # it answers; the next sample trips
+        robot.controller.next_snapshot()
+
+
+def _notice_a_stop_before_us(robot: OwnedRobot) -> None:
+    if StatusFlag.FROZEN in robot.controller.status().flags and robot.control.arm.state is State.IDLE:
+        robot.control.stop("before this connection")
+
+
+def _refuse(robot: OwnedRobot, order: Long | Quick, line: str, exit_code: int) -> None:
+    if not isinstance(order, Quick):
+        robot.inbox.done()
+    robot.speaker.ended(Answer(number=order.number, problem=line, exit_code=exit_code))
+
+
+def _leaving(robot: OwnedRobot) -> bool:
+    return robot.inbox.closing.is_set() or robot.guardian.cause in LEAVING

@@ -1,0 +1,33 @@
+"""What an owner has reported, in the form in which people and programs get it."""
+
+from __future__ import annotations
+
+from daq.contracts.service.robot import LinkStatus, RobotIdentity, Sample
+from daq.owner.messages import ArmReport, LiveSample
+from daq.runner.line_status import with_rates
+from daq.transport import parse_port_url
+from daq.transport.endpoint import BITS_PER_BYTE
+from firmware_protocol.commands import StatusFlag
+
+
+def link_of(arm: ArmReport, age: float, url: str, identity: RobotIdentity) -> LinkStatus:
+    """The state of the link at `url`, by a report of this age (s), with the rates that it allows."""
+    link = LinkStatus(state=arm.link, counters=arm.counters, age=age)
+    return with_rates(link, parse_port_url(url).baud / BITS_PER_BYTE, identity)
+
+
+def sample_of(sample: LiveSample, now: float, utc: float) -> Sample:
+    """A sample with its age. `now` (monotonic) and `utc` (wall clock) are the same time (s)."""
+    age = now - sample.host_time
+    return Sample(
+        tick=sample.tick,
+        host_time=sample.host_time,
+        utc=utc - age,
+        age=age,
+        joints=sample.joints,
+        set_point=sample.set_point,
+        position=sample.position,
+        error=sample.error,
+        drive=sample.drive,
+        frozen=bool(sample.status & StatusFlag.FROZEN.value),
+    )
