@@ -99,7 +99,6 @@ def diagnose(
     """Find where a model and traces disagree, name the missing effect, add it, and show how the gap shrinks."""
     from daq_cli.app.progress import shown_progress
     from daq_cli.models.acquire_loop import diagnose_and_acquire
-    from model.discrepancy.carried_load import require_load_held
     from model.discrepancy.workflow import diagnose as run_diagnosis
     from server.jobs.next_experiment import experiment_chooser
 
@@ -115,8 +114,6 @@ def diagnose(
     if method is None and (acquire or next_file is not None) and simulated:
         options = options.model_copy(update={"method": Comparison.OUTPUT_ERROR.value})  # it alone asks for experiments
     check_made_for(begin.machine, [*fitted_to, *held], [*traces, *(holdout or [])])
-    if load is not None:
-        require_load_held(begin, fitted_to)
     failure: DaqError | None = None
 
     def once(traces: Sequence[Trace], chooser: ExperimentChooser) -> Diagnosis:

@@ -173,15 +173,6 @@ class Dependence(FrozenRecord):
     significance: float
 
 
-class MovingParameter(FrozenRecord):
-    """The distortion method's α(t): a parameter that would have to move, how much, and with what it moves."""
-
-    parameter: str
-    relative_range: float
-    moves_with: AgainstWhat | None
-    correlation: float
-
-
 class WorstPlace(FrozenRecord):
     """The joint and phase of motion with the largest residual, `ratio` times its noise. `rms`, `floor`: of the residual
     and of the noise, in `unit`, in that phase or over the `whole_record`."""
@@ -207,7 +198,6 @@ class Where(FrozenRecord):
     summary: str
     cells: tuple[PhaseCell, ...]
     dependences: tuple[Dependence, ...]
-    moving: tuple[MovingParameter, ...] = ()
     worst: WorstPlace | None = None
     largest: WorstPlace | None = None
 
@@ -263,8 +253,6 @@ class Step(FrozenRecord):
     improved on the fitted traces."""
     evidence_held_out: float | None = None
     """2 ln of the ratio of the likelihoods of held-out traces with and without the effect; in torques alone."""
-    sum_lambda2_before: float | None = None
-    sum_lambda2_after: float | None = None
     where: Where
     reason: str
     adopted: bool
@@ -273,13 +261,6 @@ class Step(FrozenRecord):
     proof: ControllerProof | None = None
     """Where the controller's own recorded numbers prove the effect: nothing was fitted for it."""
     refusal: Refusal | None = None
-    slight_joints: tuple[int, ...] = ()
-    """Of `joints`, those on which the effect is so slight that it may be what its law leaves of the others."""
-
-    @property
-    def main_joints(self) -> tuple[int, ...]:
-        """The joints of the effect, without those on which it is slight."""
-        return tuple(j for j in self.joints if j not in self.slight_joints)
 
 
 class DifferencePlace(FrozenRecord):

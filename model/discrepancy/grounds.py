@@ -38,12 +38,9 @@ PatternKind = Literal[
 NoteKind = Literal[
     "cutoff",
     "drive-at-limit",
-    "drive-timing",
     "errors-follow-record",
     "larger-noise",
-    "names-excluded",
     "no-experiment-left",
-    "not-exchanged",
     "not-looked-for",
     "not-separable",
     "nothing-held-out",
@@ -51,15 +48,11 @@ NoteKind = Literal[
     "positions-of-links",
     "resting-left-out",
     "shakes-above-cutoff",
-    "size-at-bound",
     "stated-numbers-moved",
-    "suspicion-dropped",
     "taken-out-again",
     "tolerances-fitted-first",
     "tolerance-source",
     "torque-left",
-    "traces-contradict",
-    "traces-exchanged",
     "unfinished-record",
 ]
 SharedLaw = Literal[
@@ -88,16 +81,12 @@ Measurement = Literal[
 ]
 """A measurement beside the arm's own readings."""
 RefusalKind = Literal[
-    "contradicts-file",
     "diverges",
     "error-grows",
     "error-rises",
     "falls-too-little",
-    "found-one-way",
-    "leaves-more-than-noise",
     "only-resembles",
     "superfluous",
-    "worse-than-given",
 ]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ HOLDING_ROUNDS = 4
 left 2.4 times the noise on a sound rig, after two 1.8, after four 1.7."""
 
 
-@dataclass(frozen=True)
-class RestingFriction:
+class RestingFriction(NamedTuple):
     """What friction does where a joint hardly moves (k, n), N·m.
 
     sliding: its torque by the smoothed direction of motion, which the balance has counted. lowest, highest: limits of
@@ -28,6 +27,10 @@ class RestingFriction:
     sliding: Floats
     lowest: Floats
     highest: Floats
+
+    def of_joint(self, joint: int) -> RestingFriction:
+        """Of one joint (index) alone, (k, 1) each."""
+        return RestingFriction(*(part[:, joint : joint + 1] for part in self))
 
 
 def friction_at_rest(level: Floats, motion: LinkMotion, joints: Floats) -> RestingFriction:

@@ -188,6 +188,17 @@ class RecordedMotion:
         return np.asarray(sums / (high - low))
 
     @cached_property
+    def by_joint(self) -> tuple[RecordedMotion, ...]:
+        """The same motion, each joint's columns alone."""
+        return tuple(self._of(slice(j, j + 1)) for j in range(self.position.shape[1]))
+
+    def _of(self, joints: slice) -> RecordedMotion:
+        alone = ("turning", "own_speed")
+        across = ("position", "speed", "acceleration", "drive", "commanded", "contact", "moving", "at_limit")
+        own = {name: getattr(self, name)[joints] for name in alone}
+        return replace(self, **own, **{name: getattr(self, name)[:, joints] for name in across})
+
+    @cached_property
     def _passages(self) -> tuple[Rows, Rows]:
         """First row, and the row after the last (k, n each), of what every sample of `turns` is averaged with."""
         count, half = len(self.time), max(1, round(0.5 / (self.cutoff * self.period)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,7 +19,7 @@ from model.dynamics.recursive import inverse_dynamics_along
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
-from model.inverse_dynamics.friction_at_rest import friction_at_rest, subtract_held
+from model.inverse_dynamics.friction_at_rest import RestingFriction, friction_at_rest, subtract_held
 from model.inverse_dynamics.link_motion import SENSOR_COLUMNS, LinkMotion, link_motion
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
 from model.inverse_dynamics.smoothing import derivative
@@ -59,6 +59,8 @@ class TorqueBalance:
     model: Model
     records: tuple[RecordedMotion, ...]
     _kept: dict[str, tuple[bytes, list[Any]]] = field(default_factory=dict, repr=False)
+    _geometry: dict[int, bytes] = field(default_factory=dict, repr=False)
+    _last: dict[tuple[int, int], list[tuple[Floats, Floats]]] = field(default_factory=dict, repr=False)
     difference: float = DIFFERENCE
     """Step of the finite differences, as a share of a parameter's natural size."""
 
@@ -75,11 +77,11 @@ class TorqueBalance:
         vector, late = self._vector(values), samples_late(self.model, values)
         joints = _joints_of(vector, self.model)
         chain = chain_body(np.ascontiguousarray(vector[: at.SHARED]), joints, self.model.flags)
-        bodies = vector[: at.SHARED].tobytes() + joints[:, list(BODY_COLUMNS)].tobytes()
+        bodies = self.model.flags.tobytes() + vector[: at.SHARED].tobytes() + joints[:, list(BODY_COLUMNS)].tobytes()
         sensors = joints[:, list(SENSOR_COLUMNS)].tobytes()
         friction = joints[:, list(FRICTION_COLUMNS)].tobytes()
         motions = self._cached("motion", sensors, lambda i: link_motion(self.records[i], joints))
-        needed = self._cached("needed", sensors + bodies, lambda i: _needed(chain, motions[i]))
+        needed = self._cached("needed", sensors + bodies, lambda i: self._needed(sensors, chain, motions, i))
         levels = self._cached(
             "levels", sensors + bodies + friction, lambda i: _levels(self.model, chain, motions[i].position, joints)
         )
@@ -100,10 +102,31 @@ class TorqueBalance:
                 gravity[i],
             )
             torque, rise = self._missing(driven, motion.acceleration, needed[i], joints)
-            torque = subtract_held(torque, friction_at_rest(levels[i], motion, joints), record)
-            told = torque * (1.0 + rise) * self._told_per_torque(joints)
-            result.append(record.subtract_unknown(record.compared(told)))
+            told = (1.0 + rise) * self._told_per_torque(joints)
+            result.append(self._compared(i, torque, told, friction_at_rest(levels[i], motion, joints)))
         return result
+
+    def _compared(self, index: int, torque: Floats, told: Floats, friction: RestingFriction) -> Floats:
+        """What is compared (m, n) of a torque (k, n) with what friction holds taken out, told with factors (k, n).
+
+        Only the joints are computed whose torque or friction is another one than in both of the last two results that
+        were not the same: a derivative by a number of one joint changes that joint.
+        """
+        columns = []
+        for j, record in enumerate(self.records[index].by_joint):
+            given = np.stack([torque[:, j], told[:, j], *(part[:, j] for part in friction)])
+            last = self._last.setdefault((index, j), [])
+            found = next((done for key, done in last if np.array_equal(key, given)), None)
+            if found is None:
+                held = subtract_held(torque[:, j : j + 1], friction.of_joint(j), record)
+                found = record.subtract_unknown(record.compared(held * told[:, j : j + 1]))
+                last[:] = [(given, found), *last[:1]]
+            columns.append(found)
+        return np.concatenate(columns, axis=1)
+
+    def of_model(self, model: Model) -> TorqueBalance:
+        """The balance of another model of the same machine, which shares what is kept."""
+        return replace(self, model=model)
 
     def told_per_torque(self, values: Mapping[str, float]) -> Floats:
         """What `residual` tells (n,) for a unit of torque at each joint: not 1 where the motor's numbers are not the
@@ -158,6 +181,19 @@ class TorqueBalance:
             kept = key, [compute(i) for i in range(len(self.records))]
             self._kept[what] = kept
         return kept[1]
+
+    def _needed(self, sensors: bytes, chain: ChainArrays, motions: Sequence[LinkMotion], index: int) -> Floats:
+        """Torque (k, n) that the links' motion needs. It is linear in the numbers of the links' masses: once it is
+        asked for a second time at one geometry, the torques of unit numbers are kept and give those of all others."""
+        key = sensors + b"".join(part.tobytes() for part in (chain.prismatic, chain.geometry, chain.gravity))
+        kept = self._kept.get("units")
+        if (kept is None or kept[0] != key) and self._geometry.get(index) != key:
+            self._geometry[index] = key
+            motion = motions[index]
+            return np.asarray(inverse_dynamics_along(chain, motion.position, motion.speed, motion.acceleration))
+        units = self._cached("units", key, lambda i: _of_units(chain, motions[i]))[index]
+        numbers = np.concatenate([chain.inertial.ravel(), chain.rotor_inertia])
+        return np.asarray((numbers @ units).reshape(motions[index].position.shape))
 
     def _volts(self, index: int, vector: Floats, joints: Floats, samples: Floats) -> Floats:
         """Volts at the motors at the grid's times, after delay, threshold and limit; `_lost_in_dead_zone` has what a
@@ -226,8 +262,16 @@ def _levels(model: Model, chain: ChainArrays, position: Floats, joints: Floats) 
     return out
 
 
-def _needed(chain: ChainArrays, motion: LinkMotion) -> Floats:
-    return np.asarray(inverse_dynamics_along(chain, motion.position, motion.speed, motion.acceleration))
+def _of_units(chain: ChainArrays, motion: LinkMotion) -> Floats:
+    """Torques (11 n, k n) that the motion needs for one of each of the links' numbers, and none of all others."""
+    links = len(chain.rotor_inertia)
+    found = []
+    for number in range(11 * links):
+        alone = np.zeros(11 * links)
+        alone[number] = 1.0
+        unit = chain._replace(inertial=alone[: 10 * links].reshape(links, 10), rotor_inertia=alone[10 * links :])
+        found.append(inverse_dynamics_along(unit, motion.position, motion.speed, motion.acceleration).ravel())
+    return np.stack(found)
 
 
 def _gravity(chain: ChainArrays, motion: LinkMotion) -> Floats:

@@ -12,7 +12,7 @@ from model.machine_model.parameter import Parameter
 from model.reports.diagnosis_map import dependence_picture, map_picture
 from model.reports.diagnosis_pictures import evidence_picture
 from model.reports.diagnosis_words import Compared, gap
-from model.reports.numbers import column, estimate
+from model.reports.numbers import estimate
 
 
 def step_sections(number: int, steps: Sequence[Step], of: Compared, stated: Mapping[str, Parameter]) -> list[Section]:
@@ -34,7 +34,7 @@ def step_sections(number: int, steps: Sequence[Step], of: Compared, stated: Mapp
 
 
 def where_blocks(where: Where, errors: Sequence[SignalError], of: Compared) -> tuple[Block, ...]:
-    """The location in words, the map of every trace, what the residual depends on, and what would have to vary."""
+    """The location in words, the map of every trace, and what the residual depends on."""
     blocks: list[Block] = [Text(where.summary, "plain" if where.joint is None else "warning")]
     if where.cells:
         blocks.append(Text(of.errors, "quiet"))
@@ -43,32 +43,11 @@ def where_blocks(where: Where, errors: Sequence[SignalError], of: Compared) -> t
     unit = next((e.unit for e in errors if e.joint == joint), "rad")
     if joint is not None and (picture := dependence_picture(where, joint, of.residual, unit)) is not None:
         blocks.append(picture)
-    if where.moving:
-        blocks.append(_moving(where))
     return tuple(blocks)
 
 
 def _most_dependent(dependences: Sequence[Dependence]) -> int | None:
     return max(dependences, key=lambda d: d.significance).joint if dependences else None
-
-
-def _moving(where: Where) -> Table:
-    ranges = [f"{v} %" for v in column([100 * m.relative_range for m in where.moving], digits=2)]
-    rows = tuple(
-        (
-            Cell(m.parameter),
-            Cell(shown, number=True),
-            Cell("–" if m.moves_with is None else f"{m.moves_with} ({m.correlation:+.2f})"),
-        )
-        for m, shown in zip(where.moving, ranges, strict=True)
-    )
-    return Table(
-        ("parameter", "would have to range over", "and moves with"),
-        rows,
-        "The distortion method in time: which parameter alone, moving with time, would explain most, and what it would "
-        "move with (correlation; a dash: with nothing). A parameter that moves with something stands for a term that "
-        "the model lacks.",
-    )
 
 
 def _what(step: Step, before: Sequence[Step]) -> tuple[Block, ...]:

@@ -240,7 +240,7 @@ def _answered_joints(effect: HiddenEffect, answer: Diagnosis) -> set[int]:
     same = [step for step in answer.steps if step.adopted and step.effect == effect.known_as]
     if same:
         alike = [c.joints for step in same for c in step.group if c.effect == effect.known_as]
-        return {joint for joints in (*(step.main_joints for step in same), *alike) for joint in joints}
+        return {joint for joints in (*(step.joints for step in same), *alike) for joint in joints}
     if not answer.steps:
         return {shape.joint for shape in answer.remaining[:1]}
     first = answer.steps[0]

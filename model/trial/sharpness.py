@@ -42,7 +42,7 @@ def asks_for_rivals(score: Score) -> bool:
 def named_rivals(score: Score, answer: Diagnosis) -> tuple[tuple[str, tuple[int, ...]], ...]:
     """Effects other than the hidden one that the adopted steps of an answer name or group, with their joints there."""
     steps = [step for step in answer.steps if step.adopted]
-    named = [(step.effect, step.main_joints) for step in steps if step.effect is not None]
+    named = [(step.effect, step.joints) for step in steps if step.effect is not None]
     named += [(candidate.effect, candidate.joints) for step in steps for candidate in step.group]
     wanted = set(score.answered) - set(score.known_as)
     return tuple(dict.fromkeys((effect, joints) for effect, joints in named if effect in wanted))

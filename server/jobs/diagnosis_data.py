@@ -77,14 +77,13 @@ def where_given(model: Model, traces: Sequence[Trace]) -> Where | None:
     left = [record.measured - run.at_samples(run.reading) for record, run in zip(records, runs, strict=True)]
     if not all(np.isfinite(one).all() for one in left):
         return None
-    driven = traces if all(trace.drive is not None for trace in traces) else ()
     floor = noise_floor(records, model.machine, "position")
-    return where_with_summary(locate(Residuals(model, records, left, floor), driven))
+    return where_with_summary(locate(Residuals(model, records, left, floor)))
 
 
 def _step(found: Diagnosis, step: Step) -> DiagnosisStep:
     tried = {"candidates": tuple(map(_tried, step.candidates)), "group": tuple(map(_tried, step.group))}
-    called = "nothing" if step.effect is None else placed(step.effect, step.main_joints or step.joints)
+    called = "nothing" if step.effect is None else placed(step.effect, step.joints)
     return DiagnosisStep(**{**dict(step), **tried, "called": called, **_beside_map(found, step.where)})
 
 

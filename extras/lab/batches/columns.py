@@ -56,7 +56,7 @@ def of_diagnosis(found: Diagnosis, headline: str) -> Columns:
     columns: Columns = {
         "verdict": found.verdict,
         "headline": headline,
-        "effects": "; ".join(f"{step.effect}:{','.join(map(str, step.main_joints))}".rstrip(":") for step in added),
+        "effects": "; ".join(f"{step.effect}:{','.join(map(str, step.joints))}".rstrip(":") for step in added),
         "evidence": added[0].evidence if added else None,
         "margin": added[0].margin if added else None,
         "method": found.method,

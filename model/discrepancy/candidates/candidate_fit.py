@@ -160,21 +160,25 @@ def _from_expected(before: Point, probe: Probe, goal: float) -> Point | None:
     """A fit from the expected value of every unknown with a prior, and from the best of the candidate's trials there.
 
     The closed loop is fitted first. None if that explains less than the baseline does. The fit is given up once a cost
-    of `goal` is out of reach.
+    of `goal` is out of reach. Until then it goes by derivatives of the expected numbers without the candidate, which
+    all candidates share, corrected by every step; only those by the candidate's own parameters are computed anew.
     """
     closed_loop = before.observation.with_feedback_share(0.0)
-    best: Point | None = None
+    begun: Point | None = None
     for trial in probe.hypothesis.trials:
         start = replace(probe, start=trial, moved=np.zeros_like(probe.moved))
-        tried = _start(before, start, closed_loop, expected=True)
-        if tried.is_finite and (best is None or tried.cost < best.cost):
-            best = tried
-    if best is None:
+        tried = _start(before, start, closed_loop, expected=True, derivatives=before.expected_in_closed_loop)
+        if tried.is_finite and (begun is None or tried.cost < begun.cost):
+            begun = tried
+    if begun is None:
         return None
-    near = converge(best, STEPS, most=1)
+    changing = _indices(begun.unknowns, [p.name for p in probe.hypothesis.free])
+    near = descend(begun, STEPS, changing)
     if near.cost > before.on(closed_loop, before.tangents).cost:
         return None
-    return converge(near.on(before.observation, near.tangents), STEPS, AGAIN, goal)
+    tangents = _start(before, probe, derivatives=before.expected_on_record).tangents
+    there = descend(near.on(before.observation, tangents), STEPS, changing, goal)
+    return there if there.cost > goal else converge(there, STEPS, AGAIN, goal)
 
 
 def polish(before: Fit, found: CandidateFit) -> CandidateFit:
@@ -244,11 +248,19 @@ def improved_baseline(before: Fit, found: CandidateFit) -> Fit | None:
     return better if better.point.cost < point.cost - BETTER else None
 
 
-def _start(before: Point, probe: Probe, observation: Observation | None = None, *, expected: bool = False) -> Point:
+def _start(
+    before: Point,
+    probe: Probe,
+    observation: Observation | None = None,
+    *,
+    expected: bool = False,
+    derivatives: Point | None = None,
+) -> Point:
     """The point with the candidate's parameters among the unknowns, at the values of the probe.
 
     Args:
-        observation: another one than the point's. expected: all that has a prior is at its mean.
+        observation: another one than the point's. expected: all that has a prior is at its mean. derivatives: of a
+            point with the same unknowns, in place of this one's.
     """
     hypothesis = probe.hypothesis
     names = {p.name for p in hypothesis.free}
@@ -266,7 +278,8 @@ def _start(before: Point, probe: Probe, observation: Observation | None = None, 
         values.append(start)
     if expected:
         values = [u.expected if u.deviation is not None else v for u, v in zip(unknowns, values, strict=True)]
-    tangents = np.concatenate([before.tangents[kept], np.zeros((len(hypothesis.free), before.tangents.shape[1]))])
+    known = (derivatives or before).tangents
+    tangents = np.concatenate([known[kept], np.zeros((len(hypothesis.free), known.shape[1]))])
     begun = Calibration(hypothesis.model, tuple(unknowns), np.array(values))
     return point_at(observation or before.observation, begun, tangents)
 

@@ -155,13 +155,6 @@ def tone(
     return _hypothesis(_Place(model, name, (joint,), name, scales), (dict(values),), bounds=bounds)
 
 
-def law_on(
-    model: Model, name: str, joints: Sequence[int], scales: Mapping[int, JointScale] = NO_SCALES
-) -> Hypothesis | None:
-    """A hypothesis without trials, for a fit that begins elsewhere; None where the model has no room for it."""
-    return _hypothesis(_Place(model, name, tuple(joints), name, scales), ())
-
-
 def on_joints(model: Model, alike: Sequence[Hypothesis], values: Mapping[str, float]) -> Hypothesis | None:
     """One law on all joints of hypotheses about single ones, with one trial. values: by full name. None where the model
     has the effect on some of the joints already."""

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.candidates.candidate_fit import (
     STRANGE,
@@ -23,7 +22,6 @@ from model.discrepancy.candidates.candidate_fit import (
     same_answer,
 )
 from model.discrepancy.candidates.library import Hypothesis, hypotheses
-from model.discrepancy.candidates.limits import without_limits
 from model.discrepancy.candidates.multi_joint_fit import fit_several_joints
 from model.discrepancy.candidates.probing import Probe, keep_promising, probe
 from model.discrepancy.candidates.recorded_trials import with_recorded_trials
@@ -80,7 +78,7 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     head = _restart_unexplained(current, head, case.thresholds.close)
     head = _finish_close(current, head, case.thresholds)
     rest = [r for r in fits if not any(r is a for a in answers)]
-    return Ranking(_one_law_per_name(without_limits(current, [*head, *rest])), tuple(probes))
+    return Ranking(_one_law_per_name(sorted([*head, *rest], key=lambda f: -f.evidence)), tuple(probes))
 
 
 def _probe_all(case: Case, current: Fit, cancel: Cancel, earlier: Sequence[Probe]) -> list[Probe]:
@@ -157,11 +155,8 @@ def _fits_from_expected(current: Fit, probes: Sequence[Probe], most: int) -> lis
     The closed loop is probed, which stays near the record whatever is missing.
     """
     tried = [p.hypothesis for p in probes if p.hypothesis.tone is None and not effect(p.hypothesis.name).is_flexible]
-    try:
-        begun = current.point.at_expected().on(current.point.observation.with_feedback_share(0.0))
-    except SpecError:
-        return []
-    if not begun.is_finite:
+    begun = current.point.expected_in_closed_loop
+    if begun is None:
         return []
     found: list[Probe] = []
     for one in probe(begun, tried):

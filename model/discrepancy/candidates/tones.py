@@ -20,7 +20,6 @@ from model.discrepancy.candidates.probing import Probe, Projection, projection
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.output_error.observation import DIFFERENCE, Observation
 from model.discrepancy.output_error.search import Point
-from model.discrepancy.output_error.thinning import LEAST_PERIOD
 from model.effects.effect import Tone
 from model.effects.library import effect, library
 from model.fitting.records import Record, resolution
@@ -113,60 +112,9 @@ def _most_moving(observation: Observation, joint: int) -> int | None:
     return None if travels[best] < 0.0 else best
 
 
-def _samples(record: Record, every: int = 1) -> int:
-    """Samples of an impulse response at a record's rate, or at that of means over so many samples."""
-    return max(2, round(RESPONSE / (every * record.inputs.period)))
-
-
-def _samples_together(observation: Observation) -> int:
-    """Over how many samples means are taken: 1, but for fast records without a gap, of which a spectrum of all samples
-    takes ten times as long."""
-    if any(len(r.runs) != 1 for r in observation.records):
-        return 1
-    return max(1, int(LEAST_PERIOD / max(r.inputs.period for r in observation.records) + 1e-6))
-
-
-def _means(signal: Floats, record: Record, every: int) -> Floats:
-    """A record's signal (…, m), or its means over `every` samples of the record's one run."""
-    if every == 1:
-        return signal
-    own = signal[..., record.runs[0]]
-    count = own.shape[-1] // every
-    return np.asarray(own[..., : count * every].reshape(*own.shape[:-1], count, every).mean(axis=-1))
-
-
-def _of_means(clear: Projection, observation: Observation, every: int) -> Projection:
-    """A projection of the means over `every` samples, each as exact as its samples together."""
-    if every == 1:
-        return clear
-    n = len(observation.deviations)
-
-    def together(weighted: Floats) -> Floats:
-        parts, done = [], 0
-        for record in observation.records:
-            count = record.samples
-            part = weighted[..., done : done + count * n].reshape(*weighted.shape[:-1], count, n)
-            done += count * n
-            kept = count // every
-            part = part[..., : kept * every, :].reshape(*weighted.shape[:-1], kept, every, n)
-            parts.append(part.mean(axis=-2).reshape(*weighted.shape[:-1], -1) * math.sqrt(every))
-        return np.ascontiguousarray(np.concatenate(parts, axis=-1))
-
-    return Projection(together(clear.tangents), clear.inverse, together(clear.residual), clear.pull)
-
-
-def _spread(shown: Floats, observation: Observation, every: int) -> Floats:
-    """A joint's signal at every sample, from its means over `every` samples."""
-    if every == 1:
-        return shown
-    parts, done = [], 0
-    for record in observation.records:
-        kept = record.samples // every
-        whole = np.zeros(record.samples)
-        whole[: kept * every] = np.repeat(shown[done : done + kept], every)
-        done += kept
-        parts.append(whole)
-    return np.concatenate(parts)
+def _samples(record: Record) -> int:
+    """Samples of an impulse response at a record's rate."""
+    return max(2, round(RESPONSE / record.inputs.period))
 
 
 def torque_response(point: Point, joint: int, record: int = 0) -> Floats:
@@ -194,11 +142,9 @@ def torque_response(point: Point, joint: int, record: int = 0) -> Floats:
             states.append(state)
             sizes.append(size)
             waves.append(np.sin(_phase(point, over, column, np.array([value]), record)[0]))
-    every = _samples_together(observation)
     shown = observation.readings(model, states)[record][..., column]
-    shown = _means(shown, observation.records[record], every)
     shown = (shown[1:] - shown[:1]) / np.array(sizes)[:, None]
-    count = _samples(observation.records[record], every)
+    count = _samples(observation.records[record])
     rows = [_lagged(wave, count) for wave in waves]
     regressor = np.concatenate([r[count:] for r in rows])
     target = np.concatenate([s[count:] for s in shown])
@@ -220,29 +166,27 @@ def _lagged(wave: Floats, count: int) -> Floats:
 
 def _phase(point: Point, over: Tone, column: int, values: Floats, record: int = 0) -> Floats:
     """Phase (k, m) of tones of the given cycles or frequencies along a record."""
-    source, every = point.observation.records[record], _samples_together(point.observation)
+    source = point.observation.records[record]
     if over is Tone.OVER_POSITION:
         angle = source.measured[:, column] - point.residuals[record][:, column]
-        return values[:, None] * _means(angle, source, every)[None]
+        return values[:, None] * angle[None]
     time = (source.inputs.rows + 0.0) * source.inputs.period
-    return 2 * np.pi * values[:, None] * _means(time, source, every)[None]
+    return 2 * np.pi * values[:, None] * time[None]
 
 
 def _passed(
     point: Point, over: Tone, column: int, values: Floats, response: Floats, record: int
 ) -> NDArray[np.complex128]:
     """Readings (k, m) that tones of unit torque cause, the cosine as real part and the sine as imaginary part."""
-    source, every = point.observation.records[record], _samples_together(point.observation)
+    source = point.observation.records[record]
     waves = np.exp(1j * _phase(point, over, column, values, record))
     if over is Tone.OVER_POSITION:
         samples = waves.shape[1]
         room = next_fast_len(samples + len(response) - 1)
         waves = ifft(fft(waves, room, axis=1) * fft(response, room), axis=1)[:, :samples]
     else:  # a frequency passes a linear response as it is, but for its size and phase
-        lags = np.arange(len(response)) * every * source.inputs.period
+        lags = np.arange(len(response)) * source.inputs.period
         waves *= np.exp(-2j * np.pi * values[:, None] * lags) @ response[:, None]
-    if every > 1:
-        return waves
     return np.concatenate([waves[:, run] for run in source.runs], axis=1)
 
 
@@ -250,23 +194,22 @@ def _best_tone(point: Point, clear: Projection, name: str, over: Tone, joint: in
     """The tone that explains most of what is left, once the tolerance parameters have moved too."""
     observation = point.observation
     column = point.model.machine.modelled_joints.index(joint)
-    rates, every = rates_tried(observation, name, joint), _samples_together(observation)
+    rates = rates_tried(observation, name, joint)
     if over is Tone.OVER_TIME:
         rates = rates[~_of_the_excitation(rates, observation)]
-    few, n = _of_means(clear, observation, every), len(observation.deviations)
-    columns = np.arange(column, len(few.residual), n)
+    n = len(observation.deviations)
+    columns = np.arange(column, len(clear.residual), n)
     best, shown = None, np.zeros_like(point.weighted)
     for own in np.array_split(rates, math.ceil(len(rates) * len(columns) / BLOCK)) if len(rates) else ():
         waves = [_passed(point, over, column, own, response, t) for t in range(len(observation.records))]
-        both = np.concatenate(waves, axis=1) / (observation.deviations[column] / math.sqrt(every))
+        both = np.concatenate(waves, axis=1) / observation.deviations[column]
         both = observation.whitened(column, both.real) + 1j * observation.whitened(column, both.imag)
         sine, cosine = np.ascontiguousarray(both.imag), np.ascontiguousarray(both.real)
-        gains, first, second = _explained(few, sine, cosine, columns)
+        gains, first, second = _explained(clear, sine, cosine, columns)
         k = int(np.argmax(gains))
         if best is None or gains[k] > best[0]:
             best = float(gains[k]), float(first[k]), float(second[k]), float(own[k])
-            means = (first[k] * sine[k] + second[k] * cosine[k]) / math.sqrt(every)
-            shown[column::n] = _spread(means, observation, every)
+            shown[column::n] = first[k] * sine[k] + second[k] * cosine[k]
     if best is None:
         return None
     gain, in_sine, in_cosine, rate = best

@@ -32,14 +32,12 @@ SHOWN = 3
 WITHIN_NOISE = 3.0
 """Error of a joint, in deviations of its readings' noise, up to which a model is said to explain it within that: sound
 rigs of other worlds leave up to 2.6, where friction turns."""
-EXCHANGED = frozenset({"traces-exchanged", "traces-contradict"})
-"""Kinds of notes of answers that are fitted to the traces which were to be held out."""
 
 
 def headline(found: Diagnosis) -> str:
     """The effects that were found, with joints and sizes; or that none was found, or none that is known; and joints
     that were not examined. A clause for the terminal, the report, lists and the page."""
-    shown = [s for s in found.steps if s.adopted and (s.main_joints or not s.joints)]
+    shown = [s for s in found.steps if s.adopted]
     findings = [_group_headline(s, found) if s.group else _finding(s) for s in shown]
     match found.verdict:
         case "check-the-record":
@@ -82,10 +80,8 @@ def summary(found: Diagnosis) -> str:
 
 
 def method_words(found: Diagnosis) -> str:
-    """How model and traces were compared, as a noun; and whether fitted and held-out traces were exchanged."""
-    exchanged = any(note.kind in EXCHANGED for note in found.notes_data)
-    held = ", in the traces that were held out; the others were held out in turn" if exchanged else ""
-    return f"{METHODS[found.method]}{held}"
+    """How model and traces were compared, as a noun."""
+    return METHODS[found.method]
 
 
 def _not_examined(joints: Sequence[int]) -> list[str]:
@@ -98,9 +94,8 @@ def _not_examined(joints: Sequence[int]) -> list[str]:
 
 
 def _finding(step: Step) -> str:
-    slight = set(step.slight_joints)
-    sizes = [v for v in sizes_of(step.effect or "", step.parameters) if not (v.joints and set(v.joints) <= slight)]
-    return ", ".join((effect_on(step.effect or "", step.main_joints), *map(size_words, sizes)))
+    sizes = sizes_of(step.effect or "", step.parameters)
+    return ", ".join((effect_on(step.effect or "", step.joints), *map(size_words, sizes)))
 
 
 def _group_headline(step: Step, found: Diagnosis) -> str:
@@ -137,10 +132,9 @@ def suspicion_words(found: Suspicion) -> str:
 def _why_nothing(found: Diagnosis) -> tuple[str, Step | None]:
     """Why nothing is named, as a key of `NOTHING`, and the step that was refused."""
     refused = [s for s in found.steps if s.effect is not None]
-    for kind in ("only-resembles", "found-one-way"):
-        for step in refused:
-            if step.refusal is not None and step.refusal.kind == kind:
-                return kind, step
+    for step in refused:
+        if step.refusal is not None and step.refusal.kind == "only-resembles":
+            return step.refusal.kind, step
     return ("refused", refused[0]) if refused else ("doubted" if doubts_of(found) else "explained", None)
 
 
@@ -158,9 +152,7 @@ def _unknown(found: Diagnosis) -> list[str]:
     """Why none of the known effects is named, and what a torque that would explain it goes with."""
     where, joints = found.where, found.unexplained_joints
     said = [] if where is None else [_left_on(joints, where) if joints and where.joint is None else where.summary]
-    one_way = any(s.refusal is not None and s.refusal.kind == "found-one-way" for s in found.steps)
-    known = "no known effect that all traces show" if one_way else "no known effect"
-    said.append(sentence(f"{known} explains it; {what_is_left(found.remaining)}"))
+    said.append(sentence(f"no known effect explains it; {what_is_left(found.remaining)}"))
     if found.worse_held_out:
         said.append(
             "The fit of the tolerance parameters does not hold on held-out traces, where the error of "

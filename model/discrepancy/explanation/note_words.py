@@ -10,7 +10,7 @@ from model.discrepancy.explanation.class_words import class_words, within
 from model.discrepancy.explanation.phrases import NOTES
 from model.discrepancy.grounds import Note, NoteKind
 from model.discrepancy.numbers import plain
-from model.effects.names import effect_name, effect_on
+from model.effects.names import effect_name
 
 Values = Mapping[str, Any]
 
@@ -32,10 +32,8 @@ def _drive_at_limit(v: Values) -> Values:
 
 
 def _noise_of(joint: Values) -> str:
-    apart = joint["apart"]
-    left_out = "" if not apart else f" beside {apart} reading{'' if apart == 1 else 's'} far off, left out"
     unit = " counts" if joint["unit"] == "count" else f" {joint['unit']}"
-    return f"joint {joint['joint']} {joint['size']:.2g}{unit} for {joint['stated']:.2g}{left_out}"
+    return f"joint {joint['joint']} {joint['size']:.2g}{unit} for {joint['stated']:.2g}"
 
 
 def _torque_left(v: Values) -> Values:
@@ -92,10 +90,8 @@ def _rounded(value: float, unit: str) -> str:
 
 WRITTEN: dict[NoteKind, Callable[[Values], Values]] = {
     "drive-at-limit": _drive_at_limit,
-    "drive-timing": lambda v: {"late": ", ".join(f"{samples:.2g}" for samples in v["late"])},
     "larger-noise": lambda v: {"joints": "; ".join(map(_noise_of, v["joints"]))},
     "no-experiment-left": lambda v: {"within": within(v["budget"]), "candidates": " from ".join(v["candidates"])},
-    "not-exchanged": lambda v: {"why": v.get("why", "they are too short for the cutoff that they bear")},
     "not-looked-for": lambda v: {
         "effects": "; ".join(f"{effect_name(name)} ({why})" for name, why in v["effects"].items())
     },
@@ -108,17 +104,9 @@ WRITTEN: dict[NoteKind, Callable[[Values], Values]] = {
             f"joint {j['joint']} at {plain(j['frequency'], 2)} Hz ({plain(j['factor'], 2)} times)" for j in v["joints"]
         )
     },
-    "size-at-bound": lambda v: {
-        "placed": effect_on(v["effect"], v["joints"]),
-        "size": _rounded(v["value"], v["unit"]),
-    },
-    "suspicion-dropped": lambda v: {"placed": effect_on(v["effect"], v["joints"])},
     "taken-out-again": lambda v: {"effect": effect_name(v["effect"])},
     "tolerances-fitted-first": lambda v: {"traces": f"{v['traces']} trace{'' if v['traces'] == 1 else 's'}"},
     "torque-left": _torque_left,
-    "traces-contradict": lambda v: {
-        "effects": " and ".join(effect_on(one["effect"], one["joints"]) for one in v["effects"])
-    },
     "unfinished-record": lambda v: {"called": v.get("file") or f"trace {v['trace']}"},
 }
 """Values that a phrase has otherwise than the note."""

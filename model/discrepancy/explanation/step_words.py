@@ -75,7 +75,7 @@ def reason_text(step: Step) -> str:
         return step.reason
     if reason.pattern is None or reason.units is None:
         return sentence(_torque_reason(step, effect, reason))
-    others = [j for j in step.main_joints if j != reason.joint]
+    others = [j for j in step.joints if j != reason.joint]
     alike = f" (and likewise {joints_in_words(others)})" if others else ""
     size = size_on(reason.joint or 0, effect, step.parameters)
     named = called(effect) + ("" if size is None else f", {size_words(size)}")
@@ -85,8 +85,6 @@ def reason_text(step: Step) -> str:
         sentences.append(sentence(_beaten(reason.rival, step)))
     if step.where.joint is None or (step.joints and step.where.joint not in step.joints):
         sentences.append("What shows it is the pattern over the whole record, not one place.")
-    if step.slight_joints:
-        sentences.append(sentence(_slight(step, effect)))
     return " ".join(sentences)
 
 
@@ -142,16 +140,6 @@ def _beaten(rival: NamedEffect, step: Step) -> str:
             "these traces do not tell which of the two it is"
         )
     return f"the next best, {name}, has evidence of {rival.evidence:.0f}, and this has {step.evidence:.0f}"
-
-
-def _slight(step: Step, effect: str) -> str:
-    """Where the effect of a step is slight, and what that may be."""
-    sizes = [size_on(joint, effect, step.parameters) for joint in step.slight_joints]
-    shown = ", ".join(size_words(v) for v in sizes if v is not None)
-    return (
-        f"on {joints_in_words(step.slight_joints)} it is slight{f' ({shown})' if shown else ''}, which may be what the "
-        "law leaves of the same effect on another joint"
-    )
 
 
 def refusal_words(refusal: Refusal) -> str:

@@ -22,14 +22,11 @@ from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.verdict import verdict
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.drive_limits import find_drives_at_limit
-from model.inverse_dynamics.drive_timing import MOST, expected_timing, samples_late
+from model.inverse_dynamics.drive_timing import expected_timing
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.machine_model.model import Lineage, Model
 from model.machine_model.parameter import Parameter
 from model.machine_model.posterior import summarise_posterior
-
-SLIGHTLY_LATE = 0.1
-"""Least lateness of a drive that is told, in samples."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +145,6 @@ def _notes(outcome: Outcome, cutoff: float, torque: tuple[Note, ...]) -> tuple[N
         *torque,
         *_assumptions(cutoff, outcome.controller.not_looked_for),
         *_at_limits(standing),
-        *_timing(standing),
         *outcome.notes,
     )
 
@@ -189,11 +185,3 @@ def _at_limits(standing: Standing) -> tuple[Note, ...]:
     joints = standing.model.machine.modelled_joints
     found = find_drives_at_limit((*standing.case.records, *standing.case.held_out), joints)
     return on_drives_at_limit(found.shares, found.unknown)
-
-
-def _timing(standing: Standing) -> tuple[Note, ...]:
-    """How late the drives were found to act, which is taken for the way in which they are formed and held."""
-    late = samples_late(standing.model, standing.now.values)
-    if late.max() < SLIGHTLY_LATE:
-        return ()
-    return (Note(kind="drive-timing", values={"late": list(map(float, late)), "samples": MOST}),)

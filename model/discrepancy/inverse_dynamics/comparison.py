@@ -14,9 +14,6 @@ from model.discrepancy.inverse_dynamics.standing import Standing
 from model.effects.library import find_named_effect
 from model.inverse_dynamics.torque_balance import TorqueBalance
 
-MOSTLY = 0.5
-"""Share of an effect's evidence from priors, above which it is taken for one that the tolerances had imitated."""
-
 
 @dataclass(frozen=True)
 class Comparison:
@@ -51,28 +48,14 @@ def compare(standing: Standing, chosen: Fitted) -> Comparison | None:
 
 def _reference(standing: Standing, chosen: Fitted) -> BalanceFit:
     """The fit that a candidate is held against: the last one, or that with a number as the file states it. With its
-    prior, a number far off may be fitted as well as without. An effect that the tolerances can imitate, at the price of
-    numbers far from what is stated, is held against what they are with it."""
+    prior, a number far off may be fitted as well as without."""
     case, now = standing.case, standing.now
-    if chosen.relief > MOSTLY:
-        return _without_effect(standing, chosen)
     if not chosen.stated:
         return now
     held = {p.name: p.value for p in chosen.stated}
     unknowns = [u for u in now.unknowns if u.name not in held]
     balance = TorqueBalance(standing.model.with_values({**now.model_values, **held}), case.records)
     return fit(balance, unknowns, now.values, case.data, now.noise.memory)
-
-
-def _without_effect(standing: Standing, chosen: Fitted) -> BalanceFit:
-    """The model that lacks an effect, or has its numbers as the file states them, with all others as they are with
-    it, but for how late the drives act: no file states that."""
-    case, model, now = standing.case, standing.model, standing.now
-    stated = {p.name: p.value for p in chosen.stated}
-    known = {name: v for name, v in chosen.fit.model_values.items() if name in model.by_name} | stated
-    balance = TorqueBalance(model.with_values(known), case.records)
-    begin = {**now.values, **chosen.fit.values, **stated}
-    return fit(balance, [u for u in now.unknowns if u.nuisance], begin, case.data, now.noise.memory)
 
 
 def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Floats) -> bool:

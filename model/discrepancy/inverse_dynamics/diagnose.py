@@ -10,10 +10,9 @@ from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.explanation.renderer import with_sentences
-from model.discrepancy.inverse_dynamics.both_ways import diagnose_both_ways
 from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
-from model.discrepancy.inverse_dynamics.looks import Records
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
+from model.discrepancy.inverse_dynamics.records import Records
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import Model
@@ -30,8 +29,7 @@ def diagnose_torques(
     """Name the effects that recorded drive and motion show and the model lacks, add them, and show what that removes.
 
     No controller and no simulation is needed. Where nothing is held out, an effect must hold on quarters of the traces
-    that are predicted from the others. Otherwise the same is looked for in those held out, with the others held out in
-    turn (`both_ways`).
+    that are predicted from the others.
 
     Raises:
         TraceError, SpecError: for traces or options that cannot give an answer. CancelledError: when asked to end.
@@ -44,7 +42,7 @@ def diagnose_torques(
     controller = judge_controller(model, traces)
     _refuse_unseen(chosen, controller.settled)
     records = Records(model, tuple(traces), tuple(held_out), chosen, controller, cancel or Never())
-    found = diagnose_both_ways(records, progress)
+    found = records.answer(progress)
     return with_sentences(found.model_copy(update={"seconds": time.perf_counter() - begun}))
 
 

@@ -14,8 +14,6 @@ from model.fitting.covariance import sandwich
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
-BOUNDED = 3.0
-"""Standard deviation of an estimate, relative to the parameter's size, above which the data do not bound it."""
 NORMAL_95 = 1.959964
 """Half width of a 95 % interval of the normal distribution, in standard deviations."""
 
@@ -26,8 +24,7 @@ def found_values(now: BalanceFit, parameters: Sequence[Parameter]) -> dict[str, 
     result = {}
     for p in parameters:
         value, deviation = now.values[p.name], deviations.get(p.name)
-        typical = max(abs(value), p.deviation or 0.0)
-        if deviation is None or not np.isfinite(deviation) or deviation > BOUNDED * typical:
+        if deviation is None or not np.isfinite(deviation):
             result[p.name] = FoundValue.of(p, value)
             continue
         low, high = value - NORMAL_95 * deviation, value + NORMAL_95 * deviation

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from types import MappingProxyType
 
 from model.discrepancy.diagnosis import Step
 from model.discrepancy.inverse_dynamics.case import TorqueCase
@@ -20,24 +19,19 @@ from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 from model.machine_model.posterior import load_posterior
 
-NOTHING: Mapping[str, float] = MappingProxyType({})
-"""No number is held."""
-
 
 @dataclass(frozen=True)
 class Found:
     """A model with the effects found so far, and its fit.
 
     added: parameters that the diagnosis has added, or whose priors it has lifted. stated: those of them that the file
-    states, as it states them. lowered: names of those that ended lower than stated, friction only: a law that is
-    missing may do that as well. steps: those that were tried, adopted or not.
+    states, as it states them. steps: those that were tried, adopted or not.
     """
 
     model: Model
     now: BalanceFit
     added: Mapping[str, Parameter]
     stated: Mapping[str, Parameter]
-    lowered: frozenset[str]
     steps: tuple[Step, ...] = ()
 
     @property
@@ -63,7 +57,7 @@ class Refitter:
 
     def begin(self) -> Found:
         """The model as it was given, with its numbers fitted."""
-        return Found(self.given, self._fit(self.given, {}, {}), {}, {}, frozenset())
+        return Found(self.given, self._fit(self.given, {}, {}), {}, {})
 
     def standing(self, found: Found) -> Standing:
         """What the next step is judged against."""
@@ -72,8 +66,6 @@ class Refitter:
     def take(self, found: Found, chosen: Fitted) -> Found:
         """Adds a candidate to the model and fits that; the step is the caller's to add."""
         values = chosen.fit.values
-        friction = bool(chosen.stated) and all(p.effect is not None for p in chosen.stated)
-        falls = friction and all(values[p.name] < p.value for p in chosen.stated)
         added = {**found.added, **{p.name: p for p in chosen.parameters}}
         model = chosen.model.with_values(chosen.fit.model_values)
         return replace(
@@ -82,23 +74,21 @@ class Refitter:
             now=self._fit(model, values, added),
             added=added,
             stated={**found.stated, **{p.name: p for p in chosen.stated}},
-            lowered=found.lowered | {p.name for p in chosen.stated if falls},
         )
 
-    def remove(self, found: Found, step: Step, held: Mapping[str, float] = NOTHING) -> Found:
-        """Takes the effect of a step out and fits the rest; numbers of the file that it had named are tolerances again,
-        but for those that are `held` at a value. The step stays in the list."""
+    def remove(self, found: Found, step: Step) -> Found:
+        """Takes the effect of a step out and fits the rest; numbers of the file that it had named are tolerances again.
+        The step stays in the list."""
         own = set(step.parameters)
         added = {name: p for name, p in found.added.items() if name not in own}
         model = self._without(found.model, step)
-        now = self._fit(model, found.now.values, added, held)
+        now = self._fit(model, found.now.values, added)
         return replace(
             found,
             model=model.with_values(now.model_values),
             now=now,
             added=added,
             stated={name: p for name, p in found.stated.items() if name not in own},
-            lowered=found.lowered - own,
         )
 
     def _without(self, model: Model, step: Step) -> Model:
@@ -110,20 +100,13 @@ class Refitter:
             return model
         return model.without_effect(step.effect, joints or None)
 
-    def _fit(
-        self,
-        model: Model,
-        begin: Mapping[str, float],
-        added: Mapping[str, Parameter],
-        held: Mapping[str, float] = NOTHING,
-    ) -> BalanceFit:
-        """The model fitted, with the parameters that the diagnosis has `added` without priors, and without those that
-        are `held`."""
+    def _fit(self, model: Model, begin: Mapping[str, float], added: Mapping[str, Parameter]) -> BalanceFit:
+        """The model fitted, with the parameters that the diagnosis has `added` without priors."""
         records, names = self.case.records, frozenset(added)
         before = tolerances(self.given, sizes=recorded_sizes(self.given, records), fitted=self.known_before)[0]
         own = [u for u in before if u.name not in names]
         known = {u.name for u in own}
         sizes = {**recorded_sizes(model, records), **added}
         found = [u for u in tolerances(model, names, sizes)[0] if u.name not in known]
-        unknowns = [u for u in (*own, *found, *timing_unknowns(model)) if u.name not in held]
-        return fit(TorqueBalance(model.with_values(held), records), unknowns, begin, self.case.data)
+        unknowns = [*own, *found, *timing_unknowns(model)]
+        return fit(TorqueBalance(model, records), unknowns, begin, self.case.data)

@@ -18,7 +18,6 @@ from model.discrepancy.output_error.controller_evidence import (
     settled_by_records,
     with_findings,
 )
-from model.discrepancy.output_error.recorded_power import with_power
 from model.discrepancy.output_error.sampled_controller import with_errors
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import Model
@@ -52,5 +51,5 @@ def judge_controller(model: Model, traces: Sequence[Trace]) -> JudgedController:
 
     Nothing is found where the machine file describes no controller, or where the traces do not hold what it needs.
     """
-    told = with_power(with_errors(traces, model.machine), model.machine)
+    told = with_errors(traces, model.machine)
     return JudgedController(check_controller(told, model.machine, model), settled_by_records(told, model.machine))

@@ -5,21 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from model.discrepancy.grounds import Refusal
-from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.comparison import Comparison, compare
-from model.discrepancy.inverse_dynamics.far_numbers import stands_for_far_number
-from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.inverse_dynamics.priors import prior_distance
-from model.discrepancy.inverse_dynamics.resolution import NO_NOISE
 from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
-from model.discrepancy.inverse_dynamics.tolerances import tolerances
-from model.inverse_dynamics.drive_timing import expected_timing
-from model.machine_model.record_verdict import FAR_OFF
 
 BESIDE_REFUSED = 0.5
 """Least evidence of an effect beside that of a rival which was refused before it: with less, it takes a small part of
@@ -29,27 +18,16 @@ CHANCES = 3
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
-NO_PART = 0.4
-"""Least share of a residual far above noise that an effect must take: on sound rigs those that are not there take up to
-35 %, and friction of a real motor, beside something else, 46 %. Any law takes a little of another one, and the
-evidence then counts the rest as noise."""
-MOST_OF_IT = 0.6
-"""Share of a residual far above noise with which an effect that takes it is named on less evidence."""
-LEAD = 4.0
-"""Lead with which an effect is named alone where all evidence, its own and the rival's, comes from priors: that of the
-other method."""
 
 
 @dataclass(frozen=True)
 class Judgement:
     """What was made of a candidate that has the evidence it needs.
 
-    noises_left: least residual that it leaves on a joint of its own, in noise floors. refusal: why it is not taken;
-    None where it is.
+    refusal: why it is not taken; None where it is.
     """
 
     comparison: Comparison
-    noises_left: float
     refusal: Refusal | None
 
     @property
@@ -65,43 +43,22 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     Args:
         refused: candidates of the same step that were not taken before it.
     """
-    if chosen.evidence <= 0 and not stands_for_far_number(standing.now, chosen):
+    if chosen.evidence <= 0:
         return None
-    most = explains_most(standing, chosen)
-    if chosen.evidence + chosen.told < needed_evidence(standing, chosen, takes_most=most):
+    if chosen.evidence + chosen.told < needed_evidence(standing, chosen):
         return None
     if any(chosen.rivals(one) and chosen.evidence < BESIDE_REFUSED * one.evidence for one in refused):
         return None
     comparison = compare(standing, chosen)
     if comparison is None:
         return None
-    noises = _noises_left(standing, comparison)
-    return Judgement(comparison, noises, _refusal(standing, comparison, noises, takes_most=most))
+    return Judgement(comparison, _refusal(standing, comparison))
 
 
-def needed_evidence(standing: Standing, chosen: Fitted, *, takes_most: bool) -> float:
-    """Evidence from which a candidate is named. takes_most: whether it takes most of what is left.
-
-    How far numbers are from what a file states does not depend on what a residual is made of, against which the larger
-    least evidence guards. Of evidence that comes from priors, as much as arouses a suspicion is enough. An effect
-    without which a number would be far from its file needs a fall of −2 log posterior of 16, the square of `FAR_OFF`.
-    """
+def needed_evidence(standing: Standing, chosen: Fitted) -> float:
+    """Evidence from which a candidate is named."""
     options = standing.case.options
-    least = options.least_evidence
-    if takes_most:
-        least = min(least, SUSPECTED)
-    least -= chosen.relief * max(least - SUSPECTED, 0.0)
-    if stands_for_far_number(standing.now, chosen):
-        least = min(least, FAR_OFF**2 - chosen.cost)
-    return least + options.echo * _collected(standing, chosen.joints)
-
-
-def needed_lead(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> float:
-    """Lead in evidence over a rival with which a candidate is named alone: as `needed_evidence`, less where the
-    evidence of both comes from priors. What one of them takes off a residual counts no more for being compared with a
-    prior."""
-    least = options.least_margin
-    return least - min(chosen.relief, rival.relief) * max(least - LEAD, 0.0)
+    return options.least_evidence + options.echo * _collected(standing, chosen.joints)
 
 
 def _collected(standing: Standing, joints: tuple[int, ...]) -> float:
@@ -110,71 +67,8 @@ def _collected(standing: Standing, joints: tuple[int, ...]) -> float:
     return sum(max(0.0, s.evidence + (s.evidence_held_out or 0.0)) for s in near)
 
 
-def explains_most(standing: Standing, chosen: Fitted) -> bool:
-    """Whether an effect takes most of a residual far above noise, on the records fitted to and on held-out ones.
-
-    A slow residual has few independent samples, so that evidence alone would ask for a longer record of what is plain
-    to see: a square wave, of which a sine takes four fifths, or a spring that gets stiffer.
-    """
-    case = standing.case
-    if not case.held_out or not chosen.joints:
-        return False
-    fits = (standing.now, chosen.fit)
-    fitted = [holdout.mean_squares(case.stretches, f.residual) for f in fits]
-    other = [holdout.held_out_squares(f.balance.model, f.values, case.held_out) for f in fits]
-    own = np.array([j in chosen.joints for j in standing.model.machine.modelled_joints])
-    far = (FAR_ABOVE_NOISE * case.noise[own]) ** 2
-    return all(
-        bool((before[own] > far).all() and (after[own] < (1 - MOST_OF_IT) * before[own]).all())
-        for before, after in (fitted, other)
-    )
-
-
-def _refusal(standing: Standing, comparison: Comparison, noises: float, *, takes_most: bool) -> Refusal | None:
-    """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to, or asks
-    for another machine than the file describes. An effect that is there brings stated numbers back; one that explains
-    most of what is left is there, whatever it does to them."""
-    chosen = comparison.chosen
+def _refusal(standing: Standing, comparison: Comparison) -> Refusal | None:
+    """Why an effect is not taken, though it has the evidence: it explains too little of records not fitted to."""
     if comparison.removed < standing.case.options.least_share:
         return Refusal(kind="falls-too-little", numbers={"share": comparison.removed})
-    if noises > NO_NOISE and comparison.removed < NO_PART:
-        return Refusal(kind="leaves-more-than-noise", numbers={"share": comparison.removed, "noises": noises})
-    if grown := _grown_held_out(standing, chosen):
-        return Refusal(kind="worse-than-given", numbers={"share": grown})
-    if tolerances(standing.model)[1] != "stated" or takes_most:
-        return None
-    farthest = _farthest_newly_off(standing, chosen)
-    return Refusal(kind="contradicts-file", numbers={"deviations": farthest}) if farthest >= FAR_OFF else None
-
-
-def _noises_left(standing: Standing, comparison: Comparison) -> float:
-    """Least residual that an effect leaves on a joint of its own, in noise floors; 0 for one of the whole machine, and
-    where nothing is known of its joints."""
-    own = np.array([j in comparison.chosen.joints for j in standing.model.machine.modelled_joints])
-    left = np.sqrt(comparison.fitted_after[own]) / standing.case.noise[own]
-    known = left[np.isfinite(left)]
-    return float(known.min()) if known.size else 0.0
-
-
-def _farthest_newly_off(standing: Standing, chosen: Fitted) -> float:
-    """Distance of the farthest of the numbers that the file states, in stated deviations, with a candidate: of those
-    that were not far off without it; 0 where there are none."""
-    now = standing.now
-    before = {u.name: abs(prior_distance(u.as_stated, now.values[u.name])[0]) for u in now.unknowns}
-    own = [u.as_stated for u in chosen.fit.unknowns if u.parameter.effect is None]
-    stated = [u for u in own if before.get(u.name, FAR_OFF) < FAR_OFF]
-    return max((abs(prior_distance(u, chosen.fit.values[u.name])[0]) for u in stated), default=0.0)
-
-
-def _grown_held_out(standing: Standing, chosen: Fitted) -> float:
-    """By which share the held-out variance is larger with an effect than with the model as given, on every joint of the
-    effect; 0 where it is not. What the fit of the stated numbers has followed is then nothing that the machine does
-    again, and an effect that only makes up for a part of that is none."""
-    held = standing.case.held_out
-    if not held:
-        return 0.0
-    given = holdout.held_out_squares(standing.given, expected_timing(standing.given), held)
-    after = holdout.held_out_squares(chosen.model, chosen.fit.values, held)
-    own = [j in chosen.joints or not chosen.joints for j in standing.model.machine.modelled_joints]
-    growth = after[own] / np.maximum(given[own], 1e-300) - 1.0
-    return max(0.0, float(np.min(growth))) if np.isfinite(growth).all() else 0.0
+    return None

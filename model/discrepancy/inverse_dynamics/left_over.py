@@ -1,21 +1,14 @@
-"""What is left over where a diagnosis ends: joints with more than noise, and the steps that this contradicts."""
+"""What is left over where a diagnosis ends: joints with more than noise, and laws that are of another form."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence, Set
 
 import numpy as np
 
 from model.arrays import Floats
-from model.discrepancy.diagnosis import RemainingShape, Step
+from model.discrepancy.diagnosis import Step
 from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit
-from model.discrepancy.inverse_dynamics.localisation import ANOTHER_LAW, bends_with_speed, remaining_shapes
-from model.discrepancy.inverse_dynamics.priors import prior_distance
-from model.discrepancy.inverse_dynamics.resolution import ends_at_bound
+from model.discrepancy.inverse_dynamics.localisation import ANOTHER_LAW, is_function_of, remaining_shapes
 from model.discrepancy.inverse_dynamics.standing import Standing
-from model.effects.library import find_named_effect
-from model.machine_model.record_verdict import FAR_OFF
 
 FAR_ABOVE_NOISE = 10.0
 """Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
@@ -26,13 +19,6 @@ SHAPED_ABOVE_NOISE = 3.0
 LONG_MEMORY = 4.0
 """Memory of a residual, in samples, beyond which it is slower than noise. White noise of a drive comes to 1.9 behind
 the low-pass, that of accelerations to 2.7."""
-VISCOUS = "viscous_friction"
-PART_OF_IT = 0.3
-"""Least share of what is left that friction which goes with the place explains, where another law was named."""
-FRICTION = "friction"
-"""The family of effects that rub."""
-SENSOR = "sensor"
-"""The family of a position sensor's errors."""
 
 
 def is_left_beside(standing: Standing) -> bool:
@@ -56,6 +42,24 @@ def joints_left_over(standing: Standing) -> tuple[int, ...]:
     return tuple(j for j, left in zip(joints, slow | shapes, strict=True) if left)
 
 
+def has_another_form(standing: Standing, step: Step) -> tuple[int, ...]:
+    """Joints on which what is left is a function of a step's own torque.
+
+    The numbers of a law are fitted. What is left as a function of the law's own torque is then something that the form
+    of the law has not: it is another law of the same quantity, as drag that grows with the square of speed is beside
+    viscous friction.
+    """
+    now, case = standing.now, standing.case
+    absent = {p.name: p.null for n in step.parameters if (p := now.balance.model.by_name[n]).null is not None}
+    left = set(joints_left_over(standing)) & set(step.joints)
+    if not left or not absent:
+        return ()
+    without = now.balance.residual({**now.values, **absent})
+    own = [less - all_of_it for less, all_of_it in zip(without, now.residual, strict=True)]
+    joints = standing.model.machine.modelled_joints
+    return tuple(j for k, j in enumerate(joints) if j in left and is_function_of(own, now, case, k))
+
+
 def _noises_left(standing: Standing) -> Floats:
     """(n,) what fitted and held-out records leave at least, in noise floors: a record in which a joint rests says
     nothing of it."""
@@ -64,70 +68,3 @@ def _noises_left(standing: Standing) -> Floats:
     if case.held_out:
         left.append(np.sqrt(holdout.held_out_squares(standing.model, now.values, case.held_out)))
     return np.asarray(np.fmin.reduce(left) / case.noise)
-
-
-def first_contradicted(standing: Standing, lowered: Set[str]) -> int | None:
-    """Index of the first step that the residual contradicts, or whose size has ended where no machine is; None where
-    there is none.
-
-    Args:
-        lowered: names of numbers that the file states and that steps have lowered.
-    """
-    shapes, left = remaining_shapes(standing.now, standing.case), set(joints_left_over(standing))
-    starved = left & _starved(standing.now)
-    for index, step in enumerate(standing.steps):
-        joints = left & set(step.joints) if step.adopted else ()
-        lowers = bool(lowered & set(step.parameters))
-        if step.adopted and _ended(standing, step):
-            return index
-        if any(
-            lowers
-            or _bends(standing.steps, step, j, shapes)
-            or rubs_elsewhere(step, j, shapes)
-            or (j in starved and _is_of(step, FRICTION))
-            for j in joints
-        ):
-            return index
-    return None
-
-
-def _starved(now: BalanceFit) -> set[int]:
-    """The joints of which the fit has lowered a friction far below what is expected of it."""
-    friction = [u for u in now.unknowns if _family(u.parameter.effect) == FRICTION and u.parameter.deviation]
-    stated = [u.as_stated for u in friction if u.low >= 0.0 and u.as_stated.expected > 0.0]
-    far = [u for u in stated if prior_distance(u, now.values[u.name])[0] <= -FAR_OFF]
-    return {joint for u in far for joint in u.parameter.joints}
-
-
-def _ended(standing: Standing, step: Step) -> bool:
-    """Whether a size of a step is at the end of what it may be, now that all others are fitted with it."""
-    known, values = standing.model.by_name, standing.now.values
-    return any(ends_at_bound(known[name], values[name]) for name in step.parameters if name in known)
-
-
-def rubs_elsewhere(step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:
-    """Whether a step names friction or a sensor where friction is left that goes with the place: a tight spot looks
-    like more friction everywhere, and like a bent sensor."""
-    if not _is_of(step, FRICTION, SENSOR):
-        return False
-    return any(s.joint == joint and s.against_motion and s.explained >= PART_OF_IT for s in shapes)
-
-
-def _is_of(step: Step, *families: str) -> bool:
-    """Whether a step names an effect of one of some families."""
-    return step.effect is not None and _family(step.effect) in families
-
-
-def _family(effect: str | None) -> str | None:
-    return None if effect is None else find_named_effect(effect).shared_name.family
-
-
-def _bends(steps: Sequence[Step], step: Step, joint: int, shapes: Sequence[RemainingShape]) -> bool:
-    """Whether a step is viscous friction, the only friction named on a joint, and another law is left there."""
-    return step.effect == VISCOUS and _only_viscous(steps, joint) and bends_with_speed(shapes, joint)
-
-
-def _only_viscous(steps: Sequence[Step], joint: int) -> bool:
-    """Whether viscous friction is the only friction that was named on a joint."""
-    named = {s.effect for s in steps if s.adopted and joint in s.joints and s.effect is not None}
-    return {name for name in named if _family(name) == FRICTION} == {VISCOUS}

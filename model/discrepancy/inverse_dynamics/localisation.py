@@ -144,25 +144,10 @@ def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape,
     return tuple(found)
 
 
-def bends_with_speed(shapes: Sequence[RemainingShape], joint: int) -> bool:
-    """Whether much of what is left on a joint (`ANOTHER_LAW`) is a torque against the motion that bends with speed.
-
-    Such a torque is odd in speed, as that of viscous friction; one that is even belongs to viscous friction of another
-    coefficient in each direction.
-    """
-    for shape in shapes:
-        if shape.joint != joint or shape.against != "speed" or shape.explained < ANOTHER_LAW:
-            continue
-        known = [(v, t) for v, t in zip(shape.centres, shape.torque, strict=True) if t is not None]
-        speed, torque = np.array(known).T
-        span = min(-speed.min(), speed.max())
-        if span <= 0.0:
-            continue
-        grid = np.linspace(0.0, span, len(speed))
-        forwards, backwards = np.interp(grid, speed, torque), np.interp(-grid, speed, torque)
-        if np.sum((forwards - backwards) ** 2) > np.sum((forwards + backwards) ** 2):
-            return True
-    return False
+def is_function_of(torque: Sequence[Floats], now: BalanceFit, case: TorqueCase, j: int) -> bool:
+    """Whether much of what is left on a joint (index) is a function of a torque (m, n) of every record."""
+    bins = _Signals(now, case, j).against(np.concatenate(list(torque)))
+    return bins is not None and bins.significance > SHAPE_SIGNIFICANCE and bins.explained >= ANOTHER_LAW
 
 
 def _time(record: RecordedMotion, row: int) -> float:
@@ -205,6 +190,11 @@ class _Signals:
         """The residual against the motion in bins of position, positive where it opposes that: friction of a tight spot
         changes its sign with the motion, so that its mean over both directions shows nothing."""
         return self._dependence(-self.signal * self.quantities["direction"][0][:, self.joint], "position")
+
+    def against(self, torque: Floats) -> Bins | None:
+        """The residual in bins of another torque (m, n)."""
+        known = Quantities({"drive": torque}, {}, self.stretches)
+        return dependence(self.signal, self.joint, "drive", known, self.floor)
 
     def _dependence(self, signal: Floats, against: AgainstWhat) -> Bins | None:
         count = self.quantities["time"][0].shape[1]

@@ -18,11 +18,10 @@ class TorqueOptions(FrozenRecord):
     joints: joints to look on; None for all that the model moves.
     most_steps: most effects that are added, one after the other.
     least_evidence: least fall of −2 log posterior by an effect, after the cost of its parameters and of the places
-        searched; the less, down to 10, the more of the fall comes from priors; less
-        than that where a number of the file would be four deviations off (`far_numbers`).
+        searched.
     echo: share of the evidence from earlier steps on the same joints, which a further effect must bring in addition:
         where the law of an effect is not exactly the rig's, what is left is no effect of its own.
-    least_margin: least lead in evidence over every other answer, for an effect to be named alone; down to 4, likewise.
+    least_margin: least lead in evidence over every other answer, for an effect to be named alone.
     least_share: least share by which the mean square of the torque on held-out records must fall.
     """
 

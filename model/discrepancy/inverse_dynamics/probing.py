@@ -61,7 +61,7 @@ class Prober:
 
     def probe(self, trial: Trial) -> Probe:
         """The best of a trial's starts."""
-        balance = TorqueBalance(trial.model, self.now.balance.records)
+        balance = self.now.balance.of_model(trial.model)
         null = {p.name: float(p.null) for p in trial.parameters if p.null is not None} | dict(trial.origin)
         best = Probe(trial, 0.0, trial.starts[0])
         if trial.stated:

@@ -125,14 +125,6 @@ def _is_hardly_reached(found: Fitted) -> bool:
     return False
 
 
-def is_beyond_motion(found: Fitted, case: TorqueCase) -> bool:
-    """Whether the recorded motion keeps this effect from being named: it repeats as often as the effect, or holds less
-    than a wave of it. Such records do not contradict it."""
-    rates = [p for p in found.parameters if p.rate_of is not None and p.low > found.model.by_name[p.name].low]
-    slowest = any(found.fit.values[p.name] <= (1 + AT_END) * p.low for p in rates)
-    return slowest or _repeats_with_motion(found, case)
-
-
 def _as_fitted(found: Fitted) -> Model:
     """The model with an effect, with the numbers of its fit."""
     return found.model.with_values(found.fit.model_values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,6 @@ from model.discrepancy.inverse_dynamics.trial import Start
 from model.effects.library import find_named_effect
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.inverse_dynamics.drive_timing import timing_unknowns
-from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
@@ -63,8 +62,6 @@ class Fitted:
     """Cost of its parameters and of the places searched, which the evidence has paid."""
     stated: tuple[Parameter, ...] = ()
     """Those of its parameters that the file states, as it states them; their priors are lifted."""
-    relief: float = 0.0
-    """Share of the fall of −2 log posterior that is of priors: numbers that no longer have to be off."""
     told: float = 0.0
     """What held-out records say for it, as evidence; 0 where there are none."""
     told_compared: float = 0.0
@@ -115,15 +112,10 @@ def search(
     case: TorqueCase,
     progress: Progress,
     cancel: Cancel,
-    also_from: Mapping[str, float] | None = None,
 ) -> Findings:
     """Try every effect that the model lacks, or that the file states, against the residuals of a fit.
 
     Raises CancelledError when asked to end.
-
-    Args:
-        also_from: values from which candidates are fitted a second time: those of a fit with an effect that was taken
-            out, without which the numbers of the others are far from what they are with it.
     """
     slopes = now.slopes()
     prober = prepare_probes(now, slopes)
@@ -138,7 +130,7 @@ def search(
     for chosen in _shortlist(probes, now):
         stop_if(cancel)
         progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
-        found.append(_fit_effect(fitted_model, now, slopes, chosen, also_from))
+        found.append(_fit_effect(fitted_model, now, slopes, chosen))
     places = sum(len(p.trial.starts) for p in probes)
     found = _refined(_weigh(found, now, places), cancel)
     weighed = _weigh(found, now, places)
@@ -147,7 +139,7 @@ def search(
         fewer = [p for p in _with_fewer_joints(probes, weighed[0]) if not _is_fitted(p, found)]
         if not fewer:
             break
-        found += _refined([_fit_effect(fitted_model, now, slopes, p, also_from) for p in fewer], cancel)
+        found += _refined([_fit_effect(fitted_model, now, slopes, p) for p in fewer], cancel)
         weighed = _weigh(found, now, places)
     return Findings(tuple(weighed), tuple(probes))
 
@@ -223,7 +215,6 @@ def _fit_effect(
     now: BalanceFit,
     slopes: Slopes,
     probes: Sequence[Probe],
-    also_from: Mapping[str, float] | None = None,
 ) -> Fitted:
     """An effect on the joints of its probes, fitted together with all unknowns. Its evidence is not known yet.
 
@@ -241,7 +232,7 @@ def _fit_effect(
     timing = {u.name for u in timing_unknowns(wider)}
     kept = (u for u in now.unknowns if u.name not in free and (not u.nuisance or u.name in timing))
     unknowns = (*kept, *(free_unknown(p) for p in own))
-    balance = TorqueBalance(wider, now.balance.records)
+    balance = now.balance.of_model(wider)
     fitted = fit(balance, unknowns, {**now.values, **start}, now.data, now.noise.memory, slopes)
     if fitted.criterion > now.criterion:
         null = {p.name: now.values.get(p.name, float(p.null)) for p in own if p.null is not None}
@@ -251,10 +242,6 @@ def _fit_effect(
     if now.prior > STRAINED:
         expected = {u.name: u.expected for u in unknowns if u.deviation is not None}
         second = fit(balance, unknowns, {**now.values, **start, **expected}, now.data, now.noise.memory)
-        fitted = min(fitted, second, key=lambda f: f.criterion)
-    if also_from is not None:
-        others = {name: value for name, value in also_from.items() if name not in free}
-        second = fit(balance, unknowns, {**now.values, **start, **others}, now.data, now.noise.memory)
         fitted = min(fitted, second, key=lambda f: f.criterion)
     return Fitted(effect, joints, wider, own, fitted, 0.0, stated=stated)
 
@@ -273,7 +260,6 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
             f,
             evidence=evidence(now, f.fit, memory, len(f.parameters), places),
             cost=cost_of(now, memory, len(f.parameters), places),
-            relief=_relief(now, f.fit, memory),
         )
         for f in found
     ]
@@ -324,13 +310,6 @@ def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: 
 def _fell(before: BalanceFit, after: BalanceFit, memory: Floats) -> float:
     """Fall of −2 log likelihood, with the independent samples of both counted by one memory (n,)."""
     return float(((before.by_joint * before.noise.memory - after.by_joint * after.noise.memory) / memory).sum())
-
-
-def _relief(before: BalanceFit, after: BalanceFit, memory: Floats) -> float:
-    """Share of the fall of −2 log posterior that is of priors, between 0 and 1."""
-    relieved = max(before.prior - after.prior, 0.0)
-    fell = max(_fell(before, after, memory), 0.0)
-    return relieved / (relieved + fell) if relieved > 0.0 else 0.0
 
 
 def cost_of(before: BalanceFit, memory: Floats, parameters: int, places: int) -> float:

@@ -16,9 +16,7 @@ from model.discrepancy.inverse_dynamics.estimates import found_values, signal_er
 from model.discrepancy.inverse_dynamics.judging import (
     SUSPECTED,
     Judgement,
-    explains_most,
     needed_evidence,
-    needed_lead,
 )
 from model.discrepancy.inverse_dynamics.localisation import locate
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
@@ -87,7 +85,7 @@ def list_tried(standing: Standing, found: Findings) -> tuple[Candidate, ...]:
         return listed
     best = max(range(min(len(found.fitted), SHOWN)), key=lambda k: listed[k].total)
     chosen = found.fitted[best]
-    needed = needed_evidence(standing, chosen, takes_most=explains_most(standing, chosen))
+    needed = needed_evidence(standing, chosen)
     told = {"evidence_held_out": chosen.told} if standing.case.held_out else {}
     return (*listed[:best], listed[best].model_copy(update={"needed": needed, **told}), *listed[best + 1 :])
 
@@ -135,7 +133,7 @@ def _cannot_be_told(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> bo
     taken off. Such a rival has to be one that would be suspected by itself. Held-out records make a lead larger and not
     smaller: a rival that leaves more of the fitted records may still take something else off others.
     """
-    needed = needed_lead(options, chosen, rival)
+    needed = options.least_margin
     lead = chosen.log_odds - rival.log_odds
     lead = max(lead, lead - (chosen.told_compared - rival.told_compared))
     if lead < needed:

@@ -9,7 +9,6 @@ from model.discrepancy.inverse_dynamics.comparison import compare
 from model.discrepancy.inverse_dynamics.judging import (
     CHANCES,
     SUSPECTED,
-    explains_most,
     needed_evidence,
 )
 from model.discrepancy.inverse_dynamics.search import Findings
@@ -32,7 +31,7 @@ def suspect(standing: Standing, found: Findings) -> Suspicion | None:
         if chosen.evidence <= 0:
             continue
         total = chosen.evidence + chosen.told
-        needed = needed_evidence(standing, chosen, takes_most=explains_most(standing, chosen))
+        needed = needed_evidence(standing, chosen)
         if not SUSPECTED <= total < needed:
             continue
         comparison = compare(standing, chosen)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from daq.contracts.progress import Cancel, Progress, stop_if
@@ -11,13 +11,11 @@ from model.discrepancy.grounds import Note, Refusal, RefusalKind
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.answer import Outcome, answer_of
 from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.far_numbers import stands_for_far_number
 from model.discrepancy.inverse_dynamics.found import Found, Refitter
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
-from model.discrepancy.inverse_dynamics.judging import CHANCES, SUSPECTED, judge
-from model.discrepancy.inverse_dynamics.left_over import FAR_ABOVE_NOISE, first_contradicted
-from model.discrepancy.inverse_dynamics.resolution import is_beyond_motion, is_resolved, sizes_at_bounds
-from model.discrepancy.inverse_dynamics.revision import describe_in_order, has_own_shape, split_step
+from model.discrepancy.inverse_dynamics.judging import CHANCES, judge
+from model.discrepancy.inverse_dynamics.left_over import has_another_form
+from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.search import (
     Findings,
     Fitted,
@@ -32,18 +30,9 @@ from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.verdict import withdrawn
 from model.machine_model.model import Model
-from model.machine_model.parameter import Parameter
 
-REVISIONS = 2
-"""Times that all effects are looked for once more, at most: again where the first time has changed one."""
-LEAVES_MORE: RefusalKind = "leaves-more-than-noise"
-"""Kind of refusal of an effect that takes little of what is no noise: two effects together may take most of it."""
 SUPERFLUOUS: RefusalKind = "superfluous"
 """Kind of refusal of an effect that nothing needs any more."""
-ONE_WAY: RefusalKind = "found-one-way"
-"""Kind of refusal of an effect that the held-out records do not show when they are fitted to in turn."""
-BEGUN_WITH = 2
-"""Refused effects with which a pair is begun, at most."""
 
 
 @dataclass
@@ -57,13 +46,7 @@ class TorqueWorkflow:
     cancel: Cancel
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
-    at_bounds: list[Note] = field(default_factory=list)
-    """Effects that would have been named, had their sizes not ended where no machine is."""
-    ended: list[Fitted] = field(default_factory=list)
-    """Candidates of a step whose sizes ended there only when the whole model was fitted with them."""
     suspicion: Suspicion | None = None
-    beyond_motion: tuple[Fitted, ...] = ()
-    """Candidates of the last step with enough evidence that the recorded motion does not let be named."""
 
     def __post_init__(self) -> None:
         self.refitter = Refitter(self.model, self.case)
@@ -74,20 +57,14 @@ class TorqueWorkflow:
         self.notes.append(Note(kind="tolerance-source", values=source))
 
     def run(self) -> None:
-        """Take steps until nothing more is significant or holds, then look for every effect once more."""
+        """Take steps until nothing more is significant or holds."""
         self._take_steps()
-        for _ in range(REVISIONS):
-            if not self._revise():
-                break
-            self._take_steps()
         self._withdraw_wrong_laws()
         self.notes += [
             Note(kind="taken-out-again", values={"effect": step.effect, "step": number})
             for number, step in enumerate(self.found.steps, start=1)
             if step.refusal is not None and step.refusal.kind == SUPERFLUOUS
         ]
-        if len(self.found.adopted) > 1:
-            self.found = describe_in_order(self.refitter, self.found)
 
     def answer(self, traces: Sequence[str], held_out: Sequence[str], cutoff: float) -> Diagnosis:
         """The whole answer, except for its sentences and the times that it took.
@@ -104,35 +81,21 @@ class TorqueWorkflow:
             stated=self.found.stated,
             tried=self.tried,
             suspicion=self.suspicion,
-            notes=(*self.notes, *self.at_bounds),
+            notes=tuple(self.notes),
         )
         return answer_of(outcome, traces, held_out, cutoff)
 
-    def withdraw_unconfirmed(self, effects: Collection[tuple[str | None, tuple[int, ...]]]) -> None:
-        """Takes effects on joints back which the held-out records do not show when they are fitted to in turn; and what
-        is suspected. The ranking and the sizes at bounds were of the model with these effects."""
-        self.suspicion = None
-        for step in [s for s in self.found.adopted if (s.effect, s.joints) in effects]:
-            self.found = self._refuse(self.refitter.remove(self.found, step), self.found, step, ONE_WAY)
-            self.tried, self.at_bounds, self.beyond_motion = (), [], ()
-        self.found = describe_in_order(self.refitter, self.found)
-
     def _take_steps(self) -> None:
-        self.beyond_motion = ()
         for _ in range(2 * self.case.options.most_steps):  # two effects may make each other superfluous in turn
             if len(self.found.adopted) >= self.case.options.most_steps:
                 break
             before = self.found
             self._report(0.1, "what is missing")
-            findings, self.ended = self._search(before), []
+            findings = self._search(before)
             self.found = self._adopt(before, findings)
-            if not _has_more(self.found, before):
-                self.found = self._adopt_pair(before, self.found, findings)
             if not _has_more(self.found, before):
                 self.tried = list_tried(self.refitter.standing(self.found), findings)
                 self.suspicion = suspect(self.refitter.standing(self.found), findings)
-                self.at_bounds = self._on_sizes_at_bounds(findings)
-                self.beyond_motion = self._beyond_motion(findings)
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(len(before.steps))
@@ -142,18 +105,11 @@ class TorqueWorkflow:
         whole, done = self.case.options.most_steps, len(self.found.steps)
         self.progress(min(0.99, (done + fraction) / (whole + 1)), f"step {done + 1}: {text}")
 
-    def _search(self, found: Found, joints: tuple[int, ...] = (), before: Found | None = None) -> Findings:
-        """What a step finds, without what the records do not resolve, the most probable by all records first.
-
-        Args:
-            joints: to look on; empty for all that may be looked on. before: what was found before an effect was taken
-                out.
-        """
-        options = self.case.options.model_copy(update={"joints": joints} if joints else {})
-        case, also_from = replace(self.case, options=options), None if before is None else before.now.values
-        findings = search(found.model, found.now, case, self._report, self.cancel, also_from)
+    def _search(self, found: Found) -> Findings:
+        """What a step finds, without what the records do not resolve, the most probable by all records first."""
+        findings = search(found.model, found.now, self.case, self._report, self.cancel)
         fitted = prefer_fewer_joints(sorted(self._with_held_out(found, findings.fitted), key=order_by_odds))
-        fitted = prefer_shorter_laws(fitted, found.now, options.least_margin)
+        fitted = prefer_shorter_laws(fitted, found.now, self.case.options.least_margin)
         resolved = [is_resolved(f, found.now, self.case) for f in fitted]
         return replace(
             findings,
@@ -164,25 +120,13 @@ class TorqueWorkflow:
     def _with_held_out(self, found: Found, candidates: Sequence[Fitted]) -> list[Fitted]:
         """Candidates with what held-out records say for them; those for which fitted records do not speak are left."""
         held = self.case.held_out
-        asked = [c for c in candidates if held and (c.evidence > 0 or stands_for_far_number(found.now, c))]
+        asked = [c for c in candidates if held and c.evidence > 0]
         told = holdout.evidence(found.now, [c.fit for c in asked], held, self.case.noise)
         others = [c for c in candidates if not any(c is one for one in asked)]
         return [
             *(replace(c, told=one.alone, told_compared=one.compared) for c, one in zip(asked, told, strict=True)),
             *others,
         ]
-
-    def _on_sizes_at_bounds(self, found: Findings) -> list[Note]:
-        """What would have been enough evidence to be named, had its size not ended where no machine is."""
-        enough = [f for f in (*self.ended, *found.unresolved) if f.evidence >= self.case.options.least_evidence]
-        best = {(f.effect, f.joints): f for f in reversed(enough) if _own_bounds(f)}
-        return [_size_at_bound(f) for f in best.values()]
-
-    def _beyond_motion(self, found: Findings) -> tuple[Fitted, ...]:
-        """What would have been enough evidence of all records, had the motion shown more of it."""
-        least = self.case.options.least_evidence
-        enough = (f for f in found.unresolved if min(f.evidence, f.told) > 0 and f.evidence + f.told >= least)
-        return tuple(f for f in enough if is_beyond_motion(f, self.case))
 
     def _adopt(self, found: Found, findings: Findings) -> Found:
         """Adds the best candidate that holds, if there is one, and the steps that were refused before it."""
@@ -196,88 +140,12 @@ class TorqueWorkflow:
             if judgement is None:
                 passed_over.append(chosen)
                 continue
-            taken = None
-            if judgement.refusal is None:
-                taken = self.refitter.take(found, chosen)
-                fitted = replace(chosen, fit=taken.now)
-                if sizes_at_bounds(fitted):
-                    self.ended.append(fitted)
-                    continue
-            rivals = [*refused, *_no_rivals(found, chosen, passed_over)]
+            rivals = [*refused, *passed_over]
             steps.append(record_step(standing, findings, judgement, rivals))
-            if taken is not None:
-                return replace(taken, steps=tuple(steps))
+            if judgement.refusal is None:
+                return replace(self.refitter.take(found, chosen), steps=tuple(steps))
             refused.append(chosen)
         return replace(found, steps=tuple(steps))
-
-    def _adopt_pair(self, before: Found, after: Found, findings: Findings) -> Found:
-        """Adds two effects of a joint, each of which takes too little of what is no noise while both leave little more
-        than noise. Where there are none, returns what the step left that adopted nothing.
-
-        Args:
-            before, after: before that step, and with what it refused. findings: of that step.
-        """
-        if len(before.adopted) + 2 > self.case.options.most_steps:
-            return after
-        refusals = {(s.effect, s.joints): s for s in after.steps[len(before.steps) :] if _leaves_structure(s)}
-        for first in [f for f in findings.fitted if (f.effect, f.joints) in refusals][:BEGUN_WITH]:
-            half = self.refitter.take(before, first)
-            beside = self._search(half, first.joints)
-            for second in beside.fitted[:CHANCES]:
-                if not set(first.joints) & set(second.joints):
-                    continue
-                judgement = judge(self.refitter.standing(before), second, ())
-                if judgement is None or judgement.refusal is not None or judgement.noises_left > FAR_ABOVE_NOISE:
-                    continue
-                begun = refusals[first.effect, first.joints]
-                taken = begun.model_copy(update={"adopted": True, "refusal": None})
-                added = record_step(self.refitter.standing(half), beside, judgement, ())
-                steps = (*(s for s in after.steps if s is not begun), taken, added)
-                return replace(self.refitter.take(half, second), steps=steps)
-        return after
-
-    def _revise(self) -> bool:
-        """Look for every effect once more with all others in place: those found first were held against their rivals
-        while others were missing. Whether another effect or joint is named."""
-        before = [(s.effect, s.joints) for s in self.found.adopted]
-        for key in before if len(before) > 1 else []:
-            step = next((s for s in self.found.adopted if (s.effect, s.joints) == key), None)
-            if step is not None:
-                self._report(0.9, "whether another effect explains it better")
-                self.found = self._look_again(self.found, step)
-        for step in [s for s in self.found.adopted if has_own_shape(s)]:
-            for joint in step.joints:
-                self._report(0.9, "whether another effect explains it better")
-                self.found = self._look_again_on(self.found, step.effect, joint)
-        return {(s.effect, s.joints) for s in self.found.adopted} != set(before)
-
-    def _look_again(self, found: Found, step: Step) -> Found:
-        """Replaces an effect by what explains best what it explained: itself, or another effect. Takes it out where
-        nothing needs it any more."""
-        place = next(k for k, s in enumerate(found.steps) if s is step)
-        others = (*found.steps[:place], *found.steps[place + 1 :])
-        without = replace(self.refitter.remove(found, step), steps=others)
-        findings = self._search(without, step.joints, found)
-        again = self._adopt(without, findings)
-        if _has_more(again, without):
-            return replace(again, steps=(*others[:place], again.steps[-1], *others[place:]))
-        mine = [f for f in findings.fitted if (f.effect, f.joints) == (step.effect, step.joints)]
-        if all(f.evidence + f.told >= SUSPECTED for f in mine):
-            return found
-        return self._refuse(without, found, step, SUPERFLUOUS)
-
-    def _look_again_on(self, found: Found, effect: str | None, joint: int) -> Found:
-        """Replaces an effect on one of its joints by another effect, where that explains the joint better."""
-        step = next((s for s in found.adopted if s.effect == effect and joint in s.joints and len(s.joints) > 1), None)
-        if step is None:
-            return found
-        part, rest = split_step(found.model, step, joint)
-        others = tuple(rest if s is step else s for s in found.steps)
-        without = replace(self.refitter.remove(found, part), steps=others)
-        again = self._adopt(without, self._search(without, (joint,), found))
-        if not _has_more(again, without) or again.steps[-1].effect == effect:
-            return found
-        return self._look_again(replace(again, steps=(*others, again.steps[-1])), rest)
 
     def _prune(self, latest: int) -> None:
         """Take out effects of earlier steps that the latest one has made superfluous."""
@@ -289,54 +157,24 @@ class TorqueWorkflow:
             if less < 0:
                 self.found = self._refuse(without, self.found, step, SUPERFLUOUS)
 
+    def _withdraw_wrong_laws(self) -> None:
+        """Take back the first effect whose law is of another form than what is there, and all effects after it."""
+        standing, steps = self.refitter.standing(self.found), self.found.steps
+        forms = ((k, has_another_form(standing, step)) for k, step in enumerate(steps) if step.adopted)
+        first, wrong = next((found for found in forms if found[1]), (len(steps), ()))
+        if not wrong:
+            return
+        for step in steps[first:]:
+            if step.adopted:
+                now = tuple(withdrawn(s, wrong) if s is step else s for s in self.found.steps)
+                self.found = replace(self.refitter.remove(self.found, step), steps=now)
+        self.suspicion, self.tried = None, ()  # they were of the model with these effects
+
     def _refuse(self, without: Found, found: Found, step: Step, kind: RefusalKind) -> Found:
         """Takes an effect out and tells why its step does not hold."""
         gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind=kind)})
         return replace(without, steps=tuple(gone if s is step else s for s in found.steps))
 
-    def _withdraw_wrong_laws(self) -> None:
-        """Take back effects that the residual contradicts, and all effects after them: friction that was lowered far
-        below what the file states where something is still missing, viscous friction whose own residual bends with
-        speed, and friction in whose place a stated one came out far lower."""
-        while (first := first_contradicted(self.refitter.standing(self.found), self.found.lowered)) is not None:
-            wrong = self.found.steps[first].joints
-            for index, step in enumerate(self.found.steps[first:], start=first):
-                if not step.adopted:
-                    continue
-                steps = list(self.found.steps)
-                steps[index] = withdrawn(step, wrong)
-                self.found = replace(self.refitter.remove(self.found, step), steps=tuple(steps))
-            # they were of the model with these effects
-            self.suspicion, self.tried, self.at_bounds, self.beyond_motion = None, (), [], ()
-
-
-def _no_rivals(found: Found, chosen: Fitted, passed_over: Sequence[Fitted]) -> list[Fitted]:
-    """Those of the candidates that were passed over which are no rivals of the one that is chosen: all of them, but
-    where it is named on less evidence than other effects need, for a number far from its file. Then what is more
-    probable than it is its rival."""
-    if chosen.evidence + chosen.told >= SUSPECTED or not stands_for_far_number(found.now, chosen):
-        return list(passed_over)
-    return [f for f in passed_over if f.log_odds < chosen.log_odds]
-
 
 def _has_more(after: Found, before: Found) -> bool:
     return len(after.adopted) > len(before.adopted)
-
-
-def _leaves_structure(step: Step) -> bool:
-    return step.refusal is not None and step.refusal.kind == LEAVES_MORE
-
-
-def _own_bounds(found: Fitted) -> list[Parameter]:
-    """Sizes of a candidate that ended where no machine is, and not merely where the records say nothing more."""
-    known = found.model.by_name
-    return [p for p in sizes_at_bounds(found) if (p.low, p.high) == (known[p.name].low, known[p.name].high)]
-
-
-def _size_at_bound(found: Fitted) -> Note:
-    """The first size of a candidate that ended at its bound."""
-    p = _own_bounds(found)[0]
-    values = {"effect": found.effect, "joints": list(found.joints), "evidence": found.evidence}
-    return Note(
-        kind="size-at-bound", values={**values, "name": p.part, "value": found.fit.values[p.name], "unit": p.unit}
-    )

@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 
 from daq.contracts.machine import Machine
-from daq.contracts.trace import Trace
 from model.arrays import Floats, Integers
 from model.discrepancy.diagnosis import UNWRITTEN, Dependence, PhaseCell, Where, WorstPlace
 from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
@@ -23,7 +22,6 @@ from model.discrepancy.localisation.statistics import (
     significance_of_chi_square,
     significance_of_squares,
 )
-from model.discrepancy.localisation.varying_parameters import moving_parameters
 from model.fitting.records import resolution
 
 WINDOW = 0.3
@@ -189,7 +187,7 @@ class _Map:
         return found
 
 
-def locate(residuals: Residuals, traces: Sequence[Trace] = ()) -> Where:
+def locate(residuals: Residuals) -> Where:
     """Where a model's residuals exceed noise.
 
     Significances take into account that neighbouring samples are correlated: each mean square counts as many samples as
@@ -198,9 +196,6 @@ def locate(residuals: Residuals, traces: Sequence[Trace] = ()) -> Where:
 
     Where even the quieter half of a joint's windows exceeds the stated noise, by up to 1.5 times its variance, that
     larger value counts as the noise.
-
-    Args:
-        traces: the same records as traces, where α(t) is wanted; needs the recorded drive (about 0.5 s).
     """
     found = _Map(residuals)
     place = found.worst()
@@ -211,7 +206,6 @@ def locate(residuals: Residuals, traces: Sequence[Trace] = ()) -> Where:
         cells=tuple(found.cells()),
         dependences=tuple(_dependences(residuals)),
         worst=found.worst_place(place),
-        moving=tuple(m for trace in traces[:1] for m in moving_parameters(residuals.model, trace)),
     )
 
 

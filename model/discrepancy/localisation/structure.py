@@ -2,7 +2,7 @@
 
 Noise of a sensor does not know what the arm does: it is as large in one place, direction and second as in another, and
 its mean is everywhere the same. A torque or a law that is missing goes with the motion, and is a slow signal, since an
-arm's inertia stands between a torque and a reading. A single frequency or wavelength is no sensor's noise either.
+arm's inertia stands between a torque and a reading.
 Outliers are clipped, so that a few of them are no shape.
 """
 
@@ -10,10 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from daq.contracts.machine import NoController
 from model.arrays import Floats
 from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
-from model.discrepancy.localisation.lines import has_line_over_position, has_line_over_time
 from model.discrepancy.localisation.residuals import Residuals
 from model.fitting.whitening import fitted_whitener
 
@@ -31,8 +29,6 @@ LONGEST_MEMORY = 12
 """Largest order, in samples, of the autoregression that tells how much of a residual its past predicts."""
 LEAST = 0.3
 """Lower bound of a residual's deviation, relative to that of noise, when its correlation is estimated."""
-FALSE_LINES = 0.01
-"""Probability with which noise of a smooth spectrum is said to hold a tone, on any joint, in time or over position."""
 
 
 def clipped(signal: Floats) -> Floats:
@@ -42,8 +38,8 @@ def clipped(signal: Floats) -> Floats:
 
 
 def joints_with_structure(residuals: Residuals | None) -> tuple[int, ...]:
-    """Joints whose residual, or its square, depends on time, position, speed, direction or drive, which holds a tone in
-    time or over position, or is so slow that it is no noise of a sensor.
+    """Joints whose residual, or its square, depends on time, position, speed, direction or drive, or which is so slow
+    that it is no noise of a sensor.
 
     The significance of a dependence takes into account that neighbouring samples are correlated
     (`statistics.binned`). None of no residuals.
@@ -52,19 +48,11 @@ def joints_with_structure(residuals: Residuals | None) -> tuple[int, ...]:
         return ()
     known = quantities(residuals.motions)
     joints = residuals.model.machine.modelled_joints
-    # Measured positions, and simulations that follow them, have the noise that is looked at: set points have none.
-    asked = not isinstance(residuals.model.machine.controller, NoController)
-    false_rate = FALSE_LINES / (2 * len(joints))
     found = []
     for column, joint in enumerate(joints):
         signal = clipped(np.concatenate(list(residuals.signals))[:, column] / residuals.deviations[column])
         runs = [signal[stretch] for stretch in known.stretches]
-        positions = [known.values["position"][stretch, column] for stretch in known.stretches] if asked else []
-        if (
-            _is_slow(runs)
-            or has_line_over_time(runs, false_rate, LEAST)
-            or (positions and has_line_over_position(runs, positions, false_rate, LEAST))
-        ):
+        if _is_slow(runs):
             found.append(joint)
             continue
         mean_square = max(float(np.mean(signal**2)), LEAST**2)

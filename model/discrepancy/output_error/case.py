@@ -9,18 +9,17 @@ import numpy as np
 
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.diagnosis import RemainingShape, SignalError, Where
+from model.discrepancy.diagnosis import SignalError, Where
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.residuals import Residuals
-from model.discrepancy.localisation.unexplained_torque import remaining_shapes
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.holdout import HeldOut
 from model.discrepancy.output_error.noise_floor import noise_floor
 from model.discrepancy.output_error.observation import Observation, Signals
 from model.discrepancy.output_error.search import STRAINED, Point
-from model.discrepancy.output_error.shown_noise import residuals_of, with_noise
+from model.discrepancy.output_error.shown_noise import residuals_of
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS, THRESHOLDS, Thresholds
 from model.discrepancy.verdict import excess_removed, rises_too_much
 from model.machine_model.model import Model
@@ -116,15 +115,9 @@ class Case:
             return Refusal(kind="error-rises", numbers={"rise": rise, "deviation": deviation})
         return None
 
-    def where(self, point: Point, *, moving: bool = True) -> Where:
-        """Where the point disagrees with the fitted traces. moving: also find which parameters would have to vary with
-        time, which takes longest."""
-        driven = tuple(t for t in self.traces if moving and t.drive is not None)
-        return locate(self.residuals_of(point), driven)
-
-    def remaining(self, point: Point) -> tuple[RemainingShape, ...]:
-        """What the point leaves of the fitted traces, as torques."""
-        return remaining_shapes(self.residuals_of(point))
+    def where(self, point: Point) -> Where:
+        """Where the point disagrees with the fitted traces."""
+        return locate(self.residuals_of(point))
 
     def residuals_of(self, point: Point) -> Residuals:
         """Residuals of the fitted traces as errors are reported."""
@@ -168,11 +161,11 @@ def build_case(
 
 
 def _held_with_noise(held: HeldOut | None, point: Point) -> HeldOut | None:
-    """Held-out traces with the noise that a point is weighed with, without readings of theirs that lie apart."""
+    """Held-out traces with the noise that a point is weighed with."""
     noise = point.observation.noise
     if held is None or noise is None:
         return held
-    return replace(held, observation=with_noise(held.observation, noise, held.residuals(point)))
+    return replace(held, observation=replace(held.observation, noise=noise))
 
 
 def errors_of_fit(point: Point) -> tuple[SignalError, ...]:

@@ -165,7 +165,7 @@ class _JointRecords:
             wrong = np.abs(sent - used) > tolerance
             clear += int((wrong if numbers is None else wrong & numbers.lost).sum())
             if numbers is not None:
-                changed &= numbers.told
+                changed &= ~numbers.limited
             moved, lost, total = (
                 moved + int(changed.sum()),
                 lost + int((wrong & changed).sum()),

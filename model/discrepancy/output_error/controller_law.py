@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import SampledPid
 from model.arrays import Floats
-from model.discrepancy.output_error.received_set_points import follow_received
 
 CLEAR = 4.0
 """Distance of a drive from what a set point makes of it, in resolutions, beyond which it was another set point: a drive
 may be rounded more coarsely than a file tells, and then lies near what either of two set points makes."""
+
+Memory = tuple[float, float, float, float, float]
+"""What a controller remembers: sum and last of the errors, of the inner ones, position."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class ControllerLaw:
         """
         used, formed, clear = np.empty_like(sent), np.empty_like(sent), np.zeros(len(sent), dtype=bool)
         factor = scale.factor
-        memory: Any = self._begin(float(sent[0] - position[0]), float(position[0]), scale)
+        memory = self._begin(float(sent[0] - position[0]), float(position[0]), scale)
         for k in range(len(sent)):
             wanted = float(sent[k])
             output, after = self._output(wanted - position[k], float(position[k]), memory)
@@ -80,43 +81,26 @@ class ControllerLaw:
             memory = self._kept(memory, after, limited=bool(limited[k]))
         return used, formed, clear
 
-    def follow_hidden(
-        self, sent: Floats, position: Floats, drive: Floats, limited: NDArray[np.bool_], scale: Scale, line: float
-    ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-        """The same as `follow`, where a drive at its limit hides set points: they are told by what follows."""
-        begin = self._begin(float(sent[0] - position[0]), float(position[0]), scale)
-
-        def step(error: Floats, at: float, memory: Any, *, limited: bool) -> Any:
-            output, after = self._output(error, at, memory)
-            return output, self._kept(memory, after, limited=limited)
-
-        path = follow_received(sent, position, drive, limited, step, begin, scale.factor, line)
-        miss, left = (np.abs(drive - scale.factor * formed) for formed in (path.of_sent, path.formed))
-        return path.used, path.formed, ~limited & (path.used != sent) & (miss > CLEAR * line) & (left <= line)
-
-    def _kept(self, before: Any, after: Any, *, limited: bool) -> Any:
+    def _kept(self, before: Memory, after: Memory, *, limited: bool) -> Memory:
         """What the controller remembers of a period: at its limit not the error, unless it winds up."""
         return (before[0], *after[1:]) if limited and not self.winds_up else after
 
-    def _begin(self, error: float, position: float, scale: Scale) -> tuple[float, float, float, float, float]:
+    def _begin(self, error: float, position: float, scale: Scale) -> Memory:
         """What the controller remembers before the first sample, whose error and position these are."""
         total = scale.held / (scale.factor * self._summed) if self.integrates else 0.0
         totals = (total, 0.0) if self.inner is None else (0.0, total)
         return totals[0], error, totals[1], 0.0, position
 
-    def _output(self, error: Any, position: Any, memory: Any) -> tuple[Any, tuple[Any, ...]]:
-        """The output for an error, and the memory after it: sum and last of the errors, of the inner ones, position.
-
-        Numbers, or arrays by age of the set point (`received_set_points`).
-        """
+    def _output(self, error: float, position: float, memory: Memory) -> tuple[float, Memory]:
+        """The output for an error, and the memory after it: sum and last of the errors, of the inner ones, position."""
         total, last, inner_total, inner_last, before = memory
         p, i, d = self.outer
-        total = total + error * self.period  # not in place: an array of the memory is read twice
+        total += error * self.period
         output = p * error + i * total + d * (error - last) / self.period
         if self.inner is None:
-            return output, (total, error, inner_total, inner_last, position + 0.0 * before)
+            return output, (total, error, inner_total, inner_last, position)
         p, i, d = self.inner
         inner = output - (position - before) / self.period
-        inner_total = inner_total + inner * self.period
+        inner_total += inner * self.period
         output = p * inner + i * inner_total + d * (inner - inner_last) / self.period
-        return output, (total, error, inner_total, inner, position + 0.0 * before)
+        return output, (total, error, inner_total, inner, position)

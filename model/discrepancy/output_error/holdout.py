@@ -87,7 +87,6 @@ def _record(observation: Observation, number: int) -> Observation:
         observation,
         records=observation.records[own],
         prepared=observation.prepared[own],
-        apart=observation.apart[own],
     )
 
 

@@ -17,7 +17,6 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import BoardPid, Machine, PlainGain, SampledPid
@@ -111,8 +110,7 @@ class Observation:
     unit: (n,) rad per count, 1 where the machine states no sensor. prepared: the records as compiled code reads them,
     with the share of the recorded readings that the simulated controller is given. scales: natural sizes, from the
     records, of joints (from 1) whose file does not say how far they are driven. noise: of the readings as the records
-    show it, where it is not what the file states. apart: (m, n) per record, readings that are left out; none where
-    empty.
+    show it, where it is not what the file states.
     """
 
     machine: Machine
@@ -122,7 +120,6 @@ class Observation:
     prepared: tuple[Prepared, ...]
     scales: Mapping[int, JointScale] = field(default_factory=dict)
     noise: ShownNoise | None = None
-    apart: tuple[NDArray[np.bool_], ...] = ()
 
     @property
     def samples(self) -> int:
@@ -170,7 +167,7 @@ class Observation:
             )
             for p, r, out in zip(self.prepared, records, outputs, strict=True)
         )
-        return replace(self, records=records, prepared=prepared, apart=())
+        return replace(self, records=records, prepared=prepared)
 
     def readings(self, model: Model, states: Sequence[State], longest_step: float = STEP) -> list[Floats]:
         """Simulated readings of p states of a model, per record (p, m, n) rad, with noise where the simulation has
@@ -279,15 +276,8 @@ class Observation:
             for column in range(len(self.deviations))
         ]
 
-    def without_apart(self, signals: Sequence[Floats]) -> Signals:
-        """Signals (…, m, n), zero where a reading is left out."""
-        if not self.apart:
-            return tuple(signals)
-        return tuple(np.where(apart, 0.0, signal) for signal, apart in zip(signals, self.apart, strict=True))
-
     def _runs(self, signals: Signals) -> list[tuple[Floats, slice]]:
-        kept = self.without_apart(signals)
-        return [(s, run) for s, r in zip(kept, self.records, strict=True) for run in r.runs]
+        return [(s, run) for s, r in zip(signals, self.records, strict=True) for run in r.runs]
 
     def errors(self, before: Signals, after: Signals, floor: Floats) -> tuple[SignalError, ...]:
         """Root mean square of every joint's residual before and after, beside the floor (n,) rad."""
@@ -300,7 +290,7 @@ class Observation:
     def in_deviations(self, signals: Sequence[Floats]) -> Floats:
         """Signals (…, m, n) in stated standard deviations of a reading, all compared samples in one row: (…, N)."""
         parts = []
-        for record, signal in zip(self.records, self.without_apart(signals), strict=True):
+        for record, signal in zip(self.records, signals, strict=True):
             chosen = np.concatenate([signal[..., run, :] for run in record.runs], axis=-2) / self.deviations
             parts.append(chosen.reshape(*chosen.shape[:-2], -1))
         return np.concatenate(parts, axis=-1)

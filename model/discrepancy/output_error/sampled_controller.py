@@ -47,8 +47,8 @@ class ControllerNumbers:
     sent: (k,) rad, set points in the steps that the controller takes. used: (k,) those that it worked with. formed:
     (k,) drive that the gains of the file make of them. drive: (k,) as recorded. limited: (k,) whether the drive is at
     its limit, where it tells nothing. free: (k,) whether it is away from it and large enough to measure a gain. lost:
-    (k,) whether it clearly worked with the set point before. told: (k,) whether it is known which set point it worked
-    with. factor: by which the drive is larger than the gains of the file make it.
+    (k,) whether it clearly worked with the set point before. factor: by which the drive is larger than the gains of the
+    file make it.
     """
 
     sent: Floats
@@ -58,7 +58,6 @@ class ControllerNumbers:
     limited: NDArray[np.bool_]
     free: NDArray[np.bool_]
     lost: NDArray[np.bool_]
-    told: NDArray[np.bool_]
     factor: float
 
 
@@ -88,21 +87,16 @@ class _Recorded:
         """(k,) whether the drive is away from its limit, and large beside its rounding."""
         return ~self.limited & (np.abs(self.drive) > LEAST_STEPS * self.resolution)
 
-    def numbers_by(self, law: ControllerLaw, scale: Scale, *, hidden: bool = False) -> _Found:
-        """The numbers by a law, and the share of samples whose drive is that law's.
-
-        hidden: whether what follows a drive at its limit is to tell which set point was in use there.
-        """
+    def numbers_by(self, law: ControllerLaw, scale: Scale) -> _Found:
+        """The numbers by a law, and the share of samples whose drive is that law's."""
         drive, limited, resolution = self.drive, self.limited, self.resolution
-        follow = law.follow_hidden if hidden else law.follow
-        used, formed, clear = follow(self.sent, self.position, drive, limited, scale, resolution)
+        used, formed, clear = law.follow(self.sent, self.position, drive, limited, scale, resolution)
         apart = np.abs(drive - scale.factor * formed)
         agreed = apart[~limited] <= (0.75 * resolution + 2 * FINEST * np.abs(drive))[~limited]
         near = apart <= _farthest(drive, resolution)
         large = ~limited & near & (np.abs(formed) > LEAST_STEPS * resolution)
         share = float(np.mean(agreed)) if agreed.size >= LEAST_SAMPLES else 0.0
-        told = ~limited | hidden
-        numbers = ControllerNumbers(self.sent, used, formed, drive, limited, large, clear, told, scale.factor)
+        numbers = ControllerNumbers(self.sent, used, formed, drive, limited, large, clear, scale.factor)
         return _Found(share, numbers)
 
 
@@ -157,12 +151,7 @@ def _by_law(law: ControllerLaw, recorded: _Recorded) -> _Found:
         # A record that begins in motion does not hold the change up to its first sample: by a later one, then.
         later = [Scale(1.0, float(drive[k] - plain[k])) for k in LATER_STARTS if not limited[k]]
         found += [recorded.numbers_by(law, scale) for scale in later]
-    best = _last_best(found)
-    if limited.any() and (best.share < LEAST_AGREEMENT or best.numbers.lost.any()):
-        # At its limit a drive hides which set point was in use, and so what follows.
-        found += [recorded.numbers_by(law, scale, hidden=True) for scale in scales]
-        best = _last_best(found)
-    return best
+    return _last_best(found)
 
 
 def _scales(law: ControllerLaw, recorded: _Recorded, plain: Floats) -> list[Scale]:

@@ -29,6 +29,9 @@ STRAINED = 4.0
 """Deviation from a prior's mean, in its standard deviations, from which a number is no likely one."""
 CONVERGED = 1.0
 """Fall of the cost below which a search ends: one unit is one standard deviation of one parameter."""
+FORETOLD = 0.1
+"""Share of the readings' change that derivatives may have missed and still hold where a search ends: what they miss of
+a further step is a tenth of it."""
 MOST_SEARCHES = 8
 """Searches with new derivatives: two are enough, except from a start that is far away."""
 
@@ -67,6 +70,24 @@ class Point(Calibration):
         found = self.tangents @ self.tangents.T + np.diag(self.precision)
         found.flags.writeable = False
         return found
+
+    @cached_property
+    def expected_in_closed_loop(self) -> Point | None:
+        """The point at which all that has a prior is at its mean, in the closed loop, which stays near the record
+        whatever is missing; None where that does not stay finite."""
+        return self._expected_on(self.observation.with_feedback_share(0.0))
+
+    @cached_property
+    def expected_on_record(self) -> Point | None:
+        """The point at which all that has a prior is at its mean; None where that does not stay finite."""
+        return self._expected_on(self.observation)
+
+    def _expected_on(self, observation: Observation) -> Point | None:
+        try:
+            found = self.at_expected().on(observation)
+        except SpecError:
+            return None
+        return found if found.is_finite else None
 
     @property
     def is_finite(self) -> bool:
@@ -150,9 +171,16 @@ def converge(point: Point, steps: int, most: int = MOST_SEARCHES, goal: float = 
         except SpecError:
             break  # on the verge of instability, as where a delay is missing: no derivative exists
         gained, point = point.cost - following.cost, replace(following, tangents=begun.tangents)
-        if gained < CONVERGED or point.cost - gained * (most - number - 1) > goal:
+        if gained < CONVERGED or point.cost - gained * (most - number - 1) > goal or _is_foretold(begun, following):
             break
     return point
+
+
+def _is_foretold(begun: Point, ended: Point) -> bool:
+    """Whether the readings have moved as the derivatives where a search began say."""
+    moved = begun.weighted - ended.weighted
+    missed = moved - (ended.values - begun.values) @ begun.tangents
+    return float(missed @ missed) <= FORETOLD**2 * float(moved @ moved)
 
 
 def _step(point: Point) -> tuple[Point, bool]:
@@ -164,10 +192,12 @@ def _step(point: Point) -> tuple[Point, bool]:
         tried = point.moved_to(values)
         if not tried.is_finite:
             continue
-        corrected = _corrected(point, tried)
-        if tried.cost < point.cost:
-            return replace(tried, tangents=corrected), True
-        point = replace(point, tangents=corrected)
+        corrected, information = _corrected(point, tried)
+        descends = tried.cost < point.cost
+        point = replace(tried if descends else point, tangents=corrected)
+        vars(point)["information"] = information
+        if descends:
+            return point, True
     return point, False
 
 
@@ -180,12 +210,17 @@ def _gauss_newton(point: Point, least: Floats, most: Floats, damping: float) -> 
     return bounded_step(information, descent, least, most)
 
 
-def _corrected(point: Point, tried: Point) -> Floats:
-    """Derivatives that reproduce what a step really did, changed as little as possible otherwise (Broyden 1965)."""
+def _corrected(point: Point, tried: Point) -> tuple[Floats, Floats]:
+    """Derivatives that reproduce what a step really did, changed as little as possible otherwise (Broyden 1965), and
+    the information (p, p) that they give."""
     moved = tried.values - point.values
     metric = np.diag(point.information) * moved
     length = float(metric @ moved)
     if length <= 0.0:
-        return point.tangents
+        return point.tangents, point.information
     surprise = (point.weighted - tried.weighted) - moved @ point.tangents
-    return point.tangents + np.outer(metric / length, surprise)
+    share = metric / length
+    crossed = np.outer(point.tangents @ surprise, share)
+    information = point.information + crossed + crossed.T + float(surprise @ surprise) * np.outer(share, share)
+    information.flags.writeable = False
+    return point.tangents + np.outer(share, surprise), information

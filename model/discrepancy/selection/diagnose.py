@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from daq.contracts.machine import SampledPid
 from daq.contracts.progress import Cancel, Progress
 from daq.contracts.trace import Trace
 from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, improved_baseline, judge
@@ -37,14 +36,11 @@ from model.discrepancy.output_error.controller_evidence import (
 from model.discrepancy.output_error.gap import closed_loop_gap, within_file
 from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.observation import Observation, observe
-from model.discrepancy.output_error.recorded_power import with_power
 from model.discrepancy.output_error.sampled_controller import with_errors
 from model.discrepancy.output_error.search import STRAINED, Point, converge, descend, point_at
-from model.discrepancy.output_error.shown_noise import note_on_noise, shown_noise, with_noise
-from model.discrepancy.output_error.thinning import thinned
+from model.discrepancy.output_error.shown_noise import note_on_noise, shown_noise
 from model.discrepancy.selection.last_fit import update_to_last_fit
 from model.discrepancy.selection.step import LAST_STEPS, make_step
-from model.discrepancy.slight_joints import with_slight_joints
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
 from model.fitting.unknowns import Unknown
@@ -76,13 +72,11 @@ def diagnose_by_simulation(
     begun = time.perf_counter()
     progress(0.0, "checking the controller's own numbers")
     traces, holdout = (with_errors(some, model.machine) for some in (traces, holdout))
-    findings = check_controller(with_power(traces, model.machine), model.machine, model)
+    findings = check_controller(traces, model.machine, model)
     excluded = settled_by_records(traces, model.machine)
     if any(f.effect is ControllerEffect.LOST_SET_POINTS for f in findings):
         # The set points that were used are known to the count.
         traces, holdout = (tuple(map(with_used_set_points, some)) for some in (traces, holdout))
-    if isinstance(model.machine.controller, SampledPid):
-        traces, holdout = (tuple(map(thinned, some)) for some in (traces, holdout))
     progress(0.02, "fitting the tolerance parameters")
     known = with_findings(model, findings)
     given = _given_point(*observe(known, traces, held_out=[t.record.trace_id for t in holdout]))
@@ -200,7 +194,7 @@ def _weighed_with_shown_noise(fitted: Point) -> Point:
         noise = shown_noise(fitted)
         if noise is None:
             break
-        observation = with_noise(fitted.observation, noise, fitted.residuals)
+        observation = replace(fitted.observation, noise=noise)
         try:
             fitted = converge(fitted.on(observation), LAST_STEPS)
             if fitted.strain >= STRAINED:
@@ -270,10 +264,8 @@ def _answer(
             joints, noisy = _joints_left(case, found, looked)
             answered = verdict(found.steps, unexplained=bool(joints))
     current, steps = update_to_last_fit(found.current, found.steps)
-    steps = with_slight_joints(steps, case.model, current.point.fitted_model)
     found, end = replace(found, current=current, steps=steps), current.point
-    where = case.where(end, moving=False) if looked is None else looked  # nothing was added: it is the same point
-    remaining = case.remaining(end) if answered == "unknown-effect" else ()
+    where = case.where(end) if looked is None else looked  # nothing was added: it is the same point
     asked = Asked(None) if chooser is None else chooser.after(answered, end, found.rivals, case.traces, cancel)
     notes = (
         *on_stated_numbers(_stated(end), end.by_name),
@@ -295,7 +287,6 @@ def _answer(
         steps=(*proved, *found.steps),
         where=where,
         candidates=_candidates(found),
-        remaining=remaining,
         model_before=case.model,
         model_after=_with_lineage(case, end),
         traces=case.names,

@@ -12,7 +12,6 @@ from model.discrepancy.diagnosis import UNWRITTEN, Candidate, SignalError, Step
 from model.discrepancy.explanation import reasons
 from model.discrepancy.explanation.samples import Left
 from model.discrepancy.output_error.case import Case
-from model.discrepancy.output_error.distortion import sum_of_contributions
 from model.discrepancy.output_error.search import Point, converge
 from model.discrepancy.verdict import excess_removed
 
@@ -57,8 +56,6 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
         rmse_fit=case.fitted_errors(before, after),
         rmse_holdout=held_errors,
         excess_removed_holdout=excess_removed(held_errors),
-        sum_lambda2_before=_sum_lambda2(before, before),
-        sum_lambda2_after=_sum_lambda2(after, before),
         where=where,
         reason=UNWRITTEN,
         reason_data=reason,
@@ -99,12 +96,3 @@ def _left(point: Point) -> Left:
     kept = [k for k, u in enumerate(point.unknowns) if u.name not in point.model.by_name]
     starts = point.only(kept)
     return lambda model: closed_loop.residuals(starts.of(model))
-
-
-def _sum_lambda2(point: Point, before: Point) -> float:
-    """Σλ² of the distortion method over the parameters that were there before a step: at 1 or more, deviations as large
-    as expected explain what is left."""
-    known = {u.name for u in before.unknowns}
-    kept = [k for k, u in enumerate(point.unknowns) if u.name in known]
-    names = [point.unknowns[k].name for k in kept]
-    return sum_of_contributions(point.fitted_model, names, point.weighted, point.tangents[kept])

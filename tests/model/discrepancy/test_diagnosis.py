@@ -1,6 +1,8 @@
 """What a fit has shown stands before what a probe promises, however much that is."""
 
-from model.discrepancy.diagnosis import Candidate, in_order
+import pytest
+
+from model.discrepancy.diagnosis import CLEAR_SHAPE, AgainstWhat, Candidate, RemainingShape, clear_shape, in_order
 
 
 def candidate(effect: str, evidence: float, *, refitted: bool) -> Candidate:
@@ -17,3 +19,47 @@ def test_fitted_candidates_come_first_each_kind_by_evidence() -> None:
     fitted, probed = in_order(tried)
     assert [c.effect for c in fitted] == ["coulomb_friction", "supply_limit"]
     assert [c.effect for c in probed] == ["backlash", "stiction"]
+
+
+@pytest.mark.parametrize(
+    ("against", "torque", "explained", "clear"),
+    [
+        ("time", (0.1, 0.2), 0.64, False),
+        ("position", (0.1, None, 0.2, 0.3, 0.4), 0.64, False),
+        ("position", (0.1, None, 0.2, 0.3, 0.4, 0.5), 0.64, True),
+        ("speed", (0.1, 0.2, 0.3, 0.4, 0.5), CLEAR_SHAPE - 0.01, False),
+        ("speed", (0.1, 0.2, 0.3, 0.4, 0.5), CLEAR_SHAPE, True),
+        ("direction", (-0.1, None, 0.1), 0.64, True),
+    ],
+)
+def test_a_shape_is_clear_where_it_explains_enough_in_enough_bins(
+    against: AgainstWhat, torque: tuple[float | None, ...], explained: float, clear: bool
+) -> None:
+    shape = RemainingShape(
+        joint=1,
+        against=against,
+        unit="1",
+        torque_unit="N·m",
+        centres=(0.0,) * len(torque),
+        torque=torque,
+        deviation=torque,
+        explained=explained,
+    )
+    assert (clear_shape([shape]) is not None) == clear
+
+
+def test_the_clear_shape_is_the_one_that_explains_most_in_any_order() -> None:
+    """Torques without a controller are listed by joint."""
+    shape = RemainingShape(
+        joint=1,
+        against="speed",
+        unit="rad/s",
+        torque_unit="N·m",
+        centres=(0.0,) * 5,
+        torque=(0.1,) * 5,
+        deviation=(0.1,) * 5,
+        explained=0.4,
+    )
+    better = shape.model_copy(update={"joint": 2, "explained": 0.7})
+    assert clear_shape([shape, better]) == better
+    assert clear_shape([]) is None

@@ -7,7 +7,6 @@ import pytest
 
 from daq.contracts.machine import Machine
 from daq.contracts.quantity import Quantity
-from model.discrepancy.candidates import tones
 from model.discrepancy.candidates.library import tone
 from model.discrepancy.candidates.tones import MOST_TONES, propose_tones, rates_tried, tones_tried, torque_response
 from model.discrepancy.output_error.observation import Observation, observe
@@ -51,19 +50,6 @@ def test_a_ripple_may_not_become_so_slow_that_it_is_a_spring() -> None:
     low, _ = found.hypothesis.bounds["joint2.torque_ripple.cycles"]
     assert low == pytest.approx(np.pi / travel, rel=1e-6)
     assert found.start["joint2.torque_ripple.cycles"] >= low
-
-
-def test_tones_of_a_fast_record_are_those_that_all_of_its_samples_propose(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is compared with them in means of several samples."""
-    point = seen(imagined.arm().with_effect("periodic_disturbance", (2,), HUM), imagined.arm())
-    every = propose_tones(point, (2,))[0]
-    monkeypatch.setattr(tones, "LEAST_PERIOD", 2 * imagined.PERIOD)
-    found = propose_tones(point, (2,))[0]
-    assert found.hypothesis.name == every.hypothesis.name == "periodic_disturbance"
-    assert found.gain == pytest.approx(every.gain, rel=0.02)
-    assert np.linalg.norm(found.response - every.response) < 0.3 * np.linalg.norm(every.response)
-    rate = "joint2.periodic_disturbance.frequency"
-    assert found.start[rate] == pytest.approx(every.start[rate], rel=0.05)
 
 
 def test_the_response_to_a_torque_is_the_same_beside_a_tone() -> None:

@@ -106,5 +106,3 @@ def test_noise_that_the_file_does_not_state_is_told_in_counts() -> None:
     assert note_words(note).startswith(
         "the noise of readings is larger than what the machine file states of noise and rounding: joint 2 "
     )
-    apart = Note(kind="larger-noise", values={"joints": [{**joint, "size": 1.0, "stated": 0.3, "apart": 1}]})
-    assert "joint 2 1 counts for 0.3 beside 1 reading far off, left out;" in note_words(apart)

@@ -13,8 +13,6 @@ from daq.contracts.progress import CancelledError
 from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
-from model.discrepancy.explanation.step_words import refusal_words
-from model.discrepancy.grounds import Refusal
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.holdout import relative_torque_error
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
@@ -173,12 +171,6 @@ def test_a_spring_is_named_beside_a_mass_that_is_not_the_files_and_a_note_tells_
     assert (found.verdict, [step.effect for step in found.steps]) == ("named", ["spring_torque"]), found.summary
     assert found.model_after.parameter("link1.mass").value == pytest.approx(mass, rel=0.01)
     assert any("link1.mass" in note for note in found.notes) == noted
-
-
-def test_the_refusal_of_an_effect_that_contradicts_the_file_says_by_how_much() -> None:
-    words = refusal_words(Refusal(kind="contradicts-file", numbers={"deviations": 6.7}))
-    assert "6.7" in words
-    assert "stated deviations from what its file says" in words
 
 
 @pytest.mark.slow

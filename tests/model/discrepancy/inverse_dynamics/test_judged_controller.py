@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from daq.contracts.machine import Machine, SampledPid
+from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace, TraceRecord
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
 from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.output_error.controller_law import ControllerLaw, Scale
 from model.discrepancy.workflow import diagnose
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import base_model
@@ -220,19 +219,6 @@ def test_set_points_are_lost_beside_a_limit_that_the_file_does_not_state() -> No
     (found,) = judged("pid", lost=0.4, limit=limit).findings
     assert found.effect.value == "lost_set_points"
     assert found.value == pytest.approx(0.4, abs=0.06)
-
-
-@pytest.mark.parametrize("law", GAINS)
-def test_set_points_in_use_are_the_same_with_what_a_limit_hides_and_without(law: str) -> None:
-    """Where no drive is at a limit, nothing is hidden."""
-    trace, known = recorded(law, lost=0.3), machine(law)
-    assert trace.set_point is not None
-    assert trace.drive is not None
-    assert isinstance(known.controller, SampledPid)
-    own = ControllerLaw(known.controller, 1, PERIOD, winds_up=False)
-    columns = (trace.set_point[:, 0], trace.position[:, 0], trace.drive[:, 0], np.zeros(len(trace), dtype=bool))
-    plain, hidden = (f(*columns, Scale(1.0, 0.0), RESOLUTION)[0] for f in (own.follow, own.follow_hidden))
-    assert np.mean(np.abs(plain - hidden) < 1e-9) > 0.97
 
 
 def stated(law: str, **controller: Any) -> Machine:

@@ -7,7 +7,6 @@ import pytest
 
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
-from model.discrepancy.explanation.step_words import refusal_words
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.inverse_dynamics import repeats
@@ -25,42 +24,6 @@ def slide(training: Trace, held_out: Trace | None = None, options: TorqueOptions
 
 def traces(**hidden: float) -> tuple[Trace, Trace]:
     return rigs.slide_trace(1, hidden), rigs.slide_trace(2, hidden)
-
-
-def test_an_effect_that_leaves_more_held_out_than_the_model_as_given_is_refused() -> None:
-    """The axis carried a kilogram in the training record alone. The fit of its stated mass follows that, and friction,
-    which both records have, makes up for a part of what the mass then costs held out."""
-    training, held_out = rigs.slide_trace(1, {"mass": 13.0, "coulomb": 3.0}), rigs.slide_trace(2, {"coulomb": 3.0})
-    found = slide(training, held_out, TorqueOptions(effects=FRICTION))
-    (step,) = found.steps
-    assert (step.effect, step.adopted) == ("coulomb_friction", False), found.summary
-    assert step.refusal is not None
-    assert step.refusal.kind == "worse-than-given"
-    assert step.refusal.numbers["share"] > 0.0
-    assert "larger than with the model as given" in refusal_words(step.refusal)
-    assert found.model_after.effects == found.model_before.effects
-
-
-def test_most_of_a_residual_far_above_noise_is_named_on_less_evidence() -> None:
-    """So much evidence is asked for that no record of this length could bring it."""
-    asked = TorqueOptions(effects=FRICTION, least_evidence=1e6)
-    large, small = traces(coulomb=8.0), traces(coulomb=0.5)
-    found = slide(*large, asked)
-    assert [(s.effect, s.adopted) for s in found.steps] == [("coulomb_friction", True)], found.summary
-    assert found.steps[0].evidence < 1e6
-    assert slide(*small, asked).steps == (), "a residual near noise is explained as well, and is not plain to see"
-    assert slide(large[0], None, asked).steps == (), "on no other record has it been seen"
-
-
-def test_a_small_part_of_what_something_else_makes_is_no_effect() -> None:
-    """A hum of 16 N, which may not be named here: friction of 6 N takes a third, with all the evidence."""
-    found = slide(*traces(coulomb=6.0, hum=16.0), TorqueOptions(effects=FRICTION, least_evidence=4.0))
-    assert [(s.effect, s.adopted) for s in found.steps] == [("coulomb_friction", False)], found.summary
-    assert found.steps[0].refusal is not None
-    assert found.steps[0].refusal.kind == "leaves-more-than-noise"
-    assert found.steps[0].refusal.numbers["noises"] > 5.0
-    assert found.steps[0].refusal.numbers["share"] < 0.4
-    assert "any law takes a part" in refusal_words(found.steps[0].refusal)
 
 
 @pytest.mark.parametrize(("coulomb", "suspected"), [(0.002, False), (0.014, True)])

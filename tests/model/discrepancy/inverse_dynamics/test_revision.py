@@ -6,14 +6,13 @@ import pytest
 
 from daq.contracts.machine import Machine
 from daq.contracts.progress import Never, silent
-from model.discrepancy.diagnosis import Diagnosis, FoundValue
+from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit
 from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.inverse_dynamics.revision import has_own_shape, split_step
 from model.discrepancy.inverse_dynamics.search import (
     FILE_IS_RIGHT,
     Fitted,
@@ -28,7 +27,6 @@ from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.inverse_dynamics.searches import sliding
-from tests.model.discrepancy.steps import step
 
 
 def adopted(found: Diagnosis) -> set[tuple[str | None, tuple[int, ...]]]:
@@ -44,33 +42,11 @@ def slide(effects: tuple[str, ...], **hidden: float) -> Diagnosis:
 @pytest.mark.slow
 def test_effects_of_which_each_takes_a_third_are_named_together() -> None:
     hidden = {"coulomb": 6.0, "hum": 8.5, "spring": 120.0}
-    alone = slide(("coulomb_friction",), **hidden)
-    assert [s.refusal.kind for s in alone.steps if s.refusal] == ["leaves-more-than-noise"], alone.summary
     found = slide(("coulomb_friction", "periodic_disturbance", "spring_torque"), **hidden)
     assert adopted(found) == {(n, (1,)) for n in ("coulomb_friction", "periodic_disturbance", "spring_torque")}
 
 
-def test_a_pair_is_not_taken_where_one_step_is_left() -> None:
-    training, held_out = (rigs.slide_trace(s, {"coulomb": 6.0, "hum": 8.5, "spring": 120.0}) for s in (1, 2))
-    names = ("coulomb_friction", "periodic_disturbance", "spring_torque")
-    options = TorqueOptions(effects=names, least_evidence=10.0, most_steps=1)
-    found = diagnose_torques(base_model(rigs.slide_machine()), [training], [held_out], options)
-    assert len(adopted(found)) <= 1, found.summary
-
-
-def test_an_effect_with_several_sizes_a_joint_is_split_by_joint() -> None:
-    model = base_model(rigs.six_machine()).with_effect("potentiometer_nonlinearity", (1, 3))
-    bent = {p.name: FoundValue.of(p, 0.1) for p in model.parameters if p.effect == "potentiometer_nonlinearity"}
-    whole = step("potentiometer_nonlinearity", joints=(1, 3)).model_copy(update={"parameters": bent})
-    assert has_own_shape(whole)
-    part, rest = split_step(model, whole, 3)
-    assert (part.joints, rest.joints) == ((3,), (1,))
-    assert {v.joints for v in part.parameters.values()} == {(3,)}
-    assert {**part.parameters, **rest.parameters} == bent
-    assert not has_own_shape(rest)
-
-
-def test_the_gap_shrinks_with_every_step_though_steps_were_looked_for_again() -> None:
+def test_the_gap_shrinks_with_every_step() -> None:
     found = slide(("coulomb_friction", "periodic_disturbance"), coulomb=6.0, hum=8.5)
     gap = found.gap
     assert gap is not None
@@ -83,8 +59,6 @@ def test_the_gap_shrinks_with_every_step_though_steps_were_looked_for_again() ->
         assert noisier * second > whole > 0.0, "the numbers as the file states them leave hardly more"
         assert alone > 1.2 * first, "numbers alone do not do it"
     assert "Without the effect, fitted numbers alone leave" in gap.without.text
-    earlier, later = (s for s in found.steps if s.adopted)
-    assert later.rmse_fit[0].before == pytest.approx(earlier.rmse_fit[0].after)
 
 
 def candidate(effect: str, flow: TorqueWorkflow, evidence: float, told: float = 0.0) -> Fitted:

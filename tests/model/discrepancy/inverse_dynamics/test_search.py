@@ -86,7 +86,7 @@ def test_records_leave_open_what_differs_by_the_cost_of_parameters_alone(
     found: tuple[Fitted, ...], parameters: int, behind: float, open_: bool
 ) -> None:
     """A parameter costs 8 here, of which noise brings 1: two more are 14 beyond the lead of 12."""
-    chosen = replace(found[0], evidence=100.0, cost=8.0, relief=0.0)
+    chosen = replace(found[0], evidence=100.0, cost=8.0)
     own = tuple(replace(chosen.parameters[0], name=f"p{k}") for k in range(parameters))
     rival = replace(chosen, parameters=own, evidence=100.0 - behind, cost=8.0 * parameters)
     assert _cannot_be_told(TorqueOptions(), chosen, rival) is open_

@@ -1,5 +1,4 @@
-"""Effects that stated numbers can take over, at the price of being far from what is stated; and laws that only
-resemble what is missing."""
+"""Effects that stated numbers can take over, at the price of being far from what is stated."""
 
 import math
 from dataclasses import replace
@@ -9,16 +8,13 @@ import pytest
 
 from daq.contracts.machine import load_machine
 from daq.traces.csv_table import import_csv
-from model.discrepancy.diagnosis import Diagnosis, RemainingShape
+from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.left_over import rubs_elsewhere
-from model.discrepancy.inverse_dynamics.localisation import bends_with_speed
 from model.discrepancy.inverse_dynamics.priors import prior_cost, prior_distance
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
-from tests.model.discrepancy.steps import step
 from trials.rigs.folder import write_world
 
 
@@ -80,56 +76,11 @@ def rigs_noise(found: Diagnosis) -> float:
     return diagnose_torques(base_model(rigs.slide_machine()), [training], [held_out]).rmse_holdout[0].after
 
 
-def shape(torque: list[float], against: str = "speed", explained: float = 0.8) -> RemainingShape:
-    centres = (-1.0, -0.6, -0.2, 0.2, 0.6, 1.0)
-    return RemainingShape(
-        joint=1,
-        against=against,
-        unit="rad/s",
-        torque_unit="N·m",
-        centres=centres,
-        torque=tuple(torque),
-        deviation=(0.01,) * 6,
-        explained=explained,
-    )
-
-
-def test_only_what_is_odd_in_speed_says_that_another_law_goes_with_it() -> None:
-    """What viscous friction leaves of quadratic drag is odd; what it leaves of two coefficients is even."""
-    drag = [v * abs(v) - 0.85 * v for v in (-1.0, -0.6, -0.2, 0.2, 0.6, 1.0)]
-    by_direction = [abs(v) - 0.6 for v in (-1.0, -0.6, -0.2, 0.2, 0.6, 1.0)]
-    assert bends_with_speed([shape(drag)], 1)
-    assert not bends_with_speed([shape(by_direction)], 1)
-    assert not bends_with_speed([shape(drag)], 2)
-    assert not bends_with_speed([shape(drag, explained=0.3)], 1)
-    assert not bends_with_speed([shape(drag, against="position")], 1)
-
-
-@pytest.mark.parametrize(
-    ("effect", "explained", "contradicted"),
-    [
-        ("coulomb_friction", 0.9, True),
-        ("potentiometer_nonlinearity", 0.35, True),
-        ("coulomb_friction", 0.2, False),
-        ("payload", 0.9, False),
-    ],
-)
-def test_friction_that_goes_with_the_place_contradicts_friction_everywhere_and_a_bent_sensor(
-    effect: str, explained: float, contradicted: bool
-) -> None:
-    by_place = shape([0.1, 0.1, 0.9, 1.0, 0.1, 0.1], "position", explained)
-    against = by_place.model_copy(update={"against_motion": True})
-    assert rubs_elsewhere(step(effect), 1, [against]) is contradicted
-    assert not rubs_elsewhere(step(effect), 1, [by_place]), "a torque that goes with the place is no friction"
-    assert not rubs_elsewhere(step(effect), 2, [against])
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_quadratic_drag_is_no_viscous_friction(tmp_path: Path) -> None:
     found = of_world(tmp_path, "axis-current", 505)
     assert found.verdict == "unknown-effect", found.summary
-    assert [s.refusal.kind for s in found.steps if s.effect == "viscous_friction" and s.refusal] == ["only-resembles"]
 
 
 @pytest.mark.slow

@@ -12,19 +12,15 @@ import pytest
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.diagnosis import Diagnosis, FoundValue
+from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.left_over import _starved, first_contradicted
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.starts import narrowed
 from model.discrepancy.inverse_dynamics.step_record import excess_removed
-from model.fitting.unknowns import Unknown
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
-from tests.model.discrepancy.inverse_dynamics.searches import sliding
-from tests.model.discrepancy.steps import step
 
 
 def of_slide(*traces: Trace, options: TorqueOptions | None = None) -> Diagnosis:
@@ -56,30 +52,6 @@ def test_friction_that_fades_beyond_the_recorded_speeds_is_coulomb_friction() ->
     (step,) = (s for s in found.steps if s.adopted)
     assert (step.effect, step.group) == ("coulomb_friction", ()), found.summary
     assert "stribeck_friction" not in {c.effect for c in step.candidates if c.refitted}
-
-
-@pytest.mark.parametrize(("share", "contradicted"), [(1.0, 0), (0.5, None)])
-def test_a_size_that_ends_at_its_bound_in_a_later_fit_is_taken_back(share: float, contradicted: int | None) -> None:
-    """The records leave nothing but noise: it is the size that says that no machine has it."""
-    search = sliding({}, TorqueOptions())
-    begun = search.refitter.standing(search.found)
-    model = begun.model.with_effect("potentiometer_gain", (1,))
-    (size,) = (p for p in model.parameters if p.effect == "potentiometer_gain")
-    now = replace(begun.now, values={**begun.now.values, size.name: share * size.high})
-    value = FoundValue.of(size, share * size.high)
-    named = step("potentiometer_gain", parameters={size.name: value})
-    assert first_contradicted(replace(begun, model=model, now=now, steps=(named,)), frozenset()) == contradicted
-
-
-@pytest.mark.parametrize(("torque", "starved"), [(0.1, {1}), (0.4, set()), (9.0, set())])
-def test_a_friction_far_below_what_is_stated_is_starved_by_another(torque: float, starved: set[int]) -> None:
-    """Quadratic drag was told as Stribeck friction, with a fifth of the Coulomb friction that the file states."""
-    model = base_model(rigs.bench_machine()).with_effect("coulomb_friction", (1,))
-    rub = Unknown(model.parameter("joint1.coulomb_friction.torque"), start=0.5, low=0.0, expected=0.5, deviation=0.1)
-    (mass, *_) = (p for p in model.parameters if p.effect is None)
-    other = Unknown(mass, start=1.0, low=0.0, expected=1.0, deviation=0.01)
-    now: Any = SimpleNamespace(unknowns=(rub, other), values={rub.name: torque, other.name: 0.1})
-    assert _starved(now) == starved
 
 
 def test_a_share_of_held_out_variance_is_of_the_joints_that_an_effect_changes() -> None:

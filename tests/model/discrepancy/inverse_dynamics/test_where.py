@@ -1,4 +1,4 @@
-"""Where torques are missing most, and what is told of a size that ended at its bound."""
+"""Where torques are missing most."""
 
 from dataclasses import replace
 
@@ -7,15 +7,12 @@ import pytest
 
 from daq.contracts.progress import Never, silent
 from model.discrepancy.explanation.answer_words import what_is_left
-from model.discrepancy.explanation.note_words import note_words
 from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
 from model.discrepancy.inverse_dynamics.localisation import locate
 from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.inverse_dynamics.resolution import sizes_at_bounds
-from model.discrepancy.inverse_dynamics.search import Fitted
-from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow, _own_bounds, _size_at_bound
+from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
@@ -42,24 +39,6 @@ def test_friction_at_a_place_is_seen_where_it_is_and_is_unknown() -> None:
     assert place[1] is not None
     assert place[1] > 0.5
     assert what_is_left(found.remaining).startswith("friction at joint 1 of ")
-
-
-def test_a_size_at_its_bound_is_told_with_its_value(rubbing: TorqueWorkflow) -> None:
-    wider = rubbing.model.with_effect("link_mass", (1,))
-    (p,) = (q for q in wider.parameters if q.effect == "link_mass")
-    now = replace(rubbing.found.now, values={**rubbing.found.now.values, p.name: p.high})
-    note = _size_at_bound(Fitted("link_mass", (1,), wider, (p,), now, 80.0))
-    assert (note.kind, note.values["effect"], note.values["value"]) == ("size-at-bound", "link_mass", p.high)
-    assert f"added at the end of what it may be, {p.high:g} kg" in note_words(note)
-
-
-def test_a_bound_that_only_the_record_sets_is_no_end_of_what_machines_are(rubbing: TorqueWorkflow) -> None:
-    wider = rubbing.model.with_effect("coulomb_friction", (1,))
-    (p,) = (replace(q, high=3.0) for q in wider.parameters if q.effect == "coulomb_friction")
-    now = replace(rubbing.found.now, values={**rubbing.found.now.values, p.name: 3.0})
-    found = Fitted("coulomb_friction", (1,), wider, (p,), now, 80.0)
-    assert sizes_at_bounds(found) == [p]
-    assert _own_bounds(found) == []
 
 
 def test_the_joint_of_the_largest_residual_is_named(rubbing: TorqueWorkflow) -> None:

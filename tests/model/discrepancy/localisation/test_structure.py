@@ -75,27 +75,6 @@ def test_what_is_too_slow_for_a_sensor_has_a_shape(arm: Model, records: tuple[Re
 
 
 SEEDS = range(20)
-TONE = 2.0
-"""Variance of a tone, in that of the noise beside it."""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("coloured", [0.0, 1.5])
-def test_a_tone_is_a_shape_and_noise_of_three_times_the_size_is_none(
-    arm: Model, records: tuple[Record, ...], coloured: float
-) -> None:
-    """At frequencies and phases that are none of the record's own. White noise, and noise below 3 Hz beside it."""
-    time = PERIOD * np.arange(len(records[0].measured))
-    named, false = [], []
-    for seed in SEEDS:
-        left = 3.0 * noise(records, seed, coloured=coloured)
-        draw = np.random.default_rng(100 + seed)
-        wave = np.sin(2 * np.pi * draw.uniform(0.5, 8.0) * time + draw.uniform(0.0, 2 * np.pi))
-        false.append(bool(found(arm, records, left)))
-        left[:, 1] += np.sqrt(2.0 * TONE * left[:, 1].var()) * wave
-        named.append(found(arm, records, left))
-    assert sum(false) <= 1
-    assert sum(2 in joints for joints in named) >= 19
 
 
 def test_noise_below_three_hertz_alone_is_no_tone(arm: Model, records: tuple[Record, ...]) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace, TraceRecord
@@ -20,7 +19,6 @@ from model.discrepancy.output_error.controller_evidence import (
     settled_by_records,
     with_used_set_points,
 )
-from model.discrepancy.output_error.received_set_points import follow_received
 from model.discrepancy.output_error.sampled_controller import with_errors
 from tests.model.discrepancy import outside_arm
 
@@ -196,38 +194,3 @@ def test_set_points_in_use_are_told_wherever_they_make_a_difference() -> None:
     wrong = np.abs(restored.set_point[:, 0] - true)[free] > 2 * told
     assert wrong.mean() < 0.01
     assert (np.abs(trace.set_point[:, 0] - true)[free] > 2 * told).mean() > 0.04, "many were lost"
-
-
-def proportional(error: Floats, at: float, memory: tuple[Floats, ...], *, limited: bool) -> Any:
-    """100 V/rad."""
-    return 100.0 * error, memory
-
-
-def follow(sent: Floats, drive: Floats, at_limit: NDArray[np.bool_], resolution: float = 0.01) -> Any:
-    begin = (0.0,)
-    return follow_received(sent, np.zeros(len(sent)), drive, at_limit, proportional, begin, 1.0, resolution)
-
-
-def test_a_drive_at_its_limit_fits_every_set_point_that_asks_for_as_much() -> None:
-    sent = 0.01 * np.arange(1.0, 11.0)
-    used = sent[[0, 1, 1, 1, 4, 5, 6, 6, 8, 9]]
-    drive = np.minimum(100.0 * used, 5.5)
-    path = follow(sent, drive, drive >= 5.5)
-    shown = drive < 5.5
-    np.testing.assert_allclose(path.used[shown], used[shown])
-    np.testing.assert_allclose(path.formed[shown], drive[shown])
-    np.testing.assert_allclose(path.of_sent, 100.0 * sent)
-    np.testing.assert_array_equal(path.used[~shown], sent[~shown], "where it makes no difference, it arrived")
-
-
-def test_a_drive_at_its_limit_excludes_set_points_that_ask_for_less() -> None:
-    """The third set point asks for no more than 1 V, and the drive stands at 5: the second one was still in use."""
-    sent = np.array([0.02, 0.08, 0.01, 0.01, 0.03])
-    path = follow(sent, np.array([2.0, 5.0, 5.0, 5.0, 3.0]), np.array([False, True, True, True, False]))
-    np.testing.assert_array_equal(path.used, sent[[0, 1, 1, 1, 4]])
-
-
-def test_a_set_point_that_is_sent_again_counts_as_arrived() -> None:
-    sent = np.array([0.02, 0.02, 0.02, 0.05, 0.05])
-    path = follow(sent, 100.0 * np.array([0.02, 0.02, 0.02, 0.02, 0.05]), np.zeros(5, dtype=bool))
-    np.testing.assert_array_equal(path.used, [0.02, 0.02, 0.02, 0.02, 0.05])

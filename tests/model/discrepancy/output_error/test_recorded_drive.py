@@ -14,7 +14,6 @@ from model.discrepancy.output_error.controller_evidence import (
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.sampled_controller import with_errors
 from model.discrepancy.output_error.search import point_at
-from model.discrepancy.output_error.thinning import thinned
 from model.discrepancy.selection.diagnose import _fit_tolerances, _given_point
 from model.discrepancy.workflow import diagnose
 from model.fitting.records import records_of
@@ -129,19 +128,3 @@ def test_set_points_are_compared_with_the_travel_not_with_counts(sound: outside_
     joints = tuple(j.model_copy(update={"sensor": fine.model_copy(update={"bits": 24})}) for j in MACHINE.joints)
     made = outside_arm.record(sound, 11)
     assert records_of([made], MACHINE.model_copy(update={"joints": joints}), "position")
-
-
-def test_a_fast_record_is_thinned_and_its_drive_averaged(sound: outside_arm.OutsideArm) -> None:
-    made = outside_arm.record(sound, 11)
-    assert made.drive is not None
-    assert thinned(made) is made
-    record = made.record.model_copy(update={"period": outside_arm.PERIOD / 10})
-    rough = 5.0 + np.arange(len(made))[:, None] % 2 * np.ones(3)
-    shaking = replace(made, time=made.time / 10, record=record, drive=rough)
-    assert thinned(shaking) is shaking, "what such a drive does to friction, its mean does not"
-    calm = 5.0 + np.sin(0.02 * np.arange(len(made)))[:, None] * np.ones(3)
-    few = thinned(replace(shaking, drive=calm))
-    assert few.record.period == pytest.approx(0.005)
-    assert few.drive is not None
-    assert np.array_equal(few.position, made.position[::5])
-    assert np.allclose(few.drive[3], calm[15:20].mean(axis=0))

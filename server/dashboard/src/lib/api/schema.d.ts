@@ -2434,10 +2434,6 @@ export interface components {
             excess_removed_holdout?: number | null;
             /** Evidence Held Out */
             evidence_held_out?: number | null;
-            /** Sum Lambda2 Before */
-            sum_lambda2_before?: number | null;
-            /** Sum Lambda2 After */
-            sum_lambda2_after?: number | null;
             where: components["schemas"]["Where"];
             /** Reason */
             reason: string;
@@ -2448,11 +2444,6 @@ export interface components {
             reason_data?: components["schemas"]["Reason"] | null;
             proof?: components["schemas"]["ControllerProof"] | null;
             refusal?: components["schemas"]["Refusal"] | null;
-            /**
-             * Slight Joints
-             * @default []
-             */
-            slight_joints?: number[];
             /** Called */
             called: string;
             /** Chance */
@@ -4257,20 +4248,6 @@ export interface components {
             limit: number | null;
             /** Message */
             message: string;
-        };
-        /**
-         * MovingParameter
-         * @description The distortion method's α(t): a parameter that would have to move, how much, and with what it moves.
-         */
-        MovingParameter: {
-            /** Parameter */
-            parameter: string;
-            /** Relative Range */
-            relative_range: number;
-            /** Moves With */
-            moves_with: ("time" | "position" | "speed" | "direction" | "drive") | null;
-            /** Correlation */
-            correlation: number;
         };
         /**
          * Multisine
@@ -6588,11 +6565,6 @@ export interface components {
             cells: components["schemas"]["PhaseCell"][];
             /** Dependences */
             dependences: components["schemas"]["Dependence"][];
-            /**
-             * Moving
-             * @default []
-             */
-            moving?: components["schemas"]["MovingParameter"][];
             worst?: components["schemas"]["WorstPlace"] | null;
             largest?: components["schemas"]["WorstPlace"] | null;
         };
