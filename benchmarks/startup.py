@@ -1,4 +1,4 @@
-"""Start-up of the command line: `daq --help`, beside a Python that does nothing.
+"""Start-up of the command line, `daq --help`, beside a Python that does nothing; and of the service.
 
 python -m benchmarks startup
 """
@@ -8,12 +8,18 @@ from __future__ import annotations
 import argparse
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
+import httpx
+
 from benchmarks.figures import Figure, at_most, show
+from benchmarks.service_process import children, started_service
+from daq.contracts.processor import added, processor_time
 
 TARGET_S = 0.3
+SERVICE_TARGET_S = 1.0
 
 
 def fastest(command: list[str], repeats: int) -> float:
@@ -24,6 +30,23 @@ def fastest(command: list[str], repeats: int) -> float:
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         times.append(time.perf_counter() - begun)
     return min(times)
+
+
+def of_service(folder: Path) -> float:
+    """Processor time (s) of `daq serve` and its stop listener until its first answer. No robot is connected."""
+    (folder / "daq.toml").write_text("[server]\nconnect_at_start = false\n", "utf-8")
+    with started_service(folder, "mock://") as service:
+        httpx.get(f"{service.url}/healthz").raise_for_status()
+        every = (service.process.pid, *children(service.process.pid, b"server.stopping"))
+        taken = added(map(processor_time, every))
+    assert taken is not None, "this kernel does not count"
+    return taken.ran
+
+
+def least_of_service(repeats: int) -> float:
+    """The least of several starts; the first one makes the database."""
+    with tempfile.TemporaryDirectory() as folder:
+        return min(of_service(Path(folder)) for _ in range(1 + repeats))
 
 
 def main() -> int:
@@ -37,6 +60,7 @@ def main() -> int:
     bare = fastest([sys.executable, "-c", "pass"], repeats)
     figures = [
         at_most("daq --help", fastest([daq, "--help"], repeats), TARGET_S, "s", f"python -c pass: {bare:.3f} s"),
+        at_most("daq serve, processor time", least_of_service(repeats), SERVICE_TARGET_S, "s"),
         Figure("daq run ramp --help", f"{fastest([daq, 'run', 'ramp', '--help'], repeats):.3g} s"),
         Figure("daq stop --help", f"{fastest([daq, 'stop', '--help'], repeats):.3g} s"),
     ]

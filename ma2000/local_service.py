@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from daq.acquisition.stop_socket import FOLDER_VARIABLE
+from daq.child import Child, last_words
 from daq.contracts.errors import DaqError, SpecError
 from daq.transport import MockPort, parse_port_url
 from ma2000.running import MOCK
@@ -59,15 +59,15 @@ class LocalService:
                 f"{self.folder}: has a daq.toml, whose service is begun with `daq serve`; name another folder"
             )
         self._process = _started(self.folder, port)
-        assert self._process.stdout is not None
-        self.url = self._process.stdout.readline().strip()
+        self.url = self._process.output.readline().decode().strip()
         if not self.url:
             code = self._process.wait()
             self.close()
-            raise LocalServiceError(f"the service did not start (exit code {code}): {_last_line(self.folder / LOG)}")
+            words = last_words((self.folder / LOG).read_text("utf-8", errors="replace"))
+            raise LocalServiceError(f"the service did not start (exit code {code}): {words}")
 
     def __repr__(self) -> str:
-        state = "ended" if self._process.poll() is not None else self.url
+        state = "ended" if self._process.code is not None else self.url
         return f"<LocalService {state}, in {self.folder}>"
 
     def __enter__(self) -> Self:
@@ -81,17 +81,10 @@ class LocalService:
     def close(self) -> None:
         """Ends the service in order. May be called twice."""
         self._process.terminate()
-        try:
-            self._process.wait(ENDS_WITHIN)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                pipe.close()
+        self._process.close(ENDS_WITHIN)
 
 
-def _started(folder: Path, port: str) -> subprocess.Popen[str]:
+def _started(folder: Path, port: str) -> Child:
     """Raises SpecError for a folder that cannot be made."""
     environment = {
         name: value for name, value in os.environ.items() if name == FOLDER_VARIABLE or not name.startswith("DAQ_")
@@ -100,20 +93,7 @@ def _started(folder: Path, port: str) -> subprocess.Popen[str]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / LOG).open("ab") as log:
-            return subprocess.Popen(
-                [sys.executable, "-c", _OWNED, "--port", port, "serve", "--host", "127.0.0.1", "--port", "0"],
-                cwd=folder,
-                env=environment,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                text=True,
-                start_new_session=True,  # Ctrl-C ends the cell of a notebook, not the service
-            )
+            command = [sys.executable, "-c", _OWNED, "--port", port, "serve", "--host", "127.0.0.1", "--port", "0"]
+            return Child(command, complaints=log, environment=environment, folder=folder)
     except OSError as error:
         raise SpecError(f"{folder}: no folder for a service: {error.strerror}") from error
-
-
-def _last_line(log: Path) -> str:
-    lines = log.read_text("utf-8", errors="replace").strip().splitlines()
-    return lines[-1] if lines else "it said nothing"

@@ -31,7 +31,7 @@ from server.api import (
     traces,
 )
 from server.page import Page
-from server.routes import include
+from server.routes import DeclaredRoute, include
 from server.services import Services
 from server.site import serve_site
 
@@ -71,6 +71,9 @@ def bare_app(services: Services | None) -> FastAPI:
         app.state.services = services
         for rig in services.robots():
             rig.hub.open(lambda robot=rig.robot: robot.experiment)  # type: ignore[misc]
+        for route in app.routes:
+            if isinstance(route, DeclaredRoute) and route.path.endswith("/stop"):
+                _ = route.of_fastapi  # the first stop must not wait for it
         await run_in_threadpool(services.start)
         described.begin_soon()
         yield

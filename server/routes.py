@@ -14,6 +14,8 @@ from pydantic.warnings import UnsupportedFieldAttributeWarning
 from starlette.routing import BaseRoute, Match
 from starlette.types import Receive, Scope, Send
 
+from daq.plugins import named
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -81,7 +83,7 @@ class DeclaredRoute(BaseRoute):
     """A route that becomes FastAPI's when somebody asks for its address, or for the description of the API."""
 
     def __init__(self, path: str, endpoint: Callable[..., Any], options: Mapping[str, Any]) -> None:
-        self._path = path
+        self.path = path
         self._endpoint = endpoint
         self._options = options
         self._segments = path.split("/")
@@ -92,10 +94,16 @@ class DeclaredRoute(BaseRoute):
         with warnings.catch_warnings():
             # As FastAPI does: the field of a body has the body's name, which pydantic needs not.
             warnings.simplefilter("ignore", UnsupportedFieldAttributeWarning)
-            route = APIRoute(self._path, self._endpoint, **self._options)
-            if route.body_field is not None:
-                route.body_field.validate(None)  # the models are built when they are used first: now
+            route = APIRoute(self.path, self._endpoint, **{**self._options, **self._named()})
+            for field in (route.body_field, route.response_field):
+                if field is not None:
+                    field.validate(None)  # models are built when they are used first: now
         return route
+
+    def _named(self) -> dict[str, Any]:
+        """The model of the answer, where "module:name" names it: some are loaded with much that the start needs not."""
+        model = self._options.get("response_model")
+        return {"response_model": named(model)} if isinstance(model, str) else {}
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
         """Whether this is the route of a request."""

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, StrictBool, TypeAdapter
 
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.frozen import FrozenRecord
+from daq.contracts.frozen import WHEN_USED, FrozenRecord
 from daq.contracts.labels import Outcome
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
@@ -86,4 +86,4 @@ class Failed(FrozenRecord):
 
 
 Report = Annotated[Progress | EventHappened | Sampled | Finished | Failed, Field(discriminator="kind")]
-REPORT: TypeAdapter[Progress | EventHappened | Sampled | Finished | Failed] = TypeAdapter(Report)
+REPORT: TypeAdapter[Progress | EventHappened | Sampled | Finished | Failed] = TypeAdapter(Report, config=WHEN_USED)

@@ -15,6 +15,7 @@ from typing import Generic, TypeVar
 from daq.acquisition.freezer import Freezer
 from daq.acquisition.guardian import Guardian
 from daq.acquisition.stop_socket import stop_listener
+from daq.contracts.frozen import build_records
 from daq.driver import Controller
 from daq.runner.arm_control import ArmControl
 from firmware_protocol.memory_map import MemoryMap
@@ -62,6 +63,7 @@ def port_session(
 
     Raises ReachError when the stop socket cannot be made, LinkError when the robot is not reached.
     """
+    build_records()  # nothing that keeps time waits for it later
     with (
         ExitStack() as closed_last,
         Freezer(robot, url) as freezer,

@@ -19,6 +19,7 @@ from daq.client.errors import ServiceError, ServiceNotReachedError, reason_of
 from daq.contracts.errors import SpecError
 from daq.contracts.service.base import Page
 from daq.contracts.service.problems import ProblemDetails
+from daq.contracts.whole_file import replacing
 from firmware_protocol.invalid import first_invalid
 
 API = "/api/v1"
@@ -115,20 +116,16 @@ class Connection:
 
     def download(self, path: str, target: Path) -> None:
         """A file, whole or not at all. Raises OSError when it cannot be written."""
-        part = target.with_name(f".{target.name}.download")
         try:
-            with self._http.stream("GET", quote(path)) as response:
+            with replacing(target) as part, self._http.stream("GET", quote(path)) as response:
                 if not response.is_success:  # a redirection, such as a proxy's, is no file
                     response.read()
                     raise ServiceError(_problem(response))
                 with part.open("wb") as stream:
                     for piece in response.iter_bytes(PART):
                         stream.write(piece)
-            part.replace(target)
         except httpx.TransportError as error:
             raise ServiceNotReachedError(f"{self.url}: not reached: {reason_of(error)}") from error
-        finally:
-            part.unlink(missing_ok=True)
 
     def _sent(self, request: Request) -> httpx.Response:
         """The answer, repeated as long as that may help. Raises ServiceError, ServiceNotReachedError."""

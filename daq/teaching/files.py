@@ -5,17 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from daq.contracts.errors import SpecError
+from daq.contracts.whole_file import replacing
 from daq.traces import disk
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Writes a text file under another name and renames it. Raises SpecError with one line; the old file then stays."""
-    part = path.with_name(path.name + ".part")
+    """Writes a text file. Raises SpecError with one line; the old file then stays."""
     try:
-        with part.open("wb") as stream:
-            stream.write(text.encode())
-            disk.sync(stream)
-        disk.rename(part, path)
+        with replacing(path) as part:
+            part.write_bytes(text.encode())
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise SpecError(f"{path}: cannot be written: {disk.reason(error)}") from error

@@ -10,6 +10,7 @@ from typing import IO
 
 from daq.contracts.errors import TraceError
 from daq.contracts.file_lock import take_lock
+from daq.contracts.whole_file import sync_folder
 
 
 def open_regular(path: Path) -> IO[bytes]:
@@ -83,15 +84,6 @@ def sync(stream: IO[bytes]) -> None:
     """Syncs everything written so far to the disk."""
     stream.flush()
     os.fsync(stream.fileno())
-
-
-def sync_folder(folder: Path) -> None:
-    """Syncs the names in a folder to the disk."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def rename(old: Path, new: Path) -> None:

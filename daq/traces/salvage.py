@@ -15,6 +15,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.file_lock import take_lock
 from daq.contracts.trace import Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
+from daq.contracts.whole_file import sync_folder
 from daq.traces import disk, layout
 from daq.traces.decode import cut_to_what_decodes
 from daq.traces.ends import Texts
@@ -156,7 +157,7 @@ def _salvage_locked(part: Path, data: bytes, limits: TraceLimits) -> Salvaged:
     kept = _put_aside(part, DAMAGED_SUFFIX) if found.others or any(data[found.good_bytes :]) else None
     if kept is None:
         part.unlink()
-        disk.sync_folder(part.parent)
+        sync_folder(part.parent)
     return Salvaged(part, path, len(trace), dropped, kept=kept)
 
 

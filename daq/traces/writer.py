@@ -16,6 +16,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.labels import Outcome
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TraceEvent, TraceRecord
+from daq.contracts.whole_file import sync_folder
 from daq.traces import disk
 from daq.traces.layout import RECORDED_SIGNALS, SLOW_LINE_SIGNALS
 from daq.traces.naming import part_path
@@ -77,7 +78,7 @@ class TraceWriter:
             signals = RECORDED_SIGNALS if record.every == 1 else SLOW_LINE_SIGNALS
             self._recording = Recording(self._stream, record, joints, signals, attachments or {})
             disk.sync(self._stream)
-            disk.sync_folder(path.parent)
+            sync_folder(path.parent)
         except BaseException as error:
             self._release()
             self.part.unlink()

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import select
-import subprocess
-import sys
 import tempfile
 import time
 from dataclasses import dataclass, field
 from typing import IO
 
+from daq.child import PIECE, Child, last_words
 from daq.contracts.extras import require_extra
 from daq.contracts.processor import processor_time
 from daq.transport.url import SERVOS, MockPort, TransportError
@@ -23,8 +21,6 @@ which it waits for a processor does not count, up to STARVED_TIMEOUT_S."""
 STARVED_TIMEOUT_S = 300.0
 """Longest time for a mock to start on a computer that gives it no processor: whoever waits wants to know by then."""
 END_TIMEOUT_S = 3.0
-PIECE = 1 << 16
-"""Bytes that a pipe holds on Linux: one reading empties it, and cuts no line."""
 LAST_WORDS = 500
 """Characters of the mock's error output that are shown when it does not start."""
 
@@ -37,34 +33,26 @@ class MockProcess:
     """Port URL of its line."""
     control: str | None
     """URL of its control port, where faults are switched."""
-    _process: subprocess.Popen[bytes] = field(repr=False)
+    _process: Child = field(repr=False)
     _waited_us: int = 0
 
     def waited(self) -> float:
         """Time (s) for which the clock of its board has stood still, since it got no processor."""
-        assert self._process.stdout is not None
-        while told := _available(self._process.stdout):
+        while told := _available(self._process.output):
             lines = [json.loads(line) for line in told.splitlines()]
             self._waited_us = max([self._waited_us, *(line.get("waited_us", 0) for line in lines)])
         return self._waited_us * 1e-6
 
     def check_running(self) -> None:
         """Raises TransportError when the process has ended."""
-        code = self._process.poll()
-        if code is not None:
-            raise TransportError(f"the mock controller has ended (exit code {code})")
+        if self._process.code is not None:
+            raise TransportError(f"the mock controller has ended (exit code {self._process.code})")
 
     def close(self) -> None:
         """Ends the process and waits for it. May be called twice."""
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                pipe.close()
+        self._process.end_input()
         self._process.terminate()
-        try:
-            self._process.wait(END_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        self._process.close(END_TIMEOUT_S)
 
 
 def start_mock(port: MockPort, *, waits: bool = False) -> MockProcess:
@@ -78,29 +66,21 @@ def start_mock(port: MockPort, *, waits: bool = False) -> MockProcess:
     where = ("--pty",) if port.through_pty else ("--tcp", "127.0.0.1:0")
     module = "mock_controller.servos" if port.dialect == SERVOS else "mock_controller"
     waiting = ("--waits",) if waits and port.dialect != SERVOS else ()
-    command = [sys.executable, "-m", module, *where, "--owned", *waiting, *port.arguments]
     begun = time.monotonic()
     with tempfile.TemporaryFile() as complaints:
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=complaints,
-            start_new_session=True,  # Ctrl-C is the host's to handle: it needs the mock to confirm the stop
-        )
-        assert process.stdout is not None
+        process = Child(module, *where, "--owned", *waiting, *port.arguments, complaints=complaints)
         try:
-            ready = json.loads(_first_line(process.stdout, process.pid))
-            os.set_blocking(process.stdout.fileno(), False)
+            ready = json.loads(_first_line(process.output, process.pid))
+            os.set_blocking(process.output.fileno(), False)
             return MockProcess(ready["url"], ready.get("control"), process)
         except (ValueError, KeyError, TypeError) as error:
-            seconds, code = time.monotonic() - begun, None
-            with contextlib.suppress(subprocess.TimeoutExpired):  # one that ends closes its output a moment before
-                code = process.wait(0.0 if seconds >= START_TIMEOUT_S else END_TIMEOUT_S)
+            seconds = time.monotonic() - begun
+            # one that ends closes its output a moment before
+            code = process.wait(0.0 if seconds >= START_TIMEOUT_S else END_TIMEOUT_S)
             MockProcess("", None, process).close()
             complaints.seek(0)
             words = complaints.read().decode(errors="replace").strip()[-LAST_WORDS:]
-            last_line = words.splitlines()[-1] if words else _silent(code, seconds)
+            last_line = last_words(words) if words else _silent(code, seconds)
             raise TransportError(f"the mock controller did not start: {last_line}") from error
 
 

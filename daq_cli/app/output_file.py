@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
+from daq.contracts import whole_file
 from daq.contracts.errors import SpecError
 
 
@@ -24,21 +25,9 @@ def check_folder(path: Path, what: str) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yields a file beside `path` to write to. At the end it is synced to the disk and replaces `path` in one step.
-
-    The old file stays until then, and stays when the block raises. Raises SpecError when the file cannot be written.
-    """
-    from daq.traces import disk
-
-    final = path.resolve()  # a link stays, and points at the new file
-    part = final.with_name(f".{final.name}.{os.getpid()}.part")
+    """Does what `daq.contracts.whole_file` does. Raises SpecError when the file cannot be written."""
     try:
-        yield part
-        with part.open("rb+") as stream:
-            disk.sync(stream)
-        disk.rename(part, final)
+        with whole_file.replacing(path) as part:
+            yield part
     except OSError as error:
-        raise SpecError(f"{path}: cannot be written: {disk.reason(error)}") from error
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
+        raise SpecError(f"{path}: cannot be written: {error.strerror or error}") from error

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from daq.child import last_words
 from daq.contracts.errors import DaqError
 
 
@@ -49,6 +50,6 @@ def _line(module: str, *arguments: str) -> dict[str, Any]:
     try:
         line: dict[str, Any] = json.loads(done.stdout)
     except json.JSONDecodeError:
-        words = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
-        raise TrialStageError(f"{module} ended with code {done.returncode}: {words}") from None
+        told = f"{module} ended with code {done.returncode}: {last_words(done.stderr)}"
+        raise TrialStageError(told) from None
     return line

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from daq.child import last_words
 from daq_cli.trial.mock_side import TrialStageError
 from firmware_protocol.invalid import first_invalid
 from model.discrepancy.diagnosis import Diagnosis
@@ -97,8 +98,8 @@ def diagnose_sealed(
         seconds = time.monotonic() - begun
         answer = place / ANSWER
         if done.returncode or not answer.exists():
-            words = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
-            raise DiagnosisFailedError(f"the diagnosis ended with code {done.returncode}: {words}")
+            line = f"the diagnosis ended with code {done.returncode}: {last_words(done.stderr)}"
+            raise DiagnosisFailedError(line)
         return SealedAnswer(answer.read_bytes(), seconds)
 
 

@@ -18,6 +18,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.openapi.utils import get_openapi
 from fastapi.responses import HTMLResponse
 
+from daq.contracts.whole_file import replacing
 from daq.plugins import plugins
 from server.problems import PATH
 from server.routes import described
@@ -107,10 +108,8 @@ class Described:
     def _keep(self, digest: bytes, text: bytes) -> None:
         if self._kept is None:
             return
-        beside = self._kept.with_suffix(".new")
-        with suppress(OSError):  # it is built again at the next start
-            beside.write_bytes(digest + b" " + _sum(text) + b"\n" + text)
-            beside.replace(self._kept)
+        with suppress(OSError), replacing(self._kept, synced=False) as part:  # it is built again at the next start
+            part.write_bytes(digest + b" " + _sum(text) + b"\n" + text)
 
 
 def sources_digest() -> bytes:

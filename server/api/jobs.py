@@ -39,7 +39,6 @@ from server.api.dependencies import (
 )
 from server.api.upload import store_model
 from server.jobs.effects import known_effects
-from server.jobs.results import JobResult
 from server.jobs.service import REPORT, RESULT
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS
@@ -113,7 +112,7 @@ def delete_job(job: Identity, rig: RobotDep, _: Operator) -> Response:
     return Response(status_code=204)
 
 
-@router.get("/jobs/{job}/result", tags=["jobs"], response_model=JobResult)
+@router.get("/jobs/{job}/result", tags=["jobs"], response_model="server.jobs.results:JobResult")
 def get_job_result(job: Identity, rig: RobotDep, _: Viewer) -> FileResponse:
     """Returns the result of a job: the data of its command's `--json`, and signals for plots."""
     return FileResponse(rig.jobs.result_file(job, RESULT), media_type="application/json")

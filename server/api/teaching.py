@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from fastapi import Response
 
-from daq.calibration import gain_experiment, gains_from_trace
 from daq.contracts.errors import SpecError
 from daq.contracts.service.experiments import Experiment, ExperimentRequest
 from daq.contracts.service.teaching import (
@@ -17,7 +16,6 @@ from daq.contracts.service.teaching import (
 )
 from daq.teaching.jog import require_step_speed
 from daq.teaching.program import Absolute, Instruction, Program, Relative
-from daq.traces.reader import read_trace
 from server.api.dependencies import (
     Arrived,
     Experiments,
@@ -118,6 +116,8 @@ def calibrate_gain(
 
     It is checked like any experiment; the same Idempotency-Key returns the same experiment (200).
     """
+    from daq.calibration import gain_experiment
+
     spec = gain_experiment(tuple(sorted(set(request.joints))))
     request_of = ExperimentRequest(spec=spec)
     return submit_experiment(request_of, rig, experiments, motions, caller, response, None, idempotency_key)
@@ -126,6 +126,9 @@ def calibrate_gain(
 @router.get("/traces/{trace}/gain")
 def get_measured_gain(trace: Identity, rig: RobotDep, _: Viewer, _turn: Turn) -> tuple[MeasuredGain, ...]:
     """Returns the actual proportional gains measured from a trace."""
+    from daq.calibration import gains_from_trace
+    from daq.traces.reader import read_trace
+
     read = read_trace(rig.catalogue.path_of(trace), rig.catalogue.limits)
     fields = MeasuredGain.model_fields
     return tuple(

@@ -15,7 +15,6 @@ from fastapi.concurrency import run_in_threadpool
 from daq.contracts.service.jobs import ModelEntry
 from daq.contracts.service.traces import CatalogueEntry
 from daq.contracts.trace_limits import TraceLimits
-from model.machine_model.model_file import ModelFile
 from server.access.caller import Caller
 from server.access.lanes import Lanes
 from server.bounded.messages import Order, ReadModel, ReadUpload, UploadedTrace
@@ -87,7 +86,7 @@ async def store_model(
         await _write_body(request, path, LARGEST_MODEL, too_large)
         async with uploads.lanes.turn(caller.name):
             made = await run_in_threadpool(_read, ReadModel(path=path), uploads, "not-a-model")
-            return await run_in_threadpool(_keep, ModelFile.model_validate(made), name, rig, models, robots, caller)
+            return await run_in_threadpool(_keep, made, name, rig, models, robots, caller)
 
 
 async def _write_body(request: Request, path: Path, largest: int, too_large: ProblemError) -> int:
@@ -120,8 +119,11 @@ def _take_in(path: Path, rig: RobotServices, uploads: Uploads, traces: TraceStor
 
 
 def _keep(
-    made: ModelFile, name: str, rig: RobotServices, models: ModelStore, robots: Sequence[str], caller: Caller
+    data: dict[str, Any], name: str, rig: RobotServices, models: ModelStore, robots: Sequence[str], caller: Caller
 ) -> tuple[ModelEntry, bool]:
+    from model.machine_model.model_file import ModelFile  # what it needs takes long to load
+
+    made = ModelFile.model_validate(data)
     # Everybody who may call the service sees the traces of all its robots, and of no other.
     new = rig.models.keep(made, name, caller.name, robots=robots)
     if new:

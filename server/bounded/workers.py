@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import logging
 import os
-import select
 import signal
 import subprocess
-import sys
 import threading
 import time
-from contextlib import suppress
 
+from daq.child import Child, LateError, LongError, SilentError
 from server.bounded.messages import Answer, Limits, Order
 from server.problems import ProblemError
 
 LARGEST_ANSWER = 64 << 20
 """Number of bytes of one line, at most."""
-PIECE = 1 << 16
 START_WITHIN = 30.0
 """Time (s) for a process to start on a busy computer. It is granted in addition to the order's own time."""
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -107,16 +104,9 @@ class Workers:
 class _Worker:
     def __init__(self, limits: Limits, start_within: float) -> None:
         self._limits = limits
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "server.bounded"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-            env=os.environ | ONE_THREAD,
-        )
+        self._process = Child("server.bounded", complaints=subprocess.DEVNULL, environment=os.environ | ONE_THREAD)
         self._allowance = start_within
-        self._write(limits.model_dump_json())
+        self._process.send(limits)
 
     @property
     def number(self) -> int:
@@ -126,63 +116,43 @@ class _Worker:
     @property
     def lives(self) -> bool:
         """Whether the process is still running."""
-        return self._process.poll() is None
+        return self._process.code is None
 
     def ask(self, order: Order) -> Answer:
         """Sends an order and waits for the answer. Raises ExhaustedError."""
         until = time.monotonic() + self._limits.seconds + self._allowance
         self._allowance = 0.0
-        self._write(order.model_dump_json())
-        line = self._line(until)
+        self._process.send(order)  # lost if the process has ended; reading its answer says why
         try:
-            return Answer.model_validate_json(line)
+            return Answer.model_validate_json(self._process.line(until, LARGEST_ANSWER))
+        except LateError:
+            raise ExhaustedError(self._too_long()) from None
+        except LongError:
+            raise ExhaustedError("its reader sent too long an answer") from None
+        except SilentError:
+            raise ExhaustedError(self._why_ended()) from None
         except ValueError:
             raise ExhaustedError("its reader sent an answer that cannot be understood") from None
 
     def end(self) -> None:
         """Ends the process at once. May be called from any thread."""
-        with suppress(ProcessLookupError):
-            self._process.kill()
+        self._process.kill()
 
     def kill(self) -> None:
         """Ends the process and closes its streams. May be called again."""
         self.end()
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(1.0)
-        for stream in (self._process.stdin, self._process.stdout):
-            assert stream is not None
-            with suppress(OSError):
-                stream.close()
+        self._process.close(1.0)
 
-    def _write(self, line: str) -> None:
-        assert self._process.stdin is not None
-        with suppress(OSError):  # the process has ended; reading its answer will say why
-            self._process.stdin.write(line.encode() + b"\n")
-            self._process.stdin.flush()
-
-    def _line(self, until: float) -> bytes:
-        assert self._process.stdout is not None
-        number, pieces, poll = self._process.stdout.fileno(), bytearray(), select.poll()
-        poll.register(number, select.POLLIN)
-        while not pieces.endswith(b"\n"):
-            if not poll.poll(max(0.0, 1e3 * (until - time.monotonic()))):
-                raise ExhaustedError(f"takes more than the {self._limits.seconds:g} s that it may take")
-            piece = os.read(number, PIECE)
-            if not piece:
-                raise ExhaustedError(self._why_ended())
-            pieces += piece
-            if len(pieces) > LARGEST_ANSWER:
-                raise ExhaustedError("its reader sent too long an answer")
-        return bytes(pieces)
+    def _too_long(self) -> str:
+        return f"takes more than the {self._limits.seconds:g} s that it may take"
 
     def _why_ended(self) -> str:
-        with suppress(subprocess.TimeoutExpired):
-            code = self._process.wait(1.0)
-            if code == -signal.SIGXCPU:
-                return f"takes more than the {self._limits.seconds:g} s that it may take"
-            if code < 0:
-                name = signal.Signals(-code).name
-                return f"its reader was ended by {name}: it is damaged, or needs too much memory"
+        code = self._process.wait(1.0)
+        if code == -signal.SIGXCPU:
+            return self._too_long()
+        if code is not None and code < 0:
+            name = signal.Signals(-code).name
+            return f"its reader was ended by {name}: it is damaged, or needs too much memory"
         return f"its reader ended: it is damaged, or needs more than {self._limits.memory >> 20} MB of memory"
 
 

@@ -15,6 +15,7 @@ from sqlalchemy.exc import OperationalError
 
 from daq.contracts.service.archive import Transfer
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
+from daq.contracts.whole_file import sync_folder
 from daq.traces import disk, layout
 from daq.traces.catalogue import TraceSummary, summary_of
 from daq.traces.salvage import salvage_folder
@@ -136,7 +137,7 @@ class Catalogue:
 
         def take_away() -> None:
             path.unlink(missing_ok=True)
-            disk.sync_folder(self.folder)
+            sync_folder(self.folder)
 
         with self._lock:
             self._traces.remove(self._robot, identity, take_away)
@@ -213,7 +214,7 @@ class Catalogue:
             # After a crash between the two, the next start finds the file and says so.
             self._traces.mark_missing(self._robot, [path.name], missing=True)
             path.unlink(missing_ok=True)
-            disk.sync_folder(self.folder)
+            sync_folder(self.folder)
         return True
 
     def _take_in(self, path: Path) -> TraceSummary | None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from daq.contracts.service.jobs import KnownEffect
-from model.effects.library import library
-from model.effects.names import effect_name
 
 
 def known_effects() -> tuple[KnownEffect, ...]:
     """Returns the effects in the order of the shared list, in which those of one family are together."""
+    from model.effects.library import library
+    from model.effects.names import effect_name
+
     return tuple(
         KnownEffect(
             name=one.name,

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from daq.contracts.whole_file import replacing
+
 TELL_EVERY = 0.2
 """Time (s) between two reports of progress, and between two checks whether the job must end."""
 REQUEST, PROGRESS, CANCEL, RESULT, REPORT, MODEL = (
@@ -46,12 +48,8 @@ class Mailbox:
 
     def write_text(self, name: str, text: str) -> None:
         """Writes a text file, completely or not at all."""
-        part = self.folder / f"{name}.part"
-        with part.open("w", encoding="utf-8") as stream:
-            stream.write(text)
-            stream.flush()
-            os.fsync(stream.fileno())
-        part.replace(self.folder / name)
+        with replacing(self.folder / name) as part:
+            part.write_text(text, "utf-8")
 
     def read(self, name: str) -> Any:
         """Reads a JSON file; returns None if it does not exist."""
@@ -78,9 +76,8 @@ class Mailbox:
         if now - self._told < TELL_EVERY and not at_once:
             return
         self._told = now
-        part = self.folder / f"{PROGRESS}.part"
-        part.write_text(json.dumps({"fraction": fraction, "text": text, "process": os.getpid()}), "utf-8")
-        part.replace(self.folder / PROGRESS)
+        with replacing(self.folder / PROGRESS, synced=False) as part:
+            part.write_text(json.dumps({"fraction": fraction, "text": text, "process": os.getpid()}), "utf-8")
 
     def is_set(self) -> bool:
         """Whether the job must end, as `daq.contracts.progress.Cancel`."""

@@ -1,20 +1,21 @@
-"""The models of one robot: files in a folder, listed in the database."""
+"""The models of one robot: files in a folder, listed in the database. What reads a file is loaded when it is needed."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, EffectInModel, ModelDetails, ModelParameter
-from model.effects.names import placed
-from model.machine_model.model import EffectUse, Model, base_model
-from model.machine_model.model_file import ModelFile, file_of, load_model
-from model.machine_model.parameter_words import words_of
+from daq.contracts.whole_file import replacing
 from server.clock import Clock
 from server.store.models import ModelStore, NewModel
+
+if TYPE_CHECKING:
+    from model.machine_model.model import EffectUse, Model
+    from model.machine_model.model_file import ModelFile
 
 
 class Models:
@@ -29,6 +30,8 @@ class Models:
 
     def take_in(self, path: Path, name: str, by: str, job: str) -> str:
         """Adds a job's model, and returns its number. Adding it again changes nothing. Raises SpecError."""
+        from model.machine_model.model_file import file_of, load_model
+
         made = file_of(load_model(path))
         self.keep(made, name, by, job)
         return made.identity
@@ -56,12 +59,8 @@ class Models:
             if _is_kept(path, made):
                 return
             self.folder.mkdir(parents=True, exist_ok=True)
-            part = path.with_name(f"{new.file}.part")
-            with part.open("w", encoding="utf-8") as stream:
-                stream.write(made.text)
-                stream.flush()
-                os.fsync(stream.fileno())
-            part.replace(path)
+            with replacing(path) as part:
+                part.write_text(made.text, "utf-8")
 
         return self.store.insert(new, write, robots)
 
@@ -75,6 +74,8 @@ class Models:
 
     def details(self, identity: str) -> ModelDetails:
         """Returns a model's effects, parameters and ancestors. Raises a 404."""
+        from model.machine_model.model_file import load_model
+
         entry = self.store.get(self._robot, identity)
         model = load_model(self.path_of(identity))
         return ModelDetails(
@@ -86,11 +87,16 @@ class Models:
 
     def machine_identity(self) -> str:
         """Returns the number of the model that the machine file describes."""
-        return base_model(self._machine).identity
+        return self._base().identity
 
     def machine_parameters(self) -> tuple[ModelParameter, ...]:
         """Returns the parameters of the model that the machine file describes."""
-        return _parameters(base_model(self._machine))
+        return _parameters(self._base())
+
+    def _base(self) -> Model:
+        from model.machine_model.model import base_model
+
+        return base_model(self._machine)
 
     def remove(self, identity: str) -> None:
         """Deletes a model's row and file. Raises a 404, 409."""
@@ -100,6 +106,8 @@ class Models:
 def _is_kept(path: Path, made: ModelFile) -> bool:
     """Whether a model is in its file. A file that is not there, or was damaged or changed, is to be written anew.
     Raises SpecError for a file of another model of the same number."""
+    from model.machine_model.model_file import file_of, load_model
+
     try:
         there = file_of(load_model(path))
     except (DaqError, OSError):
@@ -110,10 +118,14 @@ def _is_kept(path: Path, made: ModelFile) -> bool:
 
 
 def _effect(use: EffectUse) -> EffectInModel:
+    from model.effects.names import placed
+
     return EffectInModel(name=use.name, joints=use.joints, called=placed(use.name, use.joints))
 
 
 def _parameters(model: Model) -> tuple[ModelParameter, ...]:
+    from model.machine_model.parameter_words import words_of
+
     return tuple(
         ModelParameter(
             name=one.name,

@@ -22,7 +22,7 @@ from daq.contracts.service.live import (
     Topic,
 )
 from daq.contracts.service.robot import RobotStatus
-from firmware_protocol.commands import StatusFlag
+from firmware_protocol.codes import StatusFlag
 from server.clock import Clock
 from server.live.history import DIGITS, History
 from server.live.outbox import Outbox

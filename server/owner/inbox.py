@@ -47,6 +47,7 @@ class Inbox:
     """
 
     def __init__(self, descriptor: int) -> None:
+        ORDER.rebuild()  # no stop waits for it
         self.closing = threading.Event()
         self.finish = threading.Event()
         self.freeze: Callable[[Freeze], None] = lambda _order: None

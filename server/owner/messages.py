@@ -9,7 +9,7 @@ from pydantic import Field, StrictBool, TypeAdapter
 
 from daq.acquisition.messages import EventHappened, Finished, Progress
 from daq.contracts.experiment import ExperimentSpec, Gain
-from daq.contracts.frozen import FrozenRecord
+from daq.contracts.frozen import WHEN_USED, FrozenRecord
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.service.robot import Activity, ArmState, ControlPeriod
@@ -187,7 +187,7 @@ Order = Annotated[
     | Close,
     Field(discriminator="kind"),
 ]
-ORDER: TypeAdapter[Order] = TypeAdapter(Order)
+ORDER: TypeAdapter[Order] = TypeAdapter(Order, config=WHEN_USED)
 
 Long = RunExperiment | JogBegin | RunProgram | LeadBegin
 Quick = ReadGains | WriteGains | ReadProcess | WriteOutput | MoveGripper | Reset
@@ -266,4 +266,4 @@ Report = Annotated[
     Opened | LiveSample | ArmReport | TeachingText | Answer | CannotOpen | Progress | EventHappened,
     Field(discriminator="kind"),
 ]
-REPORT: TypeAdapter[Report] = TypeAdapter(Report)
+REPORT: TypeAdapter[Report] = TypeAdapter(Report, config=WHEN_USED)

@@ -9,7 +9,7 @@ from daq.contracts.service.robot import LinkStatus, RobotStatus, Sample
 from daq.runner.line_status import with_rates
 from daq.transport import parse_port_url
 from daq.transport.endpoint import BITS_PER_BYTE
-from firmware_protocol.commands import StatusFlag
+from firmware_protocol.codes import StatusFlag
 from server.robot.robot import Robot, Seen
 
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import socket
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime, timedelta
 
+from daq.child import Child
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.transport import Terminal
 from server.access.caller import Caller
 from server.access.session_cookie import STOPS_FOR
-from server.stopping.messages import NEWS, Begin, Joined, Known, Left, Order, Owned, Ready, Stopped
+from server.stopping.messages import NEWS, Begin, Joined, Known, Left, Owned, Ready, Stopped
 
 READY_WITHIN = 30.0
 """Time (s) for the process to start on a busy computer."""
@@ -72,14 +70,14 @@ class StopDoor:
         told = Owned(robot=robot, process=process, terminal=known)
         with self._lock:
             self._owned[robot] = told
-            self._send(told)
+            self._process.send(told)
 
     def set_tokens(self, callers: Mapping[str, Caller]) -> None:
         """Passes on the tokens that the service has read, by digest; also to a process that is started again later."""
         tokens = {digest: (caller.name, caller.role) for digest, caller in callers.items()}
         with self._lock:
             self._begin = self._begin.model_copy(update={"tokens": tokens})
-            self._send(Known(tokens=tokens))
+            self._process.send(Known(tokens=tokens))
 
     def add(self, caller: Caller) -> None:
         """Passes on a session that has just begun, so that its person can stop the robot whatever the database does."""
@@ -87,7 +85,7 @@ class StopDoor:
         with self._lock:
             self._joined = {digest: one for digest, one in self._joined.items() if not _stops_nothing(one)}
             self._joined[caller.token] = caller
-            self._send(_joined(caller))
+            self._process.send(_joined(caller))
 
     def remove(self, caller: Caller) -> None:
         """Tells that a session was left: neither this process nor one that is started later takes its stops."""
@@ -97,47 +95,26 @@ class StopDoor:
             if (known := self._begin.tokens) is not None:
                 left = {digest: who for digest, who in known.items() if digest != caller.token}
                 self._begin = self._begin.model_copy(update={"tokens": left})
-            self._send(Left(digest=caller.token))
+            self._process.send(Left(digest=caller.token))
 
     def close(self) -> None:
         """Ends the process, after it has answered the requests under way."""
         self._closing.set()
         with self._lock:
-            self._end_input()
-        try:
-            self._process.wait(END_WITHIN)
-        except subprocess.TimeoutExpired:
+            self._process.end_input()
+        if self._process.wait(END_WITHIN) is None:
             self._process.kill()
         self._thread.join()
 
-    def _start(self) -> subprocess.Popen[bytes]:
+    def _start(self) -> Child:
         descriptor = self._listener.fileno()
-        process = subprocess.Popen(
-            [sys.executable, "-m", "server.stopping"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            pass_fds=[descriptor],
-            start_new_session=True,  # Ctrl-C in the terminal is the service's to handle
-        )
-        self._process = process
-        self._send(self._begin.model_copy(update={"descriptor": descriptor}))
+        process = self._process = Child("server.stopping", descriptors=[descriptor])
+        process.send(self._begin.model_copy(update={"descriptor": descriptor}))
         for told in self._owned.values():
-            self._send(told)
+            process.send(told)
         for caller in self._joined.values():
-            self._send(_joined(caller))
+            process.send(_joined(caller))
         return process
-
-    def _send(self, message: Order) -> None:
-        """If the process has died, the message is sent again to its successor."""
-        assert self._process.stdin is not None
-        with contextlib.suppress(OSError, ValueError):
-            self._process.stdin.write(message.model_dump_json().encode() + b"\n")
-            self._process.stdin.flush()
-
-    def _end_input(self) -> None:
-        assert self._process.stdin is not None
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
 
     def _listen(self) -> None:
         after = self._begin_again_after
@@ -147,7 +124,7 @@ class StopDoor:
             after = self._begin_again_after if self._ready.is_set() else min(2 * after, BEGIN_AGAIN_AT_MOST)
             self._ready.clear()
             with self._lock:
-                self._end_input()
+                self._process.end_input()
             line = "the stop listener's process has ended (exit code %s): it is started again in %g s"
             while not self._closing.is_set():
                 log.error(line, code, after)
@@ -170,8 +147,7 @@ class StopDoor:
             return True
 
     def _hear_all(self) -> None:
-        assert self._process.stdout is not None
-        with self._process.stdout as lines:
+        with self._process.output as lines:
             for line in lines:
                 try:
                     news = NEWS.validate_json(line)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 
+from daq.contracts.frozen import build_records
 from daq.contracts.service.queue import Role
 from daq.contracts.service.robot import StopResult
 from daq.transport import Terminal
@@ -51,6 +52,8 @@ class Robots:
 def main() -> int:
     """Listens until the input ends, because the service ends or has died. Returns the exit code."""
     logs.begin()
+    build_records()
+    ORDER.rebuild()
     lines = sys.stdin.buffer
     first = lines.readline()
     if not first:

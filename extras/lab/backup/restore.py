@@ -16,6 +16,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from daq.contracts.whole_file import sync_folder
 from daq.traces import disk
 from daq.traces.layout import PART_SUFFIX, SUFFIX
 from extras.lab.backup.database import (
@@ -160,7 +161,7 @@ class _Staged:
             target.parent.mkdir(parents=True, exist_ok=True)
             staged.replace(target)
         for folder in {target.parent for _, target in self._moves}:
-            disk.sync_folder(folder)
+            sync_folder(folder)
 
     def clear(self) -> None:
         """Removes all extracted files that have not been moved."""

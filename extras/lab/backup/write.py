@@ -11,7 +11,7 @@ from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from daq.traces import disk
+from daq.contracts.whole_file import sync_folder
 from extras.lab.backup.database import copy_database, note_dropped, revision_of
 from extras.lab.backup.manifest import FORMAT, MANIFEST, Entry, Manifest, Progress, pieces
 from extras.lab.backup.places import DATABASE, BackupError, Places, is_trace
@@ -59,7 +59,7 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
             if target.exists():
                 raise BackupError(f"{target}: was made by somebody else meanwhile; it was not overwritten")
             part.replace(target)
-            disk.sync_folder(target.absolute().parent)
+            sync_folder(target.absolute().parent)
     except OSError as error:
         raise BackupError(f"{target}: cannot be written: {error.strerror or error}") from error
     return manifest

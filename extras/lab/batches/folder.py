@@ -17,7 +17,7 @@ from daq.contracts.documents import parse_json, read_text
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.file_lock import take_lock
 from daq.contracts.frozen import FrozenRecord
-from daq.traces.disk import rename
+from daq.contracts.whole_file import replacing
 from extras.lab.batches.columns import Columns
 from extras.lab.batches.program import program_here
 from extras.lab.batches.study import Answer, Common, Study
@@ -206,12 +206,8 @@ def _whole_lines(file: Path) -> list[bytes]:
 
 def _write(file: Path, text: str) -> None:
     """Writes a file, completely or not at all, and waits until it and its name are on the disk."""
-    part = file.with_name(f".{file.name}.part")
-    with part.open("w", encoding="utf-8", newline="") as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())
-    rename(part, file)
+    with replacing(file) as part:
+        part.write_text(text, "utf-8", newline="")
 
 
 def _digest(text: str) -> str:

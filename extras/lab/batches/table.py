@@ -8,17 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from daq.contracts.extras import is_installed
+from daq.contracts.whole_file import replacing
 from extras.lab.batches.columns import Columns
 
 
 def write_csv(rows: Sequence[Columns], path: Path) -> Path:
     """Writes CSV as RFC 4180 describes it, with a line of names; an empty cell where a row has no value."""
-    part = path.with_name(f".{path.name}.part")
-    with part.open("w", encoding="utf-8", newline="") as stream:
+    with replacing(path, synced=False) as part, part.open("w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, _names(rows), restval="")
         table.writeheader()
         table.writerows(rows)
-    return part.replace(path)
+    return path
 
 
 def write_parquet(rows: Sequence[Columns], path: Path) -> Path | None:
@@ -30,9 +30,9 @@ def write_parquet(rows: Sequence[Columns], path: Path) -> Path | None:
     from pyarrow import parquet
 
     columns: dict[str, Any] = {name: pyarrow.array([row.get(name) for row in rows]) for name in _names(rows)}
-    part = path.with_name(f".{path.name}.part")
-    parquet.write_table(pyarrow.table(columns), part)
-    return part.replace(path)
+    with replacing(path, synced=False) as part:
+        parquet.write_table(pyarrow.table(columns), part)
+    return path
 
 
 def _names(rows: Sequence[Columns]) -> list[str]:

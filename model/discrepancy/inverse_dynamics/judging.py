@@ -15,6 +15,9 @@ BESIDE_REFUSED = 0.5
 something else."""
 CHANCES = 3
 """Candidates of a step that may fail on records not fitted to before the search ends."""
+UNSURE_NOISE = 3.0
+"""How many times the usual evidence an effect needs (10, odds of 150 to 1): a noise is never known as well as a
+likelihood takes it to be. What priors say has no noise in it, and counts so many times as much."""
 SUSPECTED = 10.0
 """Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
 and still short of what naming it takes."""
@@ -45,7 +48,7 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Judg
     """
     if chosen.evidence <= 0:
         return None
-    if chosen.evidence + chosen.told < needed_evidence(standing, chosen):
+    if chosen.evidence + chosen.told + (UNSURE_NOISE - 1.0) * chosen.relieved < needed_evidence(standing, chosen):
         return None
     if any(chosen.rivals(one) and chosen.evidence < BESIDE_REFUSED * one.evidence for one in refused):
         return None

@@ -62,6 +62,8 @@ class Fitted:
     """Cost of its parameters and of the places searched, which the evidence has paid."""
     stated: tuple[Parameter, ...] = ()
     """Those of its parameters that the file states, as it states them; their priors are lifted."""
+    relieved: float = 0.0
+    """Part of the evidence that is of priors: of numbers that no longer have to be off."""
     told: float = 0.0
     """What held-out records say for it, as evidence; 0 where there are none."""
     told_compared: float = 0.0
@@ -260,6 +262,7 @@ def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted
             f,
             evidence=evidence(now, f.fit, memory, len(f.parameters), places),
             cost=cost_of(now, memory, len(f.parameters), places),
+            relieved=max(now.prior - f.fit.prior, 0.0),
         )
         for f in found
     ]

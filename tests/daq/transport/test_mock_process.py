@@ -72,9 +72,8 @@ def test_a_mock_that_is_held_up_tells_for_how_long_its_board_stood_still() -> No
         os.waitid(os.P_PID, mock._process.pid, os.WSTOPPED)
         subprocess.run([sys.executable, "-c", ""], check=True)  # for a while, something else computes
         os.kill(mock._process.pid, signal.SIGCONT)
-        assert mock._process.stdout is not None
         while mock.waited() == 0.0:
-            assert select.select([mock._process.stdout], [], [], 10)[0], "it has told nothing"
+            assert select.select([mock._process.output], [], [], 10)[0], "it has told nothing"
         clock = told_by(mock.control, "state")["clock"]
         assert mock.waited() <= clock["waited_us"] * 1e-6
     finally:

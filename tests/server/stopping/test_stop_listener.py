@@ -456,7 +456,7 @@ def test_a_listener_that_cannot_be_started_again_at_once_is_started_later(
 
     with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, begin, 0.01)) as door:
         door.wait_ready()
-        monkeypatch.setattr("server.stopping.door.subprocess.Popen", seldom)
+        monkeypatch.setattr("daq.child.subprocess.Popen", seldom)
         os.kill(door.pid, signal.SIGKILL)
         stop = f"http://127.0.0.1:{listener.getsockname()[1]}/api/v1/robots/ma2000/stop"
         assert "no robot is connected" in httpx.post(stop, timeout=60).json()["text"]

@@ -9,7 +9,7 @@ from sqlalchemy import text
 from extras.lab.postgresql.lock import ServerLock
 from server.clock import SystemClock
 from server.stopping.tokens import reader_of
-from server.store.address import StoreError, open_engine, parse_address
+from server.store.address import StoreError, open_engine
 from server.store.engine import Store
 from server.store.lock import InUseError, sole_use
 from server.store.traces import TraceStore
@@ -108,4 +108,4 @@ def test_the_service_keeps_everything_in_it_and_refuses_what_it_cannot_hold(
 )
 def test_a_driver_that_is_missing_is_named(address: str, said: str) -> None:
     with pytest.raises(StoreError, match=said):
-        parse_address(address)
+        open_engine(address)
