@@ -4354,7 +4354,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "cutoff" | "drive-at-limit" | "drive-timing" | "errors-follow-record" | "larger-noise" | "names-excluded" | "no-experiment-left" | "not-exchanged" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "shakes-above-cutoff" | "size-at-bound" | "stated-numbers-moved" | "suspicion-dropped" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "traces-contradict" | "traces-exchanged" | "unfinished-record";
+            kind: "cutoff" | "drive-at-limit" | "errors-follow-record" | "larger-noise" | "no-experiment-left" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "shakes-above-cutoff" | "stated-numbers-moved" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "unfinished-record";
             /**
              * Values
              * @default {}
@@ -5214,7 +5214,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "contradicts-file" | "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "found-one-way" | "leaves-more-than-noise" | "only-resembles" | "superfluous" | "worse-than-given";
+            kind: "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous";
             /**
              * Numbers
              * @default {}
