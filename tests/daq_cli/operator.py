@@ -11,6 +11,7 @@ from daq.owner import client
 from daq_cli.app import consent
 
 REAL = """
+from daq.driver.controller import Identity
 from daq.owner.process import main
 Identity.simulated = property(lambda _: False)
 raise SystemExit(main())

@@ -15,6 +15,8 @@ from firmware_protocol.dynamixel.dialect import DynamixelDialect
 from firmware_protocol.scale import LineScale
 
 MINE = """
+from firmware_protocol.dialect import FramedDialect
+from firmware_protocol.scale import LineScale
 
 class Mine(FramedDialect):
     def __init__(self, ids):
