@@ -105,7 +105,7 @@ def residual(model: Model, trace: Trace) -> np.ndarray:
 
 
 def _shape() -> RemainingShape:
-    centres, torque = (-0.4, -0.2, 0.0, 0.2, 0.4), (8.0, 7.9, None, -7.9, -8.0)
+    centres, torque = (-0.4, -0.3, -0.2, 0.0, 0.2, 0.4), (8.0, 8.0, 7.9, None, -7.9, -8.0)
     return RemainingShape(
         joint=2,
         against="speed",
@@ -113,7 +113,7 @@ def _shape() -> RemainingShape:
         torque_unit="N·m",
         centres=centres,
         torque=torque,
-        deviation=(0.2, 0.2, None, 0.2, 0.2),
+        deviation=(0.2, 0.2, 0.2, None, 0.2, 0.2),
         explained=0.8,
     )
 
