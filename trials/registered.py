@@ -1,7 +1,7 @@
 """A registered trial on test rigs that tuning never saw: the rates of `daq diagnose`, beside those to be reached.
 
     python -m trials.registered --hashes                                                      # for a registration
-    python -m trials.registered --registration docs/trial/worlds-15.toml --folder FOLDER --seconds 500
+    python -m trials.registered --registration docs/trial/worlds-16.toml --folder FOLDER --seconds 500
     python -m trials.registered --folder FOLDER --sharpness --seconds 500
     python -m trials.registered --table FILE.csv
 

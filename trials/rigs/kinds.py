@@ -441,10 +441,6 @@ REPORTED: dict[str, Kind] = {
         motions=("steps", "sines"),
         known_loop=False,
     ),
-}
-"""Kinds that a registered trial used and that were looked at then (docs/how-well.md): for tuning from there on."""
-
-REPORTING: dict[str, Kind] = {
     "axis-volts-via": replace(
         _AXIS, rate=(300.0,), bits=(17,), contacts=(BRISTLE,), motions=("via points", "sines"), body=True
     ),
@@ -474,6 +470,46 @@ REPORTING: dict[str, Kind] = {
     ),
     "six-volts-ramps": replace(
         _ANTHROPOMORPHIC, joints=6, rate=(400.0,), bits=(19,), contacts=(TANH,), motions=("ramps", "via points")
+    ),
+}
+"""Kinds that a registered trial used and that were looked at then (docs/how-well.md): for tuning from there on."""
+
+REPORTING: dict[str, Kind] = {
+    "axis-cascade-random": replace(
+        _AXIS, controller=CASCADE, rate=(250.0,), bits=(16,), contacts=(TANH,), motions=("random steps", "sines")
+    ),
+    "planar-current-mixed": replace(
+        _PLANAR,
+        drive=CURRENT,
+        rate=(200.0,),
+        bits=(15,),
+        contacts=(BRISTLE,),
+        motions=("via points", "steps"),
+        known_loop=False,
+        horizontal=True,
+    ),
+    "planar-pid-random": replace(
+        _PLANAR, rate=(300.0,), bits=(17,), contacts=(TANH,), motions=("random steps", "ramps")
+    ),
+    "arm-cascade-random": replace(
+        _ANTHROPOMORPHIC,
+        controller=CASCADE,
+        rate=(300.0,),
+        bits=(16,),
+        contacts=(SWITCH,),
+        motions=("random steps", "sweep"),
+    ),
+    "arm-volts-mixed": replace(
+        _ANTHROPOMORPHIC, rate=(150.0,), bits=(15,), contacts=(BRISTLE,), motions=("steps", "sines"), body=True
+    ),
+    "six-cascade-sines": replace(
+        _ANTHROPOMORPHIC,
+        joints=6,
+        controller=CASCADE,
+        rate=(350.0,),
+        bits=(18,),
+        contacts=(BRISTLE,),
+        motions=("sines", "steps"),
     ),
 }
 """Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""
