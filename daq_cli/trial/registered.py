@@ -37,6 +37,7 @@ REGISTERED = (
     "firmware_protocol",
     "daq/contracts",
     "daq/plugins.py",
+    "daq/child.py",
     "daq/driver",
     "daq/trajectories",
     "daq/runner",

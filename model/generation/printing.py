@@ -53,6 +53,7 @@ in `model.dynamics.effective_inertia`. Real or dual numbers; nothing is allocate
 
 # ruff: noqa: PLR0915  (straight-line code is as long as it is)
 
+from __future__ import annotations
 
 from typing import Any
 

@@ -296,7 +296,6 @@ def test_set_points_of_the_detection_are_those_that_a_run_sends(tmp_path: Path) 
         (("--seeds", "9:1"), "write FIRST:LAST"),
         (("--seeds", "1:2", "--kinds", "dirty"), "kind 'dirty': allowed are clean"),
         (("--seeds", "1:2", "--loads", "none"), "load 'none': allowed are nominal"),
-        (("--seeds", "1:2", "--executor", "3/2"), "write local://4"),
         ((), "--seeds or --registration"),
         (("--registration", "nowhere.toml"), "nowhere.toml: cannot be read"),
     ],

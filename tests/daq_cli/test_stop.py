@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,11 +12,25 @@ from pathlib import Path
 import pytest
 import serial
 
-from daq.driver import Controller
+from daq.owner import client
 from daq.owner.stop_socket import StopAnswer, StopSocket, stop_listener
 from daq.transport.mock_process import MockProcess
 from tests.daq_cli.board import ask
 from tests.daq_cli.invoke import CommandLine
+
+OVERTAKEN = """
+from daq.driver import Controller
+from daq.owner.process import main
+release = Controller.release
+
+def overtaken(controller, *stop):
+    controller.link.stop()
+    release(controller, *stop)
+
+Controller.release = overtaken
+raise SystemExit(main())
+"""
+"""An owner that somebody else stops while it releases the arm."""
 
 
 def test_a_stop_with_nothing_running_and_nothing_configured_fails(daq: CommandLine) -> None:
@@ -40,15 +55,9 @@ def test_a_reset_does_not_end_a_later_stop(
     daq: CommandLine, mock: MockProcess, port: str, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
 ) -> None:
     assert daq("--port", port, "stop").code == 0
-    release = Controller.release
-
-    def overtaken(controller: Controller, *stop: int) -> None:
-        controller.link.stop()
-        release(controller, *stop)
-
     with monkeypatch.context() as meanwhile:
-        meanwhile.setattr(Controller, "release", overtaken)
-        daq("--port", port, *words).complains(3, "another stop has come meanwhile, and holds")
+        meanwhile.setattr(client, "PROGRAM", (sys.executable, "-c", OVERTAKEN))
+        daq("--port", port, *words).complains(4, "the arm has been stopped since this was asked for")
     assert ask(mock, "state")["frozen"]
     assert daq("--port", port, *words).code == 0
     assert not ask(mock, "state")["frozen"]

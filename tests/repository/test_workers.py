@@ -85,6 +85,7 @@ def test_after():
 """
 
 WAITING = """
+from pathlib import Path
 import os, sys, threading
 import pytest
 

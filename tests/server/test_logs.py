@@ -65,6 +65,7 @@ def test_what_is_wrong_with_the_configuration_is_a_line_of_json() -> None:
 
 def test_a_log_that_cannot_be_written_does_not_end_the_program() -> None:
     program = """
+from server import logs
 import os, sys
 logs.begin()
 os.close(2)

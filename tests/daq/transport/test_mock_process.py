@@ -16,6 +16,7 @@ from daq.transport.url import MockPort
 from tests.control_port import told_by
 
 OWNER = """
+from daq.transport.mock_process import start_mock
 import json, sys
 from daq.transport import parse_port_url
 mock = start_mock(parse_port_url("mock://?lock_step=1"))

@@ -17,6 +17,11 @@ from model.simulation.specialised import AnyChain, ClosedForm, Flexible, uncompi
 from tests.model.simulation.records import ramp_inputs
 
 SIMULATE = """
+from daq.contracts.machine import load_machine
+from model.machine_model.model import base_model
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate
+from tests.model.simulation.records import ramp_inputs
 model = base_model(load_machine("ma2000"))
 for general in (False, True):
     print(*simulate(model, ramp_inputs(model.machine, duration=0.3), Options(general=general)).position.ravel())

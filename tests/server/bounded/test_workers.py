@@ -11,6 +11,7 @@ from server.jobs.service import worker_processes
 from server.jobs.yielding import NICENESS
 
 FOREVER = """
+from server.jobs.service import worker_processes
 import os, sys
 
 if __name__ == "__main__":

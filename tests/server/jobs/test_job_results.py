@@ -181,7 +181,7 @@ def test_results_are_described_kind_by_kind(sound_service: Service) -> None:
         "content"
     ].values()
     kinds = set(content["schema"]["discriminator"]["mapping"])
-    assert kinds == {"fit", "validate", "compare", "diagnose", "batch"}
+    assert kinds == {"fit", "validate", "compare", "diagnose"}
     assert len(get_args(get_args(JobResult)[0])) == len(kinds)
 
 

@@ -231,8 +231,10 @@ def test_a_trace_that_is_archived_and_dropped_meanwhile_is_noted_as_archived(tmp
     assert manifest.left_out == ("traces/bbb.mcap",)
     restore(tmp_path / "arm.zip", there, NOW, quietly)
     store = Store(there.url)
-    entries = [TraceStore(store).get("ma2000", number) for number in ("aaa", "bbb")]
-    assert ArchivedStore(store).get("bbb") == made
+    traces = TraceStore(store)
+    traces.archived = ArchivedStore(store)  # as the archive's part does
+    entries = [traces.get("ma2000", number) for number in ("aaa", "bbb")]
+    assert traces.archived.get("bbb") == made
     assert [(one.local, one.archived) for one in entries] == [(True, False), (False, True)]
     store.close()
 

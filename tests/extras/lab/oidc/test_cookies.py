@@ -88,8 +88,7 @@ def test_a_browser_takes_both_cookies_over_tls_and_a_page_of_another_path_or_hos
     server = ThreadingHTTPServer(("127.0.0.1", 0), Page)
     server.socket = Authority(tmp_path, "localhost").server().wrap_socket(server.socket, server_side=True)
     address = f"https://localhost:{server.server_port}"
-    oidc = SimpleNamespace(address=address)
-    services: Any = SimpleNamespace(settings=SimpleNamespace(server=SimpleNamespace(oidc=oidc)))
+    services: Any = SimpleNamespace(settings=SimpleNamespace(server=SimpleNamespace(address=address)))
     names = (session_cookie(address), sign_in_cookie(address))
     with server, playwright() as driver, chromium(driver, *WITHOUT_3D) as browser:
         Thread(target=server.serve_forever, daemon=True).start()
