@@ -75,7 +75,7 @@ def test_status_and_reset_do_not_take_an_arm_of_unknown_gains_for_one_that_holds
     config = ("--config", tmp_path / "daq.toml", "--port", "mock://?lock_step=1&seed=1")
     assert GAINS_UNKNOWN in daq(*config, "status").out
     done = daq(*config, "reset", "--here")
-    assert GAINS_UNKNOWN in done.err
+    assert GAINS_UNKNOWN in done.out
     assert "holds its posture" not in done.out
     assert GAINS_UNKNOWN in ConsentPrompt(given=False).for_gains_of(load_memory_map(path)).what
     assert ConsentPrompt(given=False).for_gains_of(default_memory_map()).what == "it will move"

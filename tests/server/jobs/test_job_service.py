@@ -430,7 +430,7 @@ def test_a_trace_is_not_deleted_when_a_job_comes_to_refer_to_it_meanwhile(bench:
     bench.traces.before("remove", lambda: _submitted(bench))
     one = SimpleNamespace(robot=SimpleNamespace(name="ma2000"), catalogue=bench.catalogue)
     with pytest.raises(ProblemError, match="is used by"):
-        delete_trace(TRACE, one, SimpleNamespace(traces=bench.traces), None)  # type: ignore[arg-type]
+        delete_trace(TRACE, one, None)  # type: ignore[arg-type]
     assert bench.catalogue.path_of(TRACE).is_file()
 
 
