@@ -8,6 +8,7 @@ from functools import partial
 
 from sqlalchemy import URL, Connection, Engine, create_engine, inspect, text
 from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.pool import NullPool
 
 from extras.lab.postgresql.lock import locked
 from server.database_errors import BRING_BACK, DamagedError
@@ -45,7 +46,7 @@ class PostgreSql(Database):
     def reader(self, url: str) -> Callable[[], tuple[Callers, Callers | None]]:
         """Returns a function that reads tokens and sessions, each statement within ANSWERED_WITHIN s."""
         options = {"connect_timeout": ANSWERED_WITHIN, "options": f"-c statement_timeout={ANSWERED_WITHIN * 1000}"}
-        return partial(_read, create_engine(url, connect_args=options))
+        return partial(_read, create_engine(url, connect_args=options, poolclass=NullPool))
 
 
 def _read(engine: Engine) -> tuple[Callers, Callers | None]:
