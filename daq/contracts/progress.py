@@ -37,12 +37,3 @@ class Never:
 
 def silent(_fraction: float, _text: str) -> None:
     """A `Progress` that does nothing."""
-
-
-def part_of(progress: Progress, begin: float, end: float) -> Progress:
-    """A `Progress` for a part of a computation, which reports from `begin` to `end` of the whole."""
-
-    def tell(fraction: float, text: str) -> None:
-        progress(begin + fraction * (end - begin), text)
-
-    return tell

@@ -107,11 +107,6 @@ def initial_position(joint: int, trace: int | None = None) -> Parameter:
     return _initial(Kind.INITIAL_POSITION, "position", "rad", joint, trace)
 
 
-def initial_velocity(joint: int, trace: int | None = None) -> Parameter:
-    """How much faster a joint starts than was read, rad/s. `trace`: number (from 1) of the trace, if of one."""
-    return _initial(Kind.INITIAL_VELOCITY, "velocity", "rad/s", joint, trace)
-
-
 def presliding(joint: int, value: float) -> Parameter:
     """The distance over which a joint's friction builds up, rad."""
     slots = (at.slot(joint, at.PRESLIDING),)
