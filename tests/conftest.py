@@ -82,6 +82,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     alternate(items)
 
 
+def pytest_fixture_setup(fixturedef: pytest.FixtureDef[object], request: pytest.FixtureRequest) -> None:
+    """Refuse what pytest takes without a word: in a folder that is no package, it would live until all tests are over."""
+    if fixturedef.scope == "package" and isinstance(request.node, pytest.Session):
+        pytest.fail(f"{fixturedef.argname} has package scope, and its folder {fixturedef.baseid} is no package")
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtestloop(session: pytest.Session) -> bool | None:
     """On several processes; one that a person debugs in, or that only collects, is one."""
