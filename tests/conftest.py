@@ -83,7 +83,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_fixture_setup(fixturedef: pytest.FixtureDef[object], request: pytest.FixtureRequest) -> None:
-    """Refuse what pytest takes without a word: in a folder that is no package, it would live until all tests are over."""
+    """Refuse what pytest takes without a word: in a folder that is no package, it lives until all tests are over."""
     if fixturedef.scope == "package" and isinstance(request.node, pytest.Session):
         pytest.fail(f"{fixturedef.argname} has package scope, and its folder {fixturedef.baseid} is no package")
 
