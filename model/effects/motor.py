@@ -6,7 +6,7 @@ from model import layout as at
 from model.effects.effect import Effect, EffectParameter
 
 LONGEST_ELECTRICAL = 0.05
-"""Longest electrical time constant L/R of a winding, s: servo motors have 0.1 to 10 ms, motors of kilowatts some tens."""
+"""Longest electrical time constant L/R of a winding, s: 0.1 to 10 ms in servo motors, some tens above a kilowatt."""
 
 MOTOR = (
     Effect(
