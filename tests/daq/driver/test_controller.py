@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from daq.driver import Controller, ControllerRestartedError, GainsNotTakenError, NoSampleError, ProtocolVersionError
+from daq.driver import Controller, ControllerRestartedError, GainsNotTakenError, ProtocolVersionError
 from daq.driver.line_rate import bytes_of_a_compact_turn, bytes_of_a_turn
-from daq.link import Link, LinkState, LinkTimeoutError, RequestRefusedError
+from daq.link import Link, LinkState, RequestRefusedError
 from daq.transport import TransportError
 from firmware_protocol.commands import (
     AFTER_NEWEST,
@@ -26,10 +26,8 @@ from firmware_protocol.commands import (
     Refusal,
     Refused,
     Release,
-    Released,
     Reply,
     ReportErrorsPositionsPowers,
-    ReportGains,
     Request,
     Sample,
     SetGains,
@@ -119,19 +117,6 @@ def test_gains_that_read_back_otherwise_are_reported() -> None:
         controller_that(answers).set_gains(3, 4, 1, 0)
 
 
-def test_gains_are_named_by_joint() -> None:
-    gains = tuple((joint, 0, 1) for joint in range(1, 7))
-    controller = controller_that(lambda request: Gains(gains) if isinstance(request, ReportGains) else None)
-    assert controller.gains()[4] == (4, 0, 1)
-
-
-def test_a_sample_older_than_asked_for_is_not_delivered() -> None:
-    old = Snapshot(7, 0, ((1, JointReading(500, 2048, 0, 0)),))
-    controller = controller_that(lambda request: old if isinstance(request, Sample) else Status(7, 0, 3, 0, 0))
-    with pytest.raises(NoSampleError, match="sent tick 7, asked for one after 9"):
-        controller.next_snapshot(after=9)
-
-
 def test_a_stop_that_nobody_answers_is_told_and_not_raised() -> None:
     confirmation = controller_that(lambda _: None).stop()
     assert confirmation.sent
@@ -154,19 +139,6 @@ def test_a_stop_over_an_ended_channel_was_not_sent() -> None:
     assert (confirmation.sent, confirmation.acknowledged) == (False, False)
 
 
-def test_a_silent_controller_is_a_time_out_whatever_was_asked() -> None:
-    with pytest.raises(LinkTimeoutError, match="no reply to Sample"):
-        controller_that(lambda request: None if isinstance(request, Sample) else Status(7, 0, 3, 0, 0)).next_snapshot()
-
-
-def test_a_gap_in_the_ticks_is_counted_as_missing() -> None:
-    later = Snapshot(15, 0, ((1, JointReading(500, 2048, 0, 0)),))
-    controller = controller_that(lambda _: later)
-    snapshot = controller.next_snapshot(after=10)
-    assert snapshot.missing_before == 4
-    assert controller.counters.missing_samples == 4
-
-
 def snapshots_of(snapshot: Snapshot) -> Controller:
     """A driver over a board that takes set points in tick 7, and always delivers the same period."""
     taken, stopped = SetPointsTaken(7, 0), Stopped(7, (505,) * 6)
@@ -181,27 +153,11 @@ def test_a_period_without_set_points_by_the_board_s_own_flag_is_told_though_none
     assert controller.counters.missed_set_points == 1
 
 
-def test_a_period_that_shows_older_set_points_than_sent_is_told_without_a_flag() -> None:
-    controller = snapshots_of(Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),)))
-    assert not controller.next_snapshot().set_points_missed
-    controller.set_points({1: 510})
-    assert controller.next_snapshot().set_points_missed
-    assert controller.counters.missed_set_points == 1
-
-
 def test_set_points_of_before_a_new_greeting_are_not_missed_after_it() -> None:
     controller = snapshots_of(Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),)))
     controller.set_points({1: 510})
     controller.hello()
     assert not controller.next_snapshot().set_points_missed
-
-
-def test_after_a_stop_the_period_after_it_must_show_the_frozen_set_points() -> None:
-    assert not snapshots_of(Snapshot(7, 0, ((1, JointReading(500, 2048, 0, 0)),))).next_snapshot().set_points_missed
-    controller = snapshots_of(Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),)))
-    controller.set_points({1: 500})
-    assert controller.stop().frozen == dict.fromkeys(range(1, 7), 505)
-    assert controller.next_snapshot().set_points_missed
 
 
 def test_only_a_greeting_after_a_reset_of_the_board_says_that_it_has_restarted() -> None:
@@ -258,17 +214,6 @@ def test_set_points_that_were_refused_are_not_missed_later() -> None:
     assert not controller.next_snapshot().set_points_missed
 
 
-def test_set_points_that_were_refused_are_not_the_right_ones_later() -> None:
-    """500 was taken in tick 7; a period 8 that shows 510, which the board refused, has missed them."""
-    replies = iter([SetPointsTaken(7, 0), Refused(WriteSetPoints.OPCODE, Refusal.FROZEN)])
-    shown = Snapshot(8, 0, ((1, JointReading(510, 2089, 0, 0)),))
-    controller = controller_that(lambda request: next(replies) if isinstance(request, WriteSetPoints) else shown)
-    controller.set_points({1: 500})
-    with pytest.raises(RequestRefusedError):
-        controller.set_points({1: 510})
-    assert controller.next_snapshot().set_points_missed
-
-
 def test_set_points_travel_with_the_question_for_the_joints_asked_for() -> None:
     asked: list[Request] = []
 
@@ -300,31 +245,6 @@ def test_the_next_sample_is_waited_for_where_none_is_named() -> None:
     assert controller.next_snapshot().missing_before == 0
     assert asked == [Sample(AFTER_NEWEST, 0b111111)]
     assert controller.counters.missing_samples == 0
-
-
-def test_a_release_ends_the_stop_that_it_names() -> None:
-    asked: list[Request] = []
-
-    def answers(request: Request) -> Reply:
-        asked.append(request)
-        return Released() if isinstance(request, Release) else Status(7, 0, 3, 0, 5)
-
-    controller_that(answers).release(3)
-    assert asked[-1] == Release(3)
-
-
-def test_a_release_takes_the_control_back_from_another_host() -> None:
-    refused = iter([True])
-    asked: list[Request] = []
-
-    def answers(request: Request) -> Reply:
-        asked.append(request)
-        if isinstance(request, Release):
-            return Refused(Release.OPCODE, Refusal.BAD_SESSION) if next(refused, False) else Released()
-        return Status(7, 0, 3, 0, 5)
-
-    controller_that(answers).release(5)
-    assert [request for request in asked if isinstance(request, Release)] == [Release(5), Release(5)]
 
 
 def test_a_numbered_stop_is_timed_from_its_sending_to_its_own_confirmation() -> None:

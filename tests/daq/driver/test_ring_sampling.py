@@ -179,12 +179,6 @@ def test_a_compact_turn_is_one_frame_and_tells_when_its_set_points_were_taken(ti
     assert (found.tick, found.set_points, found.set_points_missed) == (300, {1: 500}, missed)
 
 
-def test_a_compact_question_for_the_newest_waits_for_the_next_period() -> None:
-    bench = Bench(lambda _: compact(300, 299), SLOW)
-    bench.sampling.next(None, (1, 2, 3), {1: 510, 2: 520, 3: 530})
-    assert bench.asked[0] == MoveAndSample(AFTER_NEWEST, 0b111, ((1, 510), (2, 520), (3, 530)))
-
-
 def test_set_points_that_a_compact_turn_is_refused_for_are_not_missed_later() -> None:
     replies = iter([Refused(MoveAndSample.OPCODE, Refusal.FROZEN)])
     bench = Bench(lambda _: next(replies, whole(9)), SLOW)

@@ -385,14 +385,6 @@ def test_a_link_says_where_it_leads() -> None:
         link.request(ReadStatus(), Status)
 
 
-def test_a_sample_is_waited_for_as_long_as_the_controller_s_period_is() -> None:
-    link, channel = scripted_link(lambda _sequence, _request: [])
-    link.set_period(1.0)
-    with pytest.raises(LinkTimeoutError):
-        link.request(Sample(7, 1), Snapshot)
-    assert (RETRIES + 1) * 1.0 < channel.now() < (RETRIES + 1) * 1.1
-
-
 class _Waits:
     """Ends the attempts after the delays it was asked for; never sleeps."""
 
