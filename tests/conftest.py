@@ -8,8 +8,7 @@ import pytest
 from hypothesis import settings
 
 from tests.left_running import Running, mark_this_process
-from tests.order import alternate, is_against_the_clock, is_thorough
-from tests.workers import run_tests
+from tests.order import alternate, is_against_the_clock, is_thorough, unit_of
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `daq` does, before numpy is loaded: two workers, two cores
 ROOT = Path(__file__).parent.parent
@@ -41,7 +40,6 @@ MAY_ALWAYS_SKIP = ("hardware", "lab_data")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--port", metavar="URL", help="run the hardware tests on the real controller at this port")
-    parser.addoption("--workers", type=int, default=1, metavar="N", help="run the tests in so many processes")
     parser.addoption(
         "--part",
         choices=("quick", "thorough"),
@@ -70,8 +68,10 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return is_thorough(collection_path) == (part == "quick") or None
 
 
+@pytest.hookimpl(tryfirst=True)  # before the groups are taken into the names
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
+        item.add_marker(pytest.mark.xdist_group(unit_of(item.path)))
         if item.config.getoption("--port") or not is_against_the_clock(item):
             continue
         if item.path.relative_to(ROOT / "tests").as_posix() in DETERMINISTIC:
@@ -80,15 +80,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("against_the_clock")
             item.add_marker(pytest.mark.flaky(reruns=ATTEMPTS - 1))
     alternate(items)
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtestloop(session: pytest.Session) -> bool | None:
-    """On several processes; one that a person debugs in, or that only collects, is one."""
-    option = session.config.option
-    if option.workers < 2 or option.collectonly or option.usepdb or session.testsfailed:
-        return None
-    return run_tests(session, option.workers)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
