@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from xdist.remote import Producer
 
 from tests.left_running import Running, mark_this_process
-from tests.order import alternate, is_against_the_clock, is_thorough, unit_of
+from tests.order import Units, alternate, is_against_the_clock, is_thorough
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `daq` does, before numpy is loaded: two workers, two cores
 ROOT = Path(__file__).parent.parent
@@ -68,10 +69,8 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return is_thorough(collection_path) == (part == "quick") or None
 
 
-@pytest.hookimpl(tryfirst=True)  # before the groups are taken into the names
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        item.add_marker(pytest.mark.xdist_group(unit_of(item.path)))
         if item.config.getoption("--port") or not is_against_the_clock(item):
             continue
         if item.path.relative_to(ROOT / "tests").as_posix() in DETERMINISTIC:
@@ -80,6 +79,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("against_the_clock")
             item.add_marker(pytest.mark.flaky(reruns=ATTEMPTS - 1))
     alternate(items)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Units:
+    return Units(config, log)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -4,6 +4,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
 TESTS = Path(__file__).parent
 AGAINST_THE_CLOCK = (
@@ -67,6 +68,13 @@ def unit_of(path: Path) -> str:
         if path.is_relative_to(TESTS / folder):
             return folder
     return path.relative_to(TESTS).as_posix() if path.is_relative_to(TESTS) else str(path)
+
+
+class Units(LoadScopeScheduling):
+    """Of tests on several processes, one worker runs a unit."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return unit_of(TESTS.parent / nodeid.partition("::")[0])
 
 
 def units_of(items: list[pytest.Item]) -> list[list[pytest.Item]]:
