@@ -18,8 +18,8 @@ from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.ranking import Ranking, rank
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, SignalError, Step, Where
 from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
+from model.discrepancy.explanation.answer_words import with_sentences
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
-from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import ControllerEffect, Note
 from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.localisation.structure import joints_with_structure
