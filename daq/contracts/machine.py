@@ -295,6 +295,8 @@ class SampledPid(FrozenRecord):
     """Largest output, unit of the drive, ahead of the amplifier; none: no limit."""
     set_point_resolution: Annotated[Sizes, POSITION] | None = None
     """Step to which set points are rounded before use, rad or m; none: not rounded."""
+    dead_band: Annotated[Sizes, POSITION] | None = None
+    """Error, either way, on which it does not act, rad or m; none: it acts on every error."""
     gain_error: Annotated[Quantity, in_unit("1", above=-1.0)] | tuple[Plain, ...] | None = None
     """Relative: the output is 1 + this times what the gains say; its deviation is that of the gains."""
 
@@ -357,12 +359,12 @@ class Machine(FrozenRecord):
         if not isinstance(self.controller, NoController) and len(self.controller.gains) != count:
             raise ValueError(f"controller.gains has {len(self.controller.gains)} rows for {count} joints")
         if isinstance(self.controller, SampledPid):
-            for name in ("drive_resolution", "output_limit", "set_point_resolution", "gain_error"):
+            for name in ("drive_resolution", "output_limit", "set_point_resolution", "dead_band", "gain_error"):
                 stated = getattr(self.controller, name)
                 if isinstance(stated, tuple) and len(stated) != count:
                     raise ValueError(f"controller.{name} has {len(stated)} numbers for {count} joints")
                 if name != "gain_error":
-                    positions = name == "set_point_resolution"
+                    positions = name in ("set_point_resolution", "dead_band")
                     allowed = [(j.units.position,) if positions else j.drive_units for j in self.joints]
                     require_units(f"controller.{name}", stated, allowed)
             rows = self.controller.velocity_gains

@@ -142,13 +142,14 @@ class SpelledOut:
                     motor[name] = stated | {"unit": unit, "source": f"as the {other.replace('_', ' ')}"}
         motor.setdefault("rotor_inertia", _default(0.0, "kg·m²"))
         motor.setdefault("inductance", _default(0.0, "H"))
-        motor.setdefault("amplifier_gain", _default(1.0, "1"))
+        motor.setdefault("amplifier_gain", _default(1.0, "1", assumed=False))
         if "supply_limit" in motor:
             motor.setdefault("dac_full_scale", motor["supply_limit"])
 
     def _servo(self, stated: Mapping[str, Any], servos: list[dict[str, Any] | None]) -> dict[str, Any]:
         """The sampled PID that the firmware of servos is, from gains as they stand in the servos' registers."""
-        without = [k + 1 for k, servo in enumerate(servos) if not servo]
+        unread = {path[1] for path, _ in self.problems if path[2:] == ("drive",)}
+        without = [k + 1 for k, servo in enumerate(servos) if not servo and k not in unread]
         if without:
             where = ", ".join(map(str, without))
             self.problems.append((("controller",), f"kind is 'servo', but no position servo drives joint {where}"))
@@ -166,7 +167,7 @@ class SpelledOut:
         for name in ("period", "delay"):
             if known and name in known[0]:
                 found[name] = known[0][name]
-        for name in ("output_limit", "drive_resolution", "set_point_resolution", "dead_band"):
+        for name in ("output_limit", "drive_resolution", "set_point_resolution", "dead_band", "gain_error"):
             stated_of = [servo.get(name) for servo in known]
             if all(stated_of) and stated_of:
                 found[name] = stated_of[0] if stated_of.count(stated_of[0]) == len(known) else stated_of
