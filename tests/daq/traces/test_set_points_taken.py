@@ -1,12 +1,10 @@
 """A record of a slow line tells from which control period on the set points of each sample were used."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from daq.traces import set_points_taken
 from daq.traces.reader import read_trace
@@ -33,17 +31,6 @@ def test_it_reads_back_and_is_written_again(slow: Path, tmp_path: Path) -> None:
     again = read_trace(write_trace(trace, tmp_path / "again.mcap"))
     for each in (trace, again):
         np.testing.assert_array_equal(each.taken, TAKEN)  # type: ignore[arg-type]
-
-
-def test_a_library_of_ros_2_decodes_it_by_the_definition_in_the_file(slow: Path) -> None:
-    found: list[Any] = []
-    with slow.open("rb") as stream:
-        for schema, _, message in make_reader(stream).iter_messages(set_points_taken.TOPIC):
-            assert schema is not None
-            types = get_typestore(Stores.EMPTY)
-            types.register(get_types_from_msg(schema.data.decode(), schema.name))
-            found.append(types.deserialize_cdr(message.data, schema.name))
-    assert [(each.tick, each.taken) for each in found] == list(zip(range(0, 40, 4), TAKEN, strict=True))
 
 
 def test_a_record_of_a_fast_line_shows_every_set_point_itself(tmp_path: Path) -> None:
