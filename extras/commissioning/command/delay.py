@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from daq.contracts.errors import SafetyError
+from daq.contracts.quantity import Quantity
 from daq.driver.clock import LockStepClock
 from extras.commissioning.command.bench import Bench
 from extras.commissioning.computing_delay import ComputingDelay, Effect, computing_delay
@@ -39,7 +40,7 @@ def delay(bench: Bench) -> dict[str, Any]:
     A stop, Ctrl-C and every fault freeze the arm where it is; it returns to its posture only after the last set point.
     """
     from extras.commissioning.command.held_arm import held_arm
-    from extras.commissioning.command.machine_text import with_controller
+    from extras.commissioning.command.measured import with_controller
 
     bench.configure()
     joint, period = bench.joints[0], 1e-3 * float(bench.record.steps["period"]["period_ms"])
@@ -54,7 +55,7 @@ def delay(bench: Bench) -> dict[str, Any]:
             arm.set_points({joint: there})
     found = computing_delay([one for one in shown if one is not None], period)
     bench.operator.show(str(found))
-    bench.write_machine(with_controller(bench.machine_text(), {"delay": _line(found)}))
+    bench.write_machine(with_controller(bench.machine(), {"delay": _quantity(found)}))
     return {
         "joint": joint,
         "set_points_that_showed": found.used,
@@ -100,12 +101,10 @@ def _require_following(arm: ControllerArm, machine: Machine) -> None:
         raise arm.freeze_for_fault(str(error)) from error
 
 
-def _line(found: ComputingDelay) -> str:
+def _quantity(found: ComputingDelay) -> Quantity:
     source = "measured from the taking of set points to the storing of results; the drive is taken to change then"
-    return (
-        f'{{ value = {round(found.value, 6)!r}, unit = "s", source = "{source}", low = 0.0, '
-        f"deviation = {round(found.deviation, 6)!r} }}"
-    )
+    value, deviation = round(found.value, 6), round(found.deviation, 6)
+    return Quantity(value=value, unit="s", source=source, low=0.0, deviation=deviation)
 
 
 @dataclass

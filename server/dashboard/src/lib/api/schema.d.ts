@@ -5493,6 +5493,8 @@ export interface components {
             output_limit?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
             /** Set Point Resolution */
             set_point_resolution?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
+            /** Dead Band */
+            dead_band?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
             /** Gain Error */
             gain_error?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
         };
