@@ -8,7 +8,7 @@ import pytest
 from daq.contracts.errors import SpecError
 from model.validation.criterion import contribution, required_deviation
 from model.validation.expected_deviation import expected_deviation, gaussian_share
-from tests.model.validation.synthetic import arm
+from tests.model.fitting.imagined import arm
 
 
 def test_required_variance_is_one_and_a_half_squares_at_half_damping() -> None:

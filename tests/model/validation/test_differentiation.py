@@ -7,7 +7,7 @@ from daq.contracts.errors import SpecError
 from model import layout as at
 from model.validation import differentiation as d
 from model.validation.acceleration_model import averaged_volts
-from tests.model.validation.synthetic import arm
+from tests.model.fitting.imagined import arm
 
 PERIOD = 0.02
 TIME = PERIOD * np.arange(200)

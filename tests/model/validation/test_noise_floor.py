@@ -9,7 +9,8 @@ from model.validation.acceleration_model import expected_accelerations
 from model.validation.measured_motion import smooth
 from model.validation.noise_floor import noise_floor
 from model.validation.time_domain import vary_in_time
-from tests.model.validation.synthetic import arm, multisine_trace, swinging_trace
+from tests.model.fitting.imagined import arm
+from tests.model.validation.synthetic import multisine_trace, swinging_trace
 
 SEEDS = range(7001, 7042)
 DRAWS = 12

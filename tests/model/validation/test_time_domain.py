@@ -10,7 +10,8 @@ from model.machine_model.model import Model
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.measured_motion import smooth
 from model.validation.time_domain import vary_in_time
-from tests.model.validation.synthetic import arm, ramp_trace, swinging_trace
+from tests.model.fitting.imagined import arm
+from tests.model.validation.synthetic import ramp_trace, swinging_trace
 
 VISCOUS_2 = "joint2.viscous_friction.coefficient"
 NAMES = ("load.mass", "link2.length", "joint1.motor.back_emf_constant", VISCOUS_2, "joint2.load_dependent_friction.arm")
