@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import pytest
 
@@ -31,19 +30,6 @@ def test_compliant_gear_tends_to_the_rigid_one_as_it_hardens() -> None:
     assert hard < soft / 10
 
 
-def test_backlash_shows_as_lost_motion_on_reversal() -> None:
-    play = 0.03
-    rigid = Plant(default_plant(), angles=LOW)
-    loose = Plant(default_plant(), build_modifications([("backlash", {"joint": 1, "play": play})]), angles=LOW)
-    ranges = []
-    for plant in (rigid, loose):
-        plant.advance([0.4, 0, 0, 0, 0, 0], 600_000)
-        high = plant.joint_angles[0]
-        plant.advance([-0.4, 0, 0, 0, 0, 0], 600_000)
-        ranges.append(high - plant.joint_angles[0])
-    assert ranges[1] < ranges[0] - 0.3 * play
-
-
 def test_coupling_too_hard_for_the_step_is_refused() -> None:
     with pytest.raises(PlantError, match=r"joint 6: coupling .* too hard"):
         Plant(default_plant(), build_modifications([("joint_compliance", {"joint": 6, "compliance": 1e-3})]))
@@ -55,54 +41,6 @@ def test_dead_zone_swallows_small_voltages_and_shortens_large_ones() -> None:
     assert plant.motor_volts[:2] == pytest.approx((1.4, 0.0))
     plant.advance([0.5, -0.5, 0, 0, 0, 0], 1000)
     assert plant.motor_volts[:2] == pytest.approx((14.0, -12.0))
-
-
-@dataclass
-class Push:
-    name = "push"
-    newton_metres: float
-
-    def external_torque(self, time_s: float, angles: Sequence[float], rates: Sequence[float]) -> list[float]:
-        return [self.newton_metres if time_s < 0.1 else 0.0, 0, 0, 0, 0, 0]
-
-
-@dataclass
-class WeakMotor:
-    name = "weak_motor"
-    joint: int
-    factor: float
-
-    def torque_change(self, torque: float, time_s: float, angle: float, rate: float) -> float:
-        return (self.factor - 1.0) * torque
-
-
-@dataclass
-class Dry:
-    name = "dry"
-    joint: int
-    factor: float
-
-    def friction_level(self, level: float, angle: float, rate: float) -> float:
-        return self.factor * level
-
-
-def test_torque_from_outside_moves_the_joint_it_acts_on() -> None:
-    pushed = Plant(default_plant(), [Push(20.0)], angles=(math.pi, math.pi / 2, 0, 0, 0, 0))
-    pushed.advance([0.0] * 6, 100_000)
-    assert pushed.joint_angles[0] > math.pi + 0.01
-
-
-def test_effects_with_no_strength_reproduce_the_plain_plant() -> None:
-    plain = moved()
-    for neutral in (Push(0.0), WeakMotor(1, 1.0), Dry(2, 1.0)):
-        assert moved([neutral]) == pytest.approx(plain, abs=1e-9)
-
-
-def test_friction_and_motor_effects_act_on_their_joint() -> None:
-    plain = moved()
-    weak, dry = moved([WeakMotor(1, 0.5)]), moved([Dry(3, 4.0)])
-    assert weak[0] < plain[0] - 1e-3
-    assert abs(dry[2] - plain[2]) > 1e-3
 
 
 @pytest.mark.parametrize(
