@@ -81,6 +81,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     alternate(items)
 
 
+def pytest_fixture_setup(fixturedef: pytest.FixtureDef[object], request: pytest.FixtureRequest) -> None:
+    """Refuse what pytest takes without a word: in a folder that is no package, it lives until all tests are over."""
+    if fixturedef.scope == "package" and isinstance(request.node, pytest.Session):
+        pytest.fail(f"{fixturedef.argname} has package scope, and its folder {fixturedef.baseid} is no package")
+
+
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Units:
     return Units(config, log)
 

@@ -122,7 +122,8 @@ def sources_digest() -> bytes:
         spec = find_spec(package)
         assert spec is not None, "its router was loaded"
         root = Path((spec.submodule_search_locations or [spec.origin or ""])[0])
-        for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
+        sources = (path for path in root.rglob("*") if path.suffix in (".py", ".toml"))
+        for path in sorted(sources) if root.is_dir() else [root]:
             with suppress(OSError):
                 found = path.stat()
                 digest.update(f"{path.relative_to(root)} {found.st_size} {found.st_mtime_ns}\n".encode())

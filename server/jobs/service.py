@@ -1,4 +1,7 @@
-"""The jobs of one robot: queues them, has worker processes of two lanes compute them, and keeps their results."""
+"""The jobs of one robot: queues them, has worker processes of two lanes compute them, and keeps their results.
+
+Tells a job that gets no processor from one that computes: both may say nothing new for a long time. Pure.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from pathlib import Path
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.machine import Machine
-from daq.contracts.processor import added, processor_time
+from daq.contracts.processor import ProcessorTime, added, processor_time
 from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import MACHINE, DiagnoseRequest, FitRequest, Job, JobRequest
 from daq.executors import LocalWorkers, Workers
@@ -26,11 +29,33 @@ from server.jobs.lanes import LANES, Lane, lane_of, with_what_it_waits_for
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
 from server.jobs.models import Models
 from server.jobs.shared_workers import SharedWorkers, worker_processes
-from server.jobs.standing import WAITS, Standing
 from server.jobs.work import Ended, Task, carry_out
 from server.problems import ProblemError, conflict, not_found
 from server.store.jobs import JobStore, models_of, traces_of
 from server.store.labels import job_label
+
+ASKED_AFTER = 10.0
+"""Time (s) without news after which a person asks whether a job still goes on."""
+WAITS = "waiting for the processor: the computer is busy"
+
+
+@dataclass
+class Standing:
+    """The last news of a running job, when they came (s, monotonic), and the processor's time of its processes then."""
+
+    reported: Reported | None
+    since: float
+    begun: ProcessorTime | None
+    waits: bool = False
+
+    def look(self, reported: Reported | None, now: float, time: ProcessorTime | None) -> None:
+        """Takes the present state. A job waits if its processes have mostly waited for a processor since its last
+        news, where those are older than ASKED_AFTER."""
+        if reported != self.reported or self.begun is None or time is None:
+            self.reported, self.since, self.begun, self.waits = reported, now, time, False
+        elif now - self.since >= ASKED_AFTER:
+            self.waits = time.waits_mostly_since(self.begun)
+
 
 LOOK_EVERY = 0.5
 """Time (s) between two checks of the jobs' progress."""

@@ -16,7 +16,7 @@ from extras.lab.oidc.part import SigningIn
 from extras.lab.oidc.people import name_of
 from extras.lab.oidc.sign_in import GOOD_FOR
 from server.access.caller import Caller
-from server.access.session_cookie import is_over_tls, session_cookie, sign_in_cookie
+from server.access.sessions import is_over_tls, session_cookie, sign_in_cookie
 from server.api.dependencies import ServicesDep, Viewer
 from server.problems import PROBLEMS, ProblemError, not_found
 from server.routes import Router

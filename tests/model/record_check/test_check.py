@@ -306,8 +306,9 @@ def test_public_records_of_a_real_arm_raise_no_doubt(lab_data: Path) -> None:
 NOT_TOLD = {("linear_axis", "late_drive"), ("planar-torques", "late_drive"), ("mock", "dead_at_the_beginning")}
 """Faults that a record does not hold: one sample is within friction that takes nearly all torque, or within noise; a
 joint stops within two periods of the mock elsewhere in the second half of its ramp."""
-ONLY_NOTED = {"late_drive", "wraps", "slow_times"}
-"""Faults that may be said as a note: wraps that are taken out; and what a record without a controller leaves open."""
+ONLY_NOTED = {"late_drive", "wraps", "slow_times", "cut_out"}
+"""Faults that may be said as a note: wraps that are taken out; gaps, where a record without a controller is cut; and
+what such a record leaves open."""
 NEAR = 0.3
 """s between a drawn place and where it is said: a reading that is stuck may have rested before."""
 

@@ -2,7 +2,7 @@
 
 from daq.contracts.processor import ProcessorTime
 from server.jobs.mailbox import Reported
-from server.jobs.standing import ASKED_AFTER, Standing
+from server.jobs.service import ASKED_AFTER, Standing
 
 BEGUN = ProcessorTime(0.0, 0.0)
 STARVED, BUSY = ProcessorTime(0.1, 9.0), ProcessorTime(9.0, 0.1)

@@ -12,7 +12,6 @@ from daq.contracts.progress import Never, silent
 from daq.contracts.trace import Trace
 from daq.safety.planned import planned
 from daq.trajectories.offered import offered_experiments
-from daq_cli.trial.experiments import trial_experiment
 from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, refit
 from model.discrepancy.candidates.decision import decide
 from model.discrepancy.candidates.library import Hypothesis
@@ -34,6 +33,7 @@ from model.discrepancy.output_error.search import Point, converge, descend, poin
 from model.discrepancy.thresholds import THRESHOLDS
 from model.machine_model.model import Model
 from tests.model.fitting import imagined
+from trials.blind.experiments import trial_experiment
 
 EXPERIMENTS = {e.name: e for e in offered_experiments()}
 FRICTION = ("coulomb_friction", "stribeck_friction")

@@ -12,12 +12,12 @@ from daq.contracts.errors import DaqError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine
 from daq.traces.reader import read_trace
-from daq_cli.trial.experiments import write_experiment
-from daq_cli.trial.folder import TrialFolder
-from daq_cli.trial.mock_side import TrialStageError, tell_apart
-from daq_cli.trial.sealed import SealedAnswer
 from model.trial.score import Score
 from model.trial.sharpness import Sharpness, asks_for_rivals, named_rivals
+from trials.blind.experiments import write_experiment
+from trials.blind.folder import TrialFolder
+from trials.blind.mock_side import TrialStageError, tell_apart
+from trials.blind.sealed import SealedAnswer
 
 
 def sealed_answer(folder: TrialFolder, seed: int) -> SealedAnswer:

@@ -14,7 +14,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine
 from daq.owner.client import OwnerOnDemand
 from daq.owner.messages import Open
-from daq_cli.trial.mock_side import TrialStageError
+from trials.blind.mock_side import TrialStageError
 
 
 @dataclass(frozen=True)

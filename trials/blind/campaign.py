@@ -21,17 +21,17 @@ from daq.executors import Workers, done_in_any_order
 from daq.executors.each import growing
 from daq.traces.reader import read_trace
 from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
-from daq_cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
-from daq_cli.trial.folder import STAGES, Stage, TrialFolder
-from daq_cli.trial.mock_side import TrialStageError, detect, reveal
-from daq_cli.trial.recording import Recorded, record
-from daq_cli.trial.sealed import DIAGNOSER, DiagnosisFailedError, SealedAnswer, diagnose_sealed
-from daq_cli.trial.sharpness import sealed_answer, with_rivals, work_out_sharpness
 from model.discrepancy.diagnosis import Acquired, NextExperiment
 from model.machine_model.model import base_model
 from model.trial.score import Score, score, score_of_failure
 from model.trial.table import TrialTable, trial_table
 from model.trial.truth import Detectability, parse_truth
+from trials.blind.experiments import machine_with_load, trial_experiment, write_set_points
+from trials.blind.folder import STAGES, Stage, TrialFolder
+from trials.blind.mock_side import TrialStageError, detect, reveal
+from trials.blind.recording import Recorded, record
+from trials.blind.sealed import DIAGNOSER, DiagnosisFailedError, SealedAnswer, diagnose_sealed
+from trials.blind.sharpness import sealed_answer, with_rivals, work_out_sharpness
 
 ROBOT_TIME = 60.0
 """Robot time in s that a trial may spend on further experiments."""

@@ -17,11 +17,11 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from daq.child import last_words
-from daq_cli.trial.mock_side import TrialStageError
 from firmware_protocol.invalid import first_invalid
 from model.discrepancy.diagnosis import Diagnosis
 from model.machine_model.model import Model
 from model.machine_model.model_file import save_model
+from trials.blind.mock_side import TrialStageError
 
 MODEL, ANSWER, HELD_OUT = "model.json", "answer.json", "held-out.mcap"
 ASKING = "asking.json"
@@ -30,7 +30,7 @@ TIME_LIMIT = 1800.0
 """Time limit of a diagnosis in s: generous, because the computer may be busy with others."""
 _KEPT_VARIABLES = ("PATH", "HOME", "LANG", "LC_ALL", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE", "VIRTUAL_ENV")
 _KEPT_BEGINNINGS = ("NUMBA_", "OMP_", "OPENBLAS_", "MKL_")
-DIAGNOSER = (sys.executable, "-m", "daq_cli.trial.diagnoser")
+DIAGNOSER = (sys.executable, "-m", "trials.blind.diagnoser")
 
 
 class DiagnosisFailedError(TrialStageError):

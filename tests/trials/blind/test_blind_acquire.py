@@ -10,11 +10,6 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.traces.reader import read_trace
 from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
-from daq_cli.trial import diagnoser
-from daq_cli.trial.campaign import ROBOT_TIME, Campaign
-from daq_cli.trial.experiments import trial_experiment
-from daq_cli.trial.folder import TrialFolder
-from daq_cli.trial.recording import record
 from model.discrepancy import workflow
 from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment
 from model.discrepancy.options import DiagnosisOptions
@@ -22,6 +17,11 @@ from model.machine_model.model import base_model
 from model.machine_model.model_file import save_model
 from model.trial.arms import compose
 from tests.daq.executors.by_hand import WorkersByHand
+from trials.blind import diagnoser
+from trials.blind.campaign import ROBOT_TIME, Campaign
+from trials.blind.experiments import trial_experiment
+from trials.blind.folder import TrialFolder
+from trials.blind.recording import record
 
 MACHINE = load_machine("ma2000")
 SOUND = compose(7654321, "clean", "nominal")

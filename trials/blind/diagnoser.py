@@ -1,4 +1,4 @@
-"""`python -m daq_cli.trial.diagnoser`: diagnoses the traces of the folder it is started in.
+"""`python -m trials.blind.diagnoser`: diagnoses the traces of the folder it is started in.
 
 It is given trace-1.mcap, trace-2.mcap, …, perhaps held-out.mcap, and model.json, and writes answer.json. Where it is
 given asking.json besides, it may ask for an experiment that takes no longer than the budget there, s.
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import DaqError
-from daq_cli.trial.sealed import ANSWER, ASKING, HELD_OUT, MODEL
+from trials.blind.sealed import ANSWER, ASKING, HELD_OUT, MODEL
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine

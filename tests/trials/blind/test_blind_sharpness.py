@@ -10,17 +10,17 @@ import pytest
 
 from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.machine import load_machine
-from daq_cli.trial import sharpness
-from daq_cli.trial.campaign import Campaign
-from daq_cli.trial.experiments import write_experiment
-from daq_cli.trial.folder import TrialFolder
-from daq_cli.trial.mock_side import TrialStageError, reveal
-from daq_cli.trial.sharpness import rivals_wanted, work_out_sharpness
 from mock_controller.hidden.experiment import read_experiment
 from model.trial.arms import compose
 from tests.daq.executors.by_hand import WorkersByHand
 from tests.daq_cli.invoke import CommandLine
 from tests.model.trial.answers import answer, step
+from trials.blind import sharpness
+from trials.blind.campaign import Campaign
+from trials.blind.experiments import write_experiment
+from trials.blind.folder import TrialFolder
+from trials.blind.mock_side import TrialStageError, reveal
+from trials.blind.sharpness import rivals_wanted, work_out_sharpness
 
 MACHINE = load_machine("ma2000")
 SEED = compose(7654321, "single", "nominal")

@@ -18,19 +18,19 @@ from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.machine import load_machine
 from daq.executors.workers import ending
 from daq.traces.reader import read_trace
-from daq_cli.trial import sealed
-from daq_cli.trial.campaign import Campaign
-from daq_cli.trial.experiments import machine_with_load, trial_experiment, write_set_points
-from daq_cli.trial.folder import TrialFolder
-from daq_cli.trial.mock_side import TrialStageError
-from daq_cli.trial.recording import Recorded
-from daq_cli.trial.registered import REGISTERED, library_versions, source_tree, to_register, tree_hashes
-from daq_cli.trial.sealed import diagnose_sealed
 from model.discrepancy.diagnosis import Diagnosis
 from model.machine_model.model import base_model
 from model.trial.arms import compose
 from tests.daq.executors.by_hand import WorkersByHand, WorkersInThreads
 from tests.daq_cli.invoke import CommandLine
+from trials.blind import sealed
+from trials.blind.campaign import Campaign
+from trials.blind.experiments import machine_with_load, trial_experiment, write_set_points
+from trials.blind.folder import TrialFolder
+from trials.blind.mock_side import TrialStageError
+from trials.blind.recording import Recorded
+from trials.blind.registered import REGISTERED, library_versions, source_tree, to_register, tree_hashes
+from trials.blind.sealed import diagnose_sealed
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
 MACHINE = load_machine("ma2000")
@@ -310,14 +310,13 @@ def test_hashes_prints_the_tables_of_a_registration(daq: CommandLine) -> None:
     assert printed == {"hashes": expected, "versions": library_versions()}
     assert set(library_versions()) == {"numpy", "scipy", "numba", "mujoco"}
     assert library_versions()["numpy"] == np.__version__
-    assert {"model/discrepancy", "mock_controller", "daq_cli/trial"} <= set(expected)
+    assert {"model/discrepancy", "mock_controller", "trials/blind"} <= set(expected)
     thresholds = "model/discrepancy/thresholds.py"
     assert expected[thresholds] == sha256((source_tree() / thresholds).read_bytes()).hexdigest()
 
 
 STAGE_MODULES = (
-    "daq_cli.trial",
-    "daq_cli.commands.blind",
+    "trials.blind",
     "daq.owner",
     "server.jobs.next_experiment",
     "mock_controller",
@@ -327,7 +326,7 @@ AROUND = ("daq_cli", "daq.client", "daq.config", "daq.executors")
 
 
 def test_nothing_that_a_stage_imports_is_left_out_of_a_registration() -> None:
-    every = ("daq", "daq_cli", "model", "server", "mock_controller", "firmware_protocol")
+    every = ("daq", "daq_cli", "model", "server", "mock_controller", "firmware_protocol", "trials")
     graph = grimp.build_graph(*every, exclude_type_checking_imports=True, cache_dir=None)
     begun = {name for name in graph.modules if any(f"{name}.".startswith(f"{stage}.") for stage in STAGE_MODULES)}
     used = begun.union(*(graph.find_upstream_modules(name) for name in begun))

@@ -47,8 +47,7 @@ REGISTERED = (
     "daq/link",
     "daq/transport",
     "daq/safety",
-    "daq_cli/trial",
-    "daq_cli/commands/blind.py",
+    "trials/blind",
     "daq_cli/models/stopping_rule.py",
     "server/jobs/next_experiment.py",
 )

@@ -14,7 +14,7 @@ from daq.contracts.machine import load_machine
 from daq_cli.app.context import JsonOption, console, print_json
 
 if TYPE_CHECKING:
-    from daq_cli.trial.campaign import Campaign
+    from trials.blind.campaign import Campaign
 
 app = typer.Typer(add_completion=False)
 
@@ -68,9 +68,9 @@ def blind(
     from daq.contracts.extras import require_extra
     from daq.executors import LocalWorkers
     from daq.executors.workers import ending
-    from daq_cli.trial.campaign import Campaign
-    from daq_cli.trial.folder import TrialFolder
-    from daq_cli.trial.registered import to_register
+    from trials.blind.campaign import Campaign
+    from trials.blind.folder import TrialFolder
+    from trials.blind.registered import to_register
 
     if hashes:
         print(to_register())
@@ -115,9 +115,9 @@ def _after_the_answers(context: typer.Context, folder: Path) -> tuple[Campaign, 
 
     Raises SpecError for other options, where no trial is in the folder, and where no answer has been sealed and scored.
     """
-    from daq_cli.trial.campaign import Campaign
-    from daq_cli.trial.folder import TrialFolder
-    from daq_cli.trial.sharpness import rivals_wanted
+    from trials.blind.campaign import Campaign
+    from trials.blind.folder import TrialFolder
+    from trials.blind.sharpness import rivals_wanted
 
     others = ("seeds", "cases", "kinds", "loads", "experiment", "acquire", "registration", "run", "until")
     if own := [name for name in others if _asked_for(context, name)]:
@@ -142,7 +142,7 @@ def _chosen(seeds: str, kinds: str, loads: str, cases: int | None) -> list[int]:
 
 def _registered(path: Path, run: str) -> tuple[list[int], Literal["diagnostic", "ramp"], bool, dict[str, str]]:
     """Returns the seeds, the experiment, whether the diagnosis may ask for more experiments, and the registration."""
-    from daq_cli.trial.registered import read_registration
+    from trials.blind.registered import read_registration
 
     registration, commit = read_registration(path, run)
     chosen = registration.run(run)
