@@ -21,7 +21,8 @@ from model.machine_model.model import Model
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.measured_motion import observe
 from model.validation.noise_floor import noise_floor
-from tests.model.validation.synthetic import arm, multisine_trace, ramp_trace, swinging_trace
+from tests.model.fitting.imagined import arm
+from tests.model.validation.synthetic import multisine_trace, ramp_trace, swinging_trace
 
 MOTIONS: dict[str, Callable[[Model, int], Trace]] = {
     "ramp step, 1.6 s": lambda model, seed: ramp_trace(model, seed=seed, held=True),

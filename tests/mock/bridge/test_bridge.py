@@ -1,6 +1,5 @@
 """What each request does, and what is refused."""
 
-import struct
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,7 @@ from firmware_protocol.units import counts_to_posture
 from mock_controller.board.parameters import default_board_text
 from mock_controller.bridge.bridge import WAIT_LIMIT_PERIODS, Bridge
 from mock_controller.timeline import Timeline
-from tests.mock.host import LockStepHost, RealTimeHost
+from tests.mock.host import LockStepHost
 
 
 @pytest.fixture
@@ -35,33 +34,6 @@ def test_hello_tells_what_the_bridge_can_do(host: LockStepHost) -> None:
     assert without == c.HelloReply(
         2, c.Capability.LOCK_STEP | c.Capability.SIMULATED, 20_000, 0, 1, 78, without.session
     )
-
-
-def test_a_host_of_another_version_is_told_in_words_that_version_1_understands(host: LockStepHost) -> None:
-    everything = c.Capability.SAMPLE | c.Capability.COMPACT | c.Capability.LOCK_STEP | c.Capability.SIMULATED
-    for payload in (b"", b"\x01", b"\x03" + bytes(20)):
-        (answer,) = host.device.bridge.receive(Frame(7, c.Hello.OPCODE, payload))
-        assert struct.unpack("<BHIBH", answer.payload) == (2, everything, 20_000, 64, 1)
-    assert host.ask(c.SetGains(2, 5, 1, 3)) == c.GainsSet(), "the session goes on"
-    (answer,) = host.device.bridge.receive(Frame(7, c.Stop.OPCODE, b""))
-    assert len(answer.payload) == struct.calcsize("<I6H"), "a stop is confirmed to it as version 1 did"
-
-
-@pytest.mark.parametrize(
-    ("first", "second"),
-    [
-        (c.WriteOutputs(1, 1), c.WriteSetPoints(((1, 520),))),
-        (c.SetGripper(1), c.SetGains(1, 3, 0, 0)),
-        (c.WriteBlock(0xFC78, b"1"), c.Release(0)),
-    ],
-)
-def test_no_command_is_obeyed_without_a_session(first: c.Request, second: c.Request) -> None:
-    host = LockStepHost(greeted=False)
-    before = bytes(host.board.memory.get(0xFC00 + offset) for offset in range(0x80))
-    for request in (first, second):
-        assert refusal(host.ask(request)) is c.Refusal.BAD_SESSION
-    assert bytes(host.board.memory.get(0xFC00 + offset) for offset in range(0x80)) == before
-    assert isinstance(host.ask(c.Stop()), c.Stopped), "a stop needs none"
 
 
 def test_the_session_ends_with_the_connection(host: LockStepHost) -> None:
@@ -109,23 +81,6 @@ def test_memory_ends_where_the_map_says(host: LockStepHost, request_: c.Request)
     assert host.board.time_us == before
 
 
-def test_gains_are_written_and_reported(host: LockStepHost) -> None:
-    assert host.ask(c.SetGains(2, 5, 1, 3)) == c.GainsSet()
-    assert host.ask(c.ReportGains()) == c.Gains(((2, 0, 0), (5, 1, 3), *(((2, 0, 0),) * 4)))
-
-
-def test_report_of_errors_positions_and_powers_is_what_the_memory_holds(host: LockStepHost) -> None:
-    host.ask(c.WriteSetPoints(((2, 400),)))
-    host.ask(c.Advance(19_000))
-    report = host.ask(c.ReportErrorsPositionsPowers(0b10))
-    assert isinstance(report, c.ErrorsPositionsPowers)
-    ((joint, reading),) = report.joints
-    assert joint == 2
-    assert reading.set_point == 400
-    assert reading.position == host.board.memory.values("position")[1]
-    assert reading.power == host.board.memory.values("power")[1]
-
-
 def test_process_outputs_change_only_in_the_mask_and_inputs_are_read(host: LockStepHost) -> None:
     host.board.set_process_inputs(0b1010_0000)
     assert host.ask(c.WriteOutputs(0b0011, 0b0001)) == c.OutputsWritten()
@@ -160,45 +115,6 @@ def test_stop_freezes_the_measured_posture_and_refuses_set_points_until_release(
     assert isinstance(host.ask(c.WriteSetPoints(((1, 600),))), c.SetPointsTaken)
 
 
-def test_a_sample_seen_is_not_seen_again_and_a_lost_reply_costs_nothing(host: LockStepHost) -> None:
-    host.ask(c.Advance(200_000))
-    first = host.ask(c.Sample(3, 1))
-    assert isinstance(first, c.Snapshot)
-    assert first.tick == 4
-    assert host.ask(c.Sample(3, 1)) == first
-    ticks = []
-    for _ in range(20):
-        reply = host.ask(c.Sample(ticks[-1] if ticks else 4, 1))
-        assert isinstance(reply, c.Snapshot)
-        ticks.append(reply.tick)
-    assert ticks == list(range(5, 25))
-
-
-def test_the_next_sample_may_be_asked_for_whatever_has_been_seen(host: LockStepHost) -> None:
-    host.ask(c.Advance(207_000))
-    tick = host.board.tick
-    reply = host.ask(c.Sample(c.AFTER_NEWEST, 1))
-    assert isinstance(reply, c.Snapshot)
-    assert reply.tick == tick + 1
-
-
-def test_after_a_brown_out_a_sample_comes_from_the_new_life(host: LockStepHost) -> None:
-    host.ask(c.Hello(2, 1))
-    host.ask(c.Advance(500_000))
-    host.board.brown_out()
-    reply = host.ask(c.Sample(25, 1))
-    assert isinstance(reply, c.Snapshot)
-    assert reply.tick == 1
-    assert reply.status & c.StatusFlag.RESTARTED
-    status = host.ask(c.ReadStatus())
-    assert isinstance(status, c.Status)
-    assert status.boots == 2
-    assert refusal(host.ask(c.SetGripper(1))) is c.Refusal.BAD_SESSION
-    host.ask(c.Hello(2, 1))
-    assert host.ask(c.SetGripper(1)) == c.GripperSet()
-    assert not host.ask(c.ReadStatus()).status & c.StatusFlag.RESTARTED  # type: ignore[attr-defined]
-
-
 def test_a_sample_that_waits_in_vain_is_refused(tmp_path: Path) -> None:
     slow = tmp_path / "board.toml"
     slow.write_text(default_board_text().replace("reset = { value = 100000", "reset = { value = 2000000"), "utf-8")
@@ -207,15 +123,6 @@ def test_a_sample_that_waits_in_vain_is_refused(tmp_path: Path) -> None:
     host.board.brown_out()
     assert refusal(host.ask(c.Sample(5, 1))) is c.Refusal.NOTHING_NEW
     assert host.board.time_us == 100_000 + WAIT_LIMIT_PERIODS * 20_000
-
-
-def test_what_the_bridge_cannot_do_is_refused() -> None:
-    blind = LockStepHost(sample=False)
-    assert refusal(blind.ask(c.Sample(0, 1))) is c.Refusal.NOT_CAPABLE
-    clocked = RealTimeHost()
-    clocked.send(1, c.Advance(1))
-    ((_, _, reply),) = clocked.wait(1000)
-    assert refusal(reply) is c.Refusal.NOT_CAPABLE
 
 
 @pytest.mark.parametrize(

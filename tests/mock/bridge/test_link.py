@@ -37,17 +37,6 @@ def test_a_sample_waits_for_its_period_while_others_are_answered() -> None:
     assert moment == 26_300 - 8_010
 
 
-def test_a_later_sample_takes_the_place_of_the_one_that_waits() -> None:
-    host = RealTimeHost()
-    host.wait(7_000)
-    host.send(1, c.Sample(c.AFTER_NEWEST, 1))
-    host.send(2, c.Sample(c.AFTER_NEWEST, 3))
-    ((_, number, reply),) = host.wait(50_000)
-    assert number == 2
-    assert isinstance(reply, c.Snapshot)
-    assert [joint for joint, _ in reply.joints] == [1, 2]
-
-
 def test_a_sample_is_answered_though_its_moment_falls_into_another_request() -> None:
     host = RealTimeHost()
     host.wait(26_100)

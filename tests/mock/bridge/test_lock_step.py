@@ -120,15 +120,6 @@ def test_a_stalled_bridge_answers_in_the_end() -> None:
     assert host.device.faults.counts() == {"stall": {"to_controller": 4}}
 
 
-def test_a_command_that_comes_late_does_not_undo_a_later_one() -> None:
-    host = LockStepHost(fault=("duplicate:ms=25,direction=to_controller,duration=0.001",))
-    assert isinstance(host.ask(c.WriteSetPoints(((1, 600),)), 1), c.SetPointsTaken)
-    assert isinstance(host.ask(c.WriteSetPoints(((1, 700),)), 2), c.SetPointsTaken)
-    host.replies(c.Advance(100_000), 3)
-    assert host.board.memory.values("set_point")[0] == 700
-    assert host.device.bridge.refused == {"STALE": 1}
-
-
 @pytest.mark.parametrize("options", [{}, {"fault": EVERY_WIRE_FAULT}, {"fault": EVERY_WIRE_FAULT, "baud": 115_200}])
 def test_the_same_seed_and_faults_give_the_same_bytes(options: dict[str, object]) -> None:
     first = conversation(seed=3, **options)
