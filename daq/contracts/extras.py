@@ -44,7 +44,6 @@ EXTRA_OF: dict[str, Extra] = {
     "xarray": "tables",
     "rosbags": "ros",
     "dask": "cluster",
-    "dask_jobqueue": "cluster",
     "distributed": "cluster",
     "psycopg": "postgresql",
     "obstore": "archive",

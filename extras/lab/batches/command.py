@@ -53,7 +53,7 @@ TracesOf = Annotated[
 ]
 ExecutorOption = Annotated[
     str,
-    typer.Option("--executor", help="Who computes: local://4 (processes), dask://host:8786, slurm://partition."),
+    typer.Option("--executor", help="Who computes: local://4 (processes), or dask://host:8786."),
 ]
 OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder of the result; a batch in it goes on.")]
 ModelOption = Annotated[
