@@ -16,7 +16,7 @@ DRAWS = 12
 
 
 def test_what_a_right_model_leaves_is_its_noise_floor() -> None:
-    """The median over seeds that the floor was not drawn with, on every joint; benchmarks/noise_floor.py has more."""
+    """The median over seeds that the floor was not drawn with, on every joint."""
     model, sizes = arm(), []
     first = swinging_trace(model, 4.0, SEEDS[0], held=True)
     floor, simulated = noise_floor(model, first, smooth(model, first))
