@@ -17,13 +17,12 @@ from daq.contracts.machine import BoardPid, load_machine, parse_machine
 from daq.contracts.quantity import Quantity
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from extras.commissioning.command.addresses import addresses_of
 from extras.commissioning.command.bench import Bench, Commissioner
 from extras.commissioning.command.by_hand import potentiometers
 from extras.commissioning.command.measured import with_controller, with_limits, with_sensors
 from extras.commissioning.command.periods import Periods
 from extras.commissioning.command.record import Record
-from extras.commissioning.command.sheet import acceptance_sheet, memory_picture
+from extras.commissioning.command.sheet import acceptance_sheet, addresses_of, memory_picture
 from extras.commissioning.command.steps import STEPS, lacking, resting_on, step_named
 from extras.commissioning.memory.procedure import Task, is_alive, release, switched_off_and_on
 from extras.commissioning.person.memory_page import UnprovedWriteError, open_page
