@@ -179,7 +179,7 @@ def read_traces(robot: RobotAccess, folder: Path | None, names: Sequence[str]) -
     found = []
     for name in names:
         path = robot.find_trace(place, name)
-        trace = replace(open_trace(path, call.trace_limits), file=name if Path(name).is_file() else path.name)
+        trace = replace(open_trace(path, call.trace_limits), file=name if Path(name).exists() else path.name)
         if INCOMPLETE in trace.record.notes:
             console().print(printable(f"{trace.file}: {trace.record.notes}"))
         found.append(trace)
