@@ -17,7 +17,7 @@ UNSTATED = "source not stated"
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _WRITTEN = re.compile(
     rf"(?P<value>{_NUMBER})\s*(?:(?:±|\+/?-)\s*(?P<deviation>{_NUMBER})\s*(?P<percent>%(?=\s*[^\s,\[%]))?)?"
-    rf"\s*(?P<unit>[^\s,\[±+-][^,\[±]*?)?\s*(?:(?:±|\+/?-)\s*(?P<share>{_NUMBER})\s*%)?"
+    rf"\s*(?P<unit>[^\s,\[±+-][^,\[±]*?)?\s*(?:(?:±|\+/?-)\s*(?P<share>{_NUMBER})\s*(?P<of>%|[^\s,\[%][^,\[%]*?))?"
     rf"\s*(?:\[\s*(?P<low>{_NUMBER})?\s*to\s*(?P<high>{_NUMBER})?\s*\])?\s*(?:,\s*(?P<source>.*?))?\s*",
     re.DOTALL,
 )
@@ -66,9 +66,11 @@ def read_number(written: str | float, comment: str, allowed: Sequence[str]) -> d
             found[side] = float(match[side])
     if match["deviation"] is not None:
         found["deviation"] = float(match["deviation"]) * (abs(found["value"]) / 100 if match["percent"] else 1.0)
-    if match["share"] is not None:
-        found["deviation"] = abs(found["value"]) * float(match["share"]) / 100
     found["unit"] = (match["unit"] or "").strip()
+    if match["share"] is not None:
+        if match["of"] not in ("%", found["unit"]):
+            raise ValueError(f"found {written!r:.80}: the deviation must be in {found['unit']} or %")
+        found["deviation"] = float(match["share"]) * (1.0 if match["of"] != "%" else abs(found["value"]) / 100)
     if not found["unit"]:
         if len(allowed) != 1:
             raise ValueError(f"found {written!r:.80}, which has no unit: write {' or '.join(allowed)}")
