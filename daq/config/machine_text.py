@@ -49,7 +49,9 @@ def machine_text(
     controller = data.pop("controller", None) if set(named) != set(range(1, len(joints) + 1)) else None
     top = kept.get("", ())
     lines = [*top, *[""][: len(top)], *(line for key, value in data.items() for line in _entry(key, value))]
-    if notes:
+    if notes and "\n" not in notes and len(notes) < WIDTH - len("notes = ''"):
+        lines.append(f"notes = {toml_value(notes)}")
+    elif notes:
         lines += ['notes = """', *(toml_value(line)[1:-1] for line in notes.split("\n"))]
         lines[-1] += '"""'
     if controller is not None:

@@ -64,13 +64,12 @@ def read_number(written: str | float, comment: str, allowed: Sequence[str]) -> d
     for side in ("low", "high"):
         if match[side] is not None:
             found[side] = float(match[side])
-    if match["deviation"] is not None:
-        found["deviation"] = float(match["deviation"]) * (abs(found["value"]) / 100 if match["percent"] else 1.0)
     found["unit"] = (match["unit"] or "").strip()
-    if match["share"] is not None:
-        if match["of"] not in ("%", found["unit"]):
-            raise ValueError(f"found {written!r:.80}: the deviation must be in {found['unit']} or %")
-        found["deviation"] = float(match["share"]) * (1.0 if match["of"] != "%" else abs(found["value"]) / 100)
+    share = match["percent"] is not None or match["of"] == "%"
+    if match["of"] not in (None, "%", found["unit"]):
+        raise ValueError(f"found {written!r:.80}: the deviation's unit must be {found['unit']} or %")
+    if (deviation := match["deviation"] or match["share"]) is not None:
+        found["deviation"] = _short(float(deviation) * (abs(found["value"]) / 100 if share else 1.0))
     if not found["unit"]:
         if len(allowed) != 1:
             raise ValueError(f"found {written!r:.80}, which has no unit: write {' or '.join(allowed)}")
@@ -119,7 +118,7 @@ def _inverted(number: Mapping[str, Any], unit: str, factor: float) -> dict[str, 
 def _short(value: float) -> float:
     """The number without the digits that only the conversion has added."""
     rounded = float(f"{value:.15g}")
-    return rounded if abs(rounded - value) <= 4e-16 * abs(value) else value
+    return rounded if abs(rounded - value) <= 5e-16 * abs(value) else value
 
 
 @cache
