@@ -117,7 +117,7 @@ def _inverted(number: Mapping[str, Any], unit: str, factor: float) -> dict[str, 
 
 def _short(value: float) -> float:
     """The number without the digits that only the conversion has added."""
-    rounded = float(f"{value:.15g}")
+    rounded = float(f"{value:.12g}")
     return rounded if abs(rounded - value) <= 5e-16 * abs(value) else value
 
 
