@@ -69,7 +69,7 @@ def read_number(written: str | float, comment: str, allowed: Sequence[str]) -> d
     if match["of"] not in (None, "%", found["unit"]):
         raise ValueError(f"found {written!r:.80}: the deviation's unit must be {found['unit']} or %")
     if (deviation := match["deviation"] or match["share"]) is not None:
-        found["deviation"] = _short(float(deviation) * (abs(found["value"]) / 100 if share else 1.0))
+        found["deviation"] = _short(abs(found["value"]) * float(deviation) / 100) if share else float(deviation)
     if not found["unit"]:
         if len(allowed) != 1:
             raise ValueError(f"found {written!r:.80}, which has no unit: write {' or '.join(allowed)}")
