@@ -15,12 +15,17 @@ from daq.contracts.machine_units import GAIN
 from daq.contracts.quantity import Quantity
 from daq.contracts.written_numbers import is_number, read_number
 from extras.formats.robot_files.machine_of_arm import JointParts
+from model.arrays import Floats
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
 
 TOLD = "as told when the file was made"
 GUESSED = {"mass": "0.2 kg ± 50 %, guess", "length": "100 mm ± 20 %, guess"}
+ALIKE_IN_A_ROW = 5.0
+"""Factor of the standard error of a gain, because samples in a row are left with alike errors."""
+MOST_ERROR = 0.3
+"""Most relative standard error of a gain that is taken over."""
 LIKELY = 0.5
 """Least share of the variance of a joint's needed torque that its recorded drive must explain to tell its gain."""
 
@@ -131,13 +136,31 @@ def _shown_gains(machine: Machine, trace: Trace) -> Iterator[tuple[int, tuple[fl
     balance = TorqueBalance(base_model(machine), (motion,))
     driven = balance.supplied_by_drive()[0]
     needed = balance.residual({})[0] + driven
-    contact, speed = motion.compared(motion.contact), motion.compared(motion.speed)
+    signs = (motion.contact, motion.speed, np.ones_like(motion.speed))
+    friction = [motion.compared(signal) for signal in signs]
+    rotor = motion.compared(motion.acceleration)
     for k, joint in enumerate(machine.modelled_joints):
-        columns = np.stack([driven[:, k], contact[:, k], speed[:, k], np.ones(len(driven))], axis=1)
-        found = np.linalg.lstsq(columns, needed[:, k], rcond=1e-9)[0]
-        left, whole = needed[:, k] - columns @ found, needed[:, k] - needed[:, k].mean()
-        explained = 1.0 - float(left @ left) / max(float(whole @ whole), 1e-300)
-        yield joint, (float(found[0]), explained) if explained >= LIKELY and found[0] != 0.0 else (1.0, None)
+        others = [own[:, k] for own in friction]
+        sides = needed[:, k], driven[:, k]
+        yield joint, _ratio(*sides, [*others, rotor[:, k]]) or _ratio(*sides, others) or (1.0, None)
+
+
+def _ratio(needed: Floats, driven: Floats, others: Sequence[Floats]) -> tuple[float, float] | None:
+    """The torque for a unit of drive, beside others that take part, and the share of the torque that all explain; None
+    where the record does not tell it."""
+    columns = np.stack([driven, *others], axis=1)
+    size = np.linalg.norm(columns, axis=0)
+    if not size[0]:
+        return None
+    columns = columns[:, size > 0.0] / size[size > 0.0]
+    found = np.linalg.lstsq(columns, needed, rcond=1e-9)[0]
+    left, whole = needed - columns @ found, needed - needed.mean()
+    explained = 1.0 - float(left @ left) / max(float(whole @ whole), 1e-300)
+    spread = np.linalg.pinv(columns.T @ columns)[0, 0]
+    error = ALIKE_IN_A_ROW * np.sqrt(float(left @ left) / len(left) * spread)
+    if explained < LIKELY or error > MOST_ERROR * abs(found[0]):
+        return None
+    return float(found[0] / size[0]), explained
 
 
 def _with_gains(machine: Machine, gains: Mapping[int, tuple[float, float | None]], unit: str) -> Machine:
@@ -153,7 +176,9 @@ def _with_gains(machine: Machine, gains: Mapping[int, tuple[float, float | None]
             unit=_gain_unit(unit, joint.kind == "prismatic"),
             source=source,
             assumed=True,
-            deviation=None if exact else abs(rounded) * (0.5 if likeness is None else 0.3),
+            deviation=None if exact else float(f"{abs(rounded) * (0.5 if likeness is None else MOST_ERROR):.2g}"),
         )
         joints[number - 1] = joint.model_copy(update={"drive": PlainGain(kind="gain", gain=gain)})
-    return Machine.model_validate(machine.model_copy(update={"joints": tuple(joints)}).model_dump())
+    notes = [line for line in machine.notes.split("\n") if "the recorded drive is the torque" not in line]
+    changed = {"joints": tuple(joints), "notes": "\n".join(notes)}
+    return Machine.model_validate(machine.model_copy(update=changed).model_dump())
