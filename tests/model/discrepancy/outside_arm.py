@@ -6,7 +6,6 @@ drive, and no error.
 """
 
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numba
@@ -14,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import Machine, parse_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
+from tests.model.imported import imported
 
 Floats = NDArray[np.float64]
 
@@ -116,15 +116,7 @@ def record(arm: OutsideArm, seed: int, duration: float = 17.0) -> Trace:
     numbers = np.array([arm.mass, arm.viscous, arm.coulomb, arm.resistance, arm.dead_zone])
     shared = np.array([arm.delay, arm.resolution, arm.limit, arm.period])
     _run(used, noise, numbers, shared, arm.factor, position, drive)
-    made = TraceRecord(
-        trace_id=f"outside-{seed}",
-        created=datetime(2020, 1, 1, tzinfo=UTC),
-        software="-",
-        source="imported",
-        robot="outside",
-        period=arm.period,
-        drive_unit="V",
-    )
+    made = imported(f"outside-{seed}", period=arm.period, drive_unit="V")
     time = arm.period * np.arange(len(used))
     return Trace(made, (1, 2, 3), time, position, set_point=set_points, drive=drive)
 
