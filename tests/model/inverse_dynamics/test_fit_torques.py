@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import load_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.arrays import Floats
 from model.effects.library import library
@@ -20,6 +19,7 @@ from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import Model, base_model
 from model.reports.page import write_report
 from model.reports.torque_report import torque_report
+from tests.model.imported import imported
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 LENGTH, MASS, ROTOR, VISCOUS, COULOMB = 0.3, 0.93, 0.0043, 0.03, 0.05
@@ -45,14 +45,7 @@ def swinging(seed: int, *, torque: bool = True, law: Law | None = None) -> Trace
     if law is not None:
         needed = law(needed, angle, speed)
     drive = np.interp(time + 0.003, time, needed) / 0.5  # it acts after 1 ms and is held for 4 ms
-    record = TraceRecord(
-        trace_id=f"swing{seed}",
-        created=datetime(2024, 1, 1, tzinfo=UTC),
-        software="test",
-        source="imported",
-        period=0.004,
-        drive_unit="V",
-    )
+    record = imported(f"swing{seed}", period=0.004, drive_unit="V")
     return Trace(
         record,
         (1,),

@@ -4,14 +4,13 @@ The controllers and the joints that they move are written out here: nothing of `
 """
 
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 import pytest
 
 from daq.contracts.machine import Machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
 from model.discrepancy.options import DiagnosisOptions
@@ -20,6 +19,7 @@ from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.inverse_dynamics.rigs import quantity
+from tests.model.imported import imported
 
 PERIOD, SUBSTEPS = 0.01, 10
 """Of control, s, and integrations within it."""
@@ -112,14 +112,7 @@ def recorded(
             rub = COULOMB * np.tanh(v / 1e-3) + VISCOUS * v
             v += PERIOD / SUBSTEPS * (drive[k] - rub) / MASS
             q += PERIOD / SUBSTEPS * v
-    record = TraceRecord(
-        trace_id=f"{law}{seed}",
-        created=datetime(2024, 1, 1, tzinfo=UTC),
-        software="test",
-        source="imported",
-        period=PERIOD,
-        drive_unit="N",
-    )
+    record = imported(f"{law}{seed}", period=PERIOD, drive_unit="N")
     shown = slice(begun, None)
     return Trace(
         record,
