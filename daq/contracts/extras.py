@@ -43,6 +43,7 @@ EXTRA_OF: dict[str, Extra] = {
     "pyarrow": "tables",
     "xarray": "tables",
     "rosbags": "ros",
+    "google": "ros",
     "dask": "cluster",
     "distributed": "cluster",
     "psycopg": "postgresql",

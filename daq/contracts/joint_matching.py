@@ -35,3 +35,10 @@ def other_joints(
         advice = f"with --joints and its own names for {', '.join(known)}, in this order"
     line = f"its joints are {own}, those of {machine} {', '.join(known)}"
     return TraceError(f"{called}: {line}; import it again {advice}")
+
+
+def numbers_by_name(names: Sequence[str], known: Sequence[str]) -> tuple[int, ...]:
+    """Number of each joint: the machine's where it has joints of these names, else from 1 in their order."""
+    if set(names) <= set(known):
+        return tuple(known.index(name) + 1 for name in names)
+    return tuple(range(1, len(names) + 1))

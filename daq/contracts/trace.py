@@ -116,6 +116,8 @@ class TraceRecord(FrozenRecord):
     memory_map: dict[str, object] | None = None
     joint_names: Annotated[tuple[str, ...], Field(exclude_if=lambda names: not names)] = ()
     """What an imported file calls the joints, in the order of the columns; empty where it does not name them."""
+    columns: Annotated[dict[str, str], Field(exclude_if=lambda columns: not columns)] = {}
+    """What each signal was taken from in a table of another program, by signal; empty for all other files."""
     joints_chosen: Annotated[bool, Field(exclude_if=lambda chosen: not chosen)] = False
     """Whether a person gave the order of the joints, so that names may be others than the machine's."""
     spec: ExperimentSpec | None = None

@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
@@ -40,13 +40,14 @@ from daq.owner.messages import (
 from daq.owner.stop_socket import StopAnswer
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from daq_cli.robot.answers import ImportChoice, ImportedTrace, RobotState, headline
+from daq_cli.robot.answers import ImportedTrace, RobotState, headline
 from daq_cli.robot.operations import RobotAccess
 from daq_cli.robot.own_owner import owned
 from daq_cli.robot.run_display import run_display
 
 if TYPE_CHECKING:
     from daq.client import Robot
+    from daq.contracts.import_choice import Choice
     from daq.contracts.service.robot import RobotIdentity
     from daq.contracts.status import StatusReport
     from daq.owner.messages import Seen
@@ -224,7 +225,7 @@ class LocalRobot(RobotAccess):
 
         return find_trace(folder, wanted, self.call.trace_limits)
 
-    def import_trace(self, file: Path, folder: Path | None, choice: ImportChoice) -> ImportedTrace:
+    def import_trace(self, file: Path, folder: Path | None, choice: Choice) -> ImportedTrace:
         """Writes the trace into the folder. Raises SpecError, TraceError."""
         from daq.traces.naming import trace_path
         from daq.traces.store import write_trace
@@ -233,13 +234,13 @@ class LocalRobot(RobotAccess):
         place = folder or self.call.trace_folder
         configured = "machine" in self.call.settings.robot.model_fields_set
         numbering = tuple(joint.name for joint in self.machine.joints) if configured else ()
-        found = foreign_trace(file, self.call.trace_limits, choice, numbering)
+        found = foreign_trace(file, self.call.trace_limits, replace(choice, numbering=numbering))
         try:
             place.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise TraceError(f"{place}: cannot be made: {error.strerror}") from error
         made = write_trace(found, trace_path(place, found.record), self.call.trace_limits)
-        return ImportedTrace(found.record.trace_id, str(made), str(made), found.record.notes)
+        return ImportedTrace(found.record.trace_id, str(made), str(made), found.record.notes, found.record.columns)
 
     def program(self, name: Path) -> Program:
         """A program in a file. Raises SpecError."""

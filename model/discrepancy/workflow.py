@@ -9,13 +9,14 @@ from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import UNWRITTEN, Diagnosis
 from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
-from model.discrepancy.explanation.renderer import with_sentences
+from model.discrepancy.explanation.answer_words import with_sentences
 from model.discrepancy.method_choice import choose_method
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.selection.diagnose import diagnose_by_simulation
 from model.machine_model.model import Model
 from model.record_check.check import as_used, check_records, require_computable
 from model.record_check.finding import RecordFinding, doubts_in
+from model.record_check.pieces import in_pieces
 
 
 def diagnose(
@@ -67,7 +68,7 @@ def _computed(
     if choose_method(model, (*traces, *holdout), options, designs=designs) == "inverse-dynamics":
         from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques  # not needed with a controller
 
-        whole, held = (as_used(some, model.machine) for some in (traces, holdout))
+        whole, held = (in_pieces(as_used(some, model.machine)) for some in (traces, holdout))
         return diagnose_torques(model, whole, held, options, progress, cancel)
     traces, holdout = (as_used(some, model.machine, "closed") for some in (traces, holdout))
     return diagnose_by_simulation(model, traces, holdout, options, progress, cancel, chooser)

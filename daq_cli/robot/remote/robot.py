@@ -21,13 +21,14 @@ from daq.contracts.service.robot import FleetStopResult, StopResult
 from daq.owner.stop_socket import StopAnswer
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from daq_cli.robot.answers import ImportChoice, ImportedTrace, RobotState, headline
+from daq_cli.robot.answers import ImportedTrace, RobotState, headline
 from daq_cli.robot.operations import RobotAccess
 from daq_cli.robot.remote.connection import TOKEN_VARIABLE, connected_status, controlled, remote_robot
 
 if TYPE_CHECKING:
     from daq.client import HeldControl, Robot
     from daq.contracts.experiment import ExperimentSpec
+    from daq.contracts.import_choice import Choice
     from daq.contracts.machine import Machine
     from daq.owner.messages import Finished
     from daq.teaching.program import Program
@@ -169,17 +170,18 @@ class RemoteRobot(RobotAccess):
 
         return fetched_trace(self.call, folder, wanted)
 
-    def import_trace(self, file: Path, folder: Path | None, choice: ImportChoice) -> ImportedTrace:
+    def import_trace(self, file: Path, folder: Path | None, choice: Choice) -> ImportedTrace:
         """Uploads the file to the service, which has a folder of its own; of a bag, the trace that is made of it."""
         from daq_cli.robot.imports import to_upload
 
         del folder
         with (
-            to_upload(file, self.call.trace_limits, choice, self._joint_names) as (made, notes),
+            to_upload(file, self.call.trace_limits, choice, self._joint_names) as (made, trace),
             remote_robot(self.call) as robot,
         ):
             entry = robot.traces.upload(made)
-        return ImportedTrace(entry.id, entry.file, f"{entry.id}: {entry.file} at {self.server}", notes)
+        made_of = ("", {}) if trace is None else (trace.record.notes, trace.record.columns)
+        return ImportedTrace(entry.id, entry.file, f"{entry.id}: {entry.file} at {self.server}", *made_of)
 
     def _joint_names(self) -> tuple[str, ...]:
         return tuple(joint.name for joint in self.machine.joints)

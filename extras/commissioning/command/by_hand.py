@@ -91,7 +91,7 @@ PUSHED, STAYS = 25, 5
 
 def potentiometers(bench: Bench) -> dict[str, Any]:
     """Direction, zero, range and bend of the sensors, by a protractor."""
-    from extras.commissioning.command.machine_text import with_sensors
+    from extras.commissioning.command.measured import with_sensors
     from extras.commissioning.person.memory_page import open_page
 
     memory_map = bench.memory_map()
@@ -105,7 +105,7 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
             bench.operator.show(sensor_line(sensors[-1]))
         give_power_back(page, bench.operator, memory_map)
         stop.tell(False)
-    bench.write_machine(with_sensors(bench.machine_text(), sensors))  # not before: what there was stays if it fails
+    bench.write_machine(with_sensors(bench.machine(), sensors))  # not before: what there was stays if it fails
     return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
 
 
@@ -178,7 +178,7 @@ def _sensor_data(found: Potentiometer) -> dict[str, Any]:
 
 def end_stops(bench: Bench) -> dict[str, Any]:
     """Where each joint meets its end stops, led there by hand; the limits in the machine file keep clear of them."""
-    from extras.commissioning.command.machine_text import with_limits
+    from extras.commissioning.command.measured import with_limits
     from extras.commissioning.person.memory_page import open_page
 
     memory_map, machine = bench.memory_map(), bench.machine()
@@ -194,7 +194,7 @@ def end_stops(bench: Bench) -> dict[str, Any]:
             _reading_at(bench, page, memory_map, Task("bring_back", joint))
         give_power_back(page, bench.operator, memory_map)
         stop.tell(False)
-    bench.write_machine(with_limits(bench.machine_text(), {joint: one.limits for joint, one in found.items()}))
+    bench.write_machine(with_limits(bench.machine(), {joint: one.limits for joint, one in found.items()}))
     return {"machine": MACHINE, **{f"joint_{joint}": one.as_data() for joint, one in found.items()}}
 
 

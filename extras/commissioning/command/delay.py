@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from daq.contracts.errors import SafetyError, SpecError
 from daq.contracts.limp import GAINS_UNKNOWN, require_drive
+from daq.contracts.quantity import Quantity
 from daq.driver import Controller
 from daq.driver.clock import LockStepClock
 from daq.owner.session import PortSession, port_session
@@ -212,7 +213,7 @@ def delay(bench: Bench) -> dict[str, Any]:
 
     A stop, Ctrl-C and every fault freeze the arm where it is; it returns to its posture only after the last set point.
     """
-    from extras.commissioning.command.machine_text import with_controller
+    from extras.commissioning.command.measured import with_controller
 
     bench.configure()
     joint, period = bench.joints[0], 1e-3 * float(bench.record.steps["period"]["period_ms"])
@@ -227,7 +228,7 @@ def delay(bench: Bench) -> dict[str, Any]:
             arm.set_points({joint: there})
     found = computing_delay([one for one in shown if one is not None], period)
     bench.operator.show(str(found))
-    bench.write_machine(with_controller(bench.machine_text(), {"delay": _line(found)}))
+    bench.write_machine(with_controller(bench.machine(), {"delay": _quantity(found)}))
     return {
         "joint": joint,
         "set_points_that_showed": found.used,
@@ -273,12 +274,10 @@ def _require_following(arm: ControllerArm, machine: Machine) -> None:
         raise arm.freeze_for_fault(str(error)) from error
 
 
-def _line(found: ComputingDelay) -> str:
+def _quantity(found: ComputingDelay) -> Quantity:
     source = "measured from the taking of set points to the storing of results; the drive is taken to change then"
-    return (
-        f'{{ value = {round(found.value, 6)!r}, unit = "s", source = "{source}", low = 0.0, '
-        f"deviation = {round(found.deviation, 6)!r} }}"
-    )
+    value, deviation = round(found.value, 6), round(found.deviation, 6)
+    return Quantity(value=value, unit="s", source=source, low=0.0, deviation=deviation)
 
 
 @dataclass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 from daq.contracts.errors import SpecError
@@ -56,7 +57,7 @@ class Records:
         steps.run()
         steps.notes += on_unfinished((*self.traces, *self.held_out))
         steps.notes += self._on_shaking()
-        fitted, checked = ([t.record.trace_id for t in some] for some in (self.traces, self.held_out))
+        fitted, checked = (_identities(some) for some in (self.traces, self.held_out))
         robot = sum(float(t.time[-1] - t.time[0]) for t in self.traces)
         return steps.answer(fitted, checked, cutoff).model_copy(update={"robot_seconds": robot})
 
@@ -69,3 +70,8 @@ class Records:
         shaking = find_shaking((*self.traces, *self.held_out), self.model.machine, cutoff)
         values = {"cutoff": cutoff, "joints": [asdict(one) for one in shaking]}
         return (Note(kind="shakes-above-cutoff", values=values, warning=True),) if shaking else ()
+
+
+def _identities(traces: Sequence[Trace]) -> list[str]:
+    """Each once: a trace may be in pieces."""
+    return list(dict.fromkeys(t.record.trace_id for t in traces))

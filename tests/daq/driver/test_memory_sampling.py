@@ -86,16 +86,6 @@ def test_periods_that_the_host_was_too_late_for_are_missing() -> None:
     assert bench.link.counters.missing_samples == 3
 
 
-def test_readings_that_meet_the_change_of_the_memory_move_a_quarter_of_a_period_later_and_stay_there() -> None:
-    bench = Bench()
-    bench.sampling.next(None, (1,), {})
-    bench.reader.disturbed = True
-    bench.sampling.next(1, (1,), {})
-    bench.reader.disturbed = False
-    moved = [bench.sampling.next(tick, (1,), {}).tick_time for tick in (2, 3)]
-    assert moved == pytest.approx([100.0 + 3.25 * PERIOD_S, 100.0 + 4.25 * PERIOD_S])
-
-
 def test_periods_that_have_moved_later_end_later() -> None:
     bench = Bench()
     bench.sampling.next(None, (1,), {})

@@ -264,14 +264,6 @@ def test_missed_set_points_are_counted_and_a_run_of_them_is_a_fault() -> None:
     assert guards.missed_set_points.missed == 11
 
 
-def test_a_set_point_taken_ends_the_run_of_missed_ones() -> None:
-    guards = running()
-    for tick in range(100):
-        status = StatusFlag.SET_POINT_MISSED if tick % 2 else 0
-        assert not guards.check(row(tick, status=status), {}).trips
-    assert guards.missed_set_points.missed == 50
-
-
 def test_a_set_point_other_than_sent_was_missed_too() -> None:
     start = {1: 500}
     guards = running()

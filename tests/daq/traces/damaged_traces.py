@@ -11,16 +11,16 @@ import lz4.frame
 import zstandard
 from mcap.opcode import Opcode
 
-from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TraceEvent, TraceRecord
 from daq.traces.layout import RECORDED_SIGNALS
 from daq.traces.recording import Recording
+from tests.daq.traces.samples import record as sound_record
+from tests.daq.traces.samples import row
 
 MAGIC = 8
 HEAD = 9
 SECTOR = 512
 ROWS, ROWS_A_CHUNK, JOINTS = 60, 15, (1, 2)
-PERIOD = 0.02
 BOUNDARIES = (
     0,
     1,
@@ -54,19 +54,13 @@ class Damaged:
     data: bytes
 
 
-def row(tick: int) -> SampleRow:
-    """A row that can be told from every other."""
-    values = (tick * 0.001 + 0.5, tick * 0.002 - 0.25)
-    return SampleRow(tick, tick * PERIOD, 100 + tick * PERIOD, values, values, (0.0, 0.0), values, (tick, -tick), tick)
-
-
 def recording(record: TraceRecord, close: bool) -> bytes:
     """The bytes of a trace that was closed as complete, or never."""
     stream = BytesIO()
     made = Recording(stream, record, JOINTS, RECORDED_SIGNALS, {"config.toml": b"[robot]\nname = 'ma2000'\n"})
     made.event(TraceEvent(time=0.0, kind="start", message="recording starts", tick=0))
     for tick in range(ROWS):
-        made.row(row(tick))
+        made.row(row(tick, len(JOINTS)))
         if (tick + 1) % ROWS_A_CHUNK == 0:
             made.flush()
     if close:
@@ -74,10 +68,10 @@ def recording(record: TraceRecord, close: bool) -> bytes:
     return stream.getvalue()
 
 
-def originals(record: TraceRecord) -> list[Original]:
+def originals() -> list[Original]:
     """A finished trace, also with other compressions; one whose name alone was missing; one without an end."""
-    finished = recording(record, close=True)
-    unfinished = recording(record.model_copy(update={"machine": None}), close=False)
+    finished = recording(sound_record(), close=True)
+    unfinished = recording(sound_record(machine=None), close=False)
     return [
         Original("finished", ".mcap", finished),
         Original("finished, by another tool", ".mcap", recompressed(finished, "lz4")),

@@ -10,15 +10,13 @@ import random
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from daq.contracts.errors import TraceError
-from daq.contracts.machine import load_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from daq.traces.catalogue import list_traces
 from daq.traces.layout import ALL_SIGNALS
 from daq.traces.reader import read_trace
@@ -36,7 +34,6 @@ from tests.daq.traces.damaged_traces import (
 )
 
 CASES = 22_000
-CREATED = datetime(2026, 11, 21, 5, 14, 42, tzinfo=UTC)
 
 
 @dataclass
@@ -53,19 +50,6 @@ class Tally:
         self.faults[kind] += 1
         if self.faults[kind] <= 3:
             self.examples.append(f"{kind}: {damaged.original.kind}, {damaged.way}: {detail}")
-
-
-def record() -> TraceRecord:
-    """The record of a run on the mock, with a machine."""
-    return TraceRecord(
-        trace_id="ab12cd34ef56",
-        created=CREATED,
-        software="benchmark",
-        source="mock",
-        period=0.02,
-        drive_unit="V",
-        machine=load_machine("ma2000"),
-    )
 
 
 def differs(trace: Trace, original: Trace) -> str | None:
@@ -104,7 +88,7 @@ class Campaign:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.tally = Tally()
-        self.originals = originals(record())
+        self.originals = originals()
         self._sound = {one.kind: self._read_whole(one) for one in self.originals}
 
     def _read_whole(self, original: Original) -> Trace:

@@ -162,12 +162,6 @@ def test_a_torque_that_is_missing_elsewhere_is_kept() -> None:
     assert share_left(record, 0.3 + np.sin(2.0 * time)) > 0.6, "what acts all the time is kept between"
 
 
-def test_without_a_limit_torques_are_as_they_were() -> None:
-    record = motion_of(4.0 * np.sin(2.7 * TIME))
-    torque = np.random.default_rng(5).standard_normal((len(record.moving), 1))
-    assert record.subtract_unknown(torque) is torque
-
-
 def test_a_joint_with_too_many_pieces_is_not_known_at_all() -> None:
     record = motion_of(standing(0.16, 0.32))
     assert 0.4 < record.at_limit.mean() < 0.6

@@ -69,14 +69,6 @@ def test_a_record_that_tells_when_set_points_were_taken_is_believed() -> None:
     assert found.tolist() == 3 * [0.0] + 2 * [0.1] + 9 * [0.2] + 3 * [0.3]
 
 
-def test_where_a_record_does_not_know_when_set_points_were_taken_it_was_right_after_the_sample_before() -> None:
-    wanted = np.array([0.0, 0.1, 0.2])[:, None] * np.ones(3)
-    whole = trace_of([0, 4, 8], wanted, None)
-    record = whole.record.model_copy(update={"every": 4})
-    found = inputs_of(replace(whole, record=record, taken=np.zeros(3, dtype=np.int64)), MACHINE).set_points[:, 0]
-    assert found.tolist() == [0.0] + 4 * [0.1] + 4 * [0.2]
-
-
 def test_without_set_points_or_drive_the_reading_or_zero_is_held() -> None:
     numbers = np.ones((4, 3))
     driven = inputs_of(trace_of([0, 1, 2, 3], None, numbers), MACHINE)
