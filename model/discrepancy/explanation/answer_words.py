@@ -42,15 +42,13 @@ from model.discrepancy.explanation.step_words import (
     step_with_sentences,
     where_with_summary,
 )
+from model.discrepancy.thresholds import WITHIN_NOISE
 from model.effects.names import effect_on, joints_in_words, placed
 from model.record_check.finding import doubts_headline, doubts_in, lines_of
 from model.units import shown_unit, with_unit
 
 SHOWN = 3
 """Members of a group that a headline names."""
-WITHIN_NOISE = 3.0
-"""Error of a joint, in deviations of its readings' noise, up to which a model is said to explain it within that: sound
-rigs of other worlds leave up to 2.6, where friction turns."""
 
 
 def headline(found: Diagnosis) -> str:

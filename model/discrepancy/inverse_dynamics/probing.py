@@ -9,8 +9,8 @@ import numpy as np
 
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, stacked
-from model.discrepancy.inverse_dynamics.priors import prior_distance, prior_rows
-from model.discrepancy.inverse_dynamics.trial import Start, Trial
+from model.discrepancy.inverse_dynamics.starts import Start, Trial
+from model.discrepancy.inverse_dynamics.tolerances import prior_distance, prior_rows
 from model.inverse_dynamics.torque_balance import TorqueBalance
 
 NONLINEAR = frozenset(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,15 +12,16 @@ import numpy as np
 from daq.contracts.machine import Machine
 from model.arrays import Floats, Integers
 from model.discrepancy.diagnosis import UNWRITTEN, Dependence, PhaseCell, Where, WorstPlace
-from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
-from model.discrepancy.localisation.phases import HOLD, PHASES
-from model.discrepancy.localisation.residuals import Residuals
+from model.discrepancy.localisation.phases import HOLD, PHASES, Residuals
 from model.discrepancy.localisation.statistics import (
+    LEAST,
     Correlation,
     chance_significance,
     correlation_of,
+    quantities,
     significance_of_chi_square,
     significance_of_squares,
+    table_of,
 )
 from model.fitting.records import resolution
 
@@ -32,8 +33,6 @@ MEDIAN_OF_NOISE = 0.9
 """Median of a window's mean square where there is noise alone: a little below its mean."""
 MOST_NOISE = 1.5
 """Largest variance that counts as noise, relative to the stated one."""
-LEAST = 0.3
-"""Lower bound of a residual's deviation, relative to that of noise, when its correlation is estimated."""
 
 
 @dataclass(frozen=True)
@@ -227,33 +226,11 @@ def _windows(run: slice, period: float) -> list[slice]:
     return [slice(a, b) for a, b in zip(begins, [*begins[1:], run.stop], strict=True)]
 
 
-def _dependences(residuals: Residuals) -> list[Dependence]:
+def _dependences(residuals: Residuals) -> Iterator[Dependence]:
     """The residual of every joint against every quantity that varies."""
-    known = quantities(residuals.motions)
-    every = np.concatenate(list(residuals.signals))
-    found = []
+    known, every = quantities(residuals.motions), np.concatenate(list(residuals.signals))
     for j, joint in enumerate(residuals.model.machine.modelled_joints):
-        for against in AGAINST:
-            bins = dependence(every[:, j], j, against, known, LEAST * float(residuals.deviations[j]))
-            if bins is None:
-                continue
-            found.append(
-                Dependence(
-                    joint=joint,
-                    against=against,
-                    unit=known.units[against][j],
-                    centres=tuple(map(float, bins.centres)),
-                    residual=optional(bins.mean),
-                    deviation=optional(bins.deviation),
-                    significance=bins.significance,
-                )
-            )
-    return found
-
-
-def optional(values: Floats) -> tuple[float | None, ...]:
-    """Numbers, None for NaN."""
-    return tuple(None if math.isnan(v) else float(v) for v in values)
+        yield from table_of(every[:, j], j, joint, known, LEAST * float(residuals.deviations[j]))
 
 
 def spoken_unit(machine: Machine, joint: int) -> tuple[float, str]:

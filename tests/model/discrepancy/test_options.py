@@ -5,8 +5,7 @@ import re
 import pytest
 
 from daq.contracts.errors import SpecError
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.options import DiagnosisOptions, check_options
+from model.discrepancy.options import DiagnosisOptions, TorqueOptions, check_options
 from model.effects.library import add_own, remove_own
 from tests.model.discrepancy.own_effects import own_effect
 from tests.model.fitting import imagined

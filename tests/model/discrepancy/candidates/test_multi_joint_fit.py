@@ -6,9 +6,8 @@ from functools import cache
 import pytest
 
 from daq.contracts.progress import Never
-from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, judge, nearest, refit
+from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, fit_several_joints, judge, nearest, refit
 from model.discrepancy.candidates.library import hypotheses
-from model.discrepancy.candidates.multi_joint_fit import fit_several_joints
 from model.discrepancy.candidates.probing import Probe, probe
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.search import converge, point_at

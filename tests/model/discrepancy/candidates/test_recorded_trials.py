@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from model.discrepancy.candidates.library import hypotheses
-from model.discrepancy.candidates.recorded_trials import SHARES, with_recorded_trials
+from model.discrepancy.candidates.library import SHARES, hypotheses, with_recorded_trials
 from model.discrepancy.output_error.observation import Observation, observe
 from tests.model.fitting import imagined
 

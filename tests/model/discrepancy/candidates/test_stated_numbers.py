@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from model.discrepancy.candidates.library import hypotheses
-from model.discrepancy.candidates.stated_numbers import as_effect
+from model.discrepancy.candidates.probing import as_effect
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.search import Point, point_at
 from tests.model.fitting import imagined

@@ -3,10 +3,9 @@
 from collections.abc import Mapping
 
 from daq.contracts.progress import Never, silent
-from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.inverse_dynamics.fitting import TorqueCase
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
@@ -20,4 +19,4 @@ def sliding(hidden: Mapping[str, float], options: TorqueOptions) -> TorqueWorkfl
     cutoff = choose_cutoff(traces, model.machine)
     fitted, held = (recorded_motions([t], model.machine, cutoff) for t in traces)
     case = TorqueCase(fitted, held, torque_noise(model, traces, cutoff), options)
-    return TorqueWorkflow(model, case, judge_controller(model, traces), silent, Never())
+    return TorqueWorkflow(model, case, silent, Never())

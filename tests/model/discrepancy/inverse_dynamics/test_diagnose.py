@@ -15,8 +15,7 @@ from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.holdout import relative_torque_error
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.options import DiagnosisOptions, TorqueOptions
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs

@@ -8,7 +8,7 @@ import pytest
 from daq.contracts.trace import Trace
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.holdout import held_out_squares, share_removed
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
 from model.machine_model.model import Model, base_model
 from tests.model.discrepancy.inverse_dynamics import rigs

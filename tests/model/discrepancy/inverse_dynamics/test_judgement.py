@@ -8,7 +8,7 @@ import pytest
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics import repeats
 from model.inverse_dynamics.repeats import LEAST_OF_TORQUE
 from model.machine_model.model import base_model

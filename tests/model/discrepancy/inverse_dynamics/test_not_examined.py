@@ -7,7 +7,7 @@ import numpy as np
 from daq.contracts.trace import Trace
 from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.options import TorqueOptions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics.rigs import slide_machine, slide_trace
 

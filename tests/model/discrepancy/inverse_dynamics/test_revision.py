@@ -8,11 +8,9 @@ from daq.contracts.machine import Machine
 from daq.contracts.progress import Never, silent
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.case import TorqueCase
+from model.discrepancy.inverse_dynamics.candidates import take_back
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit
-from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, TorqueCase
 from model.discrepancy.inverse_dynamics.search import (
     FILE_IS_RIGHT,
     Fitted,
@@ -20,8 +18,8 @@ from model.discrepancy.inverse_dynamics.search import (
     prefer_shorter_laws,
     search,
 )
-from model.discrepancy.inverse_dynamics.stated_numbers import take_back
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
@@ -108,7 +106,7 @@ def test_a_weakened_magnet_takes_back_what_the_constants_had_taken() -> None:
     cutoff = choose_cutoff(traces, model.machine)
     fitted, held = (recorded_motions([t], model.machine, cutoff) for t in traces)
     case = TorqueCase(fitted, held, torque_noise(model, traces, cutoff), TorqueOptions())
-    flow = TorqueWorkflow(model, case, judge_controller(model, traces), silent, Never())
+    flow = TorqueWorkflow(model, case, silent, Never())
     wider = model.with_effect("weakened_magnet", (1,))
     own = [p for p in wider.parameters if p.effect == "weakened_magnet"]
     begun = take_back("weakened_magnet", own, flow.first)

@@ -10,7 +10,7 @@ from daq.contracts.machine import load_machine
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.priors import prior_cost, prior_distance
+from model.discrepancy.inverse_dynamics.tolerances import prior_cost, prior_distance
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter

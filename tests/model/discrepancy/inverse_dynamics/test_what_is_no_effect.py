@@ -16,9 +16,9 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.starts import narrowed
 from model.discrepancy.inverse_dynamics.step_record import excess_removed
+from model.discrepancy.options import TorqueOptions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 

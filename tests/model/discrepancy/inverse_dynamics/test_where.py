@@ -7,12 +7,11 @@ import pytest
 
 from daq.contracts.progress import Never, silent
 from model.discrepancy.explanation.answer_words import what_is_left
-from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
+from model.discrepancy.inverse_dynamics.fitting import TorqueCase
 from model.discrepancy.inverse_dynamics.localisation import locate
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
@@ -56,7 +55,7 @@ def test_the_joint_of_the_largest_torque_is_told_beside_the_one_farthest_above_i
     traces = [rigs.six_trace(1, {}, duration=6.0)]
     records = recorded_motions(traces, model.machine, 3.0)
     case = TorqueCase(records, (), np.array([0.1, 0.1, 0.1, 0.1, 0.1, 1e-3]), TorqueOptions())
-    flow = TorqueWorkflow(model, case, judge_controller(model, traces), silent, Never())
+    flow = TorqueWorkflow(model, case, silent, Never())
     residual = [np.tile([0.1, 9.0, 0.1, 0.1, 0.1, 0.3], (len(r), 1)) for r in flow.found.now.residual]
     where = locate(replace(flow.found.now, residual=residual), case)
     assert where.worst is not None

@@ -6,8 +6,7 @@ import pytest
 from daq.contracts.errors import SpecError
 from model.discrepancy.explanation.step_words import where_with_summary
 from model.discrepancy.localisation.disagreement import _beyond, locate
-from model.discrepancy.localisation.phases import CREEP, HOLD, RAMP_START, REVERSAL, STEADY_RAMP, AskedMotion
-from model.discrepancy.localisation.residuals import Residuals
+from model.discrepancy.localisation.phases import CREEP, HOLD, RAMP_START, REVERSAL, STEADY_RAMP, AskedMotion, Residuals
 from model.discrepancy.localisation.statistics import (
     Correlation,
     binned,
@@ -122,7 +121,7 @@ def test_a_lag_after_reversals_is_located_in_the_reversals(arm: Model, records: 
 def test_a_dependence_is_the_most_significant_of_its_joint(
     arm: Model, records: tuple[Record, ...], against: str
 ) -> None:
-    from model.discrepancy.localisation.dependence import quantities
+    from model.discrepancy.localisation.statistics import quantities
 
     deviations = noise_floor(records, arm.machine, "position")
     quantity = np.nan_to_num(quantities([AskedMotion(arm.machine, r) for r in records]).values[against][:, 2])
