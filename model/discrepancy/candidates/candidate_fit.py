@@ -22,13 +22,11 @@ from model.discrepancy.candidates.tones import tones_tried
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.noise_model import LARGER, AutoregressiveNoise, fit_noise_model
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.search import LAST_STEPS, Point, converge, descend, point_at
+from model.discrepancy.output_error.search import LAST_STEPS, STEPS, Point, converge, descend, point_at
 from model.discrepancy.thresholds import Thresholds
 from model.fitting.unknowns import Unknown
 from model.machine_model.record_verdict import FAR_OFF
 
-STEPS = 8
-"""Steps of a search for a candidate's fit."""
 LOST = 1.1
 """Fits that end above this multiple of the baseline cost are discarded as not converged."""
 AGAIN = 3

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from daq.contracts.errors import SpecError
 from model.discrepancy.diagnosis import (
     CLEAR_SHAPE,
     FEWEST_BINS,
@@ -130,8 +129,6 @@ def _undecided(step: Step, found: Diagnosis) -> str:
     """Why several effects are named: they explain the same, within what their evidence can tell apart, or on every
     motion."""
     group = step.group
-    if len(group) < 2:
-        raise SpecError(f"{len(group)} candidates cannot be undecided between; at least 2 are needed")
     named = ", ".join(f"{called(c.effect, c.joints)} ({c.evidence:.0f})" for c in group)
     apart = max(c.evidence for c in group) - min(c.evidence for c in group)
     text = f"{step.where.summary} These explain it, with evidence that differs by no more than {apart:.0f}: {named}."

@@ -44,15 +44,20 @@ def _place(where: Where) -> str:
             f"no joint is off by more than noise; the largest residual is that of joint {worst.joint}, "
             f"{worst.ratio:.2f} times its noise {phase}"
         )
-    if not worst.whole_record and worst.floor is not None:
-        return f"joint {worst.joint}, {phase}: {worst.rms:.2g} {worst.unit} rms against a floor of {worst.floor:.2g}"
     times = f"{plain(worst.ratio)} times its noise"
     if worst.ratio >= NOISE_UNKNOWN:
         times = "and the machine file states no noise of the sensors to compare it with"
-    seen = f"joint {worst.joint}, mostly {phase}: {plain(worst.rms, 3)} {worst.unit} rms, {times}"
+    seen = (
+        f"joint {worst.joint}, {'mostly ' if worst.whole_record else ''}{phase}: {_rms(worst.rms, worst.unit)}, {times}"
+    )
     if largest is None or largest.rms is None:
         return seen
-    return f"{seen}; more is left of joint {largest.joint}, {plain(largest.rms, 3)} {largest.unit} rms"
+    return f"{seen}; more is left of joint {largest.joint}, {_rms(largest.rms, largest.unit)}"
+
+
+def _rms(value: float, unit: str) -> str:
+    factor, shown = shown_unit(unit)
+    return f"{with_unit(plain(value * factor, 3), shown)} rms"
 
 
 def step_with_sentences(step: Step, machine: Machine) -> Step:

@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 
-from daq.contracts.machine import Machine
 from model.arrays import Floats, Integers
 from model.discrepancy.diagnosis import UNWRITTEN, Dependence, PhaseCell, Where, WorstPlace
 from model.discrepancy.localisation.phases import HOLD, PHASES, Residuals
@@ -23,7 +22,7 @@ from model.discrepancy.localisation.statistics import (
     significance_of_squares,
     table_of,
 )
-from model.fitting.records import resolution
+from model.units import joint_unit
 
 WINDOW = 0.3
 """Duration of one cell of the map, s."""
@@ -160,15 +159,16 @@ class _Map:
                 for run in record.runs
             ]
         )
-        scale, unit = spoken_unit(residuals.model.machine, self.joints[j])
         rms, floor = float(np.sqrt(np.mean(own_residual**2))), float(residuals.deviations[j])
+        sensor = residuals.model.machine.joint(self.joints[j]).sensor
+        unit = joint_unit(residuals.model.machine, self.joints[j])
         return WorstPlace(
             joint=self.joints[j],
             phase=PHASES[phase],
             ratio=rms / floor,
-            rms=rms * scale,
-            floor=floor * scale,
-            unit=unit,
+            rms=rms,
+            floor=floor,
+            unit=f"{unit}/s" if sensor is not None and sensor.measures == "velocity" else unit,
         )
 
     def _shares(self, j: int) -> list[_Share]:
@@ -231,14 +231,3 @@ def _dependences(residuals: Residuals) -> Iterator[Dependence]:
     known, every = quantities(residuals.motions), np.concatenate(list(residuals.signals))
     for j, joint in enumerate(residuals.model.machine.modelled_joints):
         yield from table_of(every[:, j], j, joint, known, LEAST * float(residuals.deviations[j]))
-
-
-def spoken_unit(machine: Machine, joint: int) -> tuple[float, str]:
-    """Factor and name of the unit in which people speak of a joint's residual: counts of its sensor, degrees, mm."""
-    sensor = machine.joint(joint).sensor
-    if sensor is not None and sensor.measures == "position":
-        return 1.0 / resolution(sensor), "ADC counts"
-    speed = "/s" if sensor is not None and sensor.measures == "velocity" else ""
-    if machine.joint(joint).kind == "revolute":
-        return math.degrees(1.0), f"°{speed}"
-    return 1e3, f"mm{speed}"

@@ -9,7 +9,6 @@ from typing import get_args
 
 import numpy as np
 
-from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, NoController, Sensor
 from model.arrays import Floats, Integers
 from model.discrepancy.diagnosis import Phase
@@ -134,28 +133,12 @@ class Residuals:
         signals: (m, n) measured − simulated per record, in the unit of the measurement.
         deviations: (n,) standard deviation of such a residual when nothing is wrong.
 
-    Raises:
-        SpecError: for residuals that do not belong to the records, or deviations that are not positive.
     """
 
     model: Model
     records: Sequence[Record]
     signals: Sequence[Floats]
     deviations: Floats
-
-    def __post_init__(self) -> None:
-        if len(self.records) != len(self.signals):
-            raise SpecError(
-                f"{len(self.signals)} residuals for {len(self.records)} records: one (m, n) array a record is needed"
-            )
-        for record, residual in zip(self.records, self.signals, strict=True):
-            if residual.shape != record.measured.shape:
-                raise SpecError(
-                    f"residual of {record.name} has shape {residual.shape}: one (m, n) array a record is needed, here "
-                    f"{record.measured.shape}"
-                )
-        if not (np.isfinite(self.deviations).all() and (self.deviations > 0).all()):
-            raise SpecError(f"deviations of the noise {self.deviations}: must be positive numbers")
 
     @cached_property
     def motions(self) -> tuple[AskedMotion, ...]:

@@ -18,7 +18,7 @@ from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.holdout import HeldOut, noise_floor
 from model.discrepancy.output_error.noise_model import residuals_of
 from model.discrepancy.output_error.observation import Observation, Signals
-from model.discrepancy.output_error.search import Point, descend, point_at
+from model.discrepancy.output_error.search import FEW_STEPS, Point, descend, point_at
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS, THRESHOLDS, Thresholds
 from model.discrepancy.verdict import Errors, excess_removed, gap_numbers, gap_of, rises_too_much
 from model.machine_model.model import Model
@@ -174,10 +174,6 @@ def errors_of_fit(point: Point) -> tuple[SignalError, ...]:
     return point.observation.errors(point.residuals, point.residuals, floor)
 
 
-MOST_STEPS = 6
-"""Steps of the fit within what a file states: it begins near its end."""
-
-
 def closed_loop_gap(case: Case, first: Point, taken: Sequence[tuple[Step, Point]], end: Point) -> Gap:
     """The gap of a diagnosis by output error.
 
@@ -209,7 +205,7 @@ def _within_file(point: Point) -> Point:
     unknowns = tuple(u.within_stated for u in point.unknowns)
     values = np.clip(point.values, [u.low for u in unknowns], [u.high for u in unknowns])
     begun = point_at(point.observation, Calibration(point.model, unknowns, values), point.tangents)
-    return descend(begun, MOST_STEPS) if begun.is_finite else begun
+    return descend(begun, FEW_STEPS) if begun.is_finite else begun
 
 
 def _alone(observation: Observation) -> Observation:

@@ -18,7 +18,7 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, Signals, observe, side_by_side
-from model.discrepancy.output_error.search import Point, descend, point_at
+from model.discrepancy.output_error.search import STEPS, Point, descend, point_at
 from model.discrepancy.thresholds import FEEDBACK_SHARE, FEEDBACK_SHARE_FOR_ERRORS
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
@@ -66,9 +66,6 @@ BLOCK = 0.2
 """Time over which errors may be correlated, s."""
 NEARER = (FEEDBACK_SHARE, 0.95)
 """Feedback shares that are tried in turn where the simulation of a held-out trace does not stay finite."""
-START_STEPS = 8
-"""Steps of the search for the initial posture of a held-out trace: with play in a gear, that is not a smooth
-problem."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +153,7 @@ def _fitted_here(observation: Observation, point: Calibration, own: tuple[Unknow
     if not own or not begun.is_finite:
         return begun
     try:
-        return descend(begun, START_STEPS, range(count - len(own), count))
+        return descend(begun, STEPS, range(count - len(own), count))
     except SpecError:
         return begun  # on the verge of instability, as where a delay is missing: no derivative exists
 

@@ -30,6 +30,10 @@ CONVERGED = 1.0
 FORETOLD = 0.1
 """Share of the readings' change that derivatives may have missed and still hold where a search ends: what they miss of
 a further step is a tenth of it."""
+STEPS = 8
+"""Steps of a search that has to find its way: with play in a gear, that is not a smooth problem."""
+FEW_STEPS = 6
+"""Steps of a search that begins near its end, or is followed by another."""
 LAST_STEPS = 4
 """Steps of each search that takes a fit to its end."""
 MOST_SEARCHES = 8

@@ -29,7 +29,7 @@ from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.noise_model import note_on_noise, shown_noise
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.sampled_controller import with_errors
-from model.discrepancy.output_error.search import LAST_STEPS, Point, converge, descend, point_at
+from model.discrepancy.output_error.search import FEW_STEPS, LAST_STEPS, Point, converge, descend, point_at
 from model.discrepancy.selection.step import listed, make_step, only_probed, update_to_last_fit
 from model.discrepancy.thresholds import CHANCES, FEEDBACK_SHARE_FOR_ERRORS
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
@@ -44,8 +44,6 @@ FIRST_FEEDBACK_SHARES = (0.0, 0.5)
 """Feedback shares of the fits that come before the first one with the full share."""
 SHORT_DISTANCE = 0.3
 """Share of the expected distance over which friction builds up, below which a fit is tried with sudden friction too."""
-FIRST_STEPS = 6
-"""Steps of a search in these fits, before derivatives are computed anew."""
 
 
 def diagnose_by_simulation(
@@ -167,7 +165,7 @@ def _fit_with_feedback(point: Point, observation: Observation) -> Point | None:
     finite."""
     try:
         begun = point.on(observation)
-        return descend(begun, FIRST_STEPS) if begun.is_finite else None
+        return descend(begun, FEW_STEPS) if begun.is_finite else None
     except SpecError:
         return None
 

@@ -27,7 +27,7 @@ from model.discrepancy.grounds import Reason, Refusal
 from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.noise_model import fit_noise_model
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.search import LAST_STEPS, Point, converge, descend, point_at
+from model.discrepancy.output_error.search import LAST_STEPS, STEPS, Point, converge, descend, point_at
 from model.discrepancy.verdict import excess_removed
 from model.fitting.fit import INTERVAL
 from model.fitting.whitening import Whitener
@@ -35,8 +35,6 @@ from model.machine_model.parameter import Parameter
 
 FEEDBACK_SHARE_FOR_INTERVALS = 0.9
 """Feedback share with which the shift of an estimate by noise is measured: half as far from the record as the fits."""
-MOST_STEPS = 8
-"""Most steps of the search that measures it."""
 
 
 def found_values(found: Fit, parameters: Sequence[Parameter], shift: Floats | float = 0.0) -> dict[str, FoundValue]:
@@ -77,7 +75,7 @@ def shift_by_noise(point: Point, parameters: Sequence[Parameter]) -> Floats:
     names = {p.name for p in parameters}
     own = [k for k, u in enumerate(point.unknowns) if u.name in names]
     try:
-        return descend(point.on(nearer), MOST_STEPS, own).values - point.values
+        return descend(point.on(nearer), STEPS, own).values - point.values
     except SpecError:
         return np.zeros_like(point.values)
 
