@@ -67,7 +67,7 @@ class Importer:
     claims: str
     """"module:function" of a path and its first 16 bytes: whether the file is one for it."""
     read: str
-    """"module:function" of a path, `TraceLimits` and `daq.traces.kinds.Choice`: returns a `Trace`."""
+    """"module:function" of a path, `TraceLimits` and `daq.contracts.import_choice.Choice`: returns a `Trace`."""
 
 
 @dataclass(frozen=True)

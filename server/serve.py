@@ -37,9 +37,8 @@ from server.access.origin import is_loopback
 from server.access.sessions import session_cookie
 from server.access.tokens import KnownTokens
 from server.app import make_app
-from server.descriptors import most_connections
 from server.services import Services
-from server.steady import keep_steady
+from server.steady import keep_steady, most_connections
 from server.stopping.door import StopDoor
 from server.stopping.messages import Begin, Stopped
 from server.store.address import address_of

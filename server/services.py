@@ -61,7 +61,6 @@ from server.robot.teaching import TeachingService
 from server.robot_services import RobotServices, robot_named
 from server.store.address import address_of
 from server.store.engine import Store
-from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.models import ModelStore
@@ -69,6 +68,7 @@ from server.store.programs import ProgramStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
+from server.store.waiting_events import EventStore
 
 KEPT_FOR = 1.0
 """Time (s) for which a result is reused, since a check writes to the disk and may wait for the database."""

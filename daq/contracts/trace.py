@@ -33,6 +33,9 @@ TRACE_FORMAT = 2
 """Version of the trace's metadata and topics; a reader refuses newer ones. Format 1 had events and joint states in
 JSON."""
 
+BY_JOINT = ("position", "set_point", "error", "drive", "velocity", "power_raw")
+"""Signals of a trace with a column for each joint."""
+
 EventKind = Literal[
     "start",
     "ramp_start",
@@ -116,6 +119,8 @@ class TraceRecord(FrozenRecord):
     memory_map: dict[str, object] | None = None
     joint_names: Annotated[tuple[str, ...], Field(exclude_if=lambda names: not names)] = ()
     """What an imported file calls the joints, in the order of the columns; empty where it does not name them."""
+    columns: Annotated[dict[str, str], Field(exclude_if=lambda columns: not columns)] = {}
+    """What each signal was taken from in a table of another program, by signal; empty for all other files."""
     joints_chosen: Annotated[bool, Field(exclude_if=lambda chosen: not chosen)] = False
     """Whether a person gave the order of the joints, so that names may be others than the machine's."""
     spec: ExperimentSpec | None = None
@@ -207,7 +212,7 @@ class Trace(WithArrays):
         count = len(self.time)
         if not self.joints or len(set(self.joints)) != len(self.joints):
             raise TraceError(f"{self.called}: joints {self.joints} are not one or more different joints")
-        for name in ("position", "set_point", "error", "drive", "velocity", "power_raw"):
+        for name in BY_JOINT:
             signal = getattr(self, name)
             if signal is not None and signal.shape != (count, len(self.joints)):
                 wanted = (count, len(self.joints))

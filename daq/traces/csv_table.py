@@ -1,59 +1,45 @@
-"""Traces as plain CSV, for other rigs and tools, with a TOML file beside it for what columns cannot hold."""
+"""Traces as CSV and other text with columns, with a TOML file beside it for what columns cannot hold."""
 
 from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 import re
 from array import array
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from datetime import UTC
 from decimal import Decimal
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import TraceError
+from daq.contracts.import_choice import Choice
 from daq.contracts.machine import load_machine, shipped_machines
 from daq.contracts.trace import INCOMPLETE, Floats, Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds, disk
-from daq.traces.description import Description, DriveUnit, read_file, toml_path
+from daq.traces.description import Description, read_file, toml_path, toml_text
+from daq.traces.mapping.expression import Columns, Table, listed
+from daq.traces.mapping.mapped_trace import EPOCH, INTEGRATED, integral, mapped_trace
+from daq.traces.mapping.text_table import head_of, read_text_table
+from daq.traces.mapping.units import NONE, drive_of, factor
 from daq.traces.naming import trace_id_of
 
 SIGNALS = ("set_point", "position", "drive", "velocity")
 """Signals that a joint may have; a column is named by the signal, `_` and the joint's number. `position` is needed, or
 `velocity` in its place: the position is then the integral of the velocity, from 0."""
 
-INTEGRATED = "Positions are integrals of the measured speeds, from 0."
-"""Note in a trace whose positions were integrated."""
-
 FILE_TIME = "Its date is the last change of its file."
 """Note in a trace whose description states no `created`."""
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6}
 SLOWEST = 1.0
 """Time from row to row (s) from which times may be in ms: a moving joint is sampled more often."""
-EPOCH = 1e8
-"""First time (s) from which times count from 1970: as a float64 they would have steps of 0.2 µs."""
-
-SHOWN = 20
-"""Number of columns that an error lists."""
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-9][0-9]?)")
-
-
-class CsvDescription(Description):
-    """The TOML beside a CSV file."""
-
-    joints: tuple[Annotated[int, Field(ge=1, le=99)], ...] | None = None
-    """Joints to take from the columns; all of them when None."""
-    time_unit: Literal["s", "ms", "µs", "us"] | None = None
-    """Unit of the column `time`; s when None."""
 
 
 def export_csv(trace: Trace, path: Path) -> Path:
@@ -82,29 +68,83 @@ def export_csv(trace: Trace, path: Path) -> Path:
     return path
 
 
-def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, *, drive_unit: DriveUnit | None = None) -> Trace:
-    """The trace in a CSV file and, where there is one, the TOML beside it; `drive_unit` goes before that of the TOML.
+def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: Choice | None = None) -> Trace:
+    """The trace in a CSV file and, where there is one, the TOML beside it; the choice goes before that.
 
-    A last row without a line end may have lost digits, so it is left out, and the notes say so.
+    Columns that have this program's names are read strictly. Of other columns a choice, the TOML or the format says
+    what each is (`daq.traces.mapping`). A last row without a line end may have lost digits, so it is left out, and the
+    notes say so.
     Raises TraceError with one line that names the row (from 1, the header is row 1) and the column of what is wrong:
-    a missing or unknown column, text, NaN, time that does not increase, rows of unequal length.
+    a missing or unknown column, text, NaN, time that does not increase, rows of unequal length; or says which options
+    settle what the columns are.
     """
     path = Path(path)
     data = read_file(path, limits.file_bytes, "file_bytes")
-    description, described = CsvDescription.read(path, limits)
+    description, described = Description.read(path, limits)
+    choice = description.over(choice or Choice())
+    if choice.topic or choice.set_points or choice.received:
+        raise TraceError(f"{path}: topics and times of reception are for bags; this is none")
     whole, said = _whole_rows(data)
-    is_cut = bool(said)
-    header, table, rows, begins = _read_table(path, whole, limits)
-    if said and not len(table):
-        raise TraceError(f"{path}: {' '.join(said)} No row is left")
-    unit = description.time_unit or "s"
-    table[:, 0] *= TIME_UNITS[unit]
-    said += [f"Its times count from its first row, which is at {begins} {unit}."] if begins else []
-    joints = _joints(path, header, description)
-    _check_bounds(path, header, table, rows)
-    if description.time_unit is None and description.period is None:
-        said += _looks_like_ms(table[:, 0])
-    description.check_period(table[:, 0], str(path))
+    if choice.map or choice.where or not _has_own_names(*head_of(path, whole)):
+        return _noted(mapped_trace(path, text_table(path, whole, limits), choice, description, limits), said)
+    own = _Own(path, choice, description, trace_id_of(data, *described), said)
+    return own.trace(*_read_table(path, whole, limits))
+
+
+@dataclass(frozen=True)
+class _Own:
+    """A file with this program's names of columns. said: what is to be noted of it."""
+
+    path: Path
+    choice: Choice
+    description: Description
+    identity: str
+    said: list[str]
+
+    def trace(self, header: list[str], table: Floats, rows: array[int], begins: Decimal) -> Trace:
+        """The trace in it. Raises TraceError."""
+        path, description, said = self.path, self.description, self.said
+        if said and not len(table):
+            raise TraceError(f"{path}: {' '.join(said)} No row is left")
+        if begins:
+            said.append(f"Its times count from its first row, which is at {begins} {description.time_unit or 's'}.")
+        table[:, 0] *= factor("time", description.time_unit or "s")
+        joints = _joints(path, header, description)
+        _check_bounds(path, header, table, rows)
+        if description.time_unit is None and description.period is None:
+            said += _looks_like_ms(table[:, 0])
+        description.check_period(table[:, 0], str(path))
+        signals = _signals(path, header, table, joints)
+        if not len(table):
+            raise TraceError(f"{path}: has no row below its header")
+        record = description.record(path, description.load_machine(path), self.identity)
+        if description.created is None:
+            said.append(FILE_TIME)
+        if "position" not in signals:
+            signals["position"] = integral(table[:, 0], signals["velocity"])
+            bounds.check_signals({"position": signals["position"]}, f"{path}: integrals of the speeds")
+            said.append(INTEGRATED)
+        record = record.model_copy(update=self._chosen(joints, signals))
+        bounds.check_record(record, (), str(path))
+        return _noted(Trace(record, joints, table[:, 0], **signals), said)
+
+    def _chosen(self, joints: tuple[int, ...], signals: dict[str, Floats]) -> dict[str, Any]:
+        """What a choice changes in the record; the drive is left out, or put into the unit of a trace."""
+        names, unit = self.choice.joints, self.choice.drive_unit
+        if names is not None and len(names) != len(joints):
+            raise TraceError(f"{self.path}: --joints {','.join(names)}: it has {len(joints)} joints without names")
+        update: dict[str, Any] = {} if names is None else {"joint_names": names, "joints_chosen": True}
+        if names is None and len(self.description.joint_names) in (len(joints), 0):
+            update = {"joint_names": self.description.joint_names}
+        if unit == NONE:
+            signals.pop("drive", None)
+        elif unit is not None:
+            update["drive_unit"] = drive_of(unit, str(self.path))
+        return update
+
+
+def _signals(path: Path, header: list[str], table: Floats, joints: tuple[int, ...]) -> dict[str, Any]:
+    """Signals (n, j) by name. Raises TraceError where a joint lacks one that another has."""
     signals: dict[str, Any] = {}
     for name in SIGNALS:
         having = [joint for joint in joints if f"{name}_{joint}" in header]
@@ -113,23 +153,31 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, *, drive_
             raise TraceError(f"{path}: row 1: column '{name}_{lacking}' is missing; joint {having[0]} has one")
         if having:
             signals[name] = table[:, [header.index(f"{name}_{joint}") for joint in joints]]
-    if not len(table):
-        raise TraceError(f"{path}: has no row below its header")
-    record = description.record(path, description.load_machine(path), trace_id_of(data, *described))
-    if description.created is None:
-        said.append(FILE_TIME)
-    if "position" not in signals:
-        signals["position"] = _integrate(table[:, 0], signals["velocity"])
-        bounds.check_signals({"position": signals["position"]}, f"{path}: integrals of the speeds")
-        said.append(INTEGRATED)
+    return signals
+
+
+def text_table(path: Path, data: bytes, limits: TraceLimits) -> Table:
+    """A text file's columns by name; a file that an expression names is looked for beside it. Raises TraceError."""
+
+    def beside(file: str) -> Columns:
+        other = path.parent / file
+        return read_text_table(other, read_file(other, limits.file_bytes, "file_bytes"), limits)
+
+    return Table(str(path), read_text_table(path, data, limits), beside)
+
+
+def _has_own_names(separator: str, header: list[str]) -> bool:
+    """Whether a file speaks as this program does, with commas and the time first, so that it is read strictly."""
+    return separator == "," and header[:1] == ["time"] and any(_COLUMN.fullmatch(name) for name in header)
+
+
+def _noted(trace: Trace, said: list[str]) -> Trace:
+    """The trace with more notes; of a file that lacks something the outcome is not `complete`."""
+    record = trace.record
     update: dict[str, Any] = {"notes": " ".join([record.notes, *said]).strip()}
-    if is_cut and record.outcome in (None, "complete"):
+    if any(line.startswith(INCOMPLETE) for line in said) and record.outcome in (None, "complete"):
         update["outcome"] = "interrupted"
-    record = record.model_copy(update=update)
-    if drive_unit is not None:
-        record = record.model_copy(update={"drive_unit": drive_unit})
-    bounds.check_record(record, (), str(path))
-    return Trace(record, joints, table[:, 0], **signals)
+    return replace(trace, record=record.model_copy(update=update))
 
 
 def _whole_rows(data: bytes) -> tuple[bytes, list[str]]:
@@ -151,26 +199,16 @@ def _looks_like_ms(time: Floats) -> list[str]:
     return [f"Its rows are {usual:g} s apart. {advice}"] if usual >= SLOWEST else []
 
 
-def _integrate(time: Floats, velocity: Floats) -> Floats:
-    """Positions (k, j) from 0 for speeds (k, j), by the trapezoidal rule."""
-    steps = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)[:, None]
-    return np.concatenate([np.zeros((1, velocity.shape[1])), np.cumsum(steps, axis=0)])
-
-
-def _joints(path: Path, header: list[str], description: CsvDescription) -> tuple[int, ...]:
+def _joints(path: Path, header: list[str], description: Description) -> tuple[int, ...]:
     measured = "position_" if any(name.startswith("position_") for name in header) else "velocity_"
     found = sorted(int(name.removeprefix(measured)) for name in header if name.startswith(measured))
-    wanted = description.joints or tuple(found)
+    wanted = tuple(joint for joint in description.joints or () if isinstance(joint, int)) or tuple(found)
     for joint in wanted:
         if joint not in found:
-            raise TraceError(f"{path}: row 1: column 'position_{joint}' is missing; it has {_listed(header)}")
+            raise TraceError(f"{path}: row 1: column 'position_{joint}' is missing; it has {listed(header)}")
     if not wanted:
-        raise TraceError(f"{path}: row 1: column 'position_1' is missing; it has {_listed(header)}")
+        raise TraceError(f"{path}: row 1: column 'position_1' is missing; it has {listed(header)}")
     return wanted
-
-
-def _listed(header: list[str]) -> str:
-    return ", ".join(shown(name).strip("'") for name in header[:SHOWN]) + (" …" if len(header) > SHOWN else "")
 
 
 def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats, array[int], Decimal]:
@@ -189,17 +227,11 @@ def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str]
 
 def _check_header(path: Path, header: list[str]) -> None:
     allowed = f"allowed are time and {', '.join(f'{name}_N' for name in SIGNALS)} with N from 1 to 99"
-    if not header or header == [""]:
-        raise TraceError(f"{path}: row 1: no column names; {allowed}")
-    if len(header) == 1 and re.search(r"[;\t]", header[0]):
-        raise TraceError(f"{path}: row 1: columns must be separated by commas")
     for position, name in enumerate(header):
         if name != "time" and not _COLUMN.fullmatch(name):
             raise TraceError(f"{path}: row 1, column {position + 1}: {shown(name)} is not known; {allowed}")
         if name in header[:position]:
             raise TraceError(f"{path}: row 1, column {position + 1}: {shown(name)} comes twice")
-    if header[0] != "time":
-        raise TraceError(f"{path}: row 1: the first column must be 'time', it is {shown(header[0])}")
 
 
 def _numbers(
@@ -277,21 +309,17 @@ def _description_text(trace: Trace) -> str:
     shipped = own is not None and own.name in shipped_machines() and own == load_machine(own.name)
     machine = own.name if own is not None and shipped else None
     created = record.created.astimezone(UTC).isoformat().replace("+00:00", "Z")
-    values: dict[str, str | None] = {
-        "source": _toml_text(record.source),
-        "machine": _toml_text(machine),
-        "robot": _toml_text(record.robot),
-        "joints": str(list(trace.joints)),
-        "drive_unit": _toml_text(record.drive_unit),
-        "period": None if record.period is None else repr(float(record.period)),
-        "created": created,
-        "outcome": _toml_text(record.outcome),
-        "operator": _toml_text(record.operator),
-        "notes": _toml_text(record.notes or None),
+    values: dict[str, object] = {
+        "source": record.source,
+        "machine": machine,
+        "robot": record.robot,
+        "joints": list(trace.joints),
+        "joint_names": list(record.joint_names) or None,
+        "drive_unit": record.drive_unit,
+        "period": None if record.period is None else float(record.period),
+        "outcome": record.outcome,
+        "operator": record.operator,
+        "notes": record.notes or None,
     }
-    return "".join(f"{key} = {value}\n" for key, value in values.items() if value is not None)
-
-
-def _toml_text(text: str | None) -> str | None:
-    """A TOML string: as in JSON, except that TOML requires DEL to be escaped."""
-    return None if text is None else json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
+    lines = [f"{key} = {toml_text(value)}\n" for key, value in values.items() if value is not None]
+    return "".join([*lines, f"created = {created}\n"])

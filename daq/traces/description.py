@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
+import re
+from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -14,32 +18,50 @@ from pydantic import Field, ValidationError
 from daq.contracts.documents import parse_toml
 from daq.contracts.errors import DaqError, SpecError, TraceError
 from daq.contracts.frozen import FrozenRecord
+from daq.contracts.import_choice import Choice
 from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine, load_machine, shipped_machines
 from daq.contracts.refused import refused_words
 from daq.contracts.trace import EARLIEST, LATEST, Floats, Moment, TraceRecord
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import disk
+from daq.traces.mapping.units import drive_of
 from daq.traces.recording import software
 
 EARLY = 0.9
 """Share of a control period after which a sample can come, its clock's jitter included."""
-DriveUnit = Literal["V", "A", "N·m", "N"]
+MAP = "[map]"
+"""The table of a mapping, which `remember` writes at the end of the file."""
 
 
 class Description(FrozenRecord):
-    """What a TOML file may say of the file beside it. `machine` is the name of a shipped machine or a path from the
-    TOML's folder."""
+    """What a TOML file may say of the file beside it.
+
+    machine:   the name of a shipped machine or a path from the TOML's folder
+    joints:    numbers of the joints of a CSV file with this program's names, else names; all joints when None
+    joint_names: of a CSV file with this program's names, in the order of its joints
+    time_unit: of a CSV file with this program's names; s when None
+    topic, set_points, times: of a bag, as in `Choice`
+    where, map: of a table with names of its own, as in `Choice`
+    """
 
     source: Literal["mock", "real", "imported"] = "imported"
     machine: str | None = None
     robot: str | None = None
-    drive_unit: DriveUnit | None = None
+    drive_unit: Literal["V", "A", "N·m", "N", "none"] | None = None
     period: Annotated[float, Field(gt=0)] | None = None
     created: Moment | None = None
     outcome: Outcome | None = None
     operator: str | None = None
     notes: str = ""
+    joint_names: tuple[str, ...] = ()
+    joints: tuple[Annotated[int, Field(ge=1, le=99)], ...] | tuple[str, ...] | None = None
+    time_unit: Literal["s", "ms", "µs", "us"] | None = None
+    topic: str | None = None
+    set_points: str | None = None
+    times: Literal["stamped", "received"] | None = None
+    where: str | None = None
+    map: dict[str, str] = {}
 
     @classmethod
     def read(cls, path: Path, limits: TraceLimits) -> tuple[Self, tuple[bytes, ...]]:
@@ -69,6 +91,20 @@ class Description(FrozenRecord):
                 f"{path}: created: {description.created.isoformat()} has no time zone; write Z behind it for UTC"
             )
         return description
+
+    def over(self, choice: Choice) -> Choice:
+        """The choice, with what this file says wherever the choice leaves it open."""
+        names = tuple(name for name in self.joints or () if isinstance(name, str)) or None
+        return replace(
+            choice,
+            topic=choice.topic or self.topic,
+            set_points=choice.set_points or self.set_points,
+            joints=names if choice.joints is None else choice.joints,
+            received=choice.received or self.times == "received",
+            drive_unit=choice.drive_unit or self.drive_unit,
+            map=self.map | dict(choice.map),
+            where=choice.where or self.where,
+        )
 
     def load_machine(self, path: Path) -> Machine | None:
         """The machine that the description of the file `path` names; None where it names none. Raises TraceError."""
@@ -102,7 +138,7 @@ class Description(FrozenRecord):
             machine=machine,
             operator=self.operator,
             period=self.period,
-            drive_unit=self.drive_unit,
+            drive_unit=None if self.drive_unit == "none" else self.drive_unit,
             notes=self.notes,
             outcome=self.outcome,
         )
@@ -131,3 +167,34 @@ def read_file(path: Path, most: int, limit: str) -> bytes:
             return disk.read_at_most(stream, most, str(path), limit)
     except OSError as error:
         raise TraceError(f"{path}: cannot be read: {disk.reason(error)}") from error
+
+
+def remember(path: Path, choice: Choice, used: Mapping[str, str]) -> Path:
+    """Writes into the TOML beside a file how it was imported, so that it is read so from now on. What else the TOML
+    says stays; a mapping or a choice that it has gives way. Raises TraceError.
+    """
+    toml = toml_path(path)
+    try:
+        text = toml.read_text("utf-8") if toml.exists() else ""
+    except (OSError, UnicodeDecodeError) as error:
+        raise TraceError(f"{toml}: cannot be read: {error}") from error
+    values: dict[str, Any] = {"topic": choice.topic, "set_points": choice.set_points, "where": choice.where}
+    values |= {"joints": None if choice.joints is None else list(choice.joints)}
+    values |= {"times": "received" if choice.received else None}
+    values |= {} if used or choice.drive_unit is None else {"drive_unit": drive_of(choice.drive_unit, str(path))}
+    lines = {key: f"{key} = {toml_text(value)}\n" for key, value in values.items() if value is not None}
+    before = text.partition(f"\n{MAP}\n")[0] if f"\n{MAP}\n" in f"\n{text}" else text
+    for key in lines:
+        before = re.sub(rf"(?m)^{key}\s*=.*\n?", "", before)
+    mapped = "".join(f"{toml_text(key)} = {toml_text(value)}\n" for key, value in used.items())
+    whole = "".join(lines.values()) + before.strip("\n") + ("\n" if before.strip() else "")
+    try:
+        toml.write_text(whole + (f"\n{MAP}\n{mapped}" if mapped else ""), encoding="utf-8")
+    except OSError as error:
+        raise TraceError(f"{toml}: cannot be written: {disk.reason(error)}") from error
+    return toml
+
+
+def toml_text(value: object) -> str:
+    """A TOML value: as in JSON, except that TOML requires DEL to be escaped."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -13,31 +12,12 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.plugins import Importer, named, plugins
 from daq.traces import disk, layout
-from daq.traces.description import DriveUnit
 from daq.traces.ends import first_metadata
 
 Kind = Literal["trace", "csv"] | Importer
 """What reads a file: the reader of traces, `import_csv`, or an importer."""
 FIRST = 16
 """Number of bytes at a file's beginning by which importers know theirs."""
-
-
-@dataclass(frozen=True)
-class Choice:
-    """What is taken from a recording of many things; it goes before the TOML beside it.
-
-    topic:      of the joint states; needed where several topics have some
-    joints:     names of the joints to take, in the order of the trace's joints; samples without them are left out
-    times:      `received` takes the times at which samples were received, in place of their own
-    drive_unit: of the drive; `none` leaves the drive out
-    numbering:  names of a machine's joints 1, 2 …, for a recording that names no machine
-    """
-
-    topic: str | None = None
-    joints: tuple[str, ...] | None = None
-    times: Literal["stamped", "received"] | None = None
-    drive_unit: DriveUnit | Literal["none"] | None = None
-    numbering: tuple[str, ...] = ()
 
 
 def kind_of(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Kind:

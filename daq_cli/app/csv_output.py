@@ -29,8 +29,7 @@ def check_csv(path: Path) -> None:
     another one, such as a machine or a configuration."""
     from pydantic import ValidationError
 
-    from daq.traces.csv_table import CsvDescription
-    from daq.traces.description import toml_path
+    from daq.traces.description import Description, toml_path
 
     if path.suffix.lower() != ".csv":
         raise SpecError(f"{path}: is no .csv file; a .toml of its name is put beside it")
@@ -38,9 +37,9 @@ def check_csv(path: Path) -> None:
     if not toml.exists():
         return
     try:
-        found = CsvDescription.model_validate(parse_toml(read_text(toml, str(toml)), str(toml)))
+        found = Description.model_validate(parse_toml(read_text(toml, str(toml)), str(toml)))
     except (SpecError, ValidationError):
-        found = CsvDescription()
+        found = Description()
     if not found.model_fields_set >= WRITTEN:
         raise SpecError(
             f"{path}: {toml} would be replaced, which does not belong to a trace; give the CSV another name or folder"

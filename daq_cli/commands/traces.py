@@ -9,10 +9,10 @@ import typer
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import SpecError
+from daq.contracts.import_choice import Choice
 from daq_cli.app import completion
 from daq_cli.app.context import JsonOption, console, print_json, print_prose, print_table, printable
 from daq_cli.robot.access import robot_of
-from daq_cli.robot.answers import ImportChoice
 
 if TYPE_CHECKING:
     from daq.contracts.service.archive import ArchiveStatus, TraceArchive
@@ -186,18 +186,28 @@ def import_(
     file: Annotated[
         Path,
         typer.Argument(
-            help="A .csv file: time, then set_point_N, position_N, drive_N, velocity_N; or a bag of ROS 2 or ROS 1 "
-            "with joint states. A .toml of its name says what these cannot: drive_unit, machine, robot."
+            help="CSV or other text with columns, Parquet, a data set of lerobot, .mat, .npz, .json, or a bag of ROS. "
+            "A .toml of its name says what these cannot: drive_unit, machine, robot."
         ),
     ],
-    topic: Annotated[str | None, typer.Option(help="Of a bag: the topic of the joint states.")] = None,
-    joints: Annotated[str | None, typer.Option(help="Of a bag: names of joints, separated by commas.")] = None,
+    mapping: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map",
+            metavar="SIGNAL=COLUMNS",
+            help="What a signal is: position='q{} in deg', drive='0.5*current{} in A', time='stamp in ms'. "
+            "May be repeated; it is kept in the .toml.",
+        ),
+    ] = None,
+    where: Annotated[str | None, typer.Option(help="The rows to take: episode_index=3, or time=2..10 (s).")] = None,
+    as_guessed: Annotated[bool, typer.Option("--as-guessed", help="Take columns as their names let guess.")] = False,
+    topic: Annotated[str | None, typer.Option(help="Of a bag: the topic of the joints.")] = None,
+    set_points: Annotated[str | None, typer.Option(help="Of a bag: the topic of the set points.")] = None,
+    joints: Annotated[str | None, typer.Option(help="Names of joints to take, separated by commas.")] = None,
     received: Annotated[bool, typer.Option("--received", help="Of a bag: the times of reception.")] = False,
     drive_unit: Annotated[
         str | None,
-        typer.Option(
-            help="Unit of the drive: V, A, N or N·m (or Nm); of a bag, that of its effort, which `none` leaves out."
-        ),
+        typer.Option(help="Unit of the drive or effort: V, A, mA, Nm, N and so on; `none` leaves it out."),
     ] = None,
     folder: FolderOption = None,
     json: JsonOption = False,
@@ -205,7 +215,8 @@ def import_(
     """Import a trace of another rig or tool."""
     robot = robot_of(context)
     names = None if joints is None else tuple(name.strip() for name in joints.split(","))
-    made = robot.import_trace(file, folder, ImportChoice(topic, names, received, drive_unit))
+    choice = Choice(topic, set_points, names, received, drive_unit, _mapping(mapping or []), where, as_guessed)
+    made = robot.import_trace(file, folder, choice)
     if json:
         print_json({"trace": made.trace, "made_from": file, "file": made.file, "server": robot.call.server})
     else:
@@ -214,6 +225,20 @@ def import_(
             typer.echo(printable(made.notes), err=True)
         if robot.call.server is None:
             _print_imported(robot, Path(made.file))
+    if choice != Choice():
+        from daq.traces.description import remember
+
+        kept = remember(file, choice, made.columns)
+        typer.echo(printable(f"kept in {kept}: the file is read so from now on"), err=True)
+
+
+def _mapping(texts: list[str]) -> dict[str, str]:
+    """What is said of each signal. Raises SpecError."""
+    pairs = [text.partition("=") for text in texts]
+    for signal, _, columns in pairs:
+        if not columns.strip():
+            raise SpecError(f"--map {signal}: write SIGNAL=COLUMNS, such as position='q{{}} in deg'")
+    return {signal.strip(): columns.strip() for signal, _, columns in pairs}
 
 
 def _print_imported(robot: RobotAccess, file: Path) -> None:
@@ -227,6 +252,11 @@ def _print_imported(robot: RobotAccess, file: Path) -> None:
     length = float(trace.time[-1] - trace.time[0])
     said = f"read: {len(trace)} samples of {joints} {', '.join(map(str, trace.joints))} over {length:.2f} s"
     typer.echo(printable(f"{said}: {', '.join(columns)}"), err=True)
+    for signal, text in trace.record.columns.items():
+        typer.echo(printable(f"  {signal} = {text}"), err=True)
+    if trace.record.joint_names:
+        named = zip(trace.joints, trace.record.joint_names, strict=True)
+        typer.echo(printable(f"  joints {', '.join(f'{number} {name}' for number, name in named)}"), err=True)
     configured = "machine" in robot.call.settings.robot.model_fields_set
     machine = trace.record.machine or (robot.machine if configured else None)
     if machine is None or max(trace.joints) > len(machine.joints):

@@ -22,24 +22,15 @@ class RobotState:
 
 
 @dataclass(frozen=True)
-class ImportChoice:
-    """What is taken from a bag: the topic, the names of the joints, whether the times are those of reception, and the
-    unit of the effort. Of any other file only the unit of the drive can be chosen."""
-
-    topic: str | None = None
-    joints: tuple[str, ...] | None = None
-    received: bool = False
-    drive_unit: str | None = None
-
-
-@dataclass(frozen=True)
 class ImportedTrace:
-    """An imported trace: its number, its file, one line on where it is, and what was noted in making it."""
+    """An imported trace: its number, its file, one line on where it is, what was noted in making it, and which columns
+    its signals are."""
 
     trace: str
     file: str
     text: str
     notes: str = ""
+    columns: Mapping[str, str] = field(default_factory=dict)
 
 
 def headline(found: StatusReport) -> str:

@@ -14,13 +14,14 @@ from daq_cli.app.context import Invocation
 if TYPE_CHECKING:
     from daq.client import Robot
     from daq.contracts.experiment import ExperimentSpec, Gain
+    from daq.contracts.import_choice import Choice
     from daq.contracts.machine import Machine
     from daq.contracts.service.robot import Done, JointGains, ProcessState
     from daq.owner.messages import Finished
     from daq.owner.stop_socket import StopAnswer
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
-    from daq_cli.robot.answers import ImportChoice, ImportedTrace, RobotState
+    from daq_cli.robot.answers import ImportedTrace, RobotState
     from daq_cli.robot.pendant import Teaching
 
 
@@ -138,7 +139,7 @@ class RobotAccess(ABC):
         """Finds a trace by path, number, name or `last` in `folder`; a service's trace is downloaded into it."""
 
     @abstractmethod
-    def import_trace(self, file: Path, folder: Path | None, choice: ImportChoice) -> ImportedTrace:
+    def import_trace(self, file: Path, folder: Path | None, choice: Choice) -> ImportedTrace:
         """Imports a trace of another rig or tool; `choice` is for a bag."""
 
     @abstractmethod

@@ -9,7 +9,7 @@ from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import UNWRITTEN, Diagnosis
 from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
-from model.discrepancy.explanation.renderer import with_sentences
+from model.discrepancy.explanation.answer_words import with_sentences
 from model.discrepancy.method_choice import choose_method
 from model.discrepancy.options import DiagnosisOptions, check_options
 from model.discrepancy.selection.diagnose import diagnose_by_simulation

@@ -9,7 +9,7 @@ import numpy as np
 
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import Gain
-from daq.contracts.joint_matching import check_joints
+from daq.contracts.joint_matching import matched
 from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model.arrays import Floats
@@ -85,7 +85,7 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     joints = machine.modelled_joints
     if len(trace) < 3:
         raise TraceError(f"{trace.called}: {len(trace)} samples; at least 3 are needed")
-    check_joints(trace, machine)
+    trace = matched(trace, machine)
     columns = [trace.column(j) for j in joints]
     measured = trace.position[:, columns]
     _check_unit(trace, measured, machine)
@@ -214,6 +214,10 @@ def gains_of(machine: Machine, own: Mapping[int, Gain] | None) -> Floats:
         elif isinstance(controller, SampledPid):
             if controller.velocity_gains is not None:
                 gains[k, pid.INNER_P : pid.INNER_D + 1] = controller.velocity_gains[joint - 1]
-            resolution = of_joint(controller.drive_resolution, joint)
-            gains[k, pid.RESOLUTION] = 0.0 if resolution is None else resolution.value
+            for column, stated in (
+                (pid.RESOLUTION, controller.drive_resolution),
+                (pid.DEAD_BAND, controller.dead_band),
+            ):
+                size = of_joint(stated, joint)
+                gains[k, column] = 0.0 if size is None else size.value
     return gains

@@ -4,6 +4,8 @@ The cookies of people who sign in. Pure, and without the web framework: the stop
 
 Browsers do not tell the ports of a host apart in cookies. So the names have the port at which people reach the service:
 two services on one host name then keep their sessions apart.
+
+Tells plug-ins what a command on the service's own computer changes, beside the service.
 """
 
 from __future__ import annotations
@@ -16,13 +18,26 @@ from urllib.parse import urlsplit
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
+from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.queue import Role, role_of
+from daq.plugins import named, plugins
 from server.access.caller import Caller
-from server.access.commands import note_command
 from server.access.digest import digest_of
 from server.access.origin import DEFAULT_PORTS
 from server.store.engine import Store
 from server.store.tables import SessionRow
+
+
+def note_command(
+    session: Session, at: datetime, by: str, action: str, command: str, subject: str, detail: str = ""
+) -> None:
+    """Tells plug-ins, within the transaction that makes the change. `by`: who does it."""
+    said = {"actor": by, "action": action, "request": command, "subject": subject, "detail": detail}
+    note = AuditNote(at=at, origin="command line", outcome="done", **said)
+    for plugin in plugins():
+        for reference in plugin.noted:
+            named(reference)(session, note)
+
 
 TLS_PREFIX = "__Host-"
 """Beginning of a name that browsers take from its host over TLS only. On loopback, names are without it."""

@@ -22,8 +22,8 @@ from model.machine_model.model_file import ModelFile, file_of, model_of
 from server.bounded.messages import ORDER, Answer, Limits, Order, ReadModel, ReadUpload, UploadedTrace
 from server.bounded.motion import preview_of
 from server.bounded.upload import read_upload
-from server.core_sharing import weigh_session
 from server.problems import NO_ROOM
+from server.steady import weigh_session
 
 LARGEST_KEPT = 1 << 20
 """Largest size of a kept model in bytes. The service reads it whenever somebody looks at it; the MA2000's has 30 kB."""

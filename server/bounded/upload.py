@@ -28,12 +28,15 @@ SIGNALS = ("time", "position", "set_point", "error", "drive", "velocity", "host_
 def read_upload(order: ReadUpload) -> UploadedTrace:
     """Reads the trace in a file. Raises TraceError, and any error that a damaged file causes in its reader."""
     path = order.path
+    kind = kind_of(path, order.limits)
+    if kind not in ("trace", "csv"):
+        raise TraceError("the upload is no trace; `daq traces import` makes one of a file of another program")
     try:
         trace = open_trace(path, order.limits)
         _require_sound(trace)
         target = trace_path(order.folder, trace.record)
         made = path
-        if kind_of(path, order.limits) == "csv":
+        if kind == "csv":
             made = path.with_name(target.name)
             write_trace(trace, made, order.limits)
         summary = summary_of(made, order.limits)

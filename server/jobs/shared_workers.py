@@ -21,8 +21,8 @@ from collections.abc import Callable
 from daq.executors import LocalWorkers, Workers
 from daq.executors.parent import end_with_parent
 from server import logs
-from server.core_sharing import weigh_session
 from server.jobs.lanes import LANES, SHORT_LANE_WORKERS, Lane
+from server.steady import weigh_session
 
 NICENESS = 10
 """Nice value of the session, and of the process where sessions do not count: a tenth of the ordinary weight, so that

@@ -15,9 +15,8 @@ from daq.contracts.labels import Outcome
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, ExperimentOrder, ExperimentRequest, ExperimentState
 from daq.traces.naming import new_trace_id
-from server.experiments.order import Waiting
 from server.experiments.review import Given, Review, digest_of
-from server.experiments.states import Event, IllegalEventError, advance, after_restart
+from server.experiments.states import Event, IllegalEventError, Waiting, advance, after_restart
 from server.problems import conflict, not_found
 from server.store.engine import Store
 from server.store.labels import experiment_label

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import typer
 
+from daq.contracts.import_choice import Choice
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS
-from daq.traces.kinds import Choice
 from lab_log.log import read
 
 app = typer.Typer(add_completion=False)

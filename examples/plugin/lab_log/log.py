@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from daq.contracts.errors import TraceError
+from daq.contracts.import_choice import Choice
 from daq.contracts.trace import Trace
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces.description import Description
-from daq.traces.kinds import Choice
 from daq.traces.naming import trace_id_of
 
 

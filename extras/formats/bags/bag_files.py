@@ -21,9 +21,11 @@ _PIECE = 1 << 20
 
 
 def is_bag(path: Path, first: bytes) -> bool:
-    """Whether a file is a bag by its first bytes, or by its name. A folder is one, or what is left of one."""
+    """Whether a file is a bag by its first bytes, or by its name. A folder is one, or what is left of one, unless it
+    is a data set of lerobot."""
     begins = first.startswith((MCAP0_MAGIC, ROS_1_MAGIC)) or first == SQLITE_MAGIC
-    return path.is_dir() or begins or path.suffix.lower() in STORAGES
+    folder = path.is_dir() and not (path / "meta" / "info.json").is_file()
+    return folder or begins or path.suffix.lower() in STORAGES
 
 
 def check_files(path: Path, limits: TraceLimits) -> None:

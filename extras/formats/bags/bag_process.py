@@ -17,16 +17,16 @@ import numpy as np
 
 from daq.contracts.errors import DaqError, TraceError
 from daq.contracts.extras import require_extra
+from daq.contracts.import_choice import Choice
 from daq.contracts.trace import Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
-from daq.traces.kinds import Choice
 from extras.formats.bags.ros_bag import NO_MEMORY, import_bag
 
 SPARE = 64 << 20
 """Memory (bytes) beside that for files and messages: rosbags takes it for its definitions of types."""
 REFUSED = 2
 """Exit code of a process that answers with an error instead of a trace."""
-_SIGNALS = ("time", "position", "velocity", "drive")
+_SIGNALS = ("time", "position", "velocity", "drive", "set_point")
 _UNLIMITED = 1 << 62
 
 

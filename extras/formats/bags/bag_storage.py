@@ -29,11 +29,13 @@ from daq.traces import disk
 from daq.traces.fields import Fields, chunk_of, data_end_of
 from daq.traces.inflate import inflate
 from daq.traces.scan import HEAD, UNREADABLE
+from extras.formats.bags.joint_messages import STATES
 
 METADATA = "metadata.yaml"
-JOINT_STATE = "sensor_msgs/msg/JointState"
 LARGEST_MESSAGE = 1 << 20
 """Largest message (bytes) of joint states: that of some ten thousand joints."""
+ENCODINGS = "json", "protobuf"
+"""Encodings of messages, beside ROS's, that are read by the names of their fields."""
 NEVER_ENDED = "its recording was never ended, and what it had not yet written is missing"
 JOURNALS = "-wal", "-journal"
 SQLITE_MAGIC = b"SQLite format 3\0"
@@ -52,6 +54,7 @@ class Contents:
 
     types:    type of the messages on each topic
     messages: moment of reception (ns since 1970) and bytes of each message, by topic
+    schemas:  definition of the messages on each topic of another encoding
     missing:  one line for everything that the bag promises, or once held, and that is not here
     ended:    whether metadata.yaml, which a recorder writes when it ends, says how many messages there are
     ros_1:    whether messages are laid out as those of ROS 1
@@ -59,22 +62,31 @@ class Contents:
 
     types: dict[str, str] = field(default_factory=dict)
     messages: dict[str, list[tuple[int, bytes]]] = field(default_factory=dict)
+    schemas: dict[str, tuple[str, bytes]] = field(default_factory=dict)
     missing: list[str] = field(default_factory=list)
     ended: bool = False
     ros_1: bool = False
 
     def topic(self, name: str, kind: str) -> bool:
-        """Adds a topic; True where it has joint states."""
+        """Adds a topic; True where its messages are read."""
         self.types.setdefault(name, kind)
-        if kind == JOINT_STATE:
+        if self.is_read(name):
             self.messages.setdefault(name, [])
-        return kind == JOINT_STATE
+        return self.is_read(name)
+
+    def is_read(self, topic: str) -> bool:
+        """Whether the messages on a topic tell of joints, or of anything by names of its own."""
+        return self.types.get(topic, "").partition(" in ")[0] in STATES or self.encoding(topic) in ENCODINGS
+
+    def encoding(self, topic: str) -> str:
+        """The encoding of the messages on a topic, where it is not ROS's."""
+        return self.types.get(topic, "").partition(" in ")[2]
 
     def hold(self, before: Mapping[str, int], promised: Mapping[str, int], who: str) -> None:
         """Notes the messages that `who` promises on each topic and that have not come since `before`."""
         for topic, count in promised.items():
             there = len(self.messages.get(topic, ())) - before.get(topic, 0)
-            if self.types.get(topic) == JOINT_STATE and there < count:
+            if self.is_read(topic) and there < count:
                 self.missing.append(f"{who} promises {count} messages on {_text(topic)}, {there} are there")
 
     def counts(self) -> dict[str, int]:
@@ -197,6 +209,7 @@ class _Mcap:
     def __init__(self, file: Path, data: bytes, found: Contents, limits: TraceLimits) -> None:
         self._file, self._view, self._found, self._limits = file, memoryview(data), found, limits
         self._types: dict[int, str] = {}
+        self._schemas: dict[int, tuple[str, bytes]] = {}
         self._topics: dict[int, str] = {}
         self._counts: Counter[int] = Counter()
         self._promised: dict[int, int] = {}
@@ -276,13 +289,17 @@ class _Mcap:
                     self._found.messages[self._topics[channel]].append((logged, data))
             elif opcode == Opcode.SCHEMA:
                 fields = Fields(body)
-                self._types.setdefault(fields.u16(), _name(fields))
+                number, name = fields.u16(), _name(fields)
+                self._types.setdefault(number, name)
+                _name(fields)
+                self._schemas.setdefault(number, (name, bytes(fields.raw(fields.u32()))))
             elif opcode == Opcode.CHANNEL:
                 fields = Fields(body)
                 number, schema, topic, encoding = fields.u16(), fields.u16(), _name(fields), _name(fields)
                 kind = self._types.get(schema, "")
                 if self._found.topic(topic, kind if encoding == "cdr" else f"{kind} in {encoding}"):
                     self._topics.setdefault(number, topic)
+                    self._found.schemas.setdefault(topic, self._schemas.get(schema, (kind, b"")))
             elif opcode == Opcode.STATISTICS:
                 fields = Fields(body)
                 fields.raw(8 + 2 + 4 * 4 + 8 + 8)  # sums over all channels, and the moments of the first and the last
@@ -427,7 +444,7 @@ def _ros_1(file: Path, found: Contents) -> None:
         for connection in reader.connections:
             if found.topic(connection.topic, connection.msgtype):
                 promised[connection.topic] += connection.msgcount
-        wanted = [one for one in reader.connections if one.msgtype == JOINT_STATE]
+        wanted = [one for one in reader.connections if one.msgtype in STATES]
         for connection, received, data in reader.messages(connections=wanted) if wanted else ():
             found.messages[connection.topic].append((received, data[: LARGEST_MESSAGE + 1]))
         found.hold({}, promised, "its index")

@@ -1,16 +1,16 @@
 """Joint states in bags of ROS 2 (MCAP and SQLite) and ROS 1, decoded as a trace by the library rosbags.
 
-Only messages of the type sensor_msgs/JointState are decoded, and only by the definition that ROS has of them: what a
-bag says about its types is never run.
+Messages are decoded only by the definitions that ROS has of them. Those in JSON and protobuf are tables, whose columns
+the user names.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
-from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,33 +18,23 @@ import numpy as np
 
 from daq.contracts.errors import TraceError
 from daq.contracts.extras import require_extra
-from daq.contracts.joint_matching import other_joints
+from daq.contracts.import_choice import Choice
+from daq.contracts.joint_matching import numbers_by_name, taken_names
 from daq.contracts.trace import EARLIEST, INCOMPLETE, LATEST, Floats, Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds
-from daq.traces.description import Description, DriveUnit
-from daq.traces.kinds import Choice
+from daq.traces.description import Description
+from daq.traces.mapping.expression import Table, listed
+from daq.traces.mapping.mapped_trace import mapped_trace
+from daq.traces.mapping.units import NONE, drive_of
 from daq.traces.naming import trace_id_of
 from extras.formats.bags.bag_files import check_files
-from extras.formats.bags.bag_storage import JOINT_STATE, LARGEST_MESSAGE, Contents, contents
+from extras.formats.bags.bag_storage import LARGEST_MESSAGE, Contents, contents
+from extras.formats.bags.joint_messages import CONTROLLER_STATE, JOINT_STATE, STATES, JointValues, decoder
+from extras.formats.bags.other_messages import message_columns
 
 NO_MEMORY = "is damaged, or needs more memory than it may use (traces.limits.file_bytes and total_bytes)"
-SHOWN = 8
-"""Number of names that an error lists."""
-
-Times = Literal["stamped", "received"]
-Optional = Literal["velocity", "effort"]
-
-
-class BagDescription(Description):
-    """The TOML beside a bag."""
-
-    topic: str | None = None
-    """Topic of the joint states; None where the bag has one only."""
-    joints: tuple[str, ...] | None = None
-    """Names of the joints to take, in this order; all of them when None."""
-    times: Times | None = None
-    """Times of the samples: those in the messages, or those at which the messages were received."""
+Optional = Literal["velocity", "effort", "set_point"]
 
 
 @dataclass(frozen=True)
@@ -52,12 +42,16 @@ class _State:
     """One message. `number` counts those of its topic, from 1; `stamp` and `received` are in ns since 1970."""
 
     number: int
-    stamp: int
     received: int
-    names: tuple[str, ...]
-    position: Floats
-    velocity: Floats
-    effort: Floats
+    values: JointValues
+
+    @property
+    def stamp(self) -> int:
+        return self.values.stamp
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.values.names
 
 
 def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: Choice | None = None) -> Trace:
@@ -73,113 +67,125 @@ def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
     path, choice = Path(path), choice or Choice()
     require_extra("ros", f"{path}: reading a bag", "rosbags")
     path = path if path.name else path.resolve()
-    description, described = BagDescription.read(path, limits)
+    description, described = Description.read(path, limits)
+    choice = description.over(choice)
     check_files(path, limits)
     machine = description.load_machine(path)
-    chosen = description.joints if choice.joints is None else choice.joints
-    found_topic, states, missing = _states(path, choice.topic or description.topic, limits)
-    origin = f"{path}: topic {found_topic}"
-    names = _names(origin, states, chosen, limits)
+    found = _contents(path, limits)
+    topic = _topic(path, found, choice.topic)
+    if found.encoding(topic):
+        rows = message_columns(f"{path}: topic {listed([topic])}", found, topic)
+        return mapped_trace(path, Table(f"{path}: topic {topic}", rows), choice, description, limits)
+    origin = f"{path}: topic {topic}"
+    states = _read(path, found, topic)
+    asked = None if choice.set_points is None else _read(path, found, _topic(path, found, choice.set_points))
+    names = _names(origin, states, choice.joints, limits)
     known = choice.numbering if machine is None else tuple(joint.name for joint in machine.joints)
-    if machine is not None and chosen is None and len(names) > 1 and not set(names) <= set(known):
-        raise other_joints(origin, _in_order(names), names, machine.name, known)
-    unit = choice.drive_unit or description.drive_unit
-    table = _Table(origin, names, states, missing)
-    trace = table.trace(description.record(path, machine, ""), choice.times or description.times, unit)
+    names = taken_names(origin, names, machine, known, chosen=choice.joints is not None)
+    table = _Table(origin, names, states, found.missing)
+    trace = table.trace(description.record(path, machine, ""), choice, asked)
     description.check_period(trace.time, origin)
-    numbers, record = _numbers(names, known), trace.record
+    numbers, record = numbers_by_name(names, known), trace.record
     spoken = ", ".join(f"{number} {name}" for number, name in zip(numbers, names, strict=True))
-    signals = (trace.time, trace.position, trace.velocity, trace.drive)
+    signals = (trace.time, trace.position, trace.velocity, trace.drive, trace.set_point)
     identity = trace_id_of(
-        *(text.encode() for text in (found_topic, " ".join(names), record.created.isoformat())),
-        *([] if machine is not None or numbers == _in_order(names) else [" ".join(map(str, numbers)).encode()]),
+        *(text.encode() for text in (topic, " ".join(names), " ".join(map(str, numbers)), record.created.isoformat())),
         *(b"" if signal is None else signal.tobytes() for signal in signals),
         *described,
     )
-    notes = f"{record.notes} From topic {found_topic}, joints {spoken}.".strip()
-    told = {"joint_names": names, "joints_chosen": chosen is not None}
+    hint = _other_topics(found, topic) if trace.set_point is None else ""
+    notes = f"{record.notes} From topic {topic}, joints {spoken}.{hint}".strip()
+    told = {"joint_names": names, "joints_chosen": choice.joints is not None}
     record = record.model_copy(update={"trace_id": identity, "notes": notes} | told)
     bounds.check_signals({name: getattr(trace, name) for name in bounds.LARGEST}, str(path))
     bounds.check_record(record, (), str(path))
-    return Trace(record, numbers, trace.time, trace.position, velocity=trace.velocity, drive=trace.drive)
+    return replace(trace, record=record, joints=numbers)
 
 
-def _states(path: Path, topic: str | None, limits: TraceLimits) -> tuple[str, list[_State], list[str]]:
-    """The joint states of a topic, and what of them is missing. Raises TraceError."""
+def _other_topics(found: Contents, topic: str) -> str:
+    """Where set points are that were not taken."""
+    others = [name for name in found.messages if found.types[name] == CONTROLLER_STATE and found.messages[name]]
+    return (
+        f" Its set points are on {listed(others)}: --set-points takes them." if others and topic not in others else ""
+    )
+
+
+def _contents(path: Path, limits: TraceLimits) -> Contents:
+    """What is in a bag. Raises TraceError."""
+    with _one_error(path):
+        return contents(path, limits)
+
+
+def _read(path: Path, found: Contents, topic: str) -> list[_State]:
+    """The joint states of a topic. Raises TraceError."""
+    with _one_error(path):
+        origin = f"{path}: topic {listed([topic])}"
+        return list(_decoded(origin, found.messages[topic], decoder(found.types[topic], found.ros_1)))
+
+
+@contextmanager
+def _one_error(path: Path) -> Iterator[None]:
+    """Turns whatever a damaged bag makes rosbags raise into TraceError."""
     try:
-        found = contents(path, limits)
-        name = _topic(path, found, topic)
-        states = _decoded(f"{path}: topic {_listed([name])}", found.messages[name], found.ros_1)
-        return name, list(states), found.missing
+        yield
     except TraceError:
         raise
     except MemoryError as error:
         raise TraceError(f"{path}: {NO_MEMORY}") from error
     except OSError as error:
         raise TraceError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # a damaged bag makes rosbags and what it uses raise anything
+    except Exception as error:
         told = " ".join(str(error).split())[:200] or "it is damaged"
         raise TraceError(f"{path}: cannot be read as a bag ({type(error).__name__}: {told})") from error
 
 
 def _topic(path: Path, found: Contents, wanted: str | None) -> str:
-    """The topic with joint states: the one that is wanted, else the only one with messages. Raises TraceError."""
+    """The topic that is wanted, else the only one with messages of the first type that has some. Raises TraceError."""
     there = sorted(found.messages)
     if not there:
         others = sorted(f"{name} ({kind})" for name, kind in found.types.items())
-        raise TraceError(f"{path}: has no topic of {JOINT_STATE}; it has {_listed(others) or 'no topic'}")
+        raise TraceError(f"{path}: has no topic of {JOINT_STATE}; it has {listed(others) or 'no topic'}")
     if wanted is not None and wanted not in there:
-        raise TraceError(f"{path}: topic {_listed([wanted])}: has no joint states; there are some on {_listed(there)}")
+        raise TraceError(f"{path}: topic {listed([wanted])}: has no joint states; there are some on {listed(there)}")
+    if wanted is not None:
+        return wanted
     told = [name for name in there if found.messages[name]] or there
-    if wanted is None and len(told) > 1:
-        raise TraceError(f"{path}: has joint states on {_listed(told)}; choose one with --topic")
-    return wanted or told[0]
+    kinds = [*STATES, *{found.types[name] for name in told}]
+    first = next(kind for kind in kinds if any(found.types[name] == kind for name in told))
+    alike = [name for name in told if found.types[name] == first]
+    if len(alike) > 1:
+        raise TraceError(f"{path}: has joint states on {listed(alike)}; choose one with --topic")
+    return alike[0]
 
 
-def _decoded(origin: str, messages: list[tuple[int, bytes]], ros_1: bool) -> Iterator[_State]:
+def _decoded(
+    origin: str, messages: list[tuple[int, bytes]], decode: Callable[[bytes], JointValues]
+) -> Iterator[_State]:
     """Decodes messages. Raises TraceError."""
-    decode = _decoder(ros_1)
     for number, (received, raw) in enumerate(messages, start=1):
         place = f"{origin}: message {number}"
         if len(raw) > LARGEST_MESSAGE:
             raise TraceError(f"{place}: has more than {LARGEST_MESSAGE} bytes; joint states have not")
         try:
-            message = decode(raw, JOINT_STATE)
+            state = _State(number, received, decode(raw))
         except MemoryError:
             raise
         except Exception as error:
-            raise TraceError(f"{place}: is no {JOINT_STATE}") from error
-        state = _State(
-            number,
-            message.header.stamp.sec * 10**9 + message.header.stamp.nanosec,
-            received,
-            tuple(message.name),
-            *(np.array(values, np.float64) for values in (message.position, message.velocity, message.effort)),
-        )
+            raise TraceError(f"{place}: is no message of its type") from error
         _check_lengths(place, state)
         yield state
 
 
-@cache
-def _decoder(ros_1: bool) -> Callable[[bytes, str], Any]:
-    """What decodes a message. It knows ROS's definitions alone, whatever a bag says of its types."""
-    from rosbags.typesys import Stores, get_typestore
-
-    if ros_1:
-        return get_typestore(Stores.ROS1_NOETIC).deserialize_ros1
-    return get_typestore(Stores.ROS2_JAZZY).deserialize_cdr
-
-
 def _check_lengths(origin: str, state: _State) -> None:
     count = len(state.names)
-    if len(state.position) != count:
-        raise TraceError(f"{origin}: has {count} names and {len(state.position)} positions")
-    for name in ("velocity", "effort"):
-        values = getattr(state, name)
+    if len(state.values.position) != count:
+        raise TraceError(f"{origin}: has {count} names and {len(state.values.position)} positions")
+    for name in ("velocity", "effort", "set_point"):
+        values = getattr(state.values, name)
         if len(values) not in (0, count):
             raise TraceError(f"{origin}: has {count} names and {len(values)} values of {name}")
     if len(set(state.names)) != count:
-        raise TraceError(f"{origin}: names a joint twice: {_listed(state.names)}")
+        raise TraceError(f"{origin}: names a joint twice: {listed(state.names)}")
 
 
 def _names(origin: str, states: list[_State], wanted: tuple[str, ...] | None, limits: TraceLimits) -> tuple[str, ...]:
@@ -191,17 +197,17 @@ def _names(origin: str, states: list[_State], wanted: tuple[str, ...] | None, li
     known = {name: None for state in states for name in state.names}
     if wanted is None:
         if len(sets) > 1:
-            kinds = "; ".join(f"{_listed(sorted(names))} in {_messages(count)}" for names, count in sets.most_common(3))
+            kinds = "; ".join(f"{listed(sorted(names))} in {_messages(count)}" for names, count in sets.most_common(3))
             raise TraceError(f"{origin}: has messages of different joints: {kinds}; choose joints with --joints")
         wanted = tuple(known)
     for name in wanted:
         if name not in known:
-            raise TraceError(f"{origin}: has no joint {name!r}; it has {_listed(list(known))}")
+            raise TraceError(f"{origin}: has no joint {name!r}; it has {listed(list(known))}")
     if not 1 <= len(wanted) <= limits.joints or len(set(wanted)) != len(wanted):
         line = f"choose up to {limits.joints} different ones with --joints (traces.limits.joints)"
-        raise TraceError(f"{origin}: {len(wanted)} joints are {_listed(wanted)}; {line}")
+        raise TraceError(f"{origin}: {len(wanted)} joints are {listed(wanted)}; {line}")
     if not any(names.issuperset(wanted) for names in sets):
-        raise TraceError(f"{origin}: has no message with all of {_listed(wanted)}")
+        raise TraceError(f"{origin}: has no message with all of {listed(wanted)}")
     return wanted
 
 
@@ -216,7 +222,7 @@ class _Table:
         self._states = self._keep(
             "Messages with a position that is no number",
             self._states,
-            lambda s: bool(np.isfinite(s.position[self._columns(s)]).all()),
+            lambda s: bool(np.isfinite(s.values.position[self._columns(s)]).all()),
         )
 
     def _columns(self, state: _State) -> list[int]:
@@ -233,34 +239,56 @@ class _Table:
             self._said.append(line)
         return kept
 
-    def trace(self, record: TraceRecord, times: Times | None, unit: DriveUnit | Literal["none"] | None) -> Trace:
-        """The trace with joints numbered from 1, and notes on what was left out. Raises TraceError."""
+    def trace(self, record: TraceRecord, choice: Choice, asked: list[_State] | None) -> Trace:
+        """The trace with joints numbered from 1, and notes on what was left out. asked: messages of set points.
+
+        Raises TraceError.
+        """
         lost = bool(self._said) and self._said[0].startswith(INCOMPLETE)
-        moments = self._moments(times)
-        created, time = _since_start(moments)
+        moments = self._moments(choice.received)
+        set_point = self._optional("set_point") if asked is None else self._asked(asked, moments, choice.received)
+        created, time = _since_start(moments[len(moments) - len(self._states) :])
         if not EARLIEST <= created < LATEST:
             raise TraceError(f"{self._origin}: its times are not of the years 1970 to 2261; --received takes others")
-        velocity, effort = self._optional("velocity"), self._optional("effort")
-        if effort is not None and unit is None:
+        velocity, drive = self._optional("velocity"), self._optional("effort")
+        unit = None if choice.drive_unit is None else drive_of(choice.drive_unit, self._origin)
+        if unit == NONE:
+            drive = None
+        elif drive is not None and unit is None:
             line = "its effort may be in N·m, as ROS defines it, or in amperes, as many drivers send it"
             raise TraceError(f"{self._origin}: {line}; say --drive-unit N·m, N, A or V, or none to leave it out")
-        drive = None if unit == "none" else effort
         update: dict[str, Any] = {"notes": " ".join([record.notes, *self._said]).strip(), "created": created}
         update |= {"drive_unit": unit if drive is not None else None} | ({"outcome": "interrupted"} if lost else {})
         numbers = tuple(range(1, len(self._names) + 1))
         position = self._stacked("position")
-        return Trace(record.model_copy(update=update), numbers, time, position, velocity=velocity, drive=drive)
+        return Trace(
+            record.model_copy(update=update), numbers, time, position, set_point, drive=drive, velocity=velocity
+        )
 
-    def _moments(self, times: Times | None) -> list[int]:
+    def _asked(self, asked: list[_State], moments: list[int], received: bool) -> Floats:
+        """The set points of another topic, each held until the next comes; states before the first are left out.
+
+        Raises TraceError where that topic lacks a joint or nothing is left.
+        """
+        known = [s for s in asked if set(self._names) <= set(s.names)]
+        if not known:
+            raise TraceError(f"{self._origin}: no message of the set points has all of {listed(self._names)}")
+        by_arrival = received or not all(state.stamp for state in known)
+        since = np.array([state.received if by_arrival else state.stamp for state in known])
+        rows = np.searchsorted(since, np.array(moments), side="right") - 1
+        numbers = [state.number for state in self._states]
+        early = {number for number, row in zip(numbers, rows, strict=True) if row < 0}
+        self._states = self._keep("Messages before the first set point", self._states, lambda s: s.number not in early)
+        values = [s.values.set_point if len(s.values.set_point) else s.values.position for s in known]
+        return np.array([values[row][self._columns(known[row])] for row in rows if row >= 0])
+
+    def _moments(self, received: bool) -> list[int]:
         """Time (ns since 1970) of each sample; a message with the time of the one before is left out.
 
         Raises TraceError where a time goes back.
         """
         stamped = all(state.stamp for state in self._states)
-        if times == "stamped" and not stamped:
-            number = next(state.number for state in self._states if not state.stamp)
-            raise TraceError(f"{self._origin}: message {number}: has no stamp; --received takes other times")
-        received = times == "received" or not stamped
+        received = received or not stamped
         if received:
             self._said.append("Times are those at which messages were received.")
         moments = {state.number: state.received if received else state.stamp for state in self._states}
@@ -282,7 +310,7 @@ class _Table:
 
     def _optional(self, name: Optional) -> Floats | None:
         """A signal that messages may lack, or fill with NaN; None where one of them does."""
-        lacking = sum(len(getattr(state, name)) == 0 for state in self._states)
+        lacking = sum(len(getattr(state.values, name)) == 0 for state in self._states)
         if lacking == 0:
             found = self._stacked(name)
             finite = np.isfinite(found).all(axis=1)
@@ -293,8 +321,8 @@ class _Table:
             self._said.append(f"{name} was left out: {lacking} of {len(self._states)} messages lack it.")
         return None
 
-    def _stacked(self, name: Literal["position", "velocity", "effort"]) -> Floats:
-        return np.array([getattr(state, name)[self._columns(state)] for state in self._states])
+    def _stacked(self, name: Literal["position", "velocity", "effort", "set_point"]) -> Floats:
+        return np.array([getattr(state.values, name)[self._columns(state)] for state in self._states])
 
 
 def _since_start(moments: list[int]) -> tuple[datetime, Floats]:
@@ -307,19 +335,5 @@ def _since_start(moments: list[int]) -> tuple[datetime, Floats]:
     return created, np.array([moment - start for moment in moments], np.float64) / 1e9
 
 
-def _numbers(names: tuple[str, ...], known: tuple[str, ...]) -> tuple[int, ...]:
-    """Number of each joint: the machine's where it has joints of these names, else from 1 in their order."""
-    return tuple(known.index(name) + 1 for name in names) if set(names) <= set(known) else _in_order(names)
-
-
-def _in_order(names: tuple[str, ...]) -> tuple[int, ...]:
-    return tuple(range(1, len(names) + 1))
-
-
 def _messages(count: int) -> str:
     return f"{count} message" if count == 1 else f"{count} messages"
-
-
-def _listed(names: list[str] | tuple[str, ...]) -> str:
-    shown = ", ".join("".join(c if c.isprintable() else "?" for c in name[:60]) for name in names[:SHOWN])
-    return shown if len(names) <= SHOWN else f"{shown} and {len(names) - SHOWN} more"

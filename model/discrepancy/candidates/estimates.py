@@ -11,6 +11,7 @@ from model.arrays import Floats
 from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, price_of, says_no_more
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import Candidate, FoundValue
+from model.discrepancy.grounds import NamedEffect
 from model.discrepancy.output_error.noise_model import fit_noise_model
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import Point, descend
@@ -116,7 +117,9 @@ def only_probed(ranking: Ranking, observation: Observation) -> tuple[Candidate, 
     return tuple(left)
 
 
-def runner_up(best: Candidate, candidates: Sequence[Candidate]) -> Candidate | None:
+def runner_up(best: Candidate, candidates: Sequence[Candidate]) -> NamedEffect | None:
     """The best fitted candidate after `best` in a ranking that would be another answer."""
-    after = (c for c in candidates[candidates.index(best) + 1 :] if c.refitted)
-    return next((c for c in after if not says_no_more(c.effect, c.joints, best.effect, best.joints)), None)
+    for c in candidates[candidates.index(best) + 1 :]:
+        if c.refitted and not says_no_more(c.effect, c.joints, best.effect, best.joints):
+            return NamedEffect(effect=c.effect, joints=c.joints, evidence=c.evidence)
+    return None

@@ -11,7 +11,7 @@ from itertools import combinations
 
 from model.discrepancy.diagnosis import Inseparable, PlacedEffect
 from model.discrepancy.experiment_design.separation import LEAST, Pair
-from model.discrepancy.explanation.class_words import LAWS, MEASUREMENTS
+from model.discrepancy.explanation.effect_words import LAWS, MEASUREMENTS
 from model.discrepancy.grounds import Measurement, Note, SharedLaw
 from model.effects.names import effect_on
 

@@ -9,7 +9,7 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
-from model.discrepancy.explanation.renderer import with_sentences
+from model.discrepancy.explanation.answer_words import with_sentences
 from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
 from model.discrepancy.inverse_dynamics.options import TorqueOptions, torque_options
 from model.discrepancy.inverse_dynamics.records import Records

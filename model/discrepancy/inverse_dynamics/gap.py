@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from model.discrepancy.diagnosis import Gap, GapStage, GapWithout, SignalError, Step
-from model.discrepancy.gap_numbers import gap_numbers
+from model.discrepancy.explanation.fitted_numbers import gap_numbers
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
 from model.discrepancy.inverse_dynamics.holdout import held_out_squares
 from model.discrepancy.inverse_dynamics.standing import Standing

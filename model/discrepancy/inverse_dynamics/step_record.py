@@ -23,7 +23,6 @@ from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.resolution import OF_CHANGES
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, order_by_odds
 from model.discrepancy.inverse_dynamics.standing import Standing
-from model.machine_model.model import Model
 
 SHOWN = 12
 """Most candidates that a step lists."""
@@ -59,7 +58,7 @@ def record_step(standing: Standing, found: Findings, judgement: Judgement, refus
         ),
         where=locate(compared.reference, case),
         reason=UNWRITTEN,
-        reason_data=Reason(removed=compared.removed, slides=_slides(model, chosen.joints)),
+        reason_data=Reason(removed=compared.removed),
         adopted=judgement.refusal is None,
         refusal=judgement.refusal,
     )
@@ -158,9 +157,3 @@ def excess_removed(noise: Floats, fitted: tuple[Floats, Floats], before: Floats,
         return None
     weight = np.where(usable, 1 / np.maximum(fitted[0], 1e-300), 0.0)
     return float((weight * (before - after))[usable].sum() / (weight * excess)[usable].sum())
-
-
-def _slides(model: Model, joints: tuple[int, ...]) -> bool:
-    """Whether all joints of an effect, or of the machine for an effect without any, are prismatic."""
-    machine = model.machine
-    return all(machine.joint(j).kind == "prismatic" for j in joints or machine.modelled_joints)

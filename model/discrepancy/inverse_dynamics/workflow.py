@@ -29,6 +29,7 @@ from model.discrepancy.inverse_dynamics.step_record import list_tried, record_st
 from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.verdict import withdrawn
+from model.effects.names import effect_on
 from model.machine_model.model import Model
 
 SUPERFLUOUS: RefusalKind = "superfluous"
@@ -103,7 +104,9 @@ class TorqueWorkflow:
     def _report(self, fraction: float, text: str) -> None:
         stop_if(self.cancel)
         whole, done = self.case.options.most_steps, len(self.found.steps)
-        self.progress(min(0.99, (done + fraction) / (whole + 1)), f"step {done + 1}: {text}")
+        named = ", ".join(effect_on(s.effect, s.joints) for s in self.found.adopted if s.effect)
+        so_far = f"found so far: {named}; " if named else ""
+        self.progress(min(0.99, (done + fraction) / (whole + 1)), f"{so_far}step {done + 1}: {text}")
 
     def _search(self, found: Found) -> Findings:
         """What a step finds, without what the records do not resolve, the most probable by all records first."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.contracts.machine import SampledPid
+from daq.contracts.machine import SampledPid, of_joint
 from model.arrays import Floats
 
 CLEAR = 4.0
@@ -38,6 +38,8 @@ class ControllerLaw:
         self.outer = controller.gains[joint - 1]
         inner = controller.velocity_gains
         self.inner = None if inner is None else inner[joint - 1]
+        band = of_joint(controller.dead_band, joint)
+        self.dead_band = -1.0 if band is None else band.value
         self.period = period
         self.winds_up = winds_up
 
@@ -95,6 +97,7 @@ class ControllerLaw:
         """The output for an error, and the memory after it: sum and last of the errors, of the inner ones, position."""
         total, last, inner_total, inner_last, before = memory
         p, i, d = self.outer
+        error = 0.0 if abs(error) <= self.dead_band else error
         total += error * self.period
         output = p * error + i * total + d * (error - last) / self.period
         if self.inner is None:

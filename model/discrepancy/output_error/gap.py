@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from model.discrepancy.diagnosis import Gap, GapNumber, GapStage, GapWithout, Step
-from model.discrepancy.gap_numbers import gap_numbers
+from model.discrepancy.explanation.fitted_numbers import gap_numbers
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.observation import Observation, Signals

@@ -18,8 +18,8 @@ from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.ranking import Ranking, rank
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, SignalError, Step, Where
 from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
+from model.discrepancy.explanation.answer_words import with_sentences
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
-from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import ControllerEffect, Note
 from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.localisation.structure import joints_with_structure
@@ -43,6 +43,7 @@ from model.discrepancy.selection.last_fit import update_to_last_fit
 from model.discrepancy.selection.step import LAST_STEPS, make_step
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
+from model.effects.names import effect_on
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
 from model.machine_model.parameter import Kind
@@ -210,9 +211,11 @@ def _add_effects(case: Case, search: _Search, progress: Progress, cancel: Cancel
     steps."""
     width = 0.8 / case.options.most_steps
     for number in range(case.options.most_steps):
+        named = ", ".join(effect_on(s.effect, s.joints) for s in search.steps if s.adopted and s.effect)
+        so_far = f"found so far: {named}; " if named else ""
 
-        def tell(done: float, text: str, begin: float = 0.1 + number * width) -> None:
-            progress(begin + width * done, text)
+        def tell(done: float, text: str, begin: float = 0.1 + number * width, so_far: str = so_far) -> None:
+            progress(begin + width * done, f"{so_far}{text}")
 
         search = _add_effect(case, search, tell, cancel)
         if search.ended:

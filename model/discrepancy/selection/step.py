@@ -9,10 +9,9 @@ from model.discrepancy.candidates.decision import Decision
 from model.discrepancy.candidates.estimates import found_values, listed, only_probed, runner_up
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, SignalError, Step
-from model.discrepancy.explanation import reasons
-from model.discrepancy.explanation.samples import Left
+from model.discrepancy.grounds import Reason
 from model.discrepancy.output_error.case import Case
-from model.discrepancy.output_error.search import Point, converge
+from model.discrepancy.output_error.search import converge
 from model.discrepancy.verdict import excess_removed
 
 LAST_STEPS = 4
@@ -34,17 +33,7 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
     margin = decision.margin + best.evidence - chosen.evidence
     candidates = tuple(listed(best if r is chosen else r) for r in ranking.fitted)
     candidates += only_probed(ranking, after.observation)
-    where = case.where(before)
-    reason = reasons.reason(
-        effect,
-        joints,
-        values,
-        model=after.fitted_model,
-        before=before.fitted_model,
-        records=after.observation.records,
-        rival=runner_up(listed(best), candidates),
-        left=_left(after),
-    )
+    rival = runner_up(listed(best), candidates)
     step = Step(
         effect=effect,
         joints=joints,
@@ -56,9 +45,9 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
         rmse_fit=case.fitted_errors(before, after),
         rmse_holdout=held_errors,
         excess_removed_holdout=excess_removed(held_errors),
-        where=where,
+        where=case.where(before),
         reason=UNWRITTEN,
-        reason_data=reason,
+        reason_data=Reason(rival=rival),
         adopted=refused is None,
         refusal=refused,
     )
@@ -85,14 +74,3 @@ def _still_close(best: CandidateFit, decision: Decision, ranking: Ranking, margi
 def _on(joints: Sequence[int], found: Sequence[SignalError]) -> tuple[SignalError, ...]:
     """Errors of an effect's own joints; of all, where it is the whole machine's."""
     return tuple(e for e in found if not joints or e.joint in joints)
-
-
-def _left(point: Point) -> Left:
-    """Measured − simulated of any model with the initial postures of a point: an effect is taken out, all else stays.
-
-    In closed loop, so that the sizes in a reason are those that are seen on the arm.
-    """
-    closed_loop = point.observation.with_feedback_share(0.0)
-    kept = [k for k, u in enumerate(point.unknowns) if u.name not in point.model.by_name]
-    starts = point.only(kept)
-    return lambda model: closed_loop.residuals(starts.of(model))

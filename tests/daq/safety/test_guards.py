@@ -12,7 +12,7 @@ from daq.contracts.limits import Limits
 from daq.contracts.sample import SampleRow
 from daq.safety import RestGuards, RunningGuards, Verdict
 from daq.safety.findings import Finding, Watched
-from daq.safety.following_error import FollowingError
+from daq.safety.guards import FollowingError
 from daq.trajectories.planner import plan, start_angles
 from firmware_protocol.commands import StatusFlag
 from firmware_protocol.units import JointCalibration

@@ -136,15 +136,14 @@ def test_a_file_of_another_tool_needs_no_toml(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("", "row 1: no column names"),
-        ("time;position_1\n0;1\n", "row 1: columns must be separated by commas"),
-        ("position_1,time\n", "row 1: the first column must be 'time'"),
+        ("", "has no row"),
+        ("speed,angle_1\n0,1\n", "its columns have other names than this program's: speed, angle_1; nothing looks"),
         ("time,position_1,position_1\n", "row 1, column 3: 'position_1' comes twice"),
         (
             "time,setpoint_1,position_1\n",
             "row 1, column 2: 'setpoint_1' is not known; allowed are time and set_point_N",
         ),
-        ("time,position_0\n", "row 1, column 2: 'position_0' is not known"),
+        ("time,position_1,position_0\n", "row 1, column 3: 'position_0' is not known"),
         ("time,drive_1\n0,0\n", "row 1: column 'position_1' is missing"),
         ("time,position_1,position_2,drive_1\n", "row 1: column 'drive_2' is missing; joint 1 has one"),
         ("time,position_1\n0,1\n0.1,nan\n", "row 3, column 'position_1': 'nan' is not a finite number"),
@@ -173,7 +172,7 @@ def test_one_line_names_the_row_and_the_column(tmp_path: Path, text: str, compla
         ("joints = [0]", "rig.toml: joints.1: found 0, must be at least 1"),
         ("joints = [2]", "rig.csv: row 1: column 'position_2' is missing"),
         ("machine = 'crane.toml'", "rig.toml: machine: machine '"),
-        ("drive_unit = 'kV'", "rig.toml: drive_unit: found 'kV', must be 'V', 'A', 'N·m' or 'N'"),
+        ("drive_unit = 'kV'", "rig.toml: drive_unit: found 'kV', must be 'V', 'A', 'N·m', 'N' or 'none'"),
     ],
 )
 def test_one_line_names_what_is_wrong_beside_the_file(tmp_path: Path, toml: str, complaint: str) -> None:

@@ -35,8 +35,8 @@ def machine(*, rounded: bool = True, limit: float = LIMIT, period: float = PERIO
     """The machine file as its lab would write it. Without `rounded`, it does not speak of rounding and limit (V)."""
     lines = (Path(__file__).parent / "outside_arm.toml").read_text("utf-8").splitlines()
     kept = [line for line in lines if rounded or not line.startswith(("drive_resolution", "output_limit"))]
-    text = "\n".join(kept).replace(f"value = {LIMIT}", f"value = {limit}")
-    return parse_machine(text.replace(f"period = {{ value = {PERIOD}", f"period = {{ value = {period}"))
+    text = "\n".join(kept).replace(f'"{LIMIT:g} V"', f'"{limit} V"')
+    return parse_machine(text.replace(f'period = "{1e3 * PERIOD:g} ms"', f'period = "{period} s"'))
 
 
 @dataclass(frozen=True)

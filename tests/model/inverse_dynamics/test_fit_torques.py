@@ -201,6 +201,7 @@ LAWS: dict[str, tuple[str, float, Law]] = {
         lambda t, q, v: t + 0.2 * np.abs(MASS * 9.81 * LENGTH / 2 * np.sin(q)) * np.sign(v),
     ),
     "direction_dependent_viscous_friction": ("difference", -0.02, lambda t, _q, v: t + 0.02 * np.minimum(v, 0.0)),
+    "constant_torque": ("torque", 0.3, lambda t, _q, _v: t - 0.3),
     "one_sided_spring": ("stiffness", -0.6, lambda t, q, _v: t + 0.6 * np.minimum(q, 0.0)),
     "direction_dependent_gear_loss": ("difference", 0.15, lambda t, _q, v: np.where(t * v > 0, t / 0.85, t)),
 }

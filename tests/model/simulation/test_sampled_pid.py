@@ -53,6 +53,13 @@ def test_the_drive_is_rounded_to_its_resolution() -> None:
     assert np.ptp(drive) > 10
 
 
+def test_an_error_within_the_dead_band_moves_nothing() -> None:
+    still, moved = (run(slide(dead_band=quantity(band, "m"))).drive for band in (0.21, 0.19))
+    assert not still.any()
+    assert np.abs(moved).max() > 8.0
+    assert run(slide(dead_band=quantity(0.21, "m")), quantise=False).drive.any()
+
+
 def test_the_drive_stays_within_the_limit_of_the_output() -> None:
     free, held = run(slide()).drive, run(slide(output_limit=quantity(5.0, "V"))).drive
     assert np.abs(free).max() > 8.0

@@ -13,9 +13,9 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
+from daq.contracts.import_choice import Choice
 from daq.contracts.trace import Trace
-from daq.traces.kinds import Choice
-from extras.formats.bags.bag_storage import JOINT_STATE
+from extras.formats.bags.joint_messages import JOINT_STATE
 from extras.formats.bags.ros_bag import import_bag
 from tests.daq.traces.file_fuzz import CASES, LIMITS, ROWS, Kind, campaign
 

@@ -10,10 +10,10 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from daq.contracts.errors import TraceError
+from daq.contracts.import_choice import Choice
 from daq.contracts.trace_limits import TraceLimits
-from daq.traces.kinds import Choice
 from extras.formats.bags.bag_process import import_bag_apart
-from extras.formats.bags.bag_storage import JOINT_STATE
+from extras.formats.bags.joint_messages import JOINT_STATE
 from extras.formats.bags.ros_bag import import_bag
 from tests.extras.formats.bags.test_ros_bag import bag, state
 
@@ -24,7 +24,7 @@ BOMB = bytes(256 * MIB)
 
 def test_a_trace_from_another_process_is_the_same_to_the_bit(tmp_path: Path) -> None:
     path = bag(tmp_path / "ä", [{"velocity": [0.1, 0.2]}] * 5, topics=("/left", "/right"))
-    choice = Choice("/right", ("lift",), "received", "A")
+    choice = Choice(topic="/right", joints=("lift",), received=True, drive_unit="A")
     assert import_bag_apart(path, SMALL, choice) == import_bag(path, SMALL, choice)
 
 

@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS
-from extras.formats.bags.bag_storage import JOINT_STATE
+from extras.formats.bags.joint_messages import JOINT_STATE
 from tests.extras.formats.bags.test_ros_bag import NS, START, bag, imported, state
 
 STORE: Any = get_typestore(Stores.ROS2_HUMBLE)
@@ -186,7 +186,7 @@ def test_a_stamp_that_comes_twice_and_positions_that_are_no_number_are_left_out(
     assert len(trace) == 20 - 1 - 3
     assert "no number, left out: 3, the first is message 11." in trace.record.notes
     assert "Messages with the time of the one before, left out: 1, the first is message 6." in trace.record.notes
-    assert len(imported(tmp_path / "a", times="received")) == 17
+    assert len(imported(tmp_path / "a", received=True)) == 17
 
 
 def test_a_topic_without_messages_leaves_no_choice(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from model.discrepancy.experiment_design.next_experiment import (
     most_information,
     rivals_of,
 )
-from model.discrepancy.explanation.note_words import note_words
+from model.discrepancy.explanation.notes import note_words
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.case import build_case

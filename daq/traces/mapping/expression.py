@@ -1,0 +1,123 @@
+"""What stands for a signal: a column, or a sum of columns times numbers, and for all joints at once a pattern with {}.
+
+q{}                          the columns q1, q2 …, one a joint
+0.125*pwm_percent            a column times a number
+0.25*a - 0.5*b + 1.57        a sum; + and - stand between spaces
+pos_left, pos_right          one after the other, joint by joint
+#                            the number of the row, from 0
+int16(load)                  a count of 16 bits, read as signed
+positions[2::7]              every seventh value, from the third on
+currents.csv:Joint_{}        columns of another file beside it, with as many rows
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq.contracts.documents import shown
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import Floats
+
+Columns = dict[str, Floats]
+"""Columns (n,) by name; a value that is no number is NaN."""
+SHOWN = 20
+"""Number of columns that an error lists."""
+_NUMBER = r"[0-9.]+(?:[eE][-+]?[0-9]+)?"
+_TERM = re.compile(rf"(-)?(?:({_NUMBER})\s*\*\s*)?(.+)", re.DOTALL)
+_EVERY = re.compile(r"(.+)\[(\d+|\{\})::(\d+)\]")
+
+
+@dataclass(frozen=True)
+class Table:
+    """The columns of a file, and how those of a file beside it are read."""
+
+    origin: str
+    columns: Columns
+    beside: Callable[[str], Columns] | None = None
+
+    def value(self, expression: str) -> Floats:
+        """The values (n,) of an expression without {}. Raises TraceError."""
+        text = expression.strip()
+        if text in self.columns:
+            return self.columns[text]
+        total: Floats | float = 0.0
+        parts = re.split(r"\s+([+-])\s+", text)
+        for sign, term in zip(["+", *parts[1::2]], parts[::2], strict=True):
+            total = total + (-1.0 if sign == "-" else 1.0) * self._term(term)
+        if isinstance(total, float):
+            raise TraceError(f"{self.origin}: {shown(text)} names no column; it has {self.listed()}")
+        return np.asarray(total, np.float64)
+
+    def _term(self, term: str) -> Floats | float:
+        if term in self.columns:
+            return self.columns[term]
+        if re.fullmatch(f"-?{_NUMBER}", term) and _is_number(term):
+            return float(term)
+        match = _TERM.fullmatch(term)
+        if match is None or not _is_number(match[2] or "1"):
+            raise TraceError(f"{self.origin}: {shown(term)} is no column, number, or number*column")
+        return (-1.0 if match[1] else 1.0) * float(match[2] or 1.0) * self._column(match[3])
+
+    def _column(self, name: str) -> Floats:
+        if name in self.columns:
+            return self.columns[name]
+        if name == "#":
+            return np.arange(max((len(c) for c in self.columns.values()), default=0), dtype=np.float64)
+        if name.startswith("int16(") and name.endswith(")"):
+            counts = self._column(name[6:-1])
+            return np.where(counts >= 2**15, counts - 2**16, counts)
+        if (every := _EVERY.fullmatch(name)) is not None and every[1] in self.columns and int(every[3]) > 0:
+            return self.columns[every[1]][int(every[2]) :: int(every[3])]
+        file, colon, there = name.partition(":")
+        if colon and self.beside is not None:
+            return Table(file, self.beside(file)).value(there)
+        raise TraceError(f"{self.origin}: column {shown(name)} is missing; it has {self.listed()}")
+
+    def listed(self) -> str:
+        """The names of the columns, for an error."""
+        return listed(tuple(self.columns))
+
+    def tokens(self, pattern: str) -> tuple[str, ...]:
+        """What {} stands for in the first name of a pattern, in the order of the columns; that of numbers if they are.
+
+        Raises TraceError where no column fits.
+        """
+        terms = [_TERM.fullmatch(term) for term in re.split(r"\s+[+-]\s+", pattern.strip())]
+        name = next((term[3] for term in terms if term is not None and "{}" in term[3]), pattern)
+        name = name.removeprefix("int16(").removesuffix(")") if name.startswith("int16(") else name
+        if (every := _EVERY.fullmatch(name)) is not None and every[2] == "{}":
+            return tuple(str(index) for index in range(int(every[3])))
+        file, colon, there = name.partition(":")
+        beside = colon and self.beside is not None and not any(colon in column for column in self.columns)
+        columns = self.beside(file) if beside and self.beside is not None else self.columns
+        found = tokens_in(there if beside else name, columns)
+        if not found:
+            raise TraceError(f"{self.origin}: no column is called {shown(name)}; it has {listed(tuple(columns))}")
+        return found
+
+
+def tokens_in(name: str, columns: Sequence[str] | Columns) -> tuple[str, ...]:
+    """What {} stands for in the columns that a name with it fits."""
+    before, _, after = name.partition("{}")
+    form = re.compile(re.escape(before) + r"(.+?)" + re.escape(after).replace(re.escape("{}"), r"\1"), re.DOTALL)
+    found = [match[1] for column in columns if (match := form.fullmatch(column)) is not None]
+    numbers = [token for token in found if token.isdecimal()]
+    return tuple(sorted(numbers, key=int)) if numbers else tuple(found)
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first of many names, for an error."""
+    told = ", ".join(shown(name).strip("'") for name in names[:SHOWN])
+    return told + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,164 @@
+"""A table's signals, joint by joint, in the units of a trace, by what a mapping says of each."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from daq.contracts.documents import shown
+from daq.contracts.errors import TraceError
+from daq.contracts.trace import Floats
+from daq.traces.mapping.expression import Table
+from daq.traces.mapping.units import DRIVES, NONE, factor, known_units, unit_in
+
+BY_JOINT = ("position", "set_point", "velocity", "drive")
+"""Signals that each joint may have; the position may be left out where there is a velocity."""
+SIGNALS = ("time", *BY_JOINT)
+KEY = re.compile(rf"time|({'|'.join(BY_JOINT)})(?:_([1-9][0-9]?))?")
+"""What a mapping may speak of: a signal of all joints, or of the joint with a number."""
+_IN = re.compile(r"(?:(.*?)\s+)?in\s+(range of .+|\S+)", re.DOTALL)
+GRIPPER = "gripper"
+"""The joint whose range a calibration counts from 0, and not from -100, to 100."""
+COUNTS = 4095
+"""Counts of a turn, in lerobot's degrees and ranges of a servo."""
+
+
+@dataclass(frozen=True)
+class Said:
+    """One entry of a mapping: an expression, and a unit; either may be left open."""
+
+    expression: str
+    unit: str | None
+
+    def __str__(self) -> str:
+        return self.expression + ("" if self.unit is None else f" in {self.unit}")
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Signals (n, j) by name with `time` (n,), joints by token (what {} stands for, else numbers from 1), the drive's
+    unit, and the entries that were used."""
+
+    tokens: tuple[str, ...]
+    columns: dict[str, Floats]
+    drive_unit: str | None
+    used: dict[str, str]
+
+
+def said(key: str, text: str, origin: str) -> Said:
+    """An entry, such as `q{} in deg`. Raises TraceError for another key or unit."""
+    match = KEY.fullmatch(key)
+    if match is None:
+        keys = ", ".join(("time", *BY_JOINT))
+        raise TraceError(f"{origin}: {shown(key)} cannot be mapped; these can: {keys}, and position_1 and so on")
+    found = _IN.fullmatch(text.strip())
+    if found is None:
+        return Said(text.strip(), None)
+    signal, unit = match[1] or "time", found[2]
+    if unit in known_units(signal) or (signal == "drive" and unit == NONE):
+        return Said((found[1] or "").strip(), unit)
+    if unit.startswith("range of ") and signal in ("position", "set_point"):
+        return Said((found[1] or "").strip(), unit)
+    raise TraceError(f"{origin}: {key}: unit {shown(unit)} is not known; write {', '.join(known_units(signal))}")
+
+
+def signals_of(table: Table, entries: Mapping[str, Said], beside: Path) -> Signals:
+    """The signals of a table by a mapping of every one that is to be taken. beside: the table's file.
+
+    Raises TraceError for a column, a unit or a joint that is missing.
+    """
+    if "time" not in entries:
+        raise TraceError(f"{table.origin}: nothing says which column is the time; it has {table.listed()}")
+    time, unit = entries["time"], _unit(table, "time", entries["time"])
+    columns = {"time": table.value(time.expression) * factor("time", unit)}
+    used = {"time": str(Said(time.expression, unit))}
+    tokens: tuple[str, ...] = ()
+    drive_unit = None
+    for signal in BY_JOINT:
+        items = _items(table, signal, entries)
+        if not items:
+            continue
+        if not tokens:
+            tokens = tuple(items)
+        elif set(items) >= set(tokens):
+            items = {token: items[token] for token in tokens}
+        elif len(items) == len(tokens) and all(token.isdecimal() for token in (*items, *tokens)):
+            items = dict(zip(tokens, items.values(), strict=True))
+        else:
+            lacking = next((token for token in tokens if token not in items), tokens[0])
+            raise TraceError(f"{table.origin}: {signal}: has no column of joint {shown(lacking)}, which others have")
+        values, units = [], []
+        for token, entry in items.items():
+            unit = _unit(table, signal, entry)
+            units.append(unit)
+            values.append(table.value(entry.expression) * _factor(signal, unit, token, beside))
+        if signal == "drive":
+            bases = {DRIVES[unit][0] for unit in units}
+            if len(bases) > 1:
+                raise TraceError(f"{table.origin}: drive: units {' and '.join(sorted(bases))} differ; one is needed")
+            drive_unit = bases.pop()
+        if "#" in time.expression:  # it counts the rows of the longest column that there is
+            columns["time"] = columns["time"][: len(values[0])]
+        lengths = {len(each) for each in (columns["time"], *values)}
+        if len(lengths) > 1:
+            raise TraceError(f"{table.origin}: {signal}: has {max(lengths)} and {min(lengths)} values; times too count")
+        columns[signal] = np.stack(values, axis=1)
+        used |= {key: str(Said(e.expression, _unit(table, signal, e))) for key, e in _of(signal, entries).items()}
+    if not {"position", "velocity"} & set(columns):
+        raise TraceError(f"{table.origin}: nothing says which columns are positions; it has {table.listed()}")
+    return Signals(tokens, columns, drive_unit, used)
+
+
+def _of(signal: str, entries: Mapping[str, Said]) -> dict[str, Said]:
+    """The entries of a signal by key, without what leaves it out."""
+    own = {key: entry for key, entry in entries.items() if (m := KEY.fullmatch(key)) and (m[1] or "time") == signal}
+    return {key: entry for key, entry in own.items() if NONE not in (entry.unit, entry.expression)}
+
+
+def _items(table: Table, signal: str, entries: Mapping[str, Said]) -> dict[str, Said]:
+    """Each joint's entry, by its token."""
+    own = _of(signal, entries)
+    items: dict[str, Said] = {}
+    whole = own.pop(signal, None)
+    if whole is not None and "{}" in whole.expression:
+        items = {t: Said(whole.expression.replace("{}", t), whole.unit) for t in table.tokens(whole.expression)}
+    elif whole is not None:
+        parts = [whole.expression] if whole.expression in table.columns else whole.expression.split(", ")
+        items = {str(number): Said(part.strip(), whole.unit) for number, part in enumerate(parts, start=1)}
+    tokens = list(items)
+    for key, entry in sorted(own.items(), key=lambda each: int(each[0].rpartition("_")[2])):
+        number = int(key.rpartition("_")[2])
+        items[tokens[number - 1] if number <= len(tokens) else str(number)] = entry
+    return items
+
+
+def _unit(table: Table, signal: str, entry: Said) -> str:
+    """The unit that is said, or that the column's name states, or that of a trace. Raises TraceError for a drive
+    without one."""
+    unit = entry.unit or unit_in(signal, entry.expression)
+    if unit is None and signal == "drive":
+        raise TraceError(
+            f"{table.origin}: drive: its unit is not stated; say --drive-unit N·m, N, A or V, or none to leave it out"
+        )
+    return unit or known_units(signal)[0]
+
+
+def _factor(signal: str, unit: str, token: str, beside: Path) -> float:
+    if not unit.startswith("range of "):
+        return factor(signal, unit)
+    file = beside.parent / unit.removeprefix("range of ")
+    try:
+        known: Any = json.loads(file.read_text("utf-8"))[token]
+        span = float(known["range_max"]) - float(known["range_min"])
+    except (OSError, ValueError) as error:
+        raise TraceError(f"{file}: cannot be read as a calibration of lerobot: {error}") from error
+    except (KeyError, TypeError) as error:
+        raise TraceError(f"{file}: has no range_min and range_max of joint {shown(token)}") from error
+    return span / (100.0 if token == GRIPPER else 200.0) * 2 * math.pi / COUNTS

@@ -1,0 +1,68 @@
+"""Units in which other programs write signals, and what one of each is in the unit of a trace."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from daq.contracts.errors import TraceError
+
+TURN = 2 * math.pi
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6, "ns": 1e-9},
+    "position": {"rad": 1.0, "deg": TURN / 360, "°": TURN / 360, "rev": TURN, "turn": TURN, "turns": TURN}
+    | {"m": 1.0, "cm": 0.01, "mm": 1e-3, "inch": 0.0254},
+    "velocity": {"rad/s": 1.0, "deg/s": TURN / 360, "°/s": TURN / 360, "rpm": TURN / 60, "rev/s": TURN, "turns/s": TURN}
+    | {"m/s": 1.0, "cm/s": 0.01, "mm/s": 1e-3},
+}
+"""By signal. A set point has the units of a position."""
+UNITS["set_point"] = UNITS["position"]
+DRIVES: dict[str, tuple[str, float]] = {
+    "V": ("V", 1.0),
+    "mV": ("V", 1e-3),
+    "A": ("A", 1.0),
+    "mA": ("A", 1e-3),
+    "N·m": ("N·m", 1.0),
+    "Nm": ("N·m", 1.0),
+    "N.m": ("N·m", 1.0),
+    "mNm": ("N·m", 1e-3),
+    "Ncm": ("N·m", 0.01),
+    "kgf·cm": ("N·m", 0.0980665),
+    "lbf·in": ("N·m", 0.1129848290276167),
+    "N": ("N", 1.0),
+    "kN": ("N", 1e3),
+    "lbf": ("N", 4.4482216152605),
+}
+"""Units of a drive: the one that a trace has in its place, and what one of it is in that."""
+NONE = "none"
+"""In place of a drive's unit: the drive is left out."""
+_AT_END = re.compile(r".*[\[(_ ]([^\[\](_ )]+)[\])]?")
+
+
+def drive_of(unit: str, origin: str) -> str:
+    """What a trace calls a unit of its drive, however it is typed; `none` as it is. Raises TraceError."""
+    typed = {name: base for name, (base, size) in DRIVES.items() if size == 1.0} | {NONE: NONE}
+    if unit not in typed:
+        raise TraceError(f"{origin}: --drive-unit {unit}: write {', '.join(dict.fromkeys(typed.values()))}")
+    return typed[unit]
+
+
+def known_units(signal: str) -> tuple[str, ...]:
+    """Units that a signal may be stated in."""
+    return tuple(DRIVES if signal == "drive" else UNITS[signal])
+
+
+def factor(signal: str, unit: str) -> float:
+    """What one of a unit is in the unit of a trace."""
+    return DRIVES[unit][1] if signal == "drive" else UNITS[signal][unit]
+
+
+def unit_in(signal: str, name: str) -> str | None:
+    """The unit that a column's name ends with, as in `time [ms]` and `q1_deg`; None where it states none."""
+    text = name.replace("{}", "").strip()
+    text = re.sub(r"_(rad|deg|m|mm)_s$", r" \1/s", text)
+    found = _AT_END.fullmatch(f" {text}")
+    if found is None:
+        return None
+    by_letters = {unit.lower(): unit for unit in reversed(known_units(signal)) if len(unit) > 1}
+    return found[1] if found[1] in known_units(signal) else by_letters.get(found[1].lower())

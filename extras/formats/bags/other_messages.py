@@ -1,0 +1,52 @@
+"""Messages of an MCAP file in JSON or protobuf, as a table: a row each, a column for every number in them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from daq.contracts.errors import TraceError
+from daq.contracts.extras import require_extra
+from daq.traces.mapping.expression import Columns
+from extras.formats.bags.bag_storage import LARGEST_MESSAGE, Contents
+from extras.formats.tables.flat import columns_of
+
+
+def message_columns(origin: str, found: Contents, topic: str) -> Columns:
+    """The columns of a topic's messages, and `log_time`, in s since 1970. Raises TraceError, MissingExtraError."""
+    messages = found.messages[topic]
+    decode: Callable[[bytes], Any] = json.loads
+    if found.encoding(topic) == "protobuf":
+        decode = _protobuf(origin, *found.schemas[topic])
+    rows = []
+    for number, (_, raw) in enumerate(messages, start=1):
+        try:
+            rows.append(decode(raw[:LARGEST_MESSAGE]))
+        except Exception as error:  # whatever a damaged message makes a decoder raise
+            raise TraceError(f"{origin}: message {number}: {' '.join(str(error).split())[:200]}") from error
+    return {"log_time": np.array([received for received, _ in messages]) / 1e9} | columns_of(rows)
+
+
+def _protobuf(origin: str, name: str, schema: bytes) -> Callable[[bytes], Any]:
+    """What decodes messages by the descriptors that the file holds. Raises TraceError, MissingExtraError."""
+    require_extra("ros", f"{origin}: messages of protobuf", "google")
+    from google.protobuf import descriptor_pb2, descriptor_pool, json_format, message_factory
+
+    try:
+        files = descriptor_pb2.FileDescriptorSet.FromString(schema)
+        pool = descriptor_pool.DescriptorPool()
+        for file in files.file:
+            pool.Add(file)
+        kind = message_factory.GetMessageClass(pool.FindMessageTypeByName(name))
+    except Exception as error:  # whatever a damaged schema makes protobuf raise
+        raise TraceError(f"{origin}: its schema cannot be read: {' '.join(str(error).split())[:200]}") from error
+
+    def decode(raw: bytes) -> Any:
+        return json_format.MessageToDict(
+            kind.FromString(raw), preserving_proto_field_name=True, always_print_fields_with_no_presence=True
+        )
+
+    return decode
