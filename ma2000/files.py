@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, cast
 
 from pydantic import TypeAdapter, ValidationError
 
 from daq.contracts.errors import SpecError, TraceError
+from daq.contracts.import_choice import Choice
 from daq.contracts.trace import Trace
 from daq.traces import catalogue, disk, store
 from daq.traces.catalogue import TraceSummary, summary_of
@@ -17,9 +19,19 @@ from daq.traces.tables import export_table
 from firmware_protocol.invalid import first_invalid
 
 
-def read_trace(path: Path | str) -> Trace:
-    """The trace in a file: MCAP, or CSV as docs/own-machine.md describes it. Raises TraceError, SpecError."""
-    return open_trace(Path(path))
+def read_trace(path: Path | str, **choice: Any) -> Trace:
+    """The trace in a file: MCAP, CSV and other text, Parquet, a data set of lerobot, .mat, .npz, .json, a bag of ROS.
+
+    Of a file of another program a choice says what is taken, and goes before the TOML beside it:
+    `map={"position": "q{} in deg"}`, `where="episode_index=3"`, `joints=("pan", "lift")`, `drive_unit="A"`,
+    `as_guessed=True`; of a bag `topic`, `set_points`, `received` (`daq traces import --help` explains each).
+
+    Raises TraceError, which says what was found where a choice is needed; SpecError for a choice that there is not.
+    """
+    known = [each.name for each in fields(Choice)]
+    if unknown := sorted(set(choice) - set(known)):
+        raise SpecError(f"read_trace: {unknown[0]}: a choice is one of {', '.join(known)}")
+    return open_trace(Path(path), choice=Choice(**choice) if choice else None)
 
 
 def read_traces(folder: Path | str, pattern: str = "*.mcap", **query: object) -> tuple[Trace, ...]:
@@ -43,7 +55,7 @@ def read_traces(folder: Path | str, pattern: str = "*.mcap", **query: object) ->
     paths = _sorted(folder.glob(pattern))
     if query:
         paths = [path for path in paths if all(getattr(summary_of(path), key) == query[key] for key in query)]
-    return tuple(map(read_trace, paths))
+    return tuple(open_trace(path) for path in paths)
 
 
 def list_traces(folder: Path | str) -> tuple[TraceSummary, ...]:

@@ -1,13 +1,12 @@
-"""Records of public repositories as the CSV files that the product imports: columns are renamed, scaled, selected."""
+"""Records of public repositories, read by the product's own import."""
 
 from __future__ import annotations
 
-import io
-import json
-import re
 import subprocess
 from collections.abc import Mapping, Sequence
+from math import isinf
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from benchmarks.real_machines.rigs import Record, Rig, Torque
 from daq.contracts.machine import load_machine
+from ma2000 import read_trace
 
 Floats = NDArray[np.float64]
 Columns = dict[str, Floats]
@@ -50,20 +50,22 @@ def content(repository: Path, commit: str, path: str) -> bytes:
 
 
 def read_columns(rig: Rig, record: Record, folder: Path) -> Columns:
-    """`time` and each joint's signals, by the names of the product's CSV files, in SI units."""
+    """`time` and each joint's signals as the product imports them, by the names of its CSV files, in SI units."""
     repository = find_repository(folder, rig.repository)
-    paths = [f"{rig.folder}/{path}".lstrip("/") for path in record.files]
-    tables = [_parse(path, content(repository, rig.commit, path)) for path in paths]
-    for part in record.part.split(".") if record.part else ():
-        tables = [table[int(part) if part.isdigit() else part] for table in tables]
-    columns = {"time": _sum(rig.columns["time"][0], tables)}
-    for signal, items in rig.columns.items():
-        if signal != "time":
-            columns |= {f"{signal}_{j}": _sum(item, tables) for j, item in enumerate(items, start=1)}
-    kept = (columns["time"] >= record.start) & (columns["time"] < record.end)
-    for values in columns.values():  # rows without a reading
-        kept &= np.isfinite(values)
-    return {name: values[kept] for name, values in columns.items()}
+    mapping = {signal: text.replace("{part}", record.part) for signal, text in rig.map.items()}
+    where = "..".join("" if isinf(edge) else repr(edge) for edge in (record.start, record.end))
+    with TemporaryDirectory() as place:
+        files = [Path(place, Path(path).name) for path in record.files]
+        for file, path in zip(files, record.files, strict=True):
+            file.write_bytes(content(repository, rig.commit, f"{rig.folder}/{path}".lstrip("/")))
+        unit = rig.drive_unit if any(signal.startswith("drive") for signal in mapping) else None
+        trace = read_trace(files[0], map=mapping, where=None if where == ".." else f"time={where}", drive_unit=unit)
+    columns = {"time": trace.time}
+    for signal in ("set_point", "position", "drive", "velocity"):
+        if any(key.rstrip("_0123456789") == signal for key in mapping):  # no position that was integrated
+            values = getattr(trace, signal)
+            columns |= {f"{signal}_{joint}": values[:, trace.column(joint)] for joint in trace.joints}
+    return columns
 
 
 def write_record(columns: Columns, path: Path, drive_unit: str) -> Path:
@@ -109,63 +111,3 @@ def write_machine(source: Path, numbers: Mapping[str, float], removed: Sequence[
 def machine_data(source: Path) -> dict[str, Any]:
     """A machine file in full, as plain data."""
     return load_machine(str(source)).model_dump(mode="json", exclude_none=True)
-
-
-def _parse(path: str, data: bytes) -> Any:
-    kind = path.rpartition(".")[2]
-    if kind == "json":
-        return json.loads(data)
-    if kind == "npz":
-        return np.load(io.BytesIO(data))
-    if kind == "mat":
-        from scipy.io import loadmat
-
-        return loadmat(io.BytesIO(data), squeeze_me=True, struct_as_record=False)  # type: ignore[arg-type]
-    if kind == "parquet":
-        import pyarrow.parquet
-
-        return pyarrow.parquet.read_table(io.BytesIO(data)).to_pydict()
-    lines = [line for line in data.decode("utf-8-sig").splitlines() if not line.lstrip('"').startswith("#")]
-    comma = max(",;\t", key=lines[0].count)
-    head = lines[0].split(comma)
-    if re.fullmatch(r"[-+]?[.\d][-+.e\d]*", head[0]):  # no line of names: columns have their numbers
-        head, lines = [str(index) for index in range(len(head))], ["", *lines]
-    table = np.genfromtxt(lines[1:], delimiter=comma, ndmin=2)
-    return {name: table[:, index] for index, name in enumerate(head)}
-
-
-def _sum(item: str | list[Any], tables: Sequence[Any]) -> Floats:
-    """A column, or the sum of [factor, key] and [offset]."""
-    if isinstance(item, str):
-        return _column(item, tables)
-    total: Any = 0.0
-    for factor, *rest in item:
-        column: Any = _column(rest[0], tables) if rest else 1.0
-        if rest[1:] == ["int16"]:
-            column = np.where(column >= 2**15, column - 2**16, column)
-        total = total + factor * column
-    return np.asarray(total, dtype=np.float64)
-
-
-def _column(key: str, tables: Sequence[Any]) -> Floats:
-    number, colon, name = key.partition(":")
-    found = tables[int(number)] if colon and number.isdigit() else tables[0]
-    name = name if colon and number.isdigit() else key
-    if name == "#":
-        rows = max(len(each) for each in found.values() if not isinstance(each, str))
-        return np.arange(rows, dtype=np.float64)
-    if isinstance(found, Mapping) and name in found:
-        return np.asarray(found[name], dtype=np.float64).ravel()
-    way = re.fullmatch(r"(.*?)(?:\[(\d+)(?:::(\d+))?\])?", name)
-    assert way is not None
-    for part in [way[1]] if isinstance(found, Mapping) and way[1] in found else way[1].split("."):
-        if isinstance(found, list):
-            found = [entry[part] for entry in found]
-        else:
-            found = getattr(found, part) if hasattr(found, part) else found[part]
-    values = np.asarray(found, dtype=np.float64)
-    if way[2] is None:
-        return values.ravel()
-    if way[3] is not None:
-        return values[int(way[2]) :: int(way[3])]
-    return values[:, int(way[2])] if values.shape[0] > values.shape[1] else values[int(way[2])]

@@ -38,8 +38,8 @@ class Question:
 
 @dataclass(frozen=True)
 class Record:
-    """Files of one record, below the rig's folder, and the stretch of it, in s of its own clock. part: of a JSON file
-    with many records, the way to this one, such as `data.3`."""
+    """Files of one record, below the rig's folder, and the stretch of it, in s of its own clock. part: what
+    {part} of the mapping stands for: of a JSON file with many records, the way to this one, such as `data.3`."""
 
     files: tuple[str, ...]
     start: float
@@ -72,7 +72,7 @@ class Alteration:
 
 @dataclass(frozen=True)
 class Rig:
-    """One real machine. columns: by signal, and joint by joint, a key or the terms of a sum (`rigs.toml`)."""
+    """One real machine. map: by signal, what the import is told (`rigs.toml`)."""
 
     name: str
     title: str
@@ -85,7 +85,7 @@ class Rig:
     folder: str
     fitted: tuple[Record, ...]
     held_out: tuple[Record, ...]
-    columns: Mapping[str, tuple[Any, ...]]
+    map: Mapping[str, str]
     questions: tuple[Question, ...]
     plausible: frozenset[str]
     alteration: Alteration
@@ -98,9 +98,6 @@ def load_rigs(path: Path = HERE / "rigs.toml") -> tuple[Rig, ...]:
 
 
 def _rig(entry: Mapping[str, Any], folder: Path) -> Rig:
-    signals = {name: terms for name, terms in entry["columns"].items() if name != "time"}
-    joints = entry.get("joints", max(len(terms) for terms in signals.values()))
-    columns = {name: _by_joint(terms, joints) for name, terms in signals.items()}
     altered = entry["alteration"]
     return Rig(
         entry["name"],
@@ -110,11 +107,11 @@ def _rig(entry: Mapping[str, Any], folder: Path) -> Rig:
         entry["licence"],
         folder / entry["machine"],
         entry["drive_unit"],
-        joints,
+        entry.get("joints", 1),
         entry.get("folder", ""),
         _records(entry["fitted"]),
         _records(entry["held_out"]),
-        {"time": (entry["columns"]["time"],), **columns},
+        entry["map"],
         tuple(_question(each) for each in entry["question"]),
         frozenset(entry["plausible"]),
         Alteration(
@@ -126,19 +123,6 @@ def _rig(entry: Mapping[str, Any], folder: Path) -> Rig:
         ),
         entry.get("offset", True),
     )
-
-
-def _by_joint(terms: Sequence[Any], joints: int) -> tuple[Any, ...]:
-    """One item a joint; a single one is a pattern in which `{i}` counts joints from 0."""
-    if len(terms) == joints:
-        return tuple(terms)
-    return tuple(_numbered(terms[0], index) for index in range(joints))
-
-
-def _numbered(item: Any, index: int) -> Any:
-    if isinstance(item, str):
-        return item.replace("{i}", str(index))
-    return [_numbered(part, index) for part in item] if isinstance(item, list) else item
 
 
 def _records(entries: Sequence[Mapping[str, Any]]) -> tuple[Record, ...]:

@@ -23,12 +23,16 @@ ALIKE = ("drive", "friction", "sensor")
 """Parts that a joint may take over from another."""
 
 
-def machine_text(machine: Machine, comments: Mapping[str, Sequence[str]] | None = None) -> str:
+def machine_text(
+    machine: Machine, comments: Mapping[str, Sequence[str]] | None = None, drives: Mapping[int, str] | None = None
+) -> str:
     """A machine file: what is the default is left out, and the source of numbers stands behind them.
 
     comments: lines to be kept, by the part of the file that they stand before: `""` for its top, `controller`,
-    `limits`, or `joints.1` and so on.
+    `limits`, or `joints.1` and so on. drives: names of the library, by joint (from 1), that are written in place of its
+    drive, friction and sensor; if all joints have one, the controller is that of the servos.
     """
+    named = drives or {}
     kept = {} if comments is None else comments
     data = machine.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     joints, limits = data.pop("joints"), data.pop("limits", None)
@@ -42,10 +46,12 @@ def machine_text(machine: Machine, comments: Mapping[str, Sequence[str]] | None 
     ):
         if data.get(name) == default:
             del data[name]
-    controller = data.pop("controller", None)
+    controller = data.pop("controller", None) if set(named) != set(range(1, len(joints) + 1)) else None
     top = kept.get("", ())
     lines = [*top, *[""][: len(top)], *(line for key, value in data.items() for line in _entry(key, value))]
-    if notes:
+    if notes and "\n" not in notes and len(notes) < WIDTH - len("notes = ''"):
+        lines.append(f"notes = {toml_value(notes)}")
+    elif notes:
         lines += ['notes = """', *(toml_value(line)[1:-1] for line in notes.split("\n"))]
         lines[-1] += '"""'
     if controller is not None:
@@ -54,6 +60,8 @@ def machine_text(machine: Machine, comments: Mapping[str, Sequence[str]] | None 
         table = ["", "[limits]", *(line for key, value in limits.items() for line in _entry(key, value))]
         lines += _after(table, kept.get("limits", ()))
     for k, joint in enumerate(joints):
+        if k + 1 in named:
+            joint |= {"drive": named[k + 1], "friction": {}, "sensor": {}}
         alike = next((one for one in joints[:k] if all(one.get(part) == joint.get(part) for part in ALIKE)), None)
         lines += _after(["", "[[joints]]", *_joint(joint, alike)], kept.get(f"joints.{k + 1}", ()))
     return "\n".join(lines) + "\n"
@@ -78,7 +86,9 @@ def _joint(joint: dict[str, Any], alike: dict[str, Any] | None) -> list[str]:
     own = [f"name = {toml_value(joint['name'])}"]
     if joint["kind"] != "revolute":
         own.append(f"kind = {toml_value(joint['kind'])}")
-    if alike is None:
+    if isinstance(joint["drive"], str):
+        own.append(f"drive = {toml_value(joint['drive'])}")
+    elif alike is None:
         parts |= {"drive": _drive(joint["drive"]), "friction": joint.get("friction", {})}
         parts["sensor"] = {k: v for k, v in joint.get("sensor", {}).items() if not _is_default(v)}
     else:

@@ -14,6 +14,8 @@ from daq.contracts.errors import SpecError
 from daq.contracts.toml_places import Path, Places, places_of
 from daq.contracts.written_numbers import is_number
 
+PARTS = ("drive", "friction", "sensor", "servo")
+
 
 @dataclass(frozen=True)
 class LibraryDrive:
@@ -29,6 +31,11 @@ class LibraryDrive:
     friction: Mapping[str, Any]
     sensor: Mapping[str, Any]
     servo: Mapping[str, Any]
+
+    @property
+    def parts(self) -> dict[str, Mapping[str, Any]]:
+        """The parts that have numbers, by name."""
+        return {name: part for name in PARTS if (part := getattr(self, name))}
 
 
 def library_drive(name: str) -> LibraryDrive:

@@ -33,6 +33,9 @@ TRACE_FORMAT = 2
 """Version of the trace's metadata and topics; a reader refuses newer ones. Format 1 had events and joint states in
 JSON."""
 
+BY_JOINT = ("position", "set_point", "error", "drive", "velocity", "power_raw")
+"""Signals of a trace with a column for each joint."""
+
 EventKind = Literal[
     "start",
     "ramp_start",
@@ -209,7 +212,7 @@ class Trace(WithArrays):
         count = len(self.time)
         if not self.joints or len(set(self.joints)) != len(self.joints):
             raise TraceError(f"{self.called}: joints {self.joints} are not one or more different joints")
-        for name in ("position", "set_point", "error", "drive", "velocity", "power_raw"):
+        for name in BY_JOINT:
             signal = getattr(self, name)
             if signal is not None and signal.shape != (count, len(self.joints)):
                 wanted = (count, len(self.joints))

@@ -17,7 +17,7 @@ UNSTATED = "source not stated"
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _WRITTEN = re.compile(
     rf"(?P<value>{_NUMBER})\s*(?:(?:±|\+/?-)\s*(?P<deviation>{_NUMBER})\s*(?P<percent>%(?=\s*[^\s,\[%]))?)?"
-    rf"\s*(?P<unit>[^\s,\[±+-][^,\[±]*?)?\s*(?:(?:±|\+/?-)\s*(?P<share>{_NUMBER})\s*%)?"
+    rf"\s*(?P<unit>[^\s,\[±+-][^,\[±]*?)?\s*(?:(?:±|\+/?-)\s*(?P<share>{_NUMBER})\s*(?P<of>%|[^\s,\[%][^,\[%]*?))?"
     rf"\s*(?:\[\s*(?P<low>{_NUMBER})?\s*to\s*(?P<high>{_NUMBER})?\s*\])?\s*(?:,\s*(?P<source>.*?))?\s*",
     re.DOTALL,
 )
@@ -64,11 +64,12 @@ def read_number(written: str | float, comment: str, allowed: Sequence[str]) -> d
     for side in ("low", "high"):
         if match[side] is not None:
             found[side] = float(match[side])
-    if match["deviation"] is not None:
-        found["deviation"] = float(match["deviation"]) * (abs(found["value"]) / 100 if match["percent"] else 1.0)
-    if match["share"] is not None:
-        found["deviation"] = abs(found["value"]) * float(match["share"]) / 100
     found["unit"] = (match["unit"] or "").strip()
+    share = match["percent"] is not None or match["of"] == "%"
+    if match["of"] not in (None, "%", found["unit"]):
+        raise ValueError(f"found {written!r:.80}: the deviation's unit must be {found['unit']} or %")
+    if (deviation := match["deviation"] or match["share"]) is not None:
+        found["deviation"] = _short(abs(found["value"]) * float(deviation) / 100) if share else float(deviation)
     if not found["unit"]:
         if len(allowed) != 1:
             raise ValueError(f"found {written!r:.80}, which has no unit: write {' or '.join(allowed)}")
@@ -116,8 +117,8 @@ def _inverted(number: Mapping[str, Any], unit: str, factor: float) -> dict[str, 
 
 def _short(value: float) -> float:
     """The number without the digits that only the conversion has added."""
-    rounded = float(f"{value:.15g}")
-    return rounded if abs(rounded - value) <= 4e-16 * abs(value) else value
+    rounded = float(f"{value:.12g}")
+    return rounded if abs(rounded - value) <= 5e-16 * abs(value) else value
 
 
 @cache

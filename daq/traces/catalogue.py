@@ -119,6 +119,8 @@ def find_trace(folder: Path, wanted: str, limits: TraceLimits = DEFAULT_TRACE_LI
         for summary in summaries
         if wanted and (summary.path.name.startswith(wanted) or (summary.trace_id or "").startswith(wanted))
     ]
+    if not found and os.path.isdir(wanted):  # a bag, or a data set of lerobot
+        return Path(wanted)
     if not found:
         raise TraceError(
             f"trace {wanted!r}: is not a file, and the folder {folder} has none with such a number or name"

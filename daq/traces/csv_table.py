@@ -82,6 +82,8 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
     data = read_file(path, limits.file_bytes, "file_bytes")
     description, described = Description.read(path, limits)
     choice = description.over(choice or Choice())
+    if choice.topic or choice.set_points or choice.received:
+        raise TraceError(f"{path}: topics and times of reception are for bags; this is none")
     whole, said = _whole_rows(data)
     if choice.map or choice.where or not _has_own_names(*head_of(path, whole)):
         return _noted(mapped_trace(path, text_table(path, whole, limits), choice, description, limits), said)
@@ -137,9 +139,7 @@ class _Own:
         if unit == NONE:
             signals.pop("drive", None)
         elif unit is not None:
-            update["drive_unit"], size = drive_of(unit, str(self.path))
-            if "drive" in signals and size != 1.0:
-                signals["drive"] = signals["drive"] * size
+            update["drive_unit"] = drive_of(unit, str(self.path))
         return update
 
 

@@ -25,11 +25,11 @@ from daq.contracts.refused import refused_words
 from daq.contracts.trace import EARLIEST, LATEST, Floats, Moment, TraceRecord
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import disk
+from daq.traces.mapping.units import drive_of
 from daq.traces.recording import software
 
 EARLY = 0.9
 """Share of a control period after which a sample can come, its clock's jitter included."""
-DriveUnit = Literal["V", "A", "N·m", "N"]
 MAP = "[map]"
 """The table of a mapping, which `remember` writes at the end of the file."""
 
@@ -48,7 +48,7 @@ class Description(FrozenRecord):
     source: Literal["mock", "real", "imported"] = "imported"
     machine: str | None = None
     robot: str | None = None
-    drive_unit: DriveUnit | None = None
+    drive_unit: Literal["V", "A", "N·m", "N", "none"] | None = None
     period: Annotated[float, Field(gt=0)] | None = None
     created: Moment | None = None
     outcome: Outcome | None = None
@@ -138,7 +138,7 @@ class Description(FrozenRecord):
             machine=machine,
             operator=self.operator,
             period=self.period,
-            drive_unit=self.drive_unit,
+            drive_unit=None if self.drive_unit == "none" else self.drive_unit,
             notes=self.notes,
             outcome=self.outcome,
         )
@@ -181,7 +181,7 @@ def remember(path: Path, choice: Choice, used: Mapping[str, str]) -> Path:
     values: dict[str, Any] = {"topic": choice.topic, "set_points": choice.set_points, "where": choice.where}
     values |= {"joints": None if choice.joints is None else list(choice.joints)}
     values |= {"times": "received" if choice.received else None}
-    values |= {} if used else {"drive_unit": choice.drive_unit if choice.drive_unit != "none" else None}
+    values |= {} if used or choice.drive_unit is None else {"drive_unit": drive_of(choice.drive_unit, str(path))}
     lines = {key: f"{key} = {toml_text(value)}\n" for key, value in values.items() if value is not None}
     before = text.partition(f"\n{MAP}\n")[0] if f"\n{MAP}\n" in f"\n{text}" else text
     for key in lines:

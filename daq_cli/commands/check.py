@@ -16,7 +16,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.models.record_doubts import end_if_doubted, print_record
+from daq_cli.models.record_doubts import end_if_doubted, print_fields, print_record, say_what_is_lacking
 from daq_cli.robot.access import robot_of
 
 app = typer.Typer(add_completion=False)
@@ -32,18 +32,29 @@ def check(
     folder: TraceFolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Check units, signs, columns, times and readings of traces. The exit code is 2 where any is doubted."""
+    """Show what traces hold and lack, and check units, signs, columns, times and readings. The exit code is 2 where
+    any is doubted."""
     from model.machine_model.model import base_model
     from model.record_check.check import check_records
+    from model.record_check.fields import field_reports
 
     robot = robot_of(context)
     read = read_traces(robot, folder, traces)
     of = base_model(machine_of(read, robot, traces)) if model is None else read_model(model)
+    say_what_is_lacking(of, read)
     check_made_for(of.machine, read, traces)
-    found = check_records(of, read)
+    found, fields = check_records(of, read), field_reports(of, read)
     if json:
-        print_json([finding.model_dump(mode="json") for finding in found])
-    elif found:
+        print_json(
+            {
+                "fields": [one.model_dump(mode="json") for one in fields],
+                "findings": [one.model_dump(mode="json") for one in found],
+            }
+        )
+        end_if_doubted(found)
+        return
+    print_fields(fields)
+    if found:
         print_record(found)
     else:
         print(f"nothing is doubted in {len(read)} trace{'' if len(read) == 1 else 's'}")

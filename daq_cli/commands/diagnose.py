@@ -33,7 +33,7 @@ from daq_cli.models.model_input import (
     read_model,
     read_traces,
 )
-from daq_cli.models.record_doubts import DespiteDoubtsOption, end_if_doubted
+from daq_cli.models.record_doubts import DespiteDoubtsOption, end_if_doubted, say_what_is_lacking
 from daq_cli.models.service_jobs import NamedTraces, service_jobs
 from daq_cli.robot.access import robot_of
 from daq_cli.robot.operations import RobotAccess
@@ -114,6 +114,8 @@ def diagnose(
     )
     if method is None and (acquire or next_file is not None) and simulated:
         options = options.model_copy(update={"method": Comparison.OUTPUT_ERROR.value})  # it alone asks for experiments
+    if not json:
+        say_what_is_lacking(begin, [*fitted_to, *held])
     check_made_for(begin.machine, [*fitted_to, *held], [*traces, *(holdout or [])])
     failure: DaqError | None = None
 

@@ -217,11 +217,6 @@ def import_(
     names = None if joints is None else tuple(name.strip() for name in joints.split(","))
     choice = Choice(topic, set_points, names, received, drive_unit, _mapping(mapping or []), where, as_guessed)
     made = robot.import_trace(file, folder, choice)
-    if choice != Choice():
-        from daq.traces.description import remember
-
-        kept = remember(file, choice, made.columns)
-        typer.echo(printable(f"kept in {kept}: the file is read so from now on"), err=True)
     if json:
         print_json({"trace": made.trace, "made_from": file, "file": made.file, "server": robot.call.server})
     else:
@@ -230,6 +225,11 @@ def import_(
             typer.echo(printable(made.notes), err=True)
         if robot.call.server is None:
             _print_imported(robot, Path(made.file))
+    if choice != Choice():
+        from daq.traces.description import remember
+
+        kept = remember(file, choice, made.columns)
+        typer.echo(printable(f"kept in {kept}: the file is read so from now on"), err=True)
 
 
 def _mapping(texts: list[str]) -> dict[str, str]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from daq.contracts.errors import SpecError
+from daq.contracts.joint_matching import matched
 from daq.contracts.machine import Machine, load_machine, shipped_machines
 from daq_cli.app import completion
 from daq_cli.app.context import console, printable
@@ -178,7 +179,7 @@ def read_traces(robot: RobotAccess, folder: Path | None, names: Sequence[str]) -
     found = []
     for name in names:
         path = robot.find_trace(place, name)
-        trace = replace(open_trace(path, call.trace_limits), file=name if Path(name).is_file() else path.name)
+        trace = replace(open_trace(path, call.trace_limits), file=name if Path(name).exists() else path.name)
         if INCOMPLETE in trace.record.notes:
             console().print(printable(f"{trace.file}: {trace.record.notes}"))
         found.append(trace)
@@ -212,7 +213,7 @@ def machine_of(traces: Sequence[Trace], robot: RobotAccess, names: Sequence[str]
             )
     taken = machines[-1] if machines else robot.machine
     named = zip(_names(traces, names), traces, strict=True)
-    unnamed = [(name, trace) for name, trace in named if trace.record.machine is None]
+    unnamed = [(name, matched(trace, taken)) for name, trace in named if trace.record.machine is None]
     for name, trace in unnamed:
         if max(trace.joints) > len(taken.joints):
             raise SpecError(f"{name}: {_surplus(trace, taken)}; name its machine or model with --model")
@@ -231,12 +232,15 @@ def machine_of(traces: Sequence[Trace], robot: RobotAccess, names: Sequence[str]
 def check_made_for(machine: Machine, traces: Sequence[Trace], names: Sequence[str]) -> None:
     """Raises SpecError, with the file as the command line calls it, for a trace that cannot be of this machine."""
     speeds = [j for j in machine.modelled_joints if (s := machine.joint(j).sensor) and s.measures == "velocity"]
-    for name, trace in zip(_names(traces, names), traces, strict=True):
-        own = trace.record.machine
+    for name, read in zip(_names(traces, names), traces, strict=True):
+        own = read.record.machine
         if own is not None and own.name != machine.name:
             raise SpecError(f"{name}: was made on {own.name}, the model describes {machine.name}")
+        trace = matched(read, machine)
         if max(trace.joints) > len(machine.joints):
-            raise SpecError(f"{name}: {_surplus(trace, machine)}; is it of another machine?")
+            raise SpecError(
+                f"{name}: {_surplus(trace, machine)}; is it of another machine? `traces import --joints` chooses some"
+            )
         if lacking := [joint for joint in machine.modelled_joints if joint not in trace.joints]:
             raise SpecError(
                 f"{name}: has no joint {_listed(lacking)}, which the model of {machine.name} moves; it has "

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from daq.contracts import exit_codes
-from daq_cli.app.context import console, print_json, print_prose
+from daq_cli.app.context import console, print_json, print_prose, print_table
 from model.record_check.finding import doubts_in, lines_of
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from daq.contracts.trace import Trace
     from model.machine_model.model import Model
+    from model.record_check.fields import FieldReport
     from model.record_check.finding import RecordFinding
 
 DespiteDoubtsOption = Annotated[
@@ -29,6 +30,8 @@ def stop_if_doubted(model: Model, traces: Sequence[Trace], *, despite_doubts: bo
     """
     from model.record_check.check import check_records, require_computable
 
+    if not as_json:
+        say_what_is_lacking(model, traces)
     found = check_records(model, traces)
     require_computable(found)
     if despite_doubts or not doubts_in(found):
@@ -39,6 +42,30 @@ def stop_if_doubted(model: Model, traces: Sequence[Trace], *, despite_doubts: bo
         print_record(found)
     console().print("nothing is computed of a doubted record; --despite-doubts computes all the same")
     end_if_doubted(found)
+
+
+def say_what_is_lacking(model: Model, traces: Sequence[Trace]) -> None:
+    """Says which fields an answer needs that records do not have, joint by joint, on standard error."""
+    from model.record_check.fields import field_reports
+
+    for report in field_reports(model, traces):
+        if report.weight == "lacking":
+            joint = f"joint {report.place}: " if report.joint else ""
+            print_prose(f"{report.record}: {joint}{report.field}: {report.there}. {report.means}", "LACKS  ", err=True)
+
+
+def print_fields(reports: Sequence[FieldReport]) -> None:
+    """What each record holds, field by field, and what that means for an answer."""
+    from rich.table import Table
+
+    for record in dict.fromkeys(report.record for report in reports):
+        table = Table(box=None, header_style="bold", title=record or "machine file", title_justify="left")
+        for title in ("joint", "field", "is there", "for the answer"):
+            table.add_column(title)
+        for report in reports:
+            if report.record == record:
+                table.add_row(report.place, report.field, report.there, report.means)
+        print_table(table)
 
 
 def end_if_doubted(findings: Sequence[RecordFinding]) -> None:

@@ -11,7 +11,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.signal import welch
 
 from daq.contracts.errors import SpecError, TraceError
-from daq.contracts.joint_matching import check_joints
+from daq.contracts.joint_matching import matched
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
 from model.arrays import Floats, Mask
@@ -113,12 +113,12 @@ def readings_of(trace: Trace, machine: Machine) -> Readings:
     Raises TraceError for a trace without drive, of another machine or of more joints than it has, with a long gap, or
     with too few samples.
     """
+    trace = matched(trace, machine)
     name = trace.record.trace_id
     if trace.drive is None:
         raise TraceError(f"{trace.called}: has no recorded drive, without which torques cannot be compared")
     if trace.record.machine is not None and trace.record.machine.name != machine.name:
         raise TraceError(f"{trace.called}: made on {trace.record.machine.name}, the model describes {machine.name}")
-    check_joints(trace, machine)
     if len(trace) < FEWEST:
         raise TraceError(f"{trace.called}: {len(trace)} samples; a comparison of torques needs at least {FEWEST}")
     if max(trace.joints) > len(machine.joints):

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from daq.contracts.errors import TraceError
+from daq.contracts.joint_matching import matched
 from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Trace
 from model.arrays import Floats
@@ -57,6 +58,7 @@ def check_records(model: Model, traces: Sequence[Trace]) -> tuple[RecordFinding,
     Args:
         model: of the machine that made them. traces: as they were read.
     """
+    traces = [matched(trace, model.machine) for trace in traces]
     found = list(_on_machine(model.machine, traces))
     for trace in traces:
         if len(trace) < FEWEST:
@@ -99,8 +101,8 @@ def as_used(traces: Sequence[Trace], machine: Machine, loop: Loop = "open") -> l
         loop: `closed`: the machine's controller is simulated. `open`: the recorded drive is applied or balanced.
     """
     if loop == "closed" and not isinstance(machine.controller, NoController):
-        return list(traces)
-    return [repaired(trace, machine) for trace in traces]
+        return [matched(trace, machine) for trace in traces]
+    return [repaired(matched(trace, machine), machine) for trace in traces]
 
 
 def require_computable(findings: Sequence[RecordFinding]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import Gain
-from daq.contracts.joint_matching import check_joints
+from daq.contracts.joint_matching import matched
 from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model.arrays import Floats
@@ -85,7 +85,7 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     joints = machine.modelled_joints
     if len(trace) < 3:
         raise TraceError(f"{trace.called}: {len(trace)} samples; at least 3 are needed")
-    check_joints(trace, machine)
+    trace = matched(trace, machine)
     columns = [trace.column(j) for j in joints]
     measured = trace.position[:, columns]
     _check_unit(trace, measured, machine)

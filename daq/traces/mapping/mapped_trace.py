@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from daq.contracts.documents import shown
 from daq.contracts.errors import TraceError
 from daq.contracts.import_choice import Choice
-from daq.contracts.joint_matching import numbers_by_name
+from daq.contracts.joint_matching import numbers_by_name, taken_names
 from daq.contracts.trace import EARLIEST, LATEST, Floats, Trace
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import bounds
@@ -20,7 +20,7 @@ from daq.traces.description import Description
 from daq.traces.mapping.expression import Table
 from daq.traces.mapping.proposal import settled
 from daq.traces.mapping.signals import Signals, signals_of
-from daq.traces.mapping.units import NONE, drive_of
+from daq.traces.mapping.units import drive_of
 from daq.traces.naming import trace_id_of
 
 EPOCH = 1e8
@@ -39,10 +39,9 @@ def mapped_trace(path: Path, table: Table, choice: Choice, description: Descript
     """
     given = dict(choice.map)
     if choice.drive_unit is not None:
-        if choice.drive_unit != NONE:
-            drive_of(choice.drive_unit, table.origin)
+        unit = drive_of(choice.drive_unit, table.origin)
         for key in [key for key in given if key.startswith("drive")] or ["drive"]:
-            given[key] = f"{given.get(key, '').partition(' in ')[0]} in {choice.drive_unit}".strip()
+            given[key] = f"{given.get(key, '').partition(' in ')[0]} in {unit}".strip()
     entries, left_out = settled(table, given, as_guessed=choice.as_guessed)
     found = signals_of(table, entries, path)
     rows, notes = _kept(table, found, choice.where)
@@ -61,6 +60,10 @@ def mapped_trace(path: Path, table: Table, choice: Choice, description: Descript
     machine = description.load_machine(path)
     known = choice.numbering if machine is None else tuple(joint.name for joint in machine.joints)
     names, taken = _chosen(table, found, choice.joints)
+    if names:
+        kept = taken_names(table.origin, names, machine, known, chosen=choice.joints is not None)
+        taken = [column for column, name in zip(taken, names, strict=True) if name in kept]
+        names = kept
     columns = {name: values[:, taken] for name, values in columns.items()}
     numbers = numbers_by_name(names, known) if names else _own_numbers([found.tokens[k] for k in taken])
     record = description.record(path, machine, "")

@@ -104,6 +104,8 @@ def signals_of(table: Table, entries: Mapping[str, Said], beside: Path) -> Signa
             if len(bases) > 1:
                 raise TraceError(f"{table.origin}: drive: units {' and '.join(sorted(bases))} differ; one is needed")
             drive_unit = bases.pop()
+        if "#" in time.expression:  # it counts the rows of the longest column that there is
+            columns["time"] = columns["time"][: len(values[0])]
         lengths = {len(each) for each in (columns["time"], *values)}
         if len(lengths) > 1:
             raise TraceError(f"{table.origin}: {signal}: has {max(lengths)} and {min(lengths)} values; times too count")

@@ -39,11 +39,12 @@ NONE = "none"
 _AT_END = re.compile(r".*[\[(_ ]([^\[\](_ )]+)[\])]?")
 
 
-def drive_of(unit: str, origin: str) -> tuple[str, float]:
-    """The unit of a trace's drive for one that a person writes, and what one of that is in it. Raises TraceError."""
-    if unit not in DRIVES:
-        raise TraceError(f"{origin}: --drive-unit {unit}: write {', '.join(DRIVES)}, or {NONE} to leave the drive out")
-    return DRIVES[unit]
+def drive_of(unit: str, origin: str) -> str:
+    """What a trace calls a unit of its drive, however it is typed; `none` as it is. Raises TraceError."""
+    typed = {name: base for name, (base, size) in DRIVES.items() if size == 1.0} | {NONE: NONE}
+    if unit not in typed:
+        raise TraceError(f"{origin}: --drive-unit {unit}: write {', '.join(dict.fromkeys(typed.values()))}")
+    return typed[unit]
 
 
 def known_units(signal: str) -> tuple[str, ...]:

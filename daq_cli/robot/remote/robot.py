@@ -90,7 +90,7 @@ class RemoteRobot(RobotAccess):
 
     def find_trace(self, folder: Path, wanted: str) -> Path:
         """Returns a local file, or else a trace of the service, which is downloaded. Raises TraceError."""
-        if Path(wanted).is_file():
+        if Path(wanted).exists():
             from daq.traces.catalogue import find_trace
 
             return find_trace(folder, wanted, self.call.trace_limits)

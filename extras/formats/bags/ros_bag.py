@@ -19,7 +19,7 @@ import numpy as np
 from daq.contracts.errors import TraceError
 from daq.contracts.extras import require_extra
 from daq.contracts.import_choice import Choice
-from daq.contracts.joint_matching import numbers_by_name, other_joints
+from daq.contracts.joint_matching import numbers_by_name, taken_names
 from daq.contracts.trace import EARLIEST, INCOMPLETE, LATEST, Floats, Trace, TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds
@@ -81,8 +81,7 @@ def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
     asked = None if choice.set_points is None else _read(path, found, _topic(path, found, choice.set_points))
     names = _names(origin, states, choice.joints, limits)
     known = choice.numbering if machine is None else tuple(joint.name for joint in machine.joints)
-    if machine is not None and choice.joints is None and len(names) > 1 and not set(names) <= set(known):
-        raise other_joints(origin, tuple(range(1, len(names) + 1)), names, machine.name, known)
+    names = taken_names(origin, names, machine, known, chosen=choice.joints is not None)
     table = _Table(origin, names, states, found.missing)
     trace = table.trace(description.record(path, machine, ""), choice, asked)
     description.check_period(trace.time, origin)
@@ -252,15 +251,12 @@ class _Table:
         if not EARLIEST <= created < LATEST:
             raise TraceError(f"{self._origin}: its times are not of the years 1970 to 2261; --received takes others")
         velocity, drive = self._optional("velocity"), self._optional("effort")
-        unit = None
-        if choice.drive_unit == NONE:
+        unit = None if choice.drive_unit is None else drive_of(choice.drive_unit, self._origin)
+        if unit == NONE:
             drive = None
-        elif drive is not None and choice.drive_unit is None:
+        elif drive is not None and unit is None:
             line = "its effort may be in N·m, as ROS defines it, or in amperes, as many drivers send it"
             raise TraceError(f"{self._origin}: {line}; say --drive-unit N·m, N, A or V, or none to leave it out")
-        elif choice.drive_unit is not None:
-            unit, size = drive_of(choice.drive_unit, self._origin)
-            drive = None if drive is None else drive * size if size != 1.0 else drive
         update: dict[str, Any] = {"notes": " ".join([record.notes, *self._said]).strip(), "created": created}
         update |= {"drive_unit": unit if drive is not None else None} | ({"outcome": "interrupted"} if lost else {})
         numbers = tuple(range(1, len(self._names) + 1))

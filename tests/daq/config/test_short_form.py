@@ -66,6 +66,7 @@ def test_deviation_bounds_and_source_are_read_with_the_number() -> None:
     }
     assert read_number("60 rpm/V ± 10 %", "comment", ("V·s/rad",))["deviation"] == pytest.approx(0.0159154943)
     assert read_number("5 ± 1 %", "", ("%",))["deviation"] == 1.0
+    assert read_number("160 mm ± 1 mm", "", ("m",))["deviation"] == 0.001
     assert read_number(0.8, "guess", ("kg",)) == {"value": 0.8, "unit": "kg", "source": "guess", "assumed": True}
 
 
@@ -79,6 +80,7 @@ def test_deviation_bounds_and_source_are_read_with_the_number() -> None:
         ("0 rpm/V", ("V·s/rad",)),
         ("3", ("rad", "m")),
         ("eight kg", ("kg",)),
+        ("160 mm ± 1 m", ("m",)),
     ],
 )
 def test_what_is_no_such_quantity_is_refused(written: str, allowed: tuple[str, ...]) -> None:

@@ -11,7 +11,7 @@ from daq.driver.sampling import Deliveries, MemorySampling
 from daq.driver.set_point_watch import SetPointWatch
 from firmware_protocol.commands import Reply, Request, SetPointsTaken, Status, StatusFlag, WriteSetPoints
 from firmware_protocol.joints import JointReading
-from tests.daq.link.scripted import frame_of, scripted_link
+from tests.daq.link.scripted import says, scripted_link
 
 PERIOD_S = 0.02
 READING = ((1, JointReading(500, 2048, 0, 0)),)
@@ -55,12 +55,11 @@ class Bench:
         self.reader = Reader(self.clock)
         self.status = 0
 
-        def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        def answer(request: Request) -> Reply:
             taken = isinstance(request, WriteSetPoints)
-            reply: Reply = SetPointsTaken(7, 0) if taken else Status(7, self.status, 1, 0, 0)
-            return [(0.0, frame_of(sequence, reply))]
+            return SetPointsTaken(7, 0) if taken else Status(7, self.status, 1, 0, 0)
 
-        self.link, self.channel = scripted_link(answer)
+        self.link, self.channel = scripted_link(says(answer))
         deliveries = Deliveries(self.link, self.clock, PERIOD_S, SetPointWatch())
         self.sampling = MemorySampling(deliveries, cast(DoubleReader, self.reader))
 

@@ -12,7 +12,7 @@ from daq.link import LinkTimeoutError, RequestRefusedError
 from firmware_protocol import commands as c
 from firmware_protocol.joints import JointReading
 from tests.daq.driver.test_memory_sampling import HandClock
-from tests.daq.link.scripted import frame_of, scripted_link
+from tests.daq.link.scripted import says, scripted_link
 
 PERIOD_S = 0.02
 FAST, SLOW = 11520.0, 1920.0
@@ -31,11 +31,7 @@ class Bench:
     def __init__(self, answers: Callable[[c.Request], c.Reply | None], bytes_per_second: float = FAST) -> None:
         self.clock = HandClock()
 
-        def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
-            reply = answers(request)
-            return [] if reply is None else [(0.0, frame_of(sequence, reply))]
-
-        self.link, self.channel = scripted_link(answer)
+        self.link, self.channel = scripted_link(says(answers))
         deliveries = Deliveries(self.link, self.clock, PERIOD_S, SetPointWatch())
         self.sampling = RingSampling(
             deliveries,

@@ -12,7 +12,7 @@ from daq.link.pending import SEQUENCE_NUMBERS, PendingReplies
 from daq.link.timing import HELLO_RETRIES, RETRIES
 from firmware_protocol import commands as c
 from firmware_protocol.joints import JointReading
-from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, Zeros, frame_of, scripted_link
+from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, Zeros, frame_of, once_silent, says, scripted_link
 
 STATUS = c.Status(7, 0, 1, 0, 0)
 TAKEN = c.SetPointsTaken(7, 0)
@@ -98,10 +98,7 @@ def test_a_reply_that_nobody_waits_for_is_dropped_and_counted() -> None:
 
 
 def test_a_refusal_says_which_request_and_why_and_is_not_repeated() -> None:
-    def refuses(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
-        return [(0.0, frame_of(sequence, c.Refused(request.OPCODE, c.Refusal.FROZEN)))]
-
-    link, channel = scripted_link(refuses)
+    link, channel = scripted_link(says(lambda request: c.Refused(request.OPCODE, c.Refusal.FROZEN)))
     with pytest.raises(RequestRefusedError, match="refused WriteSetPoints: it has been stopped"):
         link.request(c.WriteSetPoints(((1, 500),)), c.SetPointsTaken)
     assert len(channel.asked) == 1
@@ -140,7 +137,7 @@ def test_round_trips_are_measured_where_it_is_known_which_copy_was_answered() ->
 
 def test_after_the_channel_has_ended_nothing_is_asked_until_reconnected() -> None:
     first = ScriptedChannel(lambda _sequence, _request: [])
-    second = ScriptedChannel(lambda sequence, _: [(0.0, frame_of(sequence, STATUS))])
+    second = ScriptedChannel(says(STATUS))
     endpoint = ScriptedEndpoint([first, second])
     link = Link(endpoint, now=first.now, chance=Zeros())
     first.broken = "cable pulled"
@@ -157,8 +154,7 @@ def test_after_the_channel_has_ended_nothing_is_asked_until_reconnected() -> Non
 
 
 def test_connecting_again_ends_the_old_channel_even_one_that_still_works() -> None:
-    first = ScriptedChannel(lambda sequence, _: [(0.0, frame_of(sequence, STATUS))])
-    second = ScriptedChannel(lambda sequence, _: [(0.0, frame_of(sequence, STATUS))])
+    first, second = ScriptedChannel(says(STATUS)), ScriptedChannel(says(STATUS))
     link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
     link.request(c.ReadStatus(), c.Status)
     link.reconnect()
@@ -196,7 +192,7 @@ def test_half_a_reply_is_forgotten_with_the_channel_it_came_over() -> None:
         return [(0.0, frame_of(sequence, STATUS)[:6])]
 
     first = ScriptedChannel(breaks_off)
-    second = ScriptedChannel(lambda sequence, _: [(0.0, frame_of(sequence, STATUS))])
+    second = ScriptedChannel(says(STATUS))
     link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
     with pytest.raises(LinkLostError, match="cable pulled"):
         link.request(c.ReadStatus(), c.Status)
@@ -276,13 +272,9 @@ def test_in_lock_step_the_nonce_is_the_controller_s_time_so_that_a_run_repeats_t
 
 
 def test_a_controller_in_lock_step_that_knows_no_time_is_greeted_all_the_same() -> None:
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
-        if isinstance(request, c.Advance):
-            return [(0.0, frame_of(sequence, c.Refused(c.Advance.OPCODE, c.Refusal.NOT_CAPABLE)))]
-        assert isinstance(request, c.Hello)
-        return [(0.0, frame_of(sequence, c.HelloReply(1, c.Capability.LOCK_STEP, 20_000, 0, 1)))]
-
-    link, _ = scripted_link(answer, lock_step=True)
+    refused = c.Refused(c.Advance.OPCODE, c.Refusal.NOT_CAPABLE)
+    hello = c.HelloReply(1, c.Capability.LOCK_STEP, 20_000, 0, 1)
+    link, _ = scripted_link(says(lambda request: refused if isinstance(request, c.Advance) else hello), lock_step=True)
     assert link.greet().version == 1
     assert link.counters.refused == 1
 
@@ -306,11 +298,10 @@ def test_numbers_and_nonces_are_drawn_from_all_there_are() -> None:
 
 
 def test_a_refusal_among_several_is_counted_by_itself_and_the_link_stays_as_good_as_it_was() -> None:
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
-        refused = c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.FROZEN)
-        return [(0.0, frame_of(sequence, refused if isinstance(request, c.WriteSetPoints) else right_reply(request)))]
-
-    link, _ = scripted_link(answer)
+    refused = c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.FROZEN)
+    link, _ = scripted_link(
+        says(lambda request: refused if isinstance(request, c.WriteSetPoints) else right_reply(request))
+    )
     assert link.state is LinkState.CONNECTED
     replies = link.exchange(c.WriteSetPoints(((1, 500),)), c.Sample(7, 1), c.WriteSetPoints(((1, 501),)))
     assert [type(reply).__name__ for reply in replies] == ["Refused", "Snapshot", "Refused"]
@@ -318,12 +309,7 @@ def test_a_refusal_among_several_is_counted_by_itself_and_the_link_stays_as_good
 
 
 def test_a_link_that_answers_again_is_lost_no_longer_and_clean_after_a_hundred() -> None:
-    silent = iter([True] * (RETRIES + 1))
-
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
-        return [] if next(silent, False) else [(0.0, frame_of(sequence, STATUS))]
-
-    link, _ = scripted_link(answer)
+    link, _ = scripted_link(once_silent(STATUS, RETRIES + 1))
     with pytest.raises(LinkTimeoutError):
         link.request(c.ReadStatus(), c.Status)
     assert link.state is LinkState.LOST
@@ -334,10 +320,7 @@ def test_a_link_that_answers_again_is_lost_no_longer_and_clean_after_a_hundred()
 
 
 def test_after_a_reconnection_the_link_is_degraded_until_a_hundred_went_well() -> None:
-    def answer(sequence: int, _: c.Request) -> list[tuple[float, bytes]]:
-        return [(0.0, frame_of(sequence, STATUS))]
-
-    first, second = ScriptedChannel(answer), ScriptedChannel(answer)
+    first, second = ScriptedChannel(says(STATUS)), ScriptedChannel(says(STATUS))
     link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
     link.reconnect()
     assert link.state is LinkState.DEGRADED

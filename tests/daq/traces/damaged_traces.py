@@ -3,8 +3,9 @@
 import random
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
 
 import lz4.frame
@@ -52,6 +53,25 @@ class Damaged:
     original: Original
     way: str
     data: bytes
+
+    def __str__(self) -> str:
+        return f"{self.original.kind}, {self.way}"
+
+
+@dataclass
+class Tally:
+    """Counts what became of damaged files; the first few of each fault are kept."""
+
+    cases: int = 0
+    ends: Counter[str] = field(default_factory=Counter)
+    faults: Counter[str] = field(default_factory=Counter)
+    examples: list[str] = field(default_factory=list)
+
+    def fault(self, kind: str, file: str, detail: str) -> None:
+        """Counts a fault."""
+        self.faults[kind] += 1
+        if self.faults[kind] <= 3:
+            self.examples.append(f"{kind}: {file}: {detail[:300]}")
 
 
 def recording(record: TraceRecord, close: bool) -> bytes:

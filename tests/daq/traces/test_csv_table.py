@@ -172,7 +172,7 @@ def test_one_line_names_the_row_and_the_column(tmp_path: Path, text: str, compla
         ("joints = [0]", "rig.toml: joints.1: found 0, must be at least 1"),
         ("joints = [2]", "rig.csv: row 1: column 'position_2' is missing"),
         ("machine = 'crane.toml'", "rig.toml: machine: machine '"),
-        ("drive_unit = 'kV'", "rig.toml: drive_unit: found 'kV', must be 'V', 'A', 'N·m' or 'N'"),
+        ("drive_unit = 'kV'", "rig.toml: drive_unit: found 'kV', must be 'V', 'A', 'N·m', 'N' or 'none'"),
     ],
 )
 def test_one_line_names_what_is_wrong_beside_the_file(tmp_path: Path, toml: str, complaint: str) -> None:

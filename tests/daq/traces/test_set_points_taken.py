@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from daq.contracts.sample import SampleRow
-from daq.contracts.trace import TraceEvent
 from daq.runner.recorder import Recorder
 from daq.traces import set_points_taken
 from daq.traces.reader import read_trace
 from daq.traces.store import write_trace
 from daq.traces.writer import TraceWriter
+from tests.daq.quiet import Quiet
 from tests.daq.traces.samples import JOINTS, record, row, write
 
 TAKEN = (0, *range(2, 38, 4))
@@ -46,17 +45,6 @@ def test_a_record_of_a_fast_line_shows_every_set_point_itself(tmp_path: Path) ->
 # ---- What is missing from a trace is counted in samples, by the trace as by the recorder that makes it.
 
 
-class _Nobody:
-    def progress(self, fraction: float, text: str) -> None:
-        return
-
-    def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
-        return
-
-    def happened(self, event: TraceEvent) -> None:
-        return
-
-
 @pytest.mark.parametrize(
     ("every", "ticks", "missing"),
     [
@@ -77,7 +65,7 @@ class _Nobody:
 )
 def test_missing_samples(tmp_path: Path, every: int, ticks: list[int], missing: int) -> None:
     with TraceWriter(tmp_path / "a.mcap", record(every=every), JOINTS, patience=10) as writer:
-        recorder = Recorder(writer, JOINTS, _Nobody(), every)
+        recorder = Recorder(writer, JOINTS, Quiet(), every)
         for tick in ticks:
             recorder.row(row(tick))
         path = writer.close("complete", {})

@@ -7,9 +7,7 @@ deleted.
 
 import itertools
 import random
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +24,7 @@ from tests.daq.traces.damaged_traces import (
     Choice,
     Damaged,
     Original,
+    Tally,
     at_boundaries,
     at_random,
     inside_chunks,
@@ -34,22 +33,6 @@ from tests.daq.traces.damaged_traces import (
 )
 
 CASES = 22_000
-
-
-@dataclass
-class Tally:
-    """Counts; the first few of each fault are kept."""
-
-    cases: int = 0
-    ends: Counter[str] = field(default_factory=Counter)
-    faults: Counter[str] = field(default_factory=Counter)
-    examples: list[str] = field(default_factory=list)
-
-    def fault(self, kind: str, damaged: Damaged, detail: str) -> None:
-        """Counts a fault."""
-        self.faults[kind] += 1
-        if self.faults[kind] <= 3:
-            self.examples.append(f"{kind}: {damaged.original.kind}, {damaged.way}: {detail}")
 
 
 def differs(trace: Trace, original: Trace) -> str | None:
@@ -122,11 +105,11 @@ class Campaign:
             return action()
         except TraceError as error:
             if "\n" in str(error):
-                self.tally.fault("errors of several lines", damaged, str(error))
+                self.tally.fault("errors of several lines", str(damaged), str(error))
             self.tally.ends["refused"] += 1
             return None
         except Exception as error:  # noqa: BLE001  # that is what is counted
-            self.tally.fault("other exceptions", damaged, repr(error))
+            self.tally.fault("other exceptions", str(damaged), repr(error))
             return None
 
     def _judge(self, damaged: Damaged, path: Path, trace: Trace | None) -> None:
@@ -134,14 +117,14 @@ class Campaign:
             return
         original = self._sound[damaged.original.kind]
         if wrong := wrong_samples(trace, original):
-            self.tally.fault("wrong samples", damaged, f"{wrong} of {len(trace)}")
+            self.tally.fault("wrong samples", str(damaged), f"{wrong} of {len(trace)}")
         different = differs(trace, original)
         self.tally.ends["read, the same" if different is None else "read, less"] += 1
         if trace.record.outcome == "complete" and (different or path.suffix == ".part"):
-            self.tally.fault("called complete", damaged, str(different))
+            self.tally.fault("called complete", str(damaged), str(different))
         finished = damaged.original.suffix == ".mcap"
         if finished and different and verify(path).trustworthy:
-            self.tally.fault("called trustworthy", damaged, different)
+            self.tally.fault("called trustworthy", str(damaged), different)
 
     def _salvaged(self, damaged: Damaged) -> None:
         made = self.folder / "a.mcap"
@@ -149,13 +132,13 @@ class Campaign:
         if not made.exists():
             self.tally.ends["put aside"] += 1
             if [one.name for one in kept] != ["a.mcap.part.unreadable"]:
-                self.tally.fault("part files lost or left", damaged, str(sorted(self.folder.iterdir())))
+                self.tally.fault("part files lost or left", str(damaged), str(sorted(self.folder.iterdir())))
             return
         self.tally.ends["salvaged"] += 1
         trace = self._guarded(damaged, lambda: read_trace(made))
         self._judge(damaged, made, trace)
         if trace is None or trace.record.outcome != "interrupted":
-            self.tally.fault("salvaged traces that are none", damaged, str(made))
+            self.tally.fault("salvaged traces that are none", str(damaged), str(made))
 
 
 def on_purpose(sound: list[Original], chosen: Choice) -> Iterator[Damaged]:

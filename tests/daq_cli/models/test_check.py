@@ -39,10 +39,12 @@ def test_a_record_is_checked_and_its_faults_have_their_place(daq: CommandLine, m
     changed(Path("spiked.csv"), spikes=True)
     said = daq("check", "spiked.csv", "--model", SINGLE_AXIS)
     assert said.code == 2
-    assert " ".join(said.out.split()).startswith("CHECK spiked.csv: joint 1: 3 spikes at 1.50, 2.50, 4.50 s, of ")
+    assert "CHECK spiked.csv: joint 1: 3 spikes at 1.50, 2.50, 4.50 s, of " in " ".join(said.out.split())
     assert max(map(len, said.out.splitlines())) <= 80
     said = daq("check", "spiked.csv", "--model", SINGLE_AXIS, "--json")
-    (found,) = [one for one in json.loads(said.out) if one["consequence"] == "doubt"]
+    told = json.loads(said.out)
+    (found,) = [one for one in told["findings"] if one["consequence"] == "doubt"]
+    assert [one["field"] for one in told["fields"]] == ["time", "position", "velocity", "set point", "drive"]
     assert (said.code, found["kind"], found["joint"], found["count"]) == (2, "spikes", 1, 3)
     assert found["times"] == pytest.approx([0.005 * row for row in SPIKES])
 

@@ -81,6 +81,11 @@ def test_memory_ends_where_the_map_says(host: LockStepHost, request_: c.Request)
     assert host.board.time_us == before
 
 
+def test_gains_are_written_and_reported(host: LockStepHost) -> None:
+    assert host.ask(c.SetGains(2, 5, 1, 3)) == c.GainsSet()
+    assert host.ask(c.ReportGains()) == c.Gains(((2, 0, 0), (5, 1, 3), *(((2, 0, 0),) * 4)))
+
+
 def test_process_outputs_change_only_in_the_mask_and_inputs_are_read(host: LockStepHost) -> None:
     host.board.set_process_inputs(0b1010_0000)
     assert host.ask(c.WriteOutputs(0b0011, 0b0001)) == c.OutputsWritten()

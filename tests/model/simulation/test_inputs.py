@@ -1,19 +1,19 @@
 """What a run takes from a record: the grid of periods, and what is held or interpolated between samples."""
 
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import load_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import base_model
 from model.simulation.inputs import RunInputs, inputs_of
 from model.simulation.prepared import Options, prepare
 from model.simulation.simulate import at_rows
+from tests.model.imported import imported
 
 MACHINE = load_machine("ma2000")
 START = np.array([3.1, 0.7, 0.0])
@@ -24,9 +24,7 @@ def trace_of(
 ) -> Trace:
     """A record with samples at these periods; positions rise by a degree a period."""
     rows = np.array(ticks)
-    record = TraceRecord(
-        trace_id="made", created=datetime(2026, 1, 1, tzinfo=UTC), software="test", source="imported", period=0.02
-    )
+    record = imported(period=0.02)
     whole = rows.astype(np.int64) if (rows == np.round(rows)).all() else None
     position = START + np.radians(rows)[:, None]
     signals = {"set_point": set_point, "drive": drive, "velocity": velocity}

@@ -7,7 +7,7 @@ import pytest
 
 from daq.contracts.errors import TraceError
 from daq.contracts.import_choice import Choice
-from daq.contracts.joint_matching import check_joints
+from daq.contracts.joint_matching import matched
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
 from daq.traces.files import open_trace
@@ -42,18 +42,30 @@ def test_joints_are_matched_by_name_and_never_by_the_order_that_they_came_in(tmp
     names = {"names": ["elbow", "pan", "lift"], "position": [3.0, 1.0, 2.0], "effort": []}
     path = bag(tmp_path / "ur", [names] * 3)
     machine = named("pan", "lift", "elbow")
-    matched = import_bag(path, choice=Choice(numbering=("pan", "lift", "elbow")))
-    assert (matched.joints, matched.record.joint_names) == ((3, 1, 2), ("elbow", "pan", "lift"))
-    check_joints(read_trace(write_trace(matched, tmp_path / "a.mcap")), machine)
-    unmatched = import_bag(path)
-    with pytest.raises(
-        TraceError, match=r"its joints are 1 elbow, 2 pan, 3 lift, .* again with --joints pan,lift,elbow$"
-    ):
-        check_joints(unmatched, machine)
+    numbered = import_bag(path, choice=Choice(numbering=("pan", "lift", "elbow")))
+    assert (numbered.joints, numbered.record.joint_names) == ((3, 1, 2), ("elbow", "pan", "lift"))
+    kept = read_trace(write_trace(numbered, tmp_path / "a.mcap"))
+    assert matched(kept, machine) is kept
+    in_order = import_bag(path)
+    assert in_order.joints == (1, 2, 3)
+    assert matched(in_order, machine).joints == (3, 1, 2)
     with pytest.raises(TraceError, match="--joints and its own names for base, shoulder, upper, in this"):
-        check_joints(unmatched, named("base", "shoulder", "upper"))
+        matched(in_order, named("base", "shoulder", "upper"))
     chosen = import_bag(path, choice=Choice(joints=("pan", "lift", "elbow")))
     assert np.array_equal(chosen.position[0], [1.0, 2.0, 3.0])
-    check_joints(chosen, machine)
-    check_joints(chosen, named("base", "shoulder", "upper"))  # a person has said which is which
-    check_joints(Trace(record(machine=None), (1, 2), np.arange(3.0), np.zeros((3, 2))), machine)  # names nothing
+    assert matched(chosen, machine) is chosen
+    assert matched(chosen, named("base", "shoulder", "upper")) is chosen  # a person has said which is which
+    without = Trace(record(machine=None), (1, 2), np.arange(3.0), np.zeros((3, 2)))
+    assert matched(without, machine) is without
+
+
+def test_joints_that_a_machine_lacks_are_left_out_by_their_names(tmp_path: Path) -> None:
+    names = {"names": ["grip", "elbow", "pan", "lift"], "position": [9.0, 3.0, 1.0, 2.0], "effort": []}
+    path = bag(tmp_path / "ur", [names] * 3)
+    machine = named("pan", "lift", "elbow")
+    trace = import_bag(path)
+    assert trace.joints == (1, 2, 3, 4)
+    fitting = matched(trace, machine)
+    assert (fitting.joints, fitting.record.joint_names) == ((3, 1, 2), ("elbow", "pan", "lift"))
+    assert [fitting.position[0, fitting.column(joint)] for joint in (1, 2, 3)] == [1.0, 2.0, 3.0]
+    assert import_bag(path, choice=Choice(numbering=("pan", "lift", "elbow"))).joints == (3, 1, 2)

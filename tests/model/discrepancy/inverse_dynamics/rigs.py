@@ -5,15 +5,15 @@ masses and a spring, the six-joint arm a cloud of points whose accelerations are
 """
 
 from collections.abc import Callable, Mapping
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from daq.contracts.machine import Machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model.arrays import Floats
+from tests.model.imported import imported
 
 Wanted = Callable[[float], tuple[float, float, float]]
 
@@ -58,9 +58,7 @@ def trace_of(
     name: str, time: Floats, position: Floats, drive: Floats, unit: Any, velocity: Floats | None = None
 ) -> Trace:
     """A trace (k, n) as an import would give it."""
-    record = TraceRecord(
-        trace_id=name, created=datetime(2024, 1, 1, tzinfo=UTC), software="test", source="imported", drive_unit=unit
-    )
+    record = imported(name, drive_unit=unit)
     joints = tuple(range(1, position.shape[1] + 1))
     return Trace(record, joints, time, position, drive=drive, velocity=velocity)
 

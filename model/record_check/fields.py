@@ -1,0 +1,213 @@
+"""What records hold, field by field, what that means for an answer, and what they and the machine file lack."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+import numpy as np
+
+from daq.contracts.frozen import FrozenRecord
+from daq.contracts.joint_matching import matched
+from daq.contracts.machine import Machine, NoController
+from daq.contracts.trace import Trace
+from model.arrays import Floats
+from model.machine_model.model import Model
+from model.record_check.readings import find_gaps, noise_of
+from model.record_check.words import number, times_of
+
+FEW_LEVELS = 16
+"""Different values of a signal up to which it is called coarse: four bits."""
+HARDLY = 20.0
+"""Travel of a joint, in its noise or in steps of its sensor, below which nothing of it is determined."""
+UNEVEN = 0.2
+"""Spread of the times between rows (middle 80 %), as a share of the usual one, from which they are uneven."""
+REPEATED = 0.1
+"""Share of rows that repeat the row before, from which a record is slower than its times say."""
+Weight = Literal["fine", "known", "lacking"]
+"""fine: nothing to say. known: an answer is less sharp for it. lacking: an answer needs it."""
+
+
+class FieldReport(FrozenRecord):
+    """One field of a record, or of the machine file where `record` is empty.
+
+    Args:
+        joint: from 1, with its name; None: of all. there: what it holds. means: for the answer; empty where all is
+            well.
+    """
+
+    record: str = ""
+    joint: int | None = None
+    name: str = ""
+    field: str
+    there: str
+    means: str = ""
+    weight: Weight = "fine"
+
+    @property
+    def place(self) -> str:
+        """The joint as a table shows it."""
+        return "" if self.joint is None else f"{self.joint} {self.name}".strip()
+
+
+def field_reports(model: Model, traces: Sequence[Trace]) -> tuple[FieldReport, ...]:
+    """Every field of records and machine file that an answer uses, records first.
+
+    Raises TraceError where the names of joints are not the machine's.
+    """
+    machine = model.machine
+    found: list[FieldReport] = []
+    for read in traces:
+        found += _Record(matched(read, machine), machine).reports()
+    return (*found, *_on_machine(machine))
+
+
+class _Record:
+    """The fields of one record."""
+
+    def __init__(self, trace: Trace, machine: Machine) -> None:
+        self._trace, self._machine = trace, machine
+        self._joints = [joint for joint in machine.modelled_joints if joint in trace.joints]
+
+    def reports(self) -> Iterator[FieldReport]:
+        """One report a field, those of times first."""
+        if len(self._trace) < 3:
+            yield self._of("time", None, times_of(len(self._trace), "row"), "Nothing can be computed.", "lacking")
+            return
+        yield self._time()
+        for joint in self._machine.modelled_joints:
+            if joint not in self._trace.joints:
+                means = "The model moves this joint: choose its column."
+                yield self._of("position", joint, "not there", means, "lacking")
+        yield from self._repeated()
+        for joint in self._joints:
+            yield self._position(joint)
+            yield self._velocity(joint)
+            yield self._set_point(joint)
+            yield self._drive(joint)
+
+    def _of(self, field: str, joint: int | None, there: str, means: str = "", weight: Weight = "fine") -> FieldReport:
+        name = "" if joint is None else self._machine.joint(joint).name
+        called = self._trace.called
+        return FieldReport(record=called, joint=joint, name=name, field=field, there=there, means=means, weight=weight)
+
+    def _time(self) -> FieldReport:
+        steps = np.diff(self._trace.time)
+        usual = float(np.median(steps))
+        low, high = np.quantile(steps, [0.1, 0.9])
+        gaps = find_gaps(self._trace.time)
+        there = f"{len(self._trace)} rows in {number(float(np.sum(steps)))} s, usually {number(usual)} s apart"
+        there += f", {times_of(len(gaps), 'gap')}" if gaps else ""
+        if high - low > UNEVEN * usual:
+            means = "Uneven times blur speeds and accelerations: stamp at the device."
+            return self._of("time", None, f"{there} ({number(float(low))} to {number(float(high))} s)", means, "known")
+        return self._of("time", None, there)
+
+    def _repeated(self) -> Iterator[FieldReport]:
+        trace = self._trace
+        rows = np.concatenate([s for s in (trace.position, trace.drive) if s is not None], axis=1)
+        same = (np.diff(rows, axis=0) == 0.0).all(axis=1)
+        moving = np.abs(np.diff(trace.position, axis=0)).max(axis=1) > 0.0
+        begin, end = np.flatnonzero(moving)[[0, -1]] if moving.any() else (0, 0)
+        inside = same[begin : end + 1]
+        if moving.any() and float(np.mean(inside)) > REPEATED:
+            says = f"{np.mean(inside):.0%} of the rows repeat the row before"
+            means = "The source is slower than the record: keep a row only where it changes."
+            yield self._of("rows", None, says, means, "known")
+
+    def _position(self, joint: int) -> FieldReport:
+        reading = self._trace.position[:, self._trace.column(joint)]
+        unit = self._machine.joint(joint).units.position
+        travel, step = float(np.ptp(reading)), _step_of(reading)
+        noise = max(noise_of(reading), step / np.sqrt(12.0))
+        turns = int(np.count_nonzero(np.diff(np.sign(_moves(reading, 3.0 * noise + step)))))
+        there = f"{number(float(reading.min()))} to {number(float(reading.max()))} {unit}, "
+        there += f"steps of {number(step)} {unit}, {times_of(turns, 'reversal')}"
+        if travel < HARDLY * max(noise, step):
+            means = "It hardly moves: its inertia and friction stay as the machine file states them."
+            return self._of("position", joint, there, means, "known")
+        if turns == 0:
+            means = "It moves one way only: friction, an offset and weight look alike."
+            return self._of("position", joint, there, means, "known")
+        return self._of("position", joint, there)
+
+    def _velocity(self, joint: int) -> FieldReport:
+        if self._trace.velocity is None:
+            sensor = self._machine.joint(joint).sensor
+            if sensor is not None and sensor.measures == "velocity":
+                return self._of("velocity", joint, "not there", "The machine file's sensor measures it.", "lacking")
+            return self._of("velocity", joint, "not there; formed from positions")
+        return self._levels("velocity", joint, self._trace.velocity, self._machine.joint(joint).units.position + "/s")
+
+    def _set_point(self, joint: int) -> FieldReport:
+        has_loop = not isinstance(self._machine.controller, NoController)
+        if self._trace.set_point is None:
+            if not has_loop:
+                return self._of("set point", joint, "not there; the drive moves the model")
+            means = "The controller cannot be simulated; torques are compared."
+            lacks: Weight = "lacking" if self._trace.drive is None else "known"
+            return self._of("set point", joint, "not there", means, lacks)
+        asked = self._trace.set_point[:, self._trace.column(joint)]
+        unit = self._machine.joint(joint).units.position
+        return self._of("set point", joint, f"{number(float(asked.min()))} to {number(float(asked.max()))} {unit}")
+
+    def _drive(self, joint: int) -> FieldReport:
+        drive, units = self._trace.drive, self._machine.joint(joint).drive_units
+        if drive is None:
+            if self._trace.set_point is None or isinstance(self._machine.controller, NoController):
+                means = f"Without it nothing can be computed: record it, in {' or '.join(units)}."
+                return self._of("drive", joint, "not there", means, "lacking")
+            means = "Set points alone tell less: friction and loads show only in what the loop leaves."
+            return self._of("drive", joint, "not there", means, "known")
+        stated = self._trace.record.drive_unit
+        if stated is not None and stated not in units:
+            means = f"The machine file's drive is in {' or '.join(units)}."
+            return self._of("drive", joint, f"in {stated}", means, "lacking")
+        if stated is None and self._trace.record.source == "imported":
+            means = f"Its unit is taken for {units[0]}: state drive_unit."
+            return self._levels("drive", joint, drive, "of no stated unit", means)
+        return self._levels("drive", joint, drive, stated or "V")
+
+    def _levels(self, field: str, joint: int, signal: Floats, unit: str, means: str = "") -> FieldReport:
+        values = signal[:, self._trace.column(joint)]
+        count = len(np.unique(values))
+        there = f"{number(float(values.min()))} to {number(float(values.max()))} {unit}"
+        if count == 1:
+            return self._of(field, joint, f"{there}, constant", "It says nothing.", "known")
+        if count <= FEW_LEVELS:
+            there = f"{there}, only {count} different values"
+            means = means or "Small torques and frictions drown in its steps."
+        return self._of(field, joint, there, means, "known" if means else "fine")
+
+
+def _moves(reading: Floats, least: float) -> Floats:
+    """The steps between the turning points of a reading, without motions smaller than `least`."""
+    points = [float(reading[0])]
+    for value in reading.tolist():
+        if len(points) > 1 and (value - points[-1]) * (points[-1] - points[-2]) > 0.0:
+            points[-1] = value
+        elif abs(value - points[-1]) > least:
+            points.append(value)
+    return np.diff(points)
+
+
+def _step_of(reading: Floats) -> float:
+    """The smallest change of a reading; 0 where it never changes."""
+    moved = np.abs(np.diff(reading))
+    return float(moved[moved > 0.0].min(initial=np.inf)) if moved.any() else 0.0
+
+
+def _on_machine(machine: Machine) -> Iterator[FieldReport]:
+    """What a machine file leaves open."""
+    for number_, joint in ((j, machine.joint(j)) for j in machine.modelled_joints):
+        if joint.sensor is None:
+            yield FieldReport(
+                joint=number_,
+                name=joint.name,
+                field="sensor",
+                there="not stated",
+                means="Its noise is taken from the record.",
+                weight="known",
+            )
+    if isinstance(machine.controller, NoController):
+        yield FieldReport(field="controller", there="none", means="Torques are compared, no loop is simulated.")
