@@ -172,7 +172,7 @@ def weight_of(machine: Machine, angles: Floats) -> Floats:
     turn = angles + joint.geometry.theta.value
     east = np.cos(turn) * own[0] - np.sin(turn) * own[1]
     north = np.sin(turn) * own[0] + np.cos(turn) * own[1]
-    return -joint.link.mass.value * (east * machine.gravity[1] - north * machine.gravity[0])
+    return np.asarray(-joint.link.mass.value * (east * machine.gravity[1] - north * machine.gravity[0]))
 
 
 def test_a_file_is_tidied_where_it_lies_or_elsewhere(daq: CommandLine) -> None:
