@@ -8,10 +8,10 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 FOR_USE := .venv/installed-for-use
 FOR_DEVELOPMENT := .venv/installed-for-development
 
-# Three workers (tests/workers.py), because many tests wait for processes in real time. The checks run beside them.
+# Three workers, because many tests wait for processes in real time. The checks run beside them.
 # For one thing after the other, in one process: make test WORKERS=
 WORKERS ?= 3
-PYTEST = $(BIN)/python -m pytest -q $(if $(WORKERS),--workers $(WORKERS))
+PYTEST = $(BIN)/python -m pytest -q $(if $(WORKERS),-n $(WORKERS))
 CHECKS = $(MAKE) --no-print-directory checks
 WITH_CHECKS = $(if $(WORKERS), \
 	$(CHECKS) >.venv/checks.log 2>&1 & checks=$$!; trap 'kill $$checks' INT TERM; \

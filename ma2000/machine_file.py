@@ -10,7 +10,7 @@ from daq.contracts.machine import Machine
 
 
 def save_machine(machine: Machine, path: Path | str) -> Path:
-    """Writes a machine file (.toml), from which `load_machine` makes the same machine. Returns the path.
+    """Writes a machine file (.toml), from which `load_machine` makes a machine of the same numbers. Returns the path.
 
     Raises SpecError when the file cannot be written.
     """

@@ -77,6 +77,7 @@ SHARED = 10
     SPRING_REST,  # rad
     CABLE,  # N·m/rad, signed: the side on which it pulls
     CABLE_REST,  # rad
+    CONSTANT_TORQUE,  # N·m
     DISTURBANCE_SINE,  # N·m
     DISTURBANCE_COSINE,
     DISTURBANCE_FREQUENCY,  # Hz
@@ -100,7 +101,7 @@ SHARED = 10
     SHAPE,  # of the link: CYLINDER, ROD or BODY
     PRISMATIC,  # 1, or 0 for a revolute joint
     USER,  # the first of USER_COLUMNS for effects from files of the user's own
-) = range(79)
+) = range(80)
 BENDS = range(BEND_1, BEND_8 + 1)
 USER_COLUMNS = 8
 PER_JOINT = USER + USER_COLUMNS

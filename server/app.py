@@ -75,9 +75,7 @@ def bare_app(services: Services | None) -> FastAPI:
             if isinstance(route, DeclaredRoute) and route.path.endswith("/stop"):
                 _ = route.of_fastapi  # the first stop must not wait for it
         await run_in_threadpool(services.start)
-        described.begin_soon()
         yield
-        described.close()
         # With a thread of its own: those of requests may all be taken by some that cannot be interrupted.
         await asyncio.to_thread(services.close)
         for rig in services.robots():
@@ -118,6 +116,5 @@ def bare_app(services: Services | None) -> FastAPI:
     app.routes.append(Page())
     serve_site(app, site_index())
     description.install(app)
-    kept = None if services is None else services.folder / description.KEPT
-    described = description.serve(app, f"{API}/openapi.json", kept)
+    description.serve(app, f"{API}/openapi.json")
     return app

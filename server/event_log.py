@@ -11,8 +11,7 @@ from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.live import EventMessage
 from server.clock import Clock
 from server.live.hub import Hub
-from server.store.events import EventStore
-from server.store.waiting_events import WaitingEvents
+from server.store.waiting_events import EventStore, WaitingEvents
 
 log = logging.getLogger("server")
 

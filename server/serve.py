@@ -1,11 +1,24 @@
-"""Starts the service: its sockets, its stop listener, its database and its web server."""
+"""Starts the service: its sockets, its stop listener, its database and its web server.
+
+Ends the service in time, whatever still computes, waits or blocks.
+
+By then, everything that can end in order has ended: the process that owns the robot's port freezes the arm and closes
+the trace by itself, and the database's transactions are on the disk. Only threads and processes that cannot be
+interrupted are left.
+
+The sockets on which the service and its stop listener listen.
+"""
 
 from __future__ import annotations
 
+import logging
+import os
 import signal
 import socket
-from collections.abc import Callable
-from contextlib import closing, suppress
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
 from types import FrameType
 
 import uvicorn
@@ -13,24 +26,120 @@ from fastapi import FastAPI
 
 from daq.config.service import ServiceSettings
 from daq.config.settings import Settings
-from daq.contracts.errors import SpecError
+from daq.contracts import exit_codes
+from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.service.audit import AuditNote
+from daq.contracts.service.system import stop_port_after
 from server.access.caller import Caller
 from server.access.connections import MOST_CONNECTIONS, Connection
 from server.access.gate import Gate
 from server.access.origin import is_loopback
-from server.access.session_cookie import session_cookie
+from server.access.sessions import session_cookie
 from server.access.tokens import KnownTokens
 from server.app import make_app
-from server.descriptors import most_connections
-from server.ending import EndInTime
-from server.listening import listening
 from server.services import Services
-from server.steady import keep_steady
+from server.steady import keep_steady, most_connections
 from server.stopping.door import StopDoor
 from server.stopping.messages import Begin, Stopped
 from server.store.address import address_of
 from server.store.lock import sole_use, sqlite_file
+
+END_WITHIN = 4.2
+"""Time (s) from the signal to the end of this process."""
+LAST_RESORT = 4.7
+"""Time (s) after which the kernel ends the process, even if its interpreter no longer runs."""
+FORCED = 1
+"""Exit code of a forced end, so that the supervisor of the service notices it."""
+log = logging.getLogger("server")
+
+
+class EndInTime:
+    """A time limit for the end of this process, armed once. `children` ends this service's processes before a
+    forced end; `in_order` says whether everything that had to end in order has ended but for `last`, which is ended
+    then: only threads are left that nobody waits for, and the exit code is 0."""
+
+    def __init__(self, children: Callable[[], None], in_order: Callable[[], bool], last: Callable[[], None]) -> None:
+        self._children = children
+        self._in_order = in_order
+        self._last = last
+        self._armed = threading.Lock()
+
+    def arm(self) -> None:
+        """Starts the time limit. Called in the main thread, from a signal's handler."""
+        if not self._armed.acquire(blocking=False):
+            return
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, LAST_RESORT)
+        timer = threading.Timer(END_WITHIN, self._end)
+        timer.daemon = True
+        timer.start()
+
+    def finish(self) -> None:
+        """Ends this process now if everything has ended in order after a signal. Python would wait for threads that
+        still compute, until the time limit."""
+        if self._armed.locked() and self._in_order():
+            self._last()
+            logging.shutdown()
+            with suppress(OSError, ValueError):
+                sys.stdout.flush()
+            os._exit(0)
+
+    def _end(self) -> None:
+        self.finish()
+        running = [thread.name for thread in threading.enumerate() if not thread.daemon]
+        log.warning("the service did not end in order within %g s and ends now: %s", END_WITHIN, ", ".join(running))
+        try:
+            self._children()
+        finally:
+            os._exit(FORCED)
+
+
+TRIES = 50
+"""Number of pairs of neighbouring ports that are tried if the configuration allows any free port."""
+
+
+class ListenError(DaqError):
+    """The service cannot listen on an address."""
+
+    exit_code = exit_codes.NOT_REACHED
+
+
+@contextmanager
+def listening(section: ServiceSettings) -> Iterator[tuple[socket.socket, socket.socket]]:
+    """Binds sockets for the service and its stop listener. Raises ListenError."""
+    own, beside = _both(section)
+    with own, beside:
+        yield own, beside
+
+
+def _both(section: ServiceSettings) -> tuple[socket.socket, socket.socket]:
+    for attempt in range(TRIES):
+        own = _bound(section.host, section.port, "server.port")
+        port = stop_port_after(own.getsockname()[1]) if section.stop_port is None else section.stop_port
+        try:
+            return own, _bound(section.host, port, "server.stop_port")
+        except ListenError:
+            own.close()
+            if section.port != 0 or section.stop_port is not None or attempt == TRIES - 1:
+                raise
+    raise AssertionError("the last attempt returns or raises")
+
+
+def _bound(host: str, port: int, setting: str) -> socket.socket:
+    listener: socket.socket | None = None
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listener = socket.socket(family, kind, protocol)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+    except (OSError, UnicodeError) as error:
+        if listener is not None:
+            listener.close()
+        why = error.strerror if isinstance(error, OSError) and error.strerror else error
+        line = f"server.host {host}, {setting} {port}: cannot be listened at: {why}"
+        raise ListenError(line) from error
+    return listener
+
 
 KEEP_ALIVE = 60
 """Time (s) for which an idle connection stays open. Clients close theirs after a few seconds (httpx: 5 s); if the

@@ -6,11 +6,15 @@ declare (`server/api/dependencies.py`), never all of this.
 
 It ends in this order: processes that read and plan; queues begin nothing more; connections, queues and jobs; workers;
 events that are recorded later, control and stops; the parts of plug-ins and the last events; the database.
+
+Whether the service is ready: checked at most once a second, however many clients ask.
 """
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -49,7 +53,6 @@ from server.parts import Attention, Part
 from server.problems import ProblemError
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
-from server.readiness import Readiness
 from server.robot.control import ControlService
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
@@ -58,7 +61,6 @@ from server.robot.teaching import TeachingService
 from server.robot_services import RobotServices, robot_named
 from server.store.address import address_of
 from server.store.engine import Store
-from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.models import ModelStore
@@ -66,6 +68,38 @@ from server.store.programs import ProgramStore
 from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
+from server.store.waiting_events import EventStore
+
+KEPT_FOR = 1.0
+"""Time (s) for which a result is reused, since a check writes to the disk and may wait for the database."""
+Checks = dict[str, str]
+"""What is wrong, by the name of the check; an empty text if nothing is."""
+
+
+class Readiness:
+    """Runs one check at a time, on a thread; requests that come meanwhile get its result. Use it on the event loop
+    only."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._checks: Checks = {}
+        self._at = -math.inf
+        self._running: asyncio.Task[Checks] | None = None
+
+    async def check(self, look: Callable[[], Checks]) -> Checks:
+        """Returns what `look`, called on a thread, returns, or returned less than KEPT_FOR s ago. Raises what it
+        raises."""
+        if self._clock.monotonic() - self._at < KEPT_FOR:
+            return self._checks
+        if self._running is None or self._running.done():
+            self._running = asyncio.create_task(self._run(look))
+        return await asyncio.shield(self._running)
+
+    async def _run(self, look: Callable[[], Checks]) -> Checks:
+        self._checks = await asyncio.to_thread(look)
+        self._at = self._clock.monotonic()
+        return self._checks
+
 
 SHUTDOWN, TIDYING = 2.0, 0.5
 """Times (s) to freeze the arm and close the trace, and to tidy up, when the service ends. The process that owns the

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from xdist.remote import Producer
 
 from tests.left_running import Running, mark_this_process
-from tests.order import alternate, is_against_the_clock, is_thorough
-from tests.workers import run_tests
+from tests.order import Units, alternate, is_against_the_clock, is_thorough
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `daq` does, before numpy is loaded: two workers, two cores
 ROOT = Path(__file__).parent.parent
@@ -41,7 +41,6 @@ MAY_ALWAYS_SKIP = ("hardware", "lab_data")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--port", metavar="URL", help="run the hardware tests on the real controller at this port")
-    parser.addoption("--workers", type=int, default=1, metavar="N", help="run the tests in so many processes")
     parser.addoption(
         "--part",
         choices=("quick", "thorough"),
@@ -82,13 +81,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     alternate(items)
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtestloop(session: pytest.Session) -> bool | None:
-    """On several processes; one that a person debugs in, or that only collects, is one."""
-    option = session.config.option
-    if option.workers < 2 or option.collectonly or option.usepdb or session.testsfailed:
-        return None
-    return run_tests(session, option.workers)
+def pytest_fixture_setup(fixturedef: pytest.FixtureDef[object], request: pytest.FixtureRequest) -> None:
+    """Refuse what pytest takes without a word: in a folder that is no package, it lives until all tests are over."""
+    if fixturedef.scope == "package" and isinstance(request.node, pytest.Session):
+        pytest.fail(f"{fixturedef.argname} has package scope, and its folder {fixturedef.baseid} is no package")
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Units:
+    return Units(config, log)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

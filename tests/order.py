@@ -4,6 +4,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
 TESTS = Path(__file__).parent
 AGAINST_THE_CLOCK = (
@@ -59,19 +60,28 @@ def _lies_below(path: Path, folders: tuple[str, ...]) -> bool:
 
 @cache
 def unit_of(path: Path) -> str:
-    """The unit of work, all of which one worker runs, that a test file belongs to: a folder's name, or its own."""
+    """The unit of work, all of which one worker runs, that a test file belongs to: a folder's name, or its own.
+
+    A file that is not below `tests` is named in full.
+    """
     for folder in ONE_WORKER:
         if path.is_relative_to(TESTS / folder):
             return folder
-    return path.relative_to(TESTS).as_posix()
+    return path.relative_to(TESTS).as_posix() if path.is_relative_to(TESTS) else str(path)
+
+
+class Units(LoadScopeScheduling):
+    """Of tests on several processes, one worker runs a unit."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return unit_of(TESTS.parent / nodeid.partition("::")[0])
 
 
 def units_of(items: list[pytest.Item]) -> list[list[pytest.Item]]:
     """The tests by their units of work, in the order of `items`."""
     units: dict[str, list[pytest.Item]] = {}
     for item in items:
-        unit = unit_of(item.path) if item.path.is_relative_to(TESTS) else str(item.path)
-        units.setdefault(unit, []).append(item)
+        units.setdefault(unit_of(item.path), []).append(item)
     return list(units.values())
 
 

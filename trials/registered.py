@@ -28,16 +28,16 @@ from typing import Any
 import numpy as np
 
 from daq.contracts.documents import parse_toml, read_text
-from daq_cli.trial.registered import (
+from model.discrepancy.diagnosis import Diagnosis
+from model.trial.rates import rate
+from model.trial.registration import RegisteredCode
+from model.trial.score import excess_removed_whole
+from trials.blind.registered import (
     REGISTERED,
     library_versions,
     registering_commit,
     tree_hashes,
 )
-from model.discrepancy.diagnosis import Diagnosis
-from model.trial.rates import rate
-from model.trial.registration import RegisteredCode
-from model.trial.score import excess_removed_whole
 from trials.intervals import covered
 from trials.judge import QUESTIONS, TOLD_APART, diagnose, names_of, score
 from trials.rigs.folder import write_world

@@ -18,7 +18,6 @@ import os
 import signal
 import subprocess
 import sys
-import tomllib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -28,7 +27,14 @@ from typing import Any
 
 from benchmarks.figures import machine
 from benchmarks.real_machines.judge import judge, moved, wrong_names
-from benchmarks.real_machines.records import MissingDataError, add_torque, read_columns, write_machine, write_record
+from benchmarks.real_machines.records import (
+    MissingDataError,
+    add_torque,
+    machine_data,
+    read_columns,
+    write_machine,
+    write_record,
+)
 from benchmarks.real_machines.reference import gain_of, reference
 from benchmarks.real_machines.rigs import HERE, Alteration, Question, Rig, load_rigs
 
@@ -88,7 +94,7 @@ def rows(rig: Rig, alteration: Alteration | None, data: Path, longest: float, ke
         place = Path(folder)
         changed = (alteration.set, alteration.remove) if alteration else ({}, ())
         model = write_machine(rig.machine, *changed, place / "machine.toml")
-        drives = [joint["drive"] for joint in tomllib.loads(rig.machine.read_text("utf-8"))["joints"]]
+        drives = [joint["drive"] for joint in machine_data(rig.machine)["joints"]]
         records = [read_columns(rig, record, data) for record in (*rig.fitted, *rig.held_out)]
         if alteration and alteration.add:
             torque = alteration.add

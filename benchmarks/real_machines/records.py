@@ -14,6 +14,7 @@ import tomlkit
 from numpy.typing import NDArray
 
 from benchmarks.real_machines.rigs import Record, Rig, Torque
+from daq.contracts.machine import load_machine
 from ma2000 import read_trace
 
 Floats = NDArray[np.float64]
@@ -94,9 +95,9 @@ def add_torque(columns: Columns, torque: Torque, gain: float) -> Columns:
 
 def write_machine(source: Path, numbers: Mapping[str, float], removed: Sequence[str], path: Path) -> Path:
     """A machine file with some numbers of it changed, by path such as `joints.0.link.mass.value`, or whole keys out."""
-    document = tomlkit.parse(source.read_text("utf-8"))
+    document = machine_data(source)
     for name in removed:
-        document.remove(name)
+        del document[name]
     for name, value in numbers.items():
         *way, last = name.split(".")
         place: Any = document
@@ -105,3 +106,8 @@ def write_machine(source: Path, numbers: Mapping[str, float], removed: Sequence[
         place[last] = value
     path.write_text(tomlkit.dumps(document), encoding="utf-8")
     return path
+
+
+def machine_data(source: Path) -> dict[str, Any]:
+    """A machine file in full, as plain data."""
+    return load_machine(str(source)).model_dump(mode="json", exclude_none=True)

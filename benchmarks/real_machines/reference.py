@@ -7,7 +7,6 @@ filter that runs forwards and backwards, applied to the spectrum. Samples at whi
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from benchmarks.real_machines.records import machine_data
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ def reference(
     offset: bool,
 ) -> Reference:
     """The linear fit. cutoff in Hz, of torques. offset: whether every joint has a constant torque, too."""
-    document = tomllib.loads(machine.read_text("utf-8"))
+    document = machine_data(machine)
     first, second = (
         [_system(document, columns, cutoff, offset=offset) for columns in records] for records in (fitted, held_out)
     )

@@ -23,7 +23,7 @@ class EffectName:
 
     name: its usual one. acts_on: where it acts. family: of effects that are easily confused. line: one line on it.
     called: its name in a sentence. size: the parameter that is its size, if one is. in_torques: how a balance of
-    torques shows it, with {torque}, {angle} and {turn}. shows: patterns of a residual that show it, the plainest first.
+    torques shows it, with {torque}, {angle} and {turn}.
     """
 
     name: str
@@ -33,7 +33,6 @@ class EffectName:
     called: str = ""
     size: str | None = None
     in_torques: str = ""
-    shows: tuple[str, ...] = ()
 
 
 @cache

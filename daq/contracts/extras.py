@@ -45,7 +45,6 @@ EXTRA_OF: dict[str, Extra] = {
     "rosbags": "ros",
     "google": "ros",
     "dask": "cluster",
-    "dask_jobqueue": "cluster",
     "distributed": "cluster",
     "psycopg": "postgresql",
     "obstore": "archive",

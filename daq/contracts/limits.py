@@ -7,18 +7,22 @@ from typing import Annotated, Self
 from pydantic import Field, FiniteFloat, model_validator
 
 from daq.contracts.frozen import FrozenRecord
+from daq.contracts.written_numbers import Units
 
 Positive = Annotated[FiniteFloat, Field(gt=0)]
+
+
+Position = Annotated[FiniteFloat, Units(("rad", "m"))]
 
 
 class JointLimits(FrozenRecord):
     """Limits of one joint, in rad and s (m and s on a prismatic joint)."""
 
-    low: FiniteFloat | None = None
+    low: Position | None = None
     """Least angle."""
-    high: FiniteFloat | None = None
+    high: Position | None = None
     """Largest angle."""
-    speed: Positive | None = None
+    speed: Annotated[Positive, Units(("rad/s", "m/s"))] | None = None
     """Largest speed of set points."""
 
     @model_validator(mode="after")
@@ -33,13 +37,13 @@ class Limits(FrozenRecord):
 
     joints: tuple[JointLimits, ...] = ()
     """Limits of each joint: `joints[i]` belongs to joint i+1."""
-    floor_height: FiniteFloat | None = None
+    floor_height: Annotated[FiniteFloat, Units(("m",))] | None = None
     """Lowest z (m, in the base frame) that any link's end may reach."""
-    reach: Positive | None = None
+    reach: Annotated[Positive, Units(("m",))] | None = None
     """Largest distance (m) of any link's end from the base's origin."""
     following_error_counts: Annotated[int, Field(ge=1, le=4095)] | None = None
     """Magnitude of positional error (ADC counts) at which set points pause (127 in the source, section 6.5)."""
-    following_error_time: Positive | None = None
+    following_error_time: Annotated[Positive, Units(("s",))] | None = None
     """Time (s) that such an error may last before the run ends in a fault."""
 
     def joint(self, number: int) -> JointLimits:

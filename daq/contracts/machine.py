@@ -7,9 +7,10 @@ Every number carries its unit and its source, and says where it is an assumption
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib import resources
+from operator import itemgetter
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -19,7 +20,21 @@ from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.limits import Limits
-from daq.contracts.machine_units import RECORDED_IN, UNITS, JointUnits, drive_unit_of, require_unit, require_units
+from daq.contracts.machine_form import SpelledOut
+from daq.contracts.machine_units import (
+    DRIVE_INERTIA,
+    GAIN,
+    POSITION,
+    RECORDED,
+    RECORDED_IN,
+    TORQUE,
+    UNITS,
+    VISCOUS,
+    JointUnits,
+    drive_unit_of,
+    require_unit,
+    require_units,
+)
 from daq.contracts.quantity import (
     Inertia,
     JointValue,
@@ -32,7 +47,8 @@ from daq.contracts.quantity import (
     Volt,
     in_unit,
 )
-from daq.contracts.refused import refused_words
+from daq.contracts.refused import refusals
+from daq.contracts.toml_places import places_of
 from firmware_protocol.units import POSTURE_UNITS, DriveScale, JointCalibration
 
 
@@ -136,9 +152,9 @@ class PlainGain(FrozenRecord):
     """A drive whose force or torque is proportional to its recorded input: N·m or N per unit of drive."""
 
     kind: Literal["gain"]
-    gain: Quantity
+    gain: Annotated[Quantity, GAIN]
     """Torque or force at the joint for a unit of the recorded drive (`N·m/V`, `N/N`): V, A, N·m, N, count, % or 1."""
-    inertia: Annotated[Quantity, in_unit("kg·m²", "kg", at_least=0.0)] | None = None
+    inertia: Annotated[Quantity, DRIVE_INERTIA, in_unit("kg·m²", "kg", at_least=0.0)] | None = None
     """Of the drive, at the joint; kg on a sliding joint."""
 
 
@@ -161,11 +177,11 @@ class Friction(FrozenRecord):
 
     viscous_motor_side: Annotated[Quantity, in_unit("N·m·s/rad", at_least=0.0)] | None = None
     """Per speed of the motor, on the motor's side."""
-    viscous: Quantity | None = None
+    viscous: Annotated[Quantity, VISCOUS] | None = None
     """Per speed of the joint, at the joint (N·m·s/rad, N·s/m)."""
     coulomb_arm: Annotated[Quantity, in_unit("m", at_least=0.0)] | None = None
     """Lever of the friction that grows with the load."""
-    coulomb: Quantity | None = None
+    coulomb: Annotated[Quantity, TORQUE] | None = None
     """Constant friction at the joint (N·m, N)."""
 
 
@@ -273,12 +289,14 @@ class SampledPid(FrozenRecord):
     """P (drive's unit per rad or m), I (per rad·s), D (s/rad) per joint."""
     velocity_gains: tuple[tuple[FiniteFloat, FiniteFloat, FiniteFloat], ...] | None = None
     """P, I, D per joint of an inner loop on speed; none: no such loop."""
-    drive_resolution: Sizes | None = None
+    drive_resolution: Annotated[Sizes, RECORDED] | None = None
     """Step of the output, unit of the drive; none: not rounded."""
-    output_limit: Sizes | None = None
+    output_limit: Annotated[Sizes, RECORDED] | None = None
     """Largest output, unit of the drive, ahead of the amplifier; none: no limit."""
-    set_point_resolution: Sizes | None = None
+    set_point_resolution: Annotated[Sizes, POSITION] | None = None
     """Step to which set points are rounded before use, rad or m; none: not rounded."""
+    dead_band: Annotated[Sizes, POSITION] | None = None
+    """Error, either way, on which it does not act, rad or m; none: it acts on every error."""
     gain_error: Annotated[Quantity, in_unit("1", above=-1.0)] | tuple[Plain, ...] | None = None
     """Relative: the output is 1 + this times what the gains say; its deviation is that of the gains."""
 
@@ -326,7 +344,7 @@ class Machine(FrozenRecord):
     """See BoardPid, SampledPid and NoController."""
     limits: Limits = Limits()
     """What the arm may do ([safety](safety.md)): experiments are planned within it."""
-    rest_posture: tuple[FiniteFloat, ...] | None = None
+    rest_posture: tuple[Annotated[FiniteFloat, POSITION], ...] | None = None
     """Position of every joint at rest, rad or m: where springs are expected to be slack."""
 
     @model_validator(mode="after")
@@ -341,12 +359,12 @@ class Machine(FrozenRecord):
         if not isinstance(self.controller, NoController) and len(self.controller.gains) != count:
             raise ValueError(f"controller.gains has {len(self.controller.gains)} rows for {count} joints")
         if isinstance(self.controller, SampledPid):
-            for name in ("drive_resolution", "output_limit", "set_point_resolution", "gain_error"):
+            for name in ("drive_resolution", "output_limit", "set_point_resolution", "dead_band", "gain_error"):
                 stated = getattr(self.controller, name)
                 if isinstance(stated, tuple) and len(stated) != count:
                     raise ValueError(f"controller.{name} has {len(stated)} numbers for {count} joints")
                 if name != "gain_error":
-                    positions = name == "set_point_resolution"
+                    positions = name in ("set_point_resolution", "dead_band")
                     allowed = [(j.units.position,) if positions else j.drive_units for j in self.joints]
                     require_units(f"controller.{name}", stated, allowed)
             rows = self.controller.velocity_gains
@@ -429,11 +447,38 @@ def joint_names(machine: Machine | None, joints: tuple[int, ...]) -> tuple[str, 
 
 
 def parse_machine(text: str, origin: str = "machine file") -> Machine:
-    """A machine from TOML text; `origin` names the file in errors. Raises SpecError with one line."""
+    """A machine from TOML text, in the short form or in full; `origin` names the file in errors.
+
+    Raises SpecError with a line for each mistake: where, the field, what was found, what is allowed.
+    """
+    data = parse_toml(text, origin)
+    places = places_of(text)
+    written = SpelledOut(data, Machine, places)
+    found = [(path, f"{'.'.join(_shown_place(path)) or 'machine'}: {words}") for path, words in written.problems]
+    told = [*(path for path, _ in found), *written.elsewhere]
     try:
-        return Machine.model_validate(parse_toml(text, origin))
+        machine = Machine.model_validate(written.data)
     except ValidationError as error:
-        raise SpecError(f"{origin}: {refused_words(error, Machine, 'machine')}") from error
+        refused = refusals(error, Machine, "machine")
+        found += [one for one in refused if not any(one[0][: len(own)] == own for own in told)]
+    else:
+        if not found:
+            return machine
+    lines = sorted(((places.line(path or _named_place(words)) or 0, words) for path, words in found), key=itemgetter(0))
+    said = [words if not line else f"line {line}: {words}" for line, words in lines]
+    raise SpecError(
+        f"{origin}: {said[0]}" if len(said) == 1 else "\n  ".join([f"{origin}: {len(said)} mistakes", *said])
+    )
+
+
+def _shown_place(path: Iterable[int | str]) -> Iterator[str]:
+    return (str(part + 1) if isinstance(part, int) else part for part in path)
+
+
+def _named_place(words: str) -> tuple[int | str, ...]:
+    """The path of the place that the words about a whole machine begin with, if they do."""
+    parts = words.removeprefix("machine: ").partition(" ")[0].rstrip(":").split(".")
+    return tuple(int(part) - 1 if part.isdecimal() else part for part in parts)
 
 
 def load_machine(name_or_path: str) -> Machine:

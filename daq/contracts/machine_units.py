@@ -7,9 +7,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from daq.contracts.quantity import Quantity
+from daq.contracts.written_numbers import Units
 
 RECORDED_IN = ("V", "A", "N·m", "N", "count", "%", "1")
 """Units in which a drive may be recorded."""
+TORQUE = Units(("N·m",), ("N",))
+VISCOUS = Units(("N·m·s/rad",), ("N·s/m",))
+GAIN = Units(
+    (*(f"N·m/({unit})" if "·" in unit else f"N·m/{unit}" for unit in RECORDED_IN), "N·m"),
+    (*(f"N/({unit})" if "·" in unit else f"N/{unit}" for unit in RECORDED_IN), "N"),
+)
+DRIVE_INERTIA = Units(("kg·m²",), ("kg", "kg·m²"))
+RECORDED = Units(RECORDED_IN)
+POSITION = Units(("rad", "m"))
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,6 @@ class ProcessorTime:
     ran: float
     waited: float
 
-    def waits_mostly_since(self, before: ProcessorTime) -> bool:
-        """Whether the process has waited for a processor longer than it has had one, since then."""
-        return self.waited - before.waited > self.ran - before.ran
-
 
 def processor_time(process: int, processes: Path = _PROCESSES) -> ProcessorTime | None:
     """Of a process of this computer, as the kernel has counted it; None where it is gone, or the kernel does not count.

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, FiniteFloat, model_validator
 
 from daq.contracts.frozen import FrozenRecord
+from daq.contracts.written_numbers import Units
 
 
 class Quantity(FrozenRecord):
@@ -51,7 +52,7 @@ def in_unit(unit: str, *others: str, above: float | None = None, at_least: float
             raise ValueError(f"value {quantity.value} {unit} must be at least {at_least}")
         return quantity
 
-    check.unit = unit  # type: ignore[attr-defined]  # for the page that is made from the schema
+    check.units = Units((unit, *others))  # type: ignore[attr-defined]  # for files, and for the page of all fields
     return AfterValidator(check)
 
 
@@ -61,7 +62,7 @@ def _joint_unit(quantity: Quantity) -> Quantity:
     return quantity
 
 
-_joint_unit.unit = "rad or m"  # type: ignore[attr-defined]
+_joint_unit.units = Units(("rad",), ("m",))  # type: ignore[attr-defined]
 Metre = Annotated[Quantity, in_unit("m")]
 Radian = Annotated[Quantity, in_unit("rad")]
 JointValue = Annotated[Quantity, AfterValidator(_joint_unit)]

@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from daq.contracts.documents import shown
 from firmware_protocol.invalid import Invalid, invalid_of
@@ -29,28 +30,41 @@ def refused_words(error: ValidationError, model: type[BaseModel], whole: str) ->
 
     whole: what is said in place of the place, where all of the data are refused.
     """
-    first = _first(error)
-    place, models = _walk(first.place[:-1] if first.kind == "extra_forbidden" else first.place, model)
-    if first.kind == "extra_forbidden":
-        name = str(first.place[-1])
-        fields = list(dict.fromkeys(field for m in models for field in m.model_fields))
-        return f"{'.'.join((*place, name))}: {_unknown_field(name, fields)}"
-    return f"{'.'.join(place) or whole}: {_words(first)}"
+    return next(refusals(error, model, whole))[1]
 
 
-def _first(error: ValidationError) -> Invalid:
-    """The first refused value; of a value that may be of several kinds, the error of the kind that fits furthest. A
-    field with a wrong name is told rather than the one that is therefore missing."""
-    errors = error.errors()
-    if errors[0]["type"] == "missing":
-        beside = [e for e in errors if e["type"] == "extra_forbidden" and e["loc"][:-1] == errors[0]["loc"][:-1]]
-        errors = [*beside, *errors]
-    place = errors[0]["loc"]
-    kind = next((k for k, part in enumerate(place) if _is_kind(part)), None)
-    if kind is None:
-        return invalid_of(errors[0])
-    alike = [e for e in errors if e["loc"][:kind] == place[:kind]]
-    return invalid_of(max(alike, key=lambda e: len(e["loc"])))
+def refusals(error: ValidationError, model: type[BaseModel], whole: str) -> Iterator[tuple[tuple[int | str, ...], str]]:
+    """Every refused value: its path in the data, and the words of `refused_words`."""
+    for found in _told(error.errors()):
+        unknown = found.kind == "extra_forbidden"
+        place, path, models = _walk(found.place[:-1] if unknown else found.place, model)
+        if unknown:
+            name = str(found.place[-1])
+            fields = list(dict.fromkeys(field for m in models for field in m.model_fields))
+            yield (*path, name), f"{'.'.join((*place, name))}: {_unknown_field(name, fields)}"
+        else:
+            yield tuple(path), f"{'.'.join(place) or whole}: {_words(found)}"
+
+
+def _told(errors: Sequence[ErrorDetails]) -> Iterator[Invalid]:
+    """One of the errors of each refused value; of a value that may be of several kinds, that of the kind that fits
+    furthest. A field with a wrong name is told rather than the one that is therefore missing."""
+    told: set[tuple[int | str, ...]] = set()
+    for error in errors:
+        place = error["loc"]
+        beside = [e for e in errors if e["type"] == "extra_forbidden" and e["loc"][:-1] == place[:-1]]
+        inside = [e for e in errors if len(e["loc"]) > len(place) and e["loc"][: len(place)] == place]
+        if (error["type"] == "missing" and beside) or (
+            error["type"] == "too_short" and inside
+        ):  # counts the valid ones
+            continue
+        kind = next((k for k, part in enumerate(place) if _is_kind(part)), None)
+        key = place if kind is None else place[:kind]
+        if key in told:
+            continue
+        told.add(key)
+        alike = [error] if kind is None else [e for e in errors if e["loc"][:kind] == key]
+        yield invalid_of(max(alike, key=lambda e: len(e["loc"])))
 
 
 def _is_kind(part: int | str) -> bool:
@@ -58,22 +72,27 @@ def _is_kind(part: int | str) -> bool:
     return isinstance(part, str) and ("[" in part or part == "Quantity")
 
 
-def _walk(place: Sequence[int | str], model: type[BaseModel]) -> tuple[list[str], list[type[BaseModel]]]:
-    """A place as it stands in the file, without the kinds of which a value might have been; and the models of the table
+def _walk(
+    place: Sequence[int | str], model: type[BaseModel]
+) -> tuple[list[str], list[int | str], list[type[BaseModel]]]:
+    """A place in words and as a path, without the kinds of which a value might have been; and the models of the table
     there."""
     named: list[str] = []
+    path: list[int | str] = []
     models: list[type[BaseModel]] = [model]
     for part in place:
         if isinstance(part, int):
             named.append(str(part + 1))
+            path.append(part)
         elif _is_kind(part):
             continue
         elif narrowed := _of_kind(models, part):
             models = narrowed
         else:
             named.append(part)
+            path.append(part)
             models = [inner for m in models if part in m.model_fields for inner in _models_at(m, part)]
-    return named, models
+    return named, path, models
 
 
 def _words(first: Invalid) -> str:

@@ -41,10 +41,6 @@ class LocalWorkers(Workers):
         """The number of processes."""
         return self._count
 
-    def processes(self) -> tuple[int, ...]:
-        """Process ids of those that have been started."""
-        return tuple(self._pool._processes or ())
-
     def submit(self, function: Callable[..., Any], /, *args: Any, **named: Any) -> Future[Any]:
         """As any executor does."""
         with self._lock, _without_main(function):

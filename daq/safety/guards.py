@@ -1,18 +1,200 @@
-"""All guards of a running plan, or of an arm at rest, asked together once a control period."""
+"""All guards of a running plan, or of an arm at rest, asked together once a control period.
+
+The following error: set points pause while it is too large, and a pause that lasts is a fault (section 6.5).
+
+Checks that samples are current: ticks must continue without long gaps, and the board must not restart.
+
+The link itself notices silence: when its retries are used up it raises LinkTimeoutError.
+
+Set points that the controller did not take because the host had the memory (section 6.3 of the source).
+
+A joint that should stand still must stand still.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
-from daq.contracts.sample import SampleRow
-from daq.safety.findings import NOTHING, Verdict, Watched
-from daq.safety.following_error import FollowingError
-from daq.safety.freshness import Freshness
-from daq.safety.missed_set_points import MissedSetPoints
-from daq.safety.unexpected_motion import UnexpectedMotion
+from daq.contracts.sample import SampleCount, SampleRow
+from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 from firmware_protocol.commands import StatusFlag
+
+
+@dataclass
+class FollowingError:
+    """Two rules with one limit. A positional error outside the limit holds the set points; and no set point may be
+    further from the measured position than the limit, so that an arm whose host or cable dies stops within it. Time is
+    the board's. A hold that lasts longer than `limits.following_error_time` is a fault."""
+
+    watched: Watched
+    held_since: int | None = None
+
+    def check(self, row: SampleRow, planned: Mapping[int, int]) -> Verdict:
+        """`planned` are the postures (by joint) that would be sent next."""
+        limit = self.watched.limits.following_error_counts
+        if limit is None:
+            return NOTHING
+        reason = self._outside(row, limit) or self._ahead(row, planned, limit)
+        if reason is None:
+            was_held, self.held_since = self.held_since, None
+            if was_held is None:
+                return NOTHING
+            waited = (row.tick - was_held) * self.watched.period
+            return Verdict(findings=(Finding("resume", f"set points go on after {waited:.2f} s"),))
+        findings: tuple[Finding, ...] = ()
+        if self.held_since is None:
+            self.held_since = row.tick
+            findings = (reason,)
+        held = (row.tick - self.held_since) * self.watched.period
+        longest = self.watched.limits.following_error_time
+        if longest is not None and held > longest:
+            line = f"{reason.message}; it lasted {held:.2f} s, allowed are {longest:g} s"
+            return Verdict(hold=True, trips=(line,), findings=findings)
+        return Verdict(hold=True, findings=findings)
+
+    def _outside(self, row: SampleRow, limit: int) -> Finding | None:
+        for joint, counts in zip(self.watched.joints, self.watched.counts(row.error), strict=True):
+            if abs(round(counts)) > limit:
+                line = f"joint {joint}: positional error of {counts:.0f} ADC counts, set points pause outside ±{limit}"
+                return Finding("pause", line, joint)
+        return None
+
+    def _ahead(self, row: SampleRow, planned: Mapping[int, int], limit: int) -> Finding | None:
+        for joint, own, position in zip(self.watched.joints, self.watched.calibrations, row.position, strict=True):
+            if joint not in planned:
+                continue
+            counts = (own.posture_to_rad(planned[joint]) - position) / own.rad_per_count
+            if abs(counts) > limit:
+                line = (
+                    f"joint {joint}: next set point is {counts:.0f} ADC counts from the arm, "
+                    f"it waits until the arm is within ±{limit}"
+                )
+                return Finding("pause", line, joint)
+        return None
+
+
+LONGEST_SILENCE = 0.2
+"""Longest time (s) between two samples: an assumption, ten control periods."""
+
+SILENT_SAMPLES = 3
+"""Samples that may be missing in a row on a line so slow that ten control periods hold fewer: an assumption."""
+
+
+@dataclass
+class Freshness:
+    """Remembers the last tick."""
+
+    watched: Watched
+    every: int = 1
+    """Control periods from one sample to the next, as the line allows."""
+    tick: int | None = None
+    count: SampleCount = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.count = SampleCount(self.every)
+
+    def check(self, row: SampleRow) -> Verdict:
+        """The verdict after a sample."""
+        last, self.tick = self.tick, row.tick
+        if row.status & StatusFlag.RESTARTED.value or (last is not None and row.tick < last):
+            line = f"the board has restarted: tick {row.tick}" + ("" if last is None else f" after {last}")
+            return Verdict(trips=(line,), findings=(Finding("restart", line),))
+        if last is None:
+            return NOTHING
+        if row.tick == last:
+            return Verdict(trips=(f"stale sample: tick {row.tick} came twice",))
+        if not self.count.missing(row.tick - last):
+            return NOTHING
+        lost = row.tick - last - self.every
+        line = f"{lost} control periods between ticks {last} and {row.tick} have no sample"
+        if self.every > 1:
+            line = (
+                f"ticks {last} and {row.tick} are {row.tick - last} control periods apart, {self.every} were asked for"
+            )
+        gap = (row.tick - last) * self.watched.period
+        longest = max(LONGEST_SILENCE, SILENT_SAMPLES * self.every * self.watched.period)
+        trips = (f"{line}; allowed are gaps up to {longest:g} s",) if gap > longest + 1e-9 else ()
+        return Verdict(trips=trips, findings=(Finding("missing", line),))
+
+
+LONGEST_RUN = 10
+"""Most control periods in a row in which the controller may miss its set points: an assumption, 0.2 s."""
+
+
+@dataclass
+class MissedSetPoints:
+    """Counts missed set points. One is harmless, since set points are absolute; a run of them means a loss of
+    control."""
+
+    watched: Watched
+    every: int = 1
+    """Control periods from one sample to the next: on a slow line a run lasts as long, but is two samples at least."""
+    missed: int = 0
+    run: int = 0
+
+    def check(self, row: SampleRow, expected: Mapping[int, int] | None) -> Verdict:
+        """`expected` are the postures (by joint) that this period should have taken; None when unknown."""
+        line = self._difference(row, expected or {})
+        if row.status & StatusFlag.SET_POINT_MISSED.value:
+            line = line or f"tick {row.tick}: the controller wanted the memory while the host had it"
+        if line is None:
+            self.run = 0
+            return NOTHING
+        self.missed += 1
+        self.run += 1
+        allowed = max(2, LONGEST_RUN // self.every)
+        trips = (f"{self.run} set points missed in a row, allowed are {allowed}",) if self.run > allowed else ()
+        return Verdict(trips=trips, findings=(Finding("missed_set_point", line),))
+
+    def _difference(self, row: SampleRow, expected: Mapping[int, int]) -> str | None:
+        for joint, own, taken in zip(self.watched.joints, self.watched.calibrations, row.set_point, strict=True):
+            if joint not in expected:
+                continue
+            posture = round((taken - own.angle_at_zero_rad) / own.rad_per_posture_unit)
+            if posture != expected[joint]:
+                return f"joint {joint}: tick {row.tick} took posture {posture}, sent was {expected[joint]}"
+        return None
+
+
+STILL_WITHIN = 40
+"""ADC counts that a joint at rest may stray: an assumption. Gravity and the motion of other joints deflect the arm by a
+few counts at the default gain; 40 are 2.6° on the major axes."""
+
+
+@dataclass
+class UnexpectedMotion:
+    """Judges the joints of `still`; the others are the following error's business.
+
+    While nothing runs the reference is where each joint was first seen; while a plan runs, its set point.
+    """
+
+    watched: Watched
+    still: frozenset[int]
+    from_set_point: bool
+    seen: dict[int, float] = field(default_factory=dict)
+
+    def check(self, row: SampleRow) -> Verdict:
+        """The verdict after a sample."""
+        trips = []
+        for joint, counts in self._strayed(row).items():
+            if abs(counts) > STILL_WITHIN:
+                what = "its set point" if self.from_set_point else "where it was"
+                strayed = f"unexpected motion, {counts:.0f} ADC counts from {what}"
+                trips.append(f"joint {joint}: {strayed}, allowed are ±{STILL_WITHIN}")
+        return Verdict(trips=tuple(trips)) if trips else NOTHING
+
+    def _strayed(self, row: SampleRow) -> Mapping[int, float]:
+        if self.from_set_point:
+            away = tuple(-error for error in row.error)
+        else:
+            for joint, position in zip(self.watched.joints, row.position, strict=True):
+                self.seen.setdefault(joint, position)
+            away = tuple(p - self.seen[j] for j, p in zip(self.watched.joints, row.position, strict=True))
+        counts = zip(self.watched.joints, self.watched.counts(away), strict=True)
+        return {joint: strayed for joint, strayed in counts if joint in self.still}
 
 
 class RunningGuards:

@@ -30,19 +30,22 @@ from daq.contracts.machine import Machine
 from daq.contracts.trace import Floats
 from daq.trajectories.cubic import cubic
 from daq.trajectories.move import move_piece, slow_speeds
-from daq.trajectories.multisine import multisine
-from daq.trajectories.path import path
-from daq.trajectories.pause import pause
 from daq.trajectories.pick_and_place import pick_and_place
 from daq.trajectories.piece import Piece, smooth_piece
-from daq.trajectories.ramp import ramp
-from daq.trajectories.sequence import join_pieces, spread
 from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, representable_angles
-from daq.trajectories.sine import sine
-from daq.trajectories.slow_ramp import slow_ramp
-from daq.trajectories.staircase import staircase
-from daq.trajectories.step import step
-from daq.trajectories.via import via
+from daq.trajectories.shapes import (
+    join_pieces,
+    multisine,
+    path,
+    pause,
+    ramp,
+    sine,
+    slow_ramp,
+    spread,
+    staircase,
+    step,
+    via,
+)
 
 Relative = Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via | Pause
 """Motions relative to their start, independent of the machine."""

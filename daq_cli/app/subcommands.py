@@ -109,14 +109,6 @@ CORE = {
             needs="model",
             group="Model",
         ),
-        Command(
-            "blind",
-            "Hide effects in the mock, diagnose blindly, and score.",
-            "daq_cli.commands.blind",
-            about="computer",
-            needs="model",
-            group="Model",
-        ),
         Command("docs", "Open the documents in the browser.", "daq_cli.commands.docs", about="computer"),
         Command(
             "demo",

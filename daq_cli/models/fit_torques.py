@@ -68,8 +68,7 @@ def fit_recorded_torques(
 def _print(found: TorqueFit, files: Mapping[str, str]) -> None:
     from rich.table import Table
 
-    from model.discrepancy.explanation.note_words import note_words
-    from model.discrepancy.explanation.notes import on_drives_at_limit
+    from model.discrepancy.explanation.notes import note_words, on_drives_at_limit
     from model.discrepancy.explanation.step_words import sentence
     from model.reports.page import trace_names
 

@@ -1,9 +1,18 @@
-"""The robot at this computer's port, which an owner of its own opens for each command."""
+"""The robot at this computer's port, which an owner of its own opens for each command.
+
+An experiment at this computer's port, by an owner of its own.
+
+Stops through the configured ports, for which no process needs to own a port.
+
+Questions and orders to the owner of this computer's port.
+"""
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -11,26 +20,137 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq.contracts.errors import ReachError, SpecError, TraceError
+from daq.contracts.errors import DaqError, ReachError, SpecError, TraceError
+from daq.contracts.experiment import ExperimentSpec, Gain
+from daq.contracts.machine import Machine
+from daq.contracts.service.robot import Done, JointGains, ProcessState
+from daq.owner.client import OwnerOnDemand
+from daq.owner.messages import (
+    EventHappened,
+    Finished,
+    MoveGripper,
+    Progress,
+    ReadGains,
+    ReadProcess,
+    Report,
+    Reset,
+    WriteGains,
+    WriteOutput,
+)
+from daq.owner.stop_socket import StopAnswer
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
 from daq_cli.robot.answers import ImportedTrace, RobotState, headline
 from daq_cli.robot.operations import RobotAccess
 from daq_cli.robot.own_owner import owned
+from daq_cli.robot.run_display import run_display
 
 if TYPE_CHECKING:
     from daq.client import Robot
-    from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.import_choice import Choice
-    from daq.contracts.machine import Machine
     from daq.contracts.service.robot import RobotIdentity
     from daq.contracts.status import StatusReport
-    from daq.owner.messages import Finished, Seen
-    from daq.owner.stop_socket import StopAnswer
+    from daq.owner.messages import Seen
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
-    from daq_cli.robot.own_robot import OwnRobot
     from daq_cli.robot.pendant import Teaching
+
+
+def acquire_locally(
+    call: Invocation, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt
+) -> Finished:
+    """Runs `spec` and shows its progress and events.
+
+    Raises OrderFailedError if there is no trace, SpecError for a folder or a port that is not valid.
+    """
+    if not str(folder).isprintable():
+        raise SpecError(f"folder {str(folder)!r}: a trace's folder has a name of printable characters")
+    with owned(call, machine, consent, folder, moves=True) as owner, run_display(spec) as display:
+
+        def heard(report: Report) -> None:
+            if isinstance(report, Progress):
+                display.progress(report.fraction, report.text)
+            elif isinstance(report, EventHappened):
+                display.event(report.event.kind, report.event.time, report.event.message)
+
+        return owner.run(spec, heard, moves_real_arm=not owner.identity.simulated)
+
+
+def stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:
+    """Stops the robots of the command line or the configuration, all of them unless one is named, except those whose
+    processes have been asked.
+
+    If the configuration cannot be read, the answer says so; other robots have been stopped by then.
+    """
+    try:
+        ports = _ports(call)
+    except DaqError as error:
+        return [StopAnswer(robot="configured robot", delivered=False, confirmed=False, text=str(error))]
+    asked = set(map(_device, reached))
+    left = [(name, url) for name, url in ports if not url.startswith("mock://") and _device(url) not in asked]
+    if not left:
+        return []
+    from daq.owner.port_stop import stop_at_port
+
+    with ThreadPoolExecutor(len(left)) as pool:  # a line that does not answer delays no other arm's stop
+        return list(pool.map(lambda one: stop_at_port(*one), left))
+
+
+def _ports(call: Invocation) -> list[tuple[str, str]]:
+    """Names and ports of the robots to stop. Raises SpecError."""
+    if call.port_option:
+        return [("robot", call.port_option)]
+    wanted = call.robot_option
+    own = [one.robot for one in call.configuration.each_robot() if wanted in (None, one.robot.name)]
+    return [(robot.name, robot.port) for robot in own if robot.port is not None]
+
+
+def _device(url: str) -> object:
+    """Returns the device or address in a port's URL, whatever its spelling; the text itself if it is not a URL."""
+    from daq.transport.url import SerialPort, TcpPort, TransportError, parse_port_url
+
+    try:
+        port = parse_port_url(url)
+    except TransportError:
+        return url
+    match port:
+        case SerialPort(device):
+            return os.path.realpath(device)
+        case TcpPort(host, number):
+            return host.lower(), number
+    return url
+
+
+@dataclass(frozen=True)
+class OwnRobot:
+    """`Orders` and `Changes` by such an owner. Raises OrderFailedError for what is refused."""
+
+    owner: OwnerOnDemand
+
+    def gains(self) -> JointGains:
+        """Reads the board."""
+        return JointGains.model_validate(self.owner.ask(ReadGains))
+
+    def set_gains(self, gains: Mapping[int, Gain]) -> JointGains:
+        """Writes and reads back."""
+        return JointGains.model_validate(self.owner.ask(WriteGains, gains=dict(gains)))
+
+    def process(self) -> ProcessState:
+        """Reads the board."""
+        return ProcessState.model_validate(self.owner.ask(ReadProcess))
+
+    def set_output(self, output: int, *, on: bool, while_stopped: bool = False) -> ProcessState:
+        """Switches and reads back."""
+        found = self.owner.ask(WriteOutput, output=output, on=on, while_stopped=while_stopped)
+        return ProcessState.model_validate(found)
+
+    def set_gripper(self, *, closed: bool, while_stopped: bool = False) -> ProcessState:
+        """Switches and reads back."""
+        return ProcessState.model_validate(self.owner.ask(MoveGripper, closed=closed, while_stopped=while_stopped))
+
+    def reset(self, *, here: bool = False) -> Done:
+        """Ends the stop that the board is in."""
+        return Done.model_validate(self.owner.ask(Reset, stop=None, here=here))
 
 
 @dataclass
@@ -50,7 +170,6 @@ class LocalRobot(RobotAccess):
     @contextmanager
     def _changed(self, consent: ConsentPrompt | None) -> Iterator[OwnRobot]:
         """Raises ReachError when no robot is configured: a new mock would have no state worth showing."""
-        from daq_cli.robot.own_robot import OwnRobot
 
         if self.call.port_option is None and self.call.settings.robot.port is None:
             raise ReachError("no robot is configured: give --port, or set robot.port in daq.toml (`daq config show`)")
@@ -85,13 +204,11 @@ class LocalRobot(RobotAccess):
 
     def stop(self, reached: set[str]) -> list[StopAnswer]:
         """Stops the robot at the configured port."""
-        from daq_cli.robot.local_stop import stop_configured
 
         return stop_configured(self.call, reached)
 
     def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
         """Runs the experiment by an owner of its own."""
-        from daq_cli.robot.local_run import acquire_locally
 
         return acquire_locally(self.call, spec, machine, folder, consent)
 

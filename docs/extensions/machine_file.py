@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 
 from daq.contracts import machine
 from daq.contracts.quantity import Quantity
+from daq.contracts.written_numbers import Units
 
 PARTS: tuple[type[BaseModel], ...] = (
     machine.Machine,
@@ -29,12 +30,17 @@ PARTS: tuple[type[BaseModel], ...] = (
     machine.BoardPid,
     machine.NoController,
 )
+MOST_UNITS = 3
+"""Most units that the column lists; the field's own text tells more of them."""
 BEGIN = f"""# The machine file, field by field
 
 Made from the schema, `daq/contracts/machine.py`. [Your own machine](own-machine.md) shows how to write such a file.
 
-A **number** is a table: `value`, `unit` (as in the column below) and `source`. It may have `assumed = true` (a guess),
-`low` and `high` (physical bounds) and `deviation`, the standard deviation expected between the file and the machine.
+A **number** is a text, `"0.8 ± 0.08 kg"`, and the comment behind it is its source. It may have bounds: `[0 to 2]`.
+Other units are converted to those of the column below. In full, it is a table of `value`, `unit`, `source`,
+`assumed` (a guess), `low`, `high` and `deviation`.
+
+Behind ± stands the standard deviation expected between the file and the machine.
 A number with a deviation is a tolerance: fits and diagnoses may move it, at a price.
 Deviations can be stated of {machine.DEVIATIONS_ARE_USED_OF}.
 For any other number of a modelled joint or of the controller they are an error: no method would use them.
@@ -83,8 +89,9 @@ def _name(kind: Any) -> str:
     """The unit of a number, or what a field may be."""
     origin, inside = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        units = [unit for note in inside[1:] if (unit := getattr(getattr(note, "func", None), "unit", None))]
-        return units[0] if units else _name(inside[0])
+        marks = [getattr(getattr(note, "func", None), "units", note) for note in inside[1:]]
+        units = [list(dict.fromkeys(u.allowed + u.sliding)) for u in marks if isinstance(u, Units)]
+        return " or ".join(units[0]) if units and len(units[0]) <= MOST_UNITS else _name(inside[0])
     if origin is Literal:
         return ", ".join(f"`{value!r}`".replace("'", '"') for value in inside)  # as TOML writes them
     if origin in (Union, types.UnionType):

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
-from server.api.problem_examples import PROBLEM_EXAMPLES
+from server.api.documented import PROBLEM_EXAMPLES
 from server.app import bare_app
 
 from .command_line import plain

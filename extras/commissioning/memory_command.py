@@ -215,7 +215,7 @@ def keep_map(found: Findings, path: Path) -> bool:
     """Writes the memory map, and where a register has no place a map to be completed beside it. Returns whether there
     is a memory map: False while one lacks a place that no map can be without."""
     from daq_cli.app.output_file import replacing
-    from extras.commissioning.memory.map_text import begun_map_text
+    from extras.commissioning.memory.findings import begun_map_text
     from firmware_protocol.memory_map import memory_map_text
 
     memory_map = found.memory_map("found at this arm")

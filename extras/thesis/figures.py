@@ -11,12 +11,12 @@ from daq.contracts.machine import load_machine
 from daq.contracts.trace import Trace
 from extras.thesis.check import Check
 from extras.thesis.influence import Influence, influences
-from extras.thesis.published_models import model_of
 from extras.thesis.tables import (
     INFLUENCE_FAST_WAIST,
     INFLUENCE_SLOW_WAIST,
     RODS_INFLUENCE,
     VISCOUS_AND_COULOMB,
+    model_of,
 )
 from extras.thesis.torques import TorqueAnalysis, largest, torques_of_run
 from model.dynamics.inertial_influence import PARAMETERS, parameter_name, parameters_about_joint

@@ -12,15 +12,19 @@ from daq.contracts.machine import Machine, load_machine
 from daq.contracts.progress import Cancel, Progress, silent
 from daq.contracts.trace import Trace
 from extras.thesis.check import Check, Choice
-from extras.thesis.published_models import BACK_EMF_SYMBOLS, FRICTION_SYMBOLS, PARAMETER, model_of, unfitted
 from extras.thesis.tables import (
+    BACK_EMF_SYMBOLS,
     BASIC,
     DATA_SHEET_BACK_EMF_2,
+    FRICTION_SYMBOLS,
     LADDER,
+    PARAMETER,
     RESISTANCE,
     TORQUE_CONSTANT,
     UNOPTIMISED,
     PublishedModel,
+    model_of,
+    unfitted,
 )
 from model.fitting.fit import fit
 from model.fitting.options import FitOptions, Prior

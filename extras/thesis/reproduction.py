@@ -13,7 +13,7 @@ from extras.thesis.control_cases import ControlChapter, control_chapter
 from extras.thesis.figures import TorqueFigures, influence_tables, torque_figures
 from extras.thesis.influence import Influence
 from extras.thesis.ladder import Ladder, Method, climb_ladder, not_recovered
-from extras.thesis.published_fidelity import RecomputedFidelity, recomputed_fidelities
+from extras.thesis.tables import RecomputedFidelity, recomputed_fidelities
 
 RECOMPUTED_TOLERANCE = 0.03
 """Largest relative difference at which Σλ² recomputed from the tables counts as the published one."""

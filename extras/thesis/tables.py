@@ -1,11 +1,22 @@
-"""Tables 5.1 to 5.3 and 7.1 to 7.10 of the thesis as data. Symbols as printed, values in SI units."""
+"""Tables 5.1 to 5.3 and 7.1 to 7.10 of the thesis as data. Symbols as printed, values in SI units.
+
+The models of chapter 7 as models of this library, with the published values or with those that a fit starts from.
+
+Σλ² recomputed from the published tables, in both conventions of τ′.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
+from daq.contracts.frozen import FrozenRecord
+from daq.contracts.machine import Machine
 from extras.thesis.driven_arm import DrivenArm
 from model.dynamics.rod_arm import RodArm
+from model.machine_model.model import Model, base_model
+from model.validation.criterion import contribution
+from model.validation.expected_deviation import Basis, Convention, deviation_share
 
 
 @dataclass(frozen=True)
@@ -169,3 +180,87 @@ INFLUENCE_SLOW_WAIST = (
 
 RODS_INFLUENCE = (_names("I1yy"), _names("m2 c2x I2yy I2zz"), _names("m3 c3x I3yy I3zz"))
 """Table 5.3: effective inertial parameters of links 1 to 3 when links 2 and 3 are rods."""
+
+
+PARAMETER = {symbol.name: symbol.parameter for symbol in SYMBOLS}
+"""Names of parameters in a model, by the symbols of the source."""
+BACK_EMF_SYMBOLS = ("Kb1-3", "Kb2")
+FRICTION_SYMBOLS = ("v_eff1", "v_eff2", "v_eff3", "μ̃")
+
+
+def model_of(published: PublishedModel, machine: Machine, *, published_inertia: bool = True) -> Model:
+    """A table of chapter 7 as a model of the machine. Raises SpecError for a machine that is not the MA2000's arm."""
+    return _with_values(structure_of(published, machine, published_inertia=published_inertia), published.values)
+
+
+def unfitted(published: PublishedModel, machine: Machine, *, published_inertia: bool = True) -> Model:
+    """The same structure at the values from which the source starts: table 7.2, data-sheet K_b2, no friction."""
+    values = {**UNOPTIMISED.values, "Kb2": DATA_SHEET_BACK_EMF_2, **dict.fromkeys(FRICTION_SYMBOLS, 0.0)}
+    structure = structure_of(published, machine, published_inertia=published_inertia)
+    return _with_values(structure, {s: v for s, v in values.items() if PARAMETER[s] in structure.by_name})
+
+
+def structure_of(published: PublishedModel, machine: Machine, *, published_inertia: bool = True) -> Model:
+    """Effects and ties of a table's model; values of the machine file."""
+    model = base_model(machine, friction=False)
+    model = model.tied(SHARED_BACK_EMF, ("joint1.motor.back_emf_constant", "joint3.motor.back_emf_constant"))
+    if "v_eff1" in published.values:
+        model = model.with_effect("viscous_friction", (1, 2, 3))
+    if "μ̃" in published.values:
+        model = model.with_effect("load_dependent_friction", (1, 2, 3), shared=True)
+    return model.model_copy(update={"published_inertia": published_inertia})
+
+
+def _with_values(model: Model, values: dict[str, float]) -> Model:
+    complete = {"Kb2": DATA_SHEET_BACK_EMF_2, **values}
+    return model.with_values({PARAMETER[symbol]: value for symbol, value in complete.items()})
+
+
+class RecomputedFidelity(FrozenRecord):
+    """Σλ² of one published model from its values and standard deviations, beside the published sum.
+
+    `contributions` are λ² by symbol; zero where the printed deviation is very large.
+    """
+
+    name: str
+    table: str
+    deviation_table: str
+    convention: Convention
+    published: float
+    ours: float
+    contributions: dict[str, float]
+
+    @property
+    def relative_difference(self) -> float:
+        """(ours − published) / published."""
+        return self.ours / self.published - 1.0
+
+
+def recomputed_fidelities(convention: Convention = "source") -> tuple[RecomputedFidelity, ...]:
+    """Σλ² of the four fitted models of chapter 7."""
+    return tuple(_recomputed(model, convention) for model in LADDER)
+
+
+def basis_of_symbol(symbol: str) -> Basis:
+    """Which rule gives the expected deviation of a parameter of chapter 7 (section 7.2.2)."""
+    if symbol[0] == "m" or symbol == "MLOAD":
+        return "mass"
+    return "length" if symbol[0] in "AR" else "gaussian"
+
+
+def _recomputed(model: PublishedModel, convention: Convention) -> RecomputedFidelity:
+    if model.sum_lambda is None or model.deviation_table is None:
+        raise ValueError(f"table {model.table} has no sum of contributions")
+    contributions = {
+        symbol: contribution(model.deviations[symbol], value * deviation_share(basis_of_symbol(symbol), convention))
+        for symbol, value in model.values.items()
+    }
+    return RecomputedFidelity(
+        name=model.name,
+        table=model.table,
+        deviation_table=model.deviation_table,
+        convention=convention,
+        published=model.sum_lambda,
+        ours=math.fsum(contributions.values()),
+        contributions=contributions,
+    )

@@ -134,6 +134,7 @@ LATER_SIZES: tuple[SizeRange, ...] = (
         signed=True,
         per_joint={"slack": (3.2, 0.77, 0.0)},
     ),
+    SizeRange("constant_torque", "torque", ((0.07, 2), (0.16, 5), (0.04, 1.2)), signed=True),
 )
 """Sizes of effects whose names are shared and that came after eight trials had been registered. They are arms of a kind
 of their own, so that every seed of those trials hides what it always hid."""

@@ -116,6 +116,21 @@ class OneSidedSpring:
 
 
 @dataclass
+class ConstantTorque:
+    """A preload turns `joint` with `torque`, wherever it is."""
+
+    name: ClassVar[str] = "constant_torque"
+    shared: ClassVar[bool] = True
+    line: ClassVar[str] = "torque + T"
+    source: ClassVar[str] = "a preload"
+    joint: int = joint_parameter()
+    torque: float = parameter(-200.0, 200.0, unit="N·m", null=0.0)
+
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
+        return self.torque
+
+
+@dataclass
 class PeriodicDisturbance:
     """Something outside pushes `joint` with `amplitude` at `frequency`, whatever the arm does."""
 
@@ -139,5 +154,6 @@ SHARED: tuple[type[Any], ...] = (
     BaseTilt,
     SpringTorque,
     OneSidedSpring,
+    ConstantTorque,
     PeriodicDisturbance,
 )

@@ -1,40 +1,16 @@
-"""What speaks for and against an answer, as data. `explanation/renderer.py` alone makes sentences from it."""
+"""What speaks for and against an answer, as data. `explanation/answer_words.py` alone makes sentences from it."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 from typing import Any, Literal
 
+from pydantic import ConfigDict
+
 from daq.contracts.frozen import FrozenRecord
-from model.discrepancy.numbers import ReadingUnits
 
 Method = Literal["output-error", "inverse-dynamics"]
 """How model and record were compared: by simulating the closed loop, or by balancing torques along the motion."""
-PatternKind = Literal[
-    "bends_with_position",
-    "drives_otherwise",
-    "fails_at_high_drive",
-    "goes_with_position",
-    "goes_with_weight",
-    "grows_with_time",
-    "is_off",
-    "jolts",
-    "lags_after_turns",
-    "lags_alike",
-    "lags_always",
-    "lags_one_way",
-    "lags_under_drive",
-    "lags_under_load",
-    "lags_when_slow",
-    "lags_with_speed",
-    "late_at_changes",
-    "stays_off",
-    "sticks",
-    "stops_short",
-    "swings_with_position",
-    "swings_with_time",
-    "swings_with_time_and_at_rest",
-]
 NoteKind = Literal[
     "cutoff",
     "drive-at-limit",
@@ -90,48 +66,15 @@ RefusalKind = Literal[
 ]
 
 
-class NamedEffect(FrozenRecord):
-    """An effect, its joints (none: of the whole machine), and its evidence."""
-
-    effect: str
-    joints: tuple[int, ...]
-    evidence: float
-
-
-class Pattern(FrozenRecord):
-    """A pattern in the residual of one joint, with the numbers that a person would read off a plot, in SI units.
-
-    `share`: of the residual's mean square that the pattern takes off.
-    """
-
-    kind: PatternKind
-    numbers: dict[str, float] = {}
-    share: float = 0.0
-
-
-class ErrorFall(FrozenRecord):
-    """Root mean square error of a joint without an effect and with it, in `unit`."""
-
-    before: float
-    after: float
-    unit: str
-
-
 class Reason(FrozenRecord):
-    """What speaks for the effect of a step, beside what the step itself holds: its parameters, evidence and place.
+    """What speaks for the effect of a step, beside what the step itself holds: its parameters, evidence and errors.
 
-    By simulation: the `pattern` that `joint` shows most clearly, in `units`, and the fall of its error, `rms`. By
-    balancing torques: `removed`, the share of the mean square that is gone on records not fitted to; `slides` says that
-    the effect's joints slide, so that torques are forces. `rival` is the next best that would be another answer.
+    `removed`: by balancing torques, the share of the mean square that is gone on records not fitted to.
     """
 
-    joint: int | None = None
-    pattern: Pattern | None = None
-    units: ReadingUnits | None = None
-    rms: ErrorFall | None = None
+    model_config = ConfigDict(extra="ignore")
+    """Older answers have more."""
     removed: float | None = None
-    slides: bool = False
-    rival: NamedEffect | None = None
 
 
 class ControllerEffect(StrEnum):

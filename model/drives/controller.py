@@ -20,10 +20,10 @@ INTEGRAL_SHARE = 64.0
 SUM, LAST_ERROR, INNER_SUM, LAST_INNER_ERROR, LAST_READING = range(5)
 MEMORY = 5
 
-# Columns of the gains: the (outer) controller, then the inner one of a cascade, then DAC counts per ADC count, and the
-# resolution of a sampled controller's output (0: none).
-P, I, D, INNER_P, INNER_I, INNER_D, SCALE, RESOLUTION = range(8)  # noqa: E741
-GAINS = 8
+# Columns of the gains: the (outer) controller, then the inner one of a cascade, then DAC counts per ADC count, and of a
+# sampled controller the resolution of its output and the dead band of its error (0: none).
+P, I, D, INNER_P, INNER_I, INNER_D, SCALE, RESOLUTION, DEAD_BAND = range(9)  # noqa: E741
+GAINS = 9
 
 
 @compiled_borrowing
@@ -54,6 +54,12 @@ def linear_board_pid(error: complex, gains: NDArray[Any], memory: NDArray[Any]) 
     memory[SUM] += gains[I] * error
     memory[LAST_ERROR] = error
     return power
+
+
+@compiled_borrowing
+def outside_band(error: complex, gains: NDArray[Any]) -> Any:
+    """The error that a sampled controller acts on: none within its dead band."""
+    return 0.0 * error if abs(error.real) <= gains[DEAD_BAND].real else error
 
 
 @compiled_borrowing

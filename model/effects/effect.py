@@ -29,6 +29,7 @@ class JointScale:
         gear: motor turns per joint turn. viscous: motor-side damping from the machine file, N·m·s/rad.
         inertia: seen by the transmission between rotor and link in series, kg·m² (kg).
         period: control period, s. length, mass: of its link. supply: the supply's limit, V.
+        resistance: of the winding, Ω.
     """
 
     torque: float
@@ -46,6 +47,7 @@ class JointScale:
     mass: float
     supply: float
     gear: float
+    resistance: float
 
 
 Size = float | Callable[[JointScale], float]

@@ -38,6 +38,21 @@ EXTERNAL = (
             EffectParameter("rest", at.CABLE_REST, "rad", null=None, start=0.0, low=-10.0, high=10.0, deviation=1.0),
         ),
     ),
+    Effect(
+        "constant_torque",
+        physics="τ = T",
+        source="a preload, a counterweight on an axis that stays level, or an offset of a current or torque sensor",
+        parameters=(
+            EffectParameter(
+                "torque",
+                at.CONSTANT_TORQUE,
+                "N·m",
+                low=lambda s: -s.strongest,
+                high=lambda s: s.strongest,
+                deviation=lambda s: 0.02 * s.torque,
+            ),
+        ),
+    ),
     # Its phase counts from the start of a record, so each record has another one. Held-out records get a phase of their
     # own (`model.discrepancy.output_error.holdout`); records that are fitted together share one, which is right for a
     # single record only.

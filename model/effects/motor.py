@@ -5,6 +5,9 @@ from __future__ import annotations
 from model import layout as at
 from model.effects.effect import Effect, EffectParameter
 
+LONGEST_ELECTRICAL = 0.05
+"""Longest electrical time constant L/R of a winding, s: 0.1 to 10 ms in servo motors, some tens above a kilowatt."""
+
 MOTOR = (
     Effect(
         "weakened_magnet",
@@ -40,7 +43,16 @@ MOTOR = (
         physics="L di/dt = u − R i − K_b n q̇, advanced by its exact exponential",
         source="(3.55), table 7.1",
         parameters=(
-            EffectParameter("inductance", at.INDUCTANCE, "H", null=0.0, start=1e-3, low=1e-7, high=1.0, deviation=1e-2),
+            EffectParameter(
+                "inductance",
+                at.INDUCTANCE,
+                "H",
+                null=0.0,
+                start=lambda s: 2e-4 * s.resistance,
+                low=lambda s: 1e-8 * s.resistance,
+                high=lambda s: LONGEST_ELECTRICAL * s.resistance,
+                deviation=lambda s: 2e-3 * s.resistance,
+            ),
         ),
         flag=at.HAS_INDUCTANCE,
     ),

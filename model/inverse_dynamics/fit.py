@@ -28,7 +28,7 @@ from model.fitting.unknowns import prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.inverse_dynamics.drive_limits import find_drives_at_limit
 from model.inverse_dynamics.problem import TorqueProblem
-from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion
+from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion, recorded_motions
 from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_sizes
 from model.inverse_dynamics.repeats import noise_left
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
@@ -37,6 +37,7 @@ from model.machine_model.posterior import summarise_posterior
 from model.machine_model.record_verdict import JointLeft, RecordVerdict
 from model.record_check.check import as_used, check_records, require_computable
 from model.record_check.finding import RecordFinding, doubts_headline
+from model.record_check.pieces import in_pieces
 from model.units import joint_unit
 
 CUTOFF = 12.0
@@ -136,8 +137,8 @@ def fit_torques(
     _check_effects(model)
     record = check_records(model, (*traces, *held_out))
     require_computable(record)
-    traces, held_out = (as_used(some, model.machine) for some in (traces, held_out))
     records_of([*traces, *held_out], model.machine, "position")
+    traces, held_out = (in_pieces(as_used(some, model.machine)) for some in (traces, held_out))
     unknowns = chosen_unknowns(model, options)
     progress(0.0, "low-passing the records")
     motions = [_driven_motion(model, trace, cutoff) for trace in (*traces, *held_out)]
@@ -165,13 +166,13 @@ def fit_torques(
     errors = [_error(fitted, motion, held_out=k >= len(traces)) for k, motion in enumerate(motions)]
     lineage = Lineage(
         parent=model.identity,
-        traces=tuple(t.record.trace_id for t in traces),
+        traces=tuple(dict.fromkeys(t.record.trace_id for t in traces)),
         fit={
             "fitted": [u.name for u in unknowns],
             "known": list(report.known),
             **summarise_posterior(
                 model.lineage,
-                [t.record.trace_id for t in traces],
+                list(dict.fromkeys(t.record.trace_id for t in traces)),
                 ((p.name, p.model_value, p.deviation) for p in parameters),
             ),
         },
@@ -198,15 +199,15 @@ def fit_torques(
 
 def torque_curves(model: Model, trace: Trace, cutoff: float = CUTOFF) -> TorqueCurves:
     """Recorded and residual torque along a trace, by a model. Raises TraceError and SpecError as `fit_torques` does."""
-    (whole,) = as_used([trace], model.machine)
-    motion = recorded_motion(whole, model.machine, cutoff)
-    balance = TorqueBalance(model, (motion,))
+    pieces = in_pieces(as_used([trace], model.machine))
+    motions = recorded_motions(pieces, model.machine, cutoff)
+    balance = TorqueBalance(model, motions)
     return TorqueCurves(
         trace.record.trace_id,
         model.machine.modelled_joints,
-        motion.time[motion.rows],
-        balance.supplied_by_drive()[0],
-        balance.residual({})[0],
+        np.concatenate([motion.time[motion.rows] for motion in motions]),
+        np.concatenate(balance.supplied_by_drive()),
+        np.concatenate(balance.residual({})),
     )
 
 

@@ -17,6 +17,7 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats, Mask
 from model.dynamics.recursive import mass_matrix
 from model.machine_model.model import Model
+from model.record_check.readings import is_bridged
 from model.simulation.chain_of_model import chain_of
 
 CUTOFFS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)
@@ -30,8 +31,6 @@ APART = 5.0
 detrended walk's root mean square is half of its end's deviation."""
 FEWEST = 32
 """Samples that a trace needs, for its noise to be estimated."""
-LONGEST_GAP = (10.0, 0.05)
-"""Longest gap between samples that is bridged: so many periods, and so many seconds more."""
 POSTURES = 20
 """Postures of each record over which its inertia is averaged for the noise floor."""
 
@@ -133,7 +132,7 @@ def readings_of(trace: Trace, machine: Machine) -> Readings:
     columns = [trace.column(j) for j in machine.modelled_joints]
     steps = np.diff(trace.time)
     period = float(np.median(steps))
-    if steps.max() > LONGEST_GAP[0] * period + LONGEST_GAP[1]:
+    if not is_bridged(float(steps.max()), period):
         place = f"a gap of {steps.max():.3g} s behind {trace.time[int(steps.argmax())]:.3f} s"
         raise TraceError(f"{trace.called}: {place}; use a piece without any")
     time = np.arange(trace.time[0], trace.time[-1], period)

@@ -263,6 +263,7 @@ def joint_scale(machine: Machine, number: int) -> JointScale:
         mass=joint.link.mass.value,
         supply=supply,
         gear=gear,
+        resistance=drive.resistance.value if isinstance(drive, DcMotor) else 1.0,
     )
 
 

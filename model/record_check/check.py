@@ -22,6 +22,7 @@ from model.machine_model.model import Model
 from model.record_check.columns import column_findings
 from model.record_check.drives import drive_findings
 from model.record_check.finding import FindingKind, RecordFinding, doubts_in
+from model.record_check.pieces import in_pieces
 from model.record_check.readings import (
     FalseReadings,
     Jump,
@@ -66,7 +67,7 @@ def check_records(model: Model, traces: Sequence[Trace]) -> tuple[RecordFinding,
             bursts = list(_on_bursts(trace))
             found += bursts or [
                 *_on_readings(trace, model.machine),
-                *_on_columns(repaired(trace, model.machine), model),
+                *_on_columns(max(in_pieces([repaired(trace, model.machine)]), key=len), model),
             ]
     return tuple(found)
 
@@ -180,7 +181,7 @@ def _on_machine(machine: Machine, traces: Sequence[Trace]) -> Iterator[RecordFin
 
 
 def _on_readings(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
-    yield from _on_gaps(trace)
+    yield from _on_gaps(trace, machine)
     for joint in machine.modelled_joints:
         yield from _on_jumps(trace, machine, joint)
         yield from _on_bounds(trace, machine, joint)
@@ -217,7 +218,8 @@ def _on_bursts(trace: Trace) -> Iterator[RecordFinding]:
         )
 
 
-def _on_gaps(trace: Trace) -> Iterator[RecordFinding]:
+def _on_gaps(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
+    """A loop is simulated through its whole record. A balance of torques is of pieces (`in_pieces`)."""
     gaps = find_gaps(trace.time)
     if not gaps:
         return
@@ -225,10 +227,12 @@ def _on_gaps(trace: Trace) -> Iterator[RecordFinding]:
     long = [gap for gap in gaps if not is_bridged(gap[1], usual)]
     shown = long or gaps
     longest = max(length for _, length in shown)
+    cut = isinstance(machine.controller, NoController)
+    advice = "It is cut there" if cut else "Use a piece without any"
     starts = [float(trace.time[row]) for row, _ in shown]
     yield RecordFinding(
         kind="gap",
-        consequence="doubt" if long else "note",
+        consequence="doubt" if long and not cut else "note",
         record=trace.called,
         times=tuple(starts[:MOST_KEPT]),
         count=len(shown),
@@ -237,7 +241,7 @@ def _on_gaps(trace: Trace) -> Iterator[RecordFinding]:
         unit="s",
         says=f"{times_of(len(shown), 'gap')} {at_times(starts)}, the longest of {number(longest)} s, where samples are "
         f"{number(usual)} s apart.",
-        advice="Use a piece without any: what moved the joints meanwhile is not known." if long else "",
+        advice=f"{advice}: what moved the joints meanwhile is not known." if long else "",
     )
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from daq.contracts.machine import BoardPid, DcMotor, Machine, NoController, SampledPid
+from daq.contracts.machine import BoardPid, DcMotor, Machine, NoController, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.drives.controller import INTEGRAL_SHARE
@@ -109,6 +109,8 @@ def formed_drive(trace: Trace, machine: Machine, joint: int, reading: Reading, s
     error = reading.set_point - reading.position
     if isinstance(controller, SampledPid):
         period = stretched * controller.period.value
+        band = of_joint(controller.dead_band, joint)
+        error = error if band is None else np.where(np.abs(error) <= band.value, 0.0, error)
         output = _pid(error, controller.gains[joint - 1], period)
         if controller.velocity_gains is not None:
             speed = np.diff(reading.position, prepend=reading.position[0]) / period

@@ -15,7 +15,7 @@ from model.discrepancy.diagnosis import (
     in_order,
 )
 from model.discrepancy.explanation.answer_words import best_tried, headline, method_words, what_is_left
-from model.discrepancy.explanation.class_words import class_words
+from model.discrepancy.explanation.effect_words import class_words
 from model.discrepancy.explanation.fitted_numbers import FittedNumber, most_moved, stated_numbers, with_deviation
 from model.discrepancy.explanation.step_words import sentence
 from model.effects.names import capitalised

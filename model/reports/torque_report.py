@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from model.base_parameters.result import BaseParameters
 from model.blocks import Cell, Picture, Report, Section, Table, Text, cells
-from model.discrepancy.explanation.note_words import note_words
-from model.discrepancy.explanation.notes import on_drives_at_limit
+from model.discrepancy.explanation.notes import note_words, on_drives_at_limit
 from model.discrepancy.explanation.step_words import sentence
 from model.fitting.shown import parameter_table
 from model.inverse_dynamics.fit import TorqueCurves, TorqueFit

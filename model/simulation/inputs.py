@@ -214,6 +214,10 @@ def gains_of(machine: Machine, own: Mapping[int, Gain] | None) -> Floats:
         elif isinstance(controller, SampledPid):
             if controller.velocity_gains is not None:
                 gains[k, pid.INNER_P : pid.INNER_D + 1] = controller.velocity_gains[joint - 1]
-            resolution = of_joint(controller.drive_resolution, joint)
-            gains[k, pid.RESOLUTION] = 0.0 if resolution is None else resolution.value
+            for column, stated in (
+                (pid.RESOLUTION, controller.drive_resolution),
+                (pid.DEAD_BAND, controller.dead_band),
+            ):
+                size = of_joint(stated, joint)
+                gains[k, column] = 0.0 if size is None else size.value
     return gains

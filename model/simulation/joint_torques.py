@@ -150,6 +150,7 @@ def extra_torque(
         torque -= joint[at.SPRING] * (q - joint[at.SPRING_REST])
     if joint[at.CABLE].real * (q - joint[at.CABLE_REST]).real > 0.0:
         torque -= magnitude(joint[at.CABLE]) * (q - joint[at.CABLE_REST])
+    torque += joint[at.CONSTANT_TORQUE]
     if joint[at.DISTURBANCE_SINE] != 0.0 or joint[at.DISTURBANCE_COSINE] != 0.0:
         s, c = sin_cos(TWO_PI * joint[at.DISTURBANCE_FREQUENCY] * time)
         torque += joint[at.DISTURBANCE_SINE] * s + joint[at.DISTURBANCE_COSINE] * c

@@ -17,6 +17,7 @@ from model.drives.controller import (
     cascade,
     given_out,
     linear_board_pid,
+    outside_band,
     sampled_pid,
 )
 from model.drives.sensor import reading
@@ -37,6 +38,7 @@ EXTRA_TORQUES = (
     at.RIPPLE_COSINE,
     at.SPRING,
     at.CABLE,
+    at.CONSTANT_TORQUE,
     at.DISTURBANCE_SINE,
     at.DISTURBANCE_COSINE,
 )
@@ -74,16 +76,17 @@ def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Ar
         error = error * unit
     else:
         error = wanted - (zero + unit * read)
+        acting = outside_band(error, record.gains[j]) if rounds else error
         if k == 0:
-            memory[j, LAST_ERROR], memory[j, LAST_READING] = error, read
+            memory[j, LAST_ERROR], memory[j, LAST_READING] = acting, read
         scale = 1.0 + joint[at.GAIN_ERROR]
         if kind == at.SAMPLED_PID:
-            drive = scale * sampled_pid(error, period, record.gains[j], memory[j])
-            drive = given_out(drive, error, period, record.gains[j], joint, rounds, memory[j])
+            drive = scale * sampled_pid(acting, period, record.gains[j], memory[j])
+            drive = given_out(drive, acting, period, record.gains[j], joint, rounds, memory[j])
         elif kind == at.CASCADE:
             speed = unit * (read - memory[j, LAST_READING]) / period
-            drive = scale * cascade(error, speed, period, record.gains[j], memory[j])
-            drive = given_out(drive, error, period, record.gains[j], joint, rounds, memory[j])
+            drive = scale * cascade(acting, speed, period, record.gains[j], memory[j])
+            drive = given_out(drive, acting, period, record.gains[j], joint, rounds, memory[j])
             memory[j, LAST_READING] = read
         else:  # at.NO_CONTROLLER: the recorded drive moves the model; `prepare` refuses controllers that have no kind
             drive = record.recorded[k, j] + 0.0 * error

@@ -78,6 +78,7 @@ TRANSLATIONS: dict[str, Translation] = {
     "centre_of_mass": _same(shift="shift"),
     "base_tilt": _tilt,
     "spring_torque": _same(stiffness="stiffness", rest="neutral"),
+    "constant_torque": _same(torque="torque"),
     "one_sided_spring": _same(stiffness="stiffness", rest="slack"),
     "periodic_disturbance": _same(frequency="frequency"),
     "potentiometer_gain": _same(relative="error"),

@@ -17,7 +17,7 @@ from server.problems import MEDIA_TYPE, ProblemError, details_of
 
 MOST_CONNECTIONS = 500
 """Largest number of connections: half of the files that a process may open by default (1024); fewer where it may open
-fewer (`server.descriptors`)."""
+fewer (`server.steady`)."""
 MOST_HEADERS = 100
 """Largest number of headers of one request. Browsers send some twenty."""
 LARGEST_HEAD = 32 << 10

@@ -19,9 +19,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from daq.contracts.errors import SpecError
 from daq.contracts.service.queue import Role, role_of
 from server.access.caller import LOCAL, Caller
-from server.access.commands import note_command
 from server.access.digest import digest_of
-from server.access.sessions import SessionStore
+from server.access.sessions import SessionStore, note_command
 from server.clock import Clock
 from server.database_errors import DamagedError
 from server.store.engine import Store

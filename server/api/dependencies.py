@@ -25,7 +25,6 @@ from server.parts import Part
 from server.problems import ProblemError
 from server.robot_services import RobotServices
 from server.services import Services
-from server.store.events import EventStore
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.models import ModelStore
@@ -33,6 +32,7 @@ from server.store.pages import Cursor
 from server.store.programs import ProgramStore
 from server.store.schedules import ScheduleStore
 from server.store.traces import TraceStore
+from server.store.waiting_events import EventStore
 
 
 def services_of(connection: HTTPConnection) -> Services:

@@ -2,16 +2,46 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
 from functools import cache
 from html import escape
+from pathlib import Path
 from typing import Any
 
-from daq.contracts.service.problems import ProblemDetails
-from server.api.problem_examples import PROBLEM_EXAMPLES
-from server.problems import MEDIA_TYPE, SCHEMA
+from daq.contracts.documents import read_document
+from daq.contracts.service.problems import FieldProblem, ProblemDetails
+from server.problems import MEDIA_TYPE, SCHEMA, ProblemError, details_of
 
 IN_COMPONENTS = "#/components/schemas/{model}"
 Document = dict[str, Any]
+CHANGES = "(post|put|patch|delete) "
+MOVES = f"{CHANGES}.*/(teaching/.*|programs/.*/run|gains|process/.*|gripper)"
+
+
+@dataclass(frozen=True)
+class Met:
+    """A problem, and which operations (`method /path`) may answer with it; None: no operation."""
+
+    problem: ProblemError
+    where: re.Pattern[str] | None
+
+    @property
+    def details(self) -> ProblemDetails:
+        """The body of the answer."""
+        return details_of(self.problem, request_id="0f3c9a1be4d27788")
+
+
+def _met(row: dict[str, Any]) -> Met:
+    where = row.pop("where", None)
+    fields = tuple(FieldProblem(**one) for one in row.pop("fields", ()))
+    pattern = None if where is None else re.compile(where.replace("{changes}", CHANGES).replace("{moves}", MOVES))
+    return Met(ProblemError(**row, fields=fields), pattern)
+
+
+PROBLEM_EXAMPLES = tuple(
+    _met(row) for row in read_document(Path(__file__).with_name("problems.toml"), "problems")["problem"]
+)
 
 
 @cache
@@ -58,5 +88,5 @@ def _problems(status: int, operation: str) -> Document:
     return {
         met.problem.kind: {"summary": met.problem.detail, "value": met.details.model_dump(mode="json")}
         for met in PROBLEM_EXAMPLES
-        if met.problem.status == status and met.where.match(operation)
+        if met.problem.status == status and met.where is not None and met.where.match(operation)
     }

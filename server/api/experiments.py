@@ -36,7 +36,7 @@ from server.bounded.messages import WorkOutMotion
 from server.bounded.motion import preview_of
 from server.bounded.workers import ExhaustedError, Workers
 from server.catalogue.room import require_room
-from server.experiments.length import LONGEST, least_length, points_of
+from server.experiments.schedule import LONGEST, least_length, points_of
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
 from server.robot_services import RobotServices

@@ -1,4 +1,7 @@
-"""Routes of jobs (fits, validations, comparisons and diagnoses in the background) and of the models they make."""
+"""Routes of jobs (fits, validations, comparisons and diagnoses in the background) and of the models they make.
+
+The effects of the library, as clients see them.
+"""
 
 from __future__ import annotations
 
@@ -38,11 +41,30 @@ from server.api.dependencies import (
     Viewer,
 )
 from server.api.upload import store_model
-from server.jobs.effects import known_effects
 from server.jobs.service import REPORT, RESULT
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS
 from server.routes import Router
+
+
+def known_effects() -> tuple[KnownEffect, ...]:
+    """Returns the effects in the order of the shared list, in which those of one family are together."""
+    from model.effects.library import library
+    from model.effects.names import effect_name
+
+    return tuple(
+        KnownEffect(
+            name=one.name,
+            called=effect_name(one.name),
+            family=one.shared_name.family,
+            title=one.shared_name.line,
+            physics=one.physics,
+            joints=one.joints,
+            whole_machine=one.whole_machine,
+        )
+        for one in library().values()
+    )
+
 
 router = Router(prefix="/robots/{robot}", responses=PROBLEMS)
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"

@@ -2,13 +2,39 @@
 
 queued → running → done | failed | cancelled | interrupted, and queued → cancelled. An experiment never leaves an end
 state: an interrupted one does not run again by itself, but must be submitted again.
+
+The meaning of a run's end for its experiment and for the queue. Pure.
+
+The order of the queue. Pure.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime
 from enum import StrEnum
 
+from daq.contracts import exit_codes
+from daq.contracts.labels import Outcome
 from daq.contracts.service.experiments import ExperimentState
+from daq.owner.messages import Answer
+
+
+@dataclass(frozen=True)
+class Waiting:
+    """A waiting experiment. `sequence` is the order of submission, which does not depend on a clock."""
+
+    id: str
+    sequence: int
+    priority: int
+    at: datetime | None
+
+
+def next_due(waiting: Iterable[Waiting], now: datetime) -> Waiting | None:
+    """The next experiment to run: of those due, the one with the highest priority, then the first submitted."""
+    due = [one for one in waiting if one.at is None or one.at <= now]
+    return min(due, key=lambda one: (-one.priority, one.sequence), default=None)
 
 
 class Event(StrEnum):
@@ -60,3 +86,38 @@ def advance(state: ExperimentState, event: Event) -> ExperimentState:
 def after_restart(state: ExperimentState) -> ExperimentState:
     """Returns the state after a restart of the service: a running experiment is interrupted; other states stay."""
     return advance(state, Event.LOST) if state == "running" else state
+
+
+_OF_OUTCOME: dict[Outcome, Event] = {
+    "complete": Event.COMPLETED,
+    "stopped": Event.STOPPED,
+    "fault": Event.FAULT,
+    "interrupted": Event.LOST,
+}
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How an experiment ended. `left_out`: the answer whose trace could not be added to the catalogue at once."""
+
+    event: Event
+    reason: str
+    outcome: Outcome | None = None
+    left_out: Answer | None = None
+
+    @property
+    def pauses_queue(self) -> bool:
+        """Whether a person must look at the arm before the next experiment runs: always, except after a completed plan
+        whose trace is in the catalogue, or after a plan refused before anything moved."""
+        return self.left_out is not None or self.event not in (Event.COMPLETED, Event.REFUSED)
+
+
+def ending_of(answer: Answer) -> Ending:
+    """Returns the ending that the answer of the port's owner reports."""
+    if answer.finished is not None:
+        return Ending(_OF_OUTCOME[answer.finished.outcome], answer.finished.reason, answer.finished.outcome)
+    if answer.exit_code in (exit_codes.WRONG_INPUT, exit_codes.REFUSED):
+        return Ending(Event.REFUSED, answer.problem)
+    if answer.exit_code == exit_codes.NOT_REACHED:
+        return Ending(Event.LOST, answer.problem)
+    return Ending(Event.STOPPED if answer.exit_code == exit_codes.STOPPED else Event.FAULT, answer.problem)

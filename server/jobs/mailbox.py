@@ -4,7 +4,6 @@ another computer could share them; each is written completely or not at all."""
 from __future__ import annotations
 
 import json
-import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,11 +25,10 @@ REQUEST, PROGRESS, CANCEL, RESULT, REPORT, MODEL = (
 
 @dataclass(frozen=True)
 class Reported:
-    """The progress of a job, and the process that computes it."""
+    """The progress of a job."""
 
     fraction: float
     text: str
-    process: int
 
 
 class Mailbox:
@@ -65,7 +63,7 @@ class Mailbox:
     def reported(self) -> Reported | None:
         """Returns the progress of the job; None before it has begun."""
         data = self.read(PROGRESS)
-        return None if data is None else Reported(data["fraction"], data["text"], data["process"])
+        return None if data is None else Reported(data["fraction"], data["text"])
 
     # ---- the worker's side
 
@@ -77,7 +75,7 @@ class Mailbox:
             return
         self._told = now
         with replacing(self.folder / PROGRESS, synced=False) as part:
-            part.write_text(json.dumps({"fraction": fraction, "text": text, "process": os.getpid()}), "utf-8")
+            part.write_text(json.dumps({"fraction": fraction, "text": text}), "utf-8")
 
     def is_set(self) -> bool:
         """Whether the job must end, as `daq.contracts.progress.Cancel`."""

@@ -15,10 +15,9 @@ from pathlib import Path
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.machine import Machine
-from daq.contracts.processor import added, processor_time
 from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import MACHINE, DiagnoseRequest, FitRequest, Job, JobRequest
-from daq.executors import LocalWorkers, Workers
+from daq.executors import Workers
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
 from server.experiments.states import Event
@@ -26,7 +25,6 @@ from server.jobs.lanes import LANES, Lane, lane_of, with_what_it_waits_for
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
 from server.jobs.models import Models
 from server.jobs.shared_workers import SharedWorkers, worker_processes
-from server.jobs.standing import WAITS, Standing
 from server.jobs.work import Ended, Task, carry_out
 from server.problems import ProblemError, conflict, not_found
 from server.store.jobs import JobStore, models_of, traces_of
@@ -80,8 +78,6 @@ class JobService:
         self._fetched: dict[str, _Fetched] = {}
         """Waiting jobs whose traces are fetched from the archive."""
         self._given_to: dict[str, Workers] = {}
-        self._standing: dict[str, Standing] = {}
-        """Running jobs, and whether they get a processor."""
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
         context.jobs.settle_after_restart(context.robot, context.clock.utc())
 
@@ -176,9 +172,6 @@ class JobService:
             return job
         reported = self._reported(job.id)
         fraction, text = (0.0, "starting") if reported is None else (reported.fraction, reported.text)
-        standing = self._standing.get(job.id)
-        if standing is not None and standing.waits and standing.reported == reported:
-            text = WAITS
         return job.model_copy(update={"progress": fraction, "progress_text": text})
 
     def close(self, patience: float) -> None:
@@ -206,7 +199,7 @@ class JobService:
         self._context.changed(self.with_progress(job))
 
     def _follow(self) -> None:
-        told: dict[str, tuple[Reported | None, bool]] = {}
+        told: dict[str, Reported] = {}
         while not self._closing:
             self._wake.clear()
             failed = False
@@ -322,7 +315,6 @@ class JobService:
                 log.exception("job %s: its end cannot be written", identity)
             del self._running[identity]
             self._given_to.pop(identity, None)
-            self._standing.pop(identity, None)
             has_ended = True
         return has_ended
 
@@ -366,23 +358,12 @@ class JobService:
         for job in self.with_progress_all(self._context.jobs.waiting(self._context.robot)[:MOST_TOLD]):
             self._context.changed(job)
 
-    def _tell_progress(self, told: dict[str, tuple[Reported | None, bool]]) -> None:
+    def _tell_progress(self, told: dict[str, Reported]) -> None:
         for identity in list(self._running):
             reported = self._reported(identity)
-            now = reported, self._waits(identity, reported)
-            if now != (None, False) and told.get(identity) != now:
-                told[identity] = now
+            if reported is not None and told.get(identity) != reported:
+                told[identity] = reported
                 self._tell(self._context.jobs.get(self._context.robot, identity))
-
-    def _waits(self, identity: str, reported: Reported | None) -> bool:
-        """Whether a job stands still because the processes of this computer that compute it get no processor."""
-        workers, now = self._given_to.get(identity), self._context.clock.monotonic()
-        if not isinstance(workers, LocalWorkers):
-            return False
-        time = added(processor_time(one) for one in ([reported.process] if reported else workers.processes()))
-        standing = self._standing.setdefault(identity, Standing(reported, now, time))
-        standing.look(reported, now, time)
-        return standing.waits
 
 
 def _failed(error: Exception) -> Future[Ended]:

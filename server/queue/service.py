@@ -15,16 +15,12 @@ from daq.contracts.service.experiments import Experiment, ExperimentRequest, Exp
 from daq.contracts.service.queue import QueueStatus
 from daq.owner.messages import Answer, ArmReport, EventHappened, HaltRun, Opened, Progress, Report, RunExperiment
 from server.database_errors import is_locked
-from server.experiments.endings import Ending, ending_of
-from server.experiments.order import next_due
 from server.experiments.review import Given, Review
-from server.experiments.states import Event, IllegalEventError, advance
+from server.experiments.states import Ending, Event, IllegalEventError, advance, ending_of, next_due
 from server.problems import ProblemError, conflict
-from server.queue.attendance import Attendance
-from server.queue.context import QueueContext
+from server.queue.context import Attendance, QueueContext
 from server.queue.due_runs import DueRuns
-from server.queue.notices import Notices
-from server.queue.readiness import Circumstances, approval_missing, what_is_missing, why_paused
+from server.queue.readiness import Circumstances, Notices, approval_missing, what_is_missing, why_paused
 from server.store.experiments import NotApprovedError
 from server.store.queues import QueueState
 

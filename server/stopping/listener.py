@@ -21,8 +21,8 @@ from daq.contracts.service.problems import ProblemDetails
 from daq.contracts.service.robot import StopResult
 from server.access.caller import Caller
 from server.access.stop_gate import StopGate, TokensCannotBeReadError
-from server.descriptors import most_connections
 from server.problems import MEDIA_TYPE, ProblemError, details_of, not_found
+from server.steady import most_connections
 from server.stopping.arm import together
 
 ADDRESS = re.compile(r"/api/v1/robots/([a-z0-9][a-z0-9_-]{0,31})/stop")

@@ -17,7 +17,7 @@ from typing import Any
 from daq.contracts.service.queue import role_of
 from server.access.caller import Caller
 from server.access.digest import digest_of
-from server.access.session_cookie import STOPS_FOR
+from server.access.sessions import STOPS_FOR
 from server.access.stop_gate import TokensCannotBeReadError
 from server.database_errors import open_to_read
 

@@ -15,16 +15,14 @@ from daq.contracts.labels import Outcome
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, ExperimentOrder, ExperimentRequest, ExperimentState
 from daq.traces.naming import new_trace_id
-from server.experiments.order import Waiting
 from server.experiments.review import Given, Review, digest_of
-from server.experiments.states import Event, IllegalEventError, advance, after_restart
+from server.experiments.states import Event, IllegalEventError, Waiting, advance, after_restart
 from server.problems import conflict, not_found
-from server.store.approvals import approval_of, approve, given_to, require_approvable, void
 from server.store.engine import Store
 from server.store.labels import experiment_label
 from server.store.pages import Cursor, newest_first, page_of
+from server.store.submitted import approval_of, approve, given_to, made_before, new_columns, require_approvable, void
 from server.store.submitted import digest_of as digest_of_request
-from server.store.submitted import made_before, new_columns
 from server.store.tables import ExperimentRow
 
 

@@ -14,9 +14,9 @@ from daq.contracts.service.experiments import Schedule, ScheduleRequest
 from server.experiments.review import Given, Review, digest_of
 from server.experiments.schedule import Plan, broken, first, following, is_due, zone_here
 from server.problems import not_found
-from server.store.approvals import approval_of, approve, given_to, require_approvable, void
 from server.store.engine import Store
 from server.store.pages import newest_first
+from server.store.submitted import approval_of, approve, given_to, require_approvable, void
 from server.store.tables import ExperimentRow, ScheduleRow
 
 

@@ -1,4 +1,7 @@
-"""What experiments and jobs have in common: a request with the same key is submitted once, however often it is sent."""
+"""What experiments and jobs have in common: a request with the same key is submitted once, however often it is sent.
+
+Approvals in the rows of experiments and schedules.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +14,48 @@ from pydantic import BaseModel
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from server.problems import conflict
-from server.store.tables import ExperimentRow, JobRow
+from daq.contracts.service.experiments import Approval
+from server.experiments.review import Given
+from server.problems import ProblemError, conflict
+from server.store.tables import Approvable, ExperimentRow, JobRow
+
+
+def approval_of(row: Approvable) -> Approval | None:
+    """Returns a row's approval as clients see it."""
+    if row.approved_by is None or row.approved is None:
+        return None
+    return Approval(by=row.approved_by, at=row.approved, as_owner=bool(row.approved_as_owner))
+
+
+def given_to(row: Approvable) -> Given | None:
+    """Returns a row's approval with the content that it is bound to."""
+    if row.approved_by is None or row.approved_content is None:
+        return None
+    return Given(row.approved_content, row.approved_by, bool(row.approved_as_owner))
+
+
+def approve(row: Approvable, given: Given, now: datetime) -> None:
+    """Writes an approval into a row."""
+    row.approved_content, row.approved_by, row.approved_as_owner = given.content, given.by, given.as_owner
+    row.approved = now
+
+
+def void(row: Approvable) -> str | None:
+    """Removes a row's approval, and returns who had given it."""
+    by = row.approved_by
+    row.approved_content = row.approved_by = row.approved_as_owner = row.approved = None
+    return by
+
+
+def require_approvable(given: Given, content: str, authors: tuple[str, ...], what: str) -> None:
+    """Raises a 403 for somebody's own experiment, and a 409 if `content` is another than what they have seen."""
+    if given.by in authors:
+        line = f"{what} was submitted or changed by {given.by}: somebody else must approve it"
+        raise ProblemError(403, "own-experiment", line, "ask another operator, or an owner of the robot")
+    if given.content != content:
+        line = f"{what} is not what you have looked at: it, or the machine file, has changed"
+        raise conflict("content-changed", line, "look at it again, then approve what it is now")
+
 
 Row = TypeVar("Row", ExperimentRow, JobRow)
 

@@ -6,22 +6,7 @@ import pytest
 
 from daq.driver import EVERY_JOINT, Controller
 from daq.link import LinkState, RequestRefusedError
-from firmware_protocol.commands import (
-    AFTER_NEWEST,
-    ALL_JOINTS,
-    PROTOCOL_VERSION,
-    Advance,
-    Advanced,
-    Block,
-    Capability,
-    Gains,
-    ReadBlock,
-    Refusal,
-    ReportGains,
-    Sample,
-    Snapshot,
-    StatusFlag,
-)
+from firmware_protocol import commands as c
 from firmware_protocol.units import posture_to_counts
 
 AT_REST_COUNTS = 12
@@ -30,16 +15,16 @@ AT_REST_COUNTS = 12
 
 def test_a_controller_identifies_itself(controller: Controller) -> None:
     identity = controller.identity
-    assert identity.version == PROTOCOL_VERSION
+    assert identity.version == c.PROTOCOL_VERSION
     assert 0.001 <= identity.period_s <= 1.0
     assert identity.boots >= 1
-    assert (identity.ring_depth >= 8) == (Capability.SAMPLE in identity.capabilities)
+    assert (identity.ring_depth >= 8) == (c.Capability.SAMPLE in identity.capabilities)
     assert controller.hello() == identity
 
 
 def test_once_greeted_it_has_not_restarted(controller: Controller) -> None:
     status = controller.status()
-    assert StatusFlag.RESTARTED not in status.flags
+    assert c.StatusFlag.RESTARTED not in status.flags
     assert status.boots == controller.identity.boots
     assert status.link is not LinkState.LOST
 
@@ -50,7 +35,7 @@ def test_each_period_is_delivered_once_and_in_order(controller: Controller) -> N
         snapshots.append(controller.next_snapshot(snapshots[-1].tick))
     ticks = [snapshot.tick for snapshot in snapshots]
     assert all(later > earlier for earlier, later in pairwise(ticks))
-    if Capability.SAMPLE in controller.identity.capabilities:
+    if c.Capability.SAMPLE in controller.identity.capabilities:
         assert ticks == list(range(ticks[0], ticks[0] + 26))
     gaps = ticks[-1] - ticks[0] - 25
     assert sum(snapshot.missing_before for snapshot in snapshots) == gaps
@@ -66,7 +51,7 @@ def test_a_sample_is_whole(controller: Controller) -> None:
     for _, reading in snapshot.joints:
         assert 0 <= reading.position <= 4095
         assert reading.position + reading.error == posture_to_counts(reading.set_point)
-    by_sample = Capability.SAMPLE in controller.identity.capabilities
+    by_sample = c.Capability.SAMPLE in controller.identity.capabilities
     assert snapshot.consistent_by == ("sample" if by_sample else "double-read")
     assert snapshot.tick_is_estimate != by_sample
 
@@ -79,7 +64,7 @@ def test_any_joints_can_be_sampled(controller: Controller) -> None:
 
 
 def test_a_host_that_was_late_loses_nothing_that_is_in_the_ring(controller: Controller) -> None:
-    if Capability.SAMPLE not in controller.identity.capabilities:
+    if c.Capability.SAMPLE not in controller.identity.capabilities:
         return  # there is no ring, and nothing is promised
     first = controller.next_snapshot()
     for _ in range(5):
@@ -97,7 +82,7 @@ def test_reports_memory_and_samples_agree(controller: Controller) -> None:
     register = controller.memory_map["position"]
     assert register.high is not None
     first, last = min(register.addresses), max(register.addresses)
-    memory = controller.link.request(ReadBlock(first, last - first + 1), Block).data
+    memory = controller.link.request(c.ReadBlock(first, last - first + 1), c.Block).data
     for joint, reading in snapshot.joints:
         low, high = register.low[joint - 1], register.high[joint - 1]
         in_memory = register.decode(memory[low - first], memory[high - first])
@@ -110,19 +95,19 @@ def test_gains_are_reported_for_every_joint(controller: Controller) -> None:
     gains = controller.gains()
     assert list(gains) == list(EVERY_JOINT)
     assert all(0 <= value <= 20 for gain in gains.values() for value in gain)
-    assert controller.link.request(ReportGains(), Gains).gains == tuple(gains.values())
+    assert controller.link.request(c.ReportGains(), c.Gains).gains == tuple(gains.values())
 
 
 def test_requests_beyond_a_controllers_capabilities_are_refused(controller: Controller) -> None:
     link, capabilities = controller.link, controller.identity.capabilities
     with pytest.raises(RequestRefusedError) as caught:
-        link.request(ReadBlock(0x0000, 48), Block)
-    assert caught.value.reason == Refusal.BAD_ADDRESS
-    if Capability.SAMPLE not in capabilities:
+        link.request(c.ReadBlock(0x0000, 48), c.Block)
+    assert caught.value.reason == c.Refusal.BAD_ADDRESS
+    if c.Capability.SAMPLE not in capabilities:
         with pytest.raises(RequestRefusedError) as caught:
-            link.request(Sample(AFTER_NEWEST, ALL_JOINTS), Snapshot)
-        assert caught.value.reason == Refusal.NOT_CAPABLE
-    if Capability.LOCK_STEP not in capabilities:
+            link.request(c.Sample(c.AFTER_NEWEST, c.ALL_JOINTS), c.Snapshot)
+        assert caught.value.reason == c.Refusal.NOT_CAPABLE
+    if c.Capability.LOCK_STEP not in capabilities:
         with pytest.raises(RequestRefusedError) as caught:
-            link.request(Advance(1000), Advanced)
-        assert caught.value.reason == Refusal.NOT_CAPABLE
+            link.request(c.Advance(1000), c.Advanced)
+        assert caught.value.reason == c.Refusal.NOT_CAPABLE

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine, load_machine
-from daq.contracts.sample import SampleRow
-from daq.contracts.trace import Trace, TraceEvent
+from daq.contracts.trace import Trace
 from daq.driver import Controller
 from daq.link import Link
 from daq.runner.arm_control import ArmControl
@@ -15,6 +14,7 @@ from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
 from mock_controller.servos.bench import Bench, Options
+from tests.daq.quiet import Quiet
 
 PAN_TILT = Path(__file__).parents[2] / "examples" / "pan_tilt.toml"
 ROUND_TRIP_US = 300
@@ -71,19 +71,6 @@ class VirtualBench:
 def pan_tilt() -> Machine:
     """The machine file of the bench."""
     return load_machine(str(PAN_TILT))
-
-
-class Quiet:
-    """A listener that nobody listens to."""
-
-    def progress(self, fraction: float, text: str) -> None:
-        """Nobody looks."""
-
-    def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
-        """Nobody looks."""
-
-    def happened(self, event: TraceEvent) -> None:
-        """Read from the trace instead."""
 
 
 def recorded(options: Options, spec: ExperimentSpec, folder: Path) -> Trace:

@@ -24,10 +24,3 @@ def test_nothing_is_known_of_a_process_that_is_gone_or_where_the_kernel_does_not
     (tmp_path / "7" / "task" / "7").mkdir(parents=True)
     (tmp_path / "7" / "task" / "7" / "schedstat").write_text("")
     assert processor_time(7, tmp_path) is None
-
-
-def test_a_process_waits_that_gets_a_processor_for_less_time_than_it_wants_one() -> None:
-    before = ProcessorTime(5.0, 1.0)
-    assert ProcessorTime(5.1, 11.0).waits_mostly_since(before)
-    assert not ProcessorTime(11.0, 5.0).waits_mostly_since(before)
-    assert not before.waits_mostly_since(before), "it waits for something else"

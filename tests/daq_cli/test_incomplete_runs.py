@@ -8,12 +8,13 @@ from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
 from daq.owner.messages import Finished
+from daq_cli.app.subcommands import subcommands
 from daq_cli.robot.local import LocalRobot
 from tests.daq.traces.samples import record, write
 from tests.daq_cli.invoke import CommandLine
 
 
-@pytest.mark.parametrize("words", ["calibrate gain", "demo", "thesis"])
+@pytest.mark.parametrize("words", ["calibrate gain", *sorted({"demo", "thesis"} & set(subcommands()))])
 @pytest.mark.parametrize(("outcome", "code"), [("stopped", 6), ("fault", 5), ("interrupted", 5)])
 def test_no_result_is_made_of_an_incomplete_run(
     daq: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, outcome: Outcome, code: int

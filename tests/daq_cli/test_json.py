@@ -22,7 +22,6 @@ WITHOUT = {"serve", "mock", "demo", "docs"} | {
         "token": "add revoke sign-out",
         "teach": "jog step program lead",
         "teach programs": "keep fetch delete",
-        "teach edit": "insert move delete change rename",
     }.items()
     for command in commands.split()
 }

@@ -21,9 +21,8 @@ from daq.contracts.service.teaching import TaughtPath, TeachingStatus
 from daq.teaching.program import Program, Wait
 from daq.teaching.recording import RecordedPath
 from daq_cli.app.consent import ConsentPrompt
-from daq_cli.robot.remote import companion
-from daq_cli.robot.remote.companion import Companion
-from daq_cli.robot.remote.run import acquire_remotely
+from daq_cli.robot.remote import run as companion
+from daq_cli.robot.remote.run import Companion, acquire_remotely
 from daq_cli.robot.remote.teach import RemoteTeaching, Stopped, StoppedAtServerError
 from tests.daq.client.service_stand_in import problem
 from tests.daq_cli.invoke import CommandLine

@@ -11,8 +11,8 @@ from prometheus_client.parser import text_string_to_metric_families
 from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.jobs import JobState
 from daq.link.counters import COUNTED
-from extras.lab.prometheus.state import ROUND_TRIPS
-from server.api.problem_examples import PROBLEM_EXAMPLES
+from extras.lab.prometheus.part import ROUND_TRIPS
+from server.api.documented import PROBLEM_EXAMPLES
 
 OF_PROMETHEUS = frozenset({"instance", "job"})
 """Labels that Prometheus adds to what it reads, and to `up`, which it makes itself."""

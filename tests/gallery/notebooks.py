@@ -7,6 +7,8 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "gallery"
 NAMES = tuple(sorted(path.stem for path in FOLDER.glob("*.md") if path.stem != "index"))
+OF_EXTRAS = {"thesis-chapters-6-and-7"} if not (ROOT / "extras").exists() else set()
+"""Those that cannot run, because they use extras and there are none."""
 LONGEST_CELL = 600.0
 """Time limit (s) of one cell, as for the site: a net for one that hangs. On two quiet cores a whole notebook takes less
 than a minute."""

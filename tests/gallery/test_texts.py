@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 import ma2000
-from tests.gallery.notebooks import FOLDER, NAMES, ROOT, code_of, notebook
+from tests.gallery.notebooks import FOLDER, NAMES, OF_EXTRAS, ROOT, code_of, notebook
 
 ALLOWED = {"ma2000", "matplotlib", "numpy", "os", "pandas", "pathlib", "xarray"}
 """What a notebook may import: the public interface, and what readers have."""
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in OF_EXTRAS])
 def test_a_notebook_parses_and_uses_the_public_interface_alone(name: str) -> None:
     found = notebook(name)
     code = "\n".join(code_of(found))

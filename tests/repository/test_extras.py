@@ -24,7 +24,8 @@ from tests.repository.without_extras import packages_beyond, run_without
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 EXTRAS = {name: [Requirement(line) for line in lines] for name, lines in PROJECT["optional-dependencies"].items()}
 OTHER_NAMES = {"serial": "pyserial", "pydantic_settings": "pydantic-settings", "prometheus_client": "prometheus-client"}
-OTHER_NAMES |= {"google": "protobuf", "dask_jobqueue": "dask-jobqueue", "markdown_it": "markdown-it-py"}
+OTHER_NAMES |= {"google": "protobuf", "markdown_it": "markdown-it-py"}
+
 NO_TRACE: Any = None
 PULLED = {"starlette": "fastapi", "dask": "distributed"}
 """Packages that come with another one."""

@@ -151,5 +151,5 @@ def test_without_the_extras_the_core_runs_and_every_command_that_it_shows_works(
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
 def test_without_the_extras_the_quick_tests_of_the_core_pass(core: Path) -> None:
-    quick = ["-m", "pytest", "-q", "--workers", "2", "-m", "not slow", "--part", "quick"]
+    quick = ["-m", "pytest", "-q", "-n", "2", "-m", "not slow", "--part", "quick"]
     in_core(core, core / ".venv/bin/python", *quick, limit=2900)

@@ -101,3 +101,20 @@ def test_every_thorough_file_is_there() -> None:
     names = (ROOT / "tests" / "thorough.txt").read_text("utf-8").split()
     assert names == sorted(set(names))
     assert [name for name in names if not (ROOT / "tests" / name).is_file()] == []
+
+
+IN_ORDER = """
+import pytest
+
+@pytest.mark.parametrize("number", range(3))
+def test_in_order(number, ran=[]):
+    ran.append(number)
+    assert ran == list(range(number + 1))
+"""
+
+
+def test_tests_of_a_file_run_in_order_in_one_process(tmp_path: Path) -> None:
+    for number in range(4):
+        (tmp_path / f"test_{number}.py").write_text(IN_ORDER)
+    run = run_folder(tmp_path, "-n", "2")
+    assert " 12 passed" in run.stdout, run.stdout

@@ -37,8 +37,8 @@ from daq.runner.arm_control import ArmControl
 from daq.runner.preparation import require_not_stopped
 from daq.teaching.controller_arm import ControllerArm
 from firmware_protocol import commands as c
-from server.experiments.order import Waiting
 from server.experiments.review import Review
+from server.experiments.states import Waiting
 from server.queue.context import QueueContext
 from server.queue.service import QueueService
 from server.robot.control import ControlService

@@ -18,7 +18,7 @@ from server.api import upload
 from server.api.upload import Uploads
 from server.bounded.messages import Order
 from server.catalogue.catalogue import Catalogue
-from server.store.events import EventStore
+from server.store.waiting_events import EventStore
 from tests.server.inside import WrongClock, service_inside
 from tests.server.polling import until
 

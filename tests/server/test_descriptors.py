@@ -4,7 +4,7 @@ import resource
 
 import pytest
 
-from server.descriptors import RESERVED, most_connections
+from server.steady import RESERVED, most_connections
 
 
 @pytest.mark.parametrize(

@@ -15,13 +15,13 @@ import pytest
 from websockets.sync.client import connect
 
 from benchmarks.service_process import child
-from server.ending import FORCED
+from server.serve import FORCED
 from tests.server.hostile_files import bomb, sound_trace
 from tests.server.service import running_service
 
 WITHIN = 5.0
 HOURS = {"trajectory": {"kind": "sine", "amplitude": 0.1, "period": 1.0, "cycles": 1000}, "joints": [1], "repeats": 10}
-BEGIN = """import re, threading, server.ending as e
+BEGIN = """import re, threading, server.serve as e
 e.END_WITHIN, e.LAST_RESORT = {}, {}
 end = e.EndInTime(lambda: None, lambda: {}, lambda: print("the stop door is closed"))
 end.arm()

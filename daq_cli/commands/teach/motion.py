@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import SafetyError, SpecError
 from daq_cli.app import completion
 from daq_cli.app.consent import ConsentPrompt
-from daq_cli.app.context import JsonOption, YesOption
+from daq_cli.app.context import JsonOption, YesOption, print_json, printable
 from daq_cli.app.quantities import parse_angle, parse_per_joint_angles, require_units
-from daq_cli.commands.teach import edit, programs
+from daq_cli.commands.teach import programs
 from daq_cli.robot.access import robot_of
 from firmware_protocol.invalid import first_invalid
+
+if TYPE_CHECKING:
+    from daq.teaching.program import Instruction
 
 LONGEST_LEAD = 3600.0
 """Longest lead in s, because somebody has to hold the arm."""
@@ -26,7 +29,6 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 app.add_typer(programs.app, name="programs")
-app.add_typer(edit.app, name="edit")
 
 
 @app.command()
@@ -75,7 +77,7 @@ def step(
     """Make one off-line step, to absolute angles or by relative ones; all joints arrive together."""
     from pydantic import ValidationError
 
-    from daq.teaching.program import Absolute, Instruction, Program, Relative
+    from daq.teaching.program import Absolute, Program, Relative
 
     if (to is None) == (by is None):
         raise SpecError("step: give either --to or --by")
@@ -108,6 +110,29 @@ def run_file(
     robot = robot_of(context)
     program = robot.program(file)
     print(robot.teaching(ConsentPrompt(yes)).perform(program))
+
+
+@app.command()
+def show(
+    context: typer.Context,
+    file: Annotated[Path, typer.Argument(help="A taught program (.json or .toml).")],
+    json: JsonOption = False,
+) -> None:
+    """Show a program's instructions, and check it: planned from the rest posture, it must stay within the limits."""
+    from daq.teaching.program import load_program
+    from daq.teaching.program_plan import check_program, plan_program
+
+    program, machine = load_program(file), robot_of(context).machine
+    if json:
+        print_json({"file": file, **program.model_dump(mode="json")})
+    else:
+        print(printable(f"{program.name}, for {program.machine}: {len(program.instructions)} instructions"))
+        for number, one in enumerate(program.instructions, start=1):
+            print(f"{number:4d}  {_in_words(one)}")
+    if machine.rest_posture is None:
+        raise SpecError(f"machine {machine.name}: it has no rest_posture to plan from")
+    if against := check_program(plan_program(program, machine, machine.rest_posture), machine, machine.limits):
+        raise SafetyError(f"program {file}: {against[0]}")
 
 
 @app.command()
@@ -170,3 +195,24 @@ def play(
         raise SpecError(f"path {file}: {first_invalid(error).message}") from error
     spec = playback(path, rate, "playback")
     carry_out(robot_of(context), spec, RunOptions(folder, dry_run, yes, json))
+
+
+def _in_words(one: Instruction) -> str:
+    from math import degrees
+
+    from daq.teaching.program import Absolute, AwaitInput, Gripper, PlayPath, Relative, SetOutput
+
+    match one:
+        case Absolute() | Relative():
+            steps = ", ".join(f"{joint}={degrees(angle):.2f}°" for joint, angle in sorted(one.angles.items()))
+            return f"{'to' if isinstance(one, Absolute) else 'by'} {steps} at {degrees(one.speed):.1f} °/s"
+        case PlayPath():
+            joints = ", ".join(map(str, one.path.joints))
+            return f"path of {one.path.duration:.2f} s on joints {joints}, {one.rate:g} times as fast"
+        case SetOutput():
+            return f"output {one.line} {'on' if one.on else 'off'}"
+        case AwaitInput():
+            return f"wait for input {one.line} {'on' if one.on else 'off'}, {one.longest:g} s at most"
+        case Gripper():
+            return f"gripper {'close' if one.closed else 'open'}"
+    return f"wait {one.duration:g} s"

@@ -1,7 +1,12 @@
-"""The robot of the service that the command line names."""
+"""The robot of the service that the command line names.
+
+A stop of a server's robots: all of them, unless one is named. Nothing else is asked for before.
+"""
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -9,12 +14,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq.contracts.errors import SpecError
+from daq.client import Client
+from daq.client.stopping import NoSuchRobot
+from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.service.robot import FleetStopResult, StopResult
+from daq.owner.stop_socket import StopAnswer
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
 from daq_cli.robot.answers import ImportedTrace, RobotState, headline
 from daq_cli.robot.operations import RobotAccess
-from daq_cli.robot.remote.connection import connected_status, controlled, remote_robot
+from daq_cli.robot.remote.connection import TOKEN_VARIABLE, connected_status, controlled, remote_robot
 
 if TYPE_CHECKING:
     from daq.client import HeldControl, Robot
@@ -22,10 +31,74 @@ if TYPE_CHECKING:
     from daq.contracts.import_choice import Choice
     from daq.contracts.machine import Machine
     from daq.owner.messages import Finished
-    from daq.owner.stop_socket import StopAnswer
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
     from daq_cli.robot.pendant import Teaching
+
+
+DEFAULT_ROBOT = "ma2000"
+NAMES_WITHIN = 1.0
+"""Time (s) for a service to name its robots: a person who stops must soon know the result."""
+
+
+def stop_at_server(call: Invocation) -> list[StopAnswer]:
+    """Stops the robot that is named; without a name, or if the service has none of this name, stops all its robots.
+
+    Never raises: the answers say what is not known.
+    """
+    assert call.server is not None
+    name = call.robot_option
+    try:
+        with Client(call.server, os.environ.get(TOKEN_VARIABLE) or None) as client:
+            if name is not None:
+                first = client.robot(name).stop()
+                if not isinstance(first, NoSuchRobot):
+                    return [_answer(name, call.server, first)]
+                print(f"{first.note}: {client.url} is asked to stop all of its robots", file=sys.stderr, flush=True)
+            found = client.stop()
+            if isinstance(found, FleetStopResult):
+                return [_answer(one, call.server, result) for one, result in found.robots.items()]
+            if isinstance(found, NoSuchRobot):
+                return _stop_by_name(call, client)
+            return [_answer(_likely_name(call), call.server, found)]
+    except DaqError as error:
+        return [StopAnswer(robot=name or "all", port=call.server, delivered=False, confirmed=False, text=str(error))]
+
+
+def _stop_by_name(call: Invocation, client: Client) -> list[StopAnswer]:
+    """Stops the robots of a service of version 0.1, which cannot stop all at once: first under the likely name."""
+    assert call.server is not None
+    name = _likely_name(call)
+    first = client.robot(name).stop()
+    others = _others(client, name, first) if isinstance(first, NoSuchRobot) else []
+    return [_answer(one, call.server, client.robot(one).stop()) for one in others] or [
+        _answer(name, call.server, first)
+    ]
+
+
+def _likely_name(call: Invocation) -> str:
+    """Returns the configured name; the default name if the configuration cannot be read, so that the stop is sent
+    nevertheless."""
+    try:
+        return call.configuration.names[0]
+    except DaqError:
+        return DEFAULT_ROBOT
+
+
+def _others(client: Client, name: str, first: StopResult) -> list[str]:
+    """Says that the service has no robot of this name, and returns the names of its robots."""
+    print(f"{first.note}: {client.url} is asked to stop all of its robots", file=sys.stderr, flush=True)
+    try:
+        names = [one.robot for one in client.robots(within=NAMES_WITHIN)]
+    except DaqError:
+        return []
+    return [] if name in names else names
+
+
+def _answer(robot: str, url: str, found: StopResult) -> StopAnswer:
+    return StopAnswer(
+        robot=robot, port=url, delivered=found.delivered, confirmed=found.confirmed, tick=found.tick, text=found.note
+    )
 
 
 @dataclass
@@ -68,7 +141,6 @@ class RemoteRobot(RobotAccess):
     def stop(self, reached: set[str]) -> list[StopAnswer]:
         """Stops the robots of the service."""
         del reached  # these are processes of this computer
-        from daq_cli.robot.remote.stop import stop_at_server
 
         return stop_at_server(self.call)
 

@@ -74,25 +74,20 @@ class Bench:
         path = self.folder / MAP
         return load_memory_map(path if path.exists() else self.call.settings.robot.memory_map)
 
-    def machine_text(self) -> str:
+    def machine(self) -> Machine:
         """The machine file as it stands: this arm's, or the configured one before anything was measured."""
-        from extras.commissioning.command.machine_text import machine_file_text
+        from daq.contracts.machine import load_machine
 
         own = self.folder / MACHINE
-        return machine_file_text(str(own) if own.exists() else self.call.settings.robot.machine)
+        return load_machine(str(own) if own.exists() else self.call.settings.robot.machine)
 
-    def machine(self) -> Machine:
-        """The same, loaded."""
-        from daq.contracts.machine import parse_machine
-
-        return parse_machine(self.machine_text(), MACHINE)
-
-    def write_machine(self, text: str) -> None:
+    def write_machine(self, machine: Machine) -> None:
         """Writes this arm's machine file, and daq.toml that names it."""
+        from daq.config.machine_text import machine_text
         from daq_cli.app.output_file import replacing
 
         with replacing(self.folder / MACHINE) as part:
-            part.write_text(text, "utf-8")
+            part.write_text(machine_text(machine), "utf-8")
         self.configure()
 
     def basis(self) -> dict[str, str]:

@@ -82,10 +82,11 @@ def gain(bench: Bench) -> dict[str, Any]:
     """Volts per radian of each joint, by `daq calibrate gain`; what all joints share goes into the machine file."""
     from daq.calibration import gain_experiment, gains_from_trace
     from daq.calibration.gain import GainEstimate, common_gain
+    from daq.contracts.quantity import Quantity
     from daq.traces.reader import read_trace
     from daq_cli.robot.access import robot_access
     from daq_cli.robot.experiment import acquire_complete
-    from extras.commissioning.command.machine_text import with_controller
+    from extras.commissioning.command.measured import with_controller
 
     robot = robot_access(bench.configured)
     joints = tuple(joint for joint in bench.joints if joint in TO_GAIN)
@@ -101,13 +102,11 @@ def gain(bench: Bench) -> dict[str, Any]:
     if common is None:
         return result | {"machine_file": "not changed: the joints have no gain per unit of P in common"}
     source = f"measured at joints {', '.join(map(str, common.joints))} by errors and powers"
-    lines = {
-        "dac_counts_per_adc_count": f'{{ value = {common.value!r}, unit = "1", source = "{source}", '
-        f"deviation = {common.deviation!r} }}"
-    }
+    gain = Quantity(value=common.value, unit="1", source=source, deviation=common.deviation)
+    values: dict[str, Any] = {"dac_counts_per_adc_count": gain}
     if trace.record.gains is not None and len(trace.record.gains) == len(robot.machine.joints):
-        lines["gains"] = str([list(trace.record.gains[joint]) for joint in sorted(trace.record.gains)])
-    bench.write_machine(with_controller(bench.machine_text(), lines))
+        values["gains"] = tuple(trace.record.gains[joint] for joint in sorted(trace.record.gains))
+    bench.write_machine(with_controller(bench.machine(), values))
     return result | {
         "machine_file": f"{common.value:.4f} ± {common.deviation:.4f} DAC counts per ADC count and unit of P"
     }

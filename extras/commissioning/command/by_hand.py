@@ -1,22 +1,83 @@
-"""Steps in which a person moves the arm by hand while the emergency stop is pressed: sensors, and the stop itself."""
+"""Steps in which a person moves the arm by hand while the emergency stop is pressed: sensors, and the stop itself.
+
+Where a joint meets its end stops, and the limits that keep clear of them.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from daq.contracts.errors import SafetyError, SpecError
 from extras.commissioning.command.bench import MACHINE, MAP, Bench, NotCommissionedError
-from extras.commissioning.end_stops import EndStops, end_stops_of
 from extras.commissioning.memory.procedure import Task
 from extras.commissioning.person.safe_release import give_power_back, release_after_interruption, typical
-from firmware_protocol.units import counts_to_posture
+from firmware_protocol.units import ADC_COUNTS, JointCalibration, counts_to_posture
 
 if TYPE_CHECKING:
     from extras.commissioning.person.memory_page import LinkPage
     from extras.commissioning.person.pressed import EmergencyStop
     from extras.commissioning.potentiometer import Potentiometer
     from firmware_protocol.memory_map import MemoryMap
+
+
+MARGIN = math.radians(2.0)
+"""Angle (rad) that limits keep from an end stop: more than a protractor's error and what a joint overshoots."""
+LEAST_TRAVEL = ADC_COUNTS / 4
+"""Least distance (ADC counts) between both readings of one joint: less is no travel from stop to stop."""
+AT_THE_END = 2
+"""Readings this close (ADC counts) to the converter's first or last one do not say how far beyond the joint is."""
+
+
+@dataclass(frozen=True)
+class EndStops:
+    """One joint's end stops: angles (rad) and readings (ADC counts) there, in the order of the angles.
+
+    beyond: whether the converter was at its end there, so that the joint goes further than the reading tells
+    """
+
+    joint: int
+    angles: tuple[float, float]
+    counts: tuple[float, float]
+    beyond: tuple[bool, bool]
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The widest limits (rad) that keep clear of the stops, and of where the reading ends."""
+        return self.angles[0] + MARGIN, self.angles[1] - MARGIN
+
+    def __str__(self) -> str:
+        low, high = (f"{math.degrees(angle):.1f}°" for angle in self.angles)
+        ends = [word for word, beyond in zip(("lower", "upper"), self.beyond, strict=True) if beyond]
+        text = f"joint {self.joint}: end stops at {low} and {high}"
+        return f"{text}; at the {' and the '.join(ends)} one the reading ends before the joint does" if ends else text
+
+    def as_data(self) -> dict[str, Any]:
+        """Plain data, angles in degrees."""
+        return {
+            "stops_deg": [round(math.degrees(angle), 2) for angle in self.angles],
+            "readings": [round(count, 1) for count in self.counts],
+            "beyond_the_reading": list(self.beyond),
+            "limits_deg": [round(math.degrees(limit), 2) for limit in self.limits],
+        }
+
+
+def end_stops_of(sensor: JointCalibration, one: float, other: float) -> EndStops:
+    """The end stops of a joint from its readings (ADC counts) at both, in any order. Raises SpecError for readings too
+    close together."""
+    if abs(one - other) < LEAST_TRAVEL:
+        raise SpecError(
+            f"joint {sensor.joint}: readings {one:.0f} and {other:.0f} at its end stops: at least {LEAST_TRAVEL:.0f} "
+            "ADC counts apart are needed"
+        )
+    (low, first), (high, second) = sorted((sensor.counts_to_rad(counts), counts) for counts in (one, other))
+    return EndStops(sensor.joint, (low, high), (first, second), (_at_the_end(first), _at_the_end(second)))
+
+
+def _at_the_end(counts: float) -> bool:
+    return counts < AT_THE_END or counts > ADC_COUNTS - 1 - AT_THE_END
+
 
 AVERAGED = 12
 """Number of readings of which the median is taken at each posture of a protractor."""
@@ -30,7 +91,7 @@ PUSHED, STAYS = 25, 5
 
 def potentiometers(bench: Bench) -> dict[str, Any]:
     """Direction, zero, range and bend of the sensors, by a protractor."""
-    from extras.commissioning.command.machine_text import with_sensors
+    from extras.commissioning.command.measured import with_sensors
     from extras.commissioning.person.memory_page import open_page
 
     memory_map = bench.memory_map()
@@ -44,7 +105,7 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
             bench.operator.show(sensor_line(sensors[-1]))
         give_power_back(page, bench.operator, memory_map)
         stop.tell(False)
-    bench.write_machine(with_sensors(bench.machine_text(), sensors))  # not before: what there was stays if it fails
+    bench.write_machine(with_sensors(bench.machine(), sensors))  # not before: what there was stays if it fails
     return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
 
 
@@ -117,7 +178,7 @@ def _sensor_data(found: Potentiometer) -> dict[str, Any]:
 
 def end_stops(bench: Bench) -> dict[str, Any]:
     """Where each joint meets its end stops, led there by hand; the limits in the machine file keep clear of them."""
-    from extras.commissioning.command.machine_text import with_limits
+    from extras.commissioning.command.measured import with_limits
     from extras.commissioning.person.memory_page import open_page
 
     memory_map, machine = bench.memory_map(), bench.machine()
@@ -133,7 +194,7 @@ def end_stops(bench: Bench) -> dict[str, Any]:
             _reading_at(bench, page, memory_map, Task("bring_back", joint))
         give_power_back(page, bench.operator, memory_map)
         stop.tell(False)
-    bench.write_machine(with_limits(bench.machine_text(), {joint: one.limits for joint, one in found.items()}))
+    bench.write_machine(with_limits(bench.machine(), {joint: one.limits for joint, one in found.items()}))
     return {"machine": MACHINE, **{f"joint_{joint}": one.as_data() for joint, one in found.items()}}
 
 

@@ -1,7 +1,12 @@
-"""`daq commission`: guides through the first day with an arm, step by step; it can be ended and gone on with."""
+"""`daq commission`: guides through the first day with an arm, step by step; it can be ended and gone on with.
+
+The port, found by unplugging the cable and plugging it in again.
+"""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -9,20 +14,54 @@ from typing import Annotated
 import typer
 
 from daq.config.robot_files import load_memory_map
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import ReachError, SpecError
 from daq.contracts.experiment import parse_joints
+from daq.transport.discovery import FoundPort, appeared, ports
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation, JsonOption, YesOption, console, invocation, print_json
 from extras.commissioning.command.arm import Said, begin_anew, require_same_arm
 from extras.commissioning.command.bench import CONFIG, MAP, Bench
 from extras.commissioning.command.by_command import end_freeze
 from extras.commissioning.command.by_hand import release_if_pressed
-from extras.commissioning.command.port import port_by_plugging
 from extras.commissioning.command.record import Record
 from extras.commissioning.command.sheet import write_sheet
 from extras.commissioning.command.steps import STEPS, Step, lacking, resting_on, stale, step_named
+from extras.commissioning.memory.procedure import Operator, Task
 from extras.commissioning.person.person_at import person_at
 from extras.commissioning.person.terminal_operator import TerminalOperator
+
+POLL_S, PATIENCE_S = 0.25, 15.0
+"""Time (s) between two looks at the list of ports, and for which a port may take to appear."""
+
+
+def port_by_plugging(
+    operator: Operator,
+    listed: Callable[[], Sequence[FoundPort]] = ports,
+    wait: Callable[[float], None] = time.sleep,
+) -> FoundPort:
+    """The port that appears when the cable is plugged in. Opens none. Raises ReachError, TransportError."""
+    before = {one.url for one in listed()}
+    if not operator.begin(Task("unplug")):
+        raise ReachError("the cable was not unplugged, so the port is not known: give --port (`daq ports` lists them)")
+    without = listed()
+    if before and before <= {one.url for one in without}:  # once more only: it may have been unplugged beforehand
+        operator.begin(Task("unplug", again=f"no port went away, there are {', '.join(sorted(before))}"))
+        without = listed()
+    if not operator.begin(Task("plug_in")):
+        raise ReachError("the cable was not plugged in, so the port is not known: give --port (`daq ports` lists them)")
+    operator.show(f"Looking for it, {PATIENCE_S:.0f} s at most.")
+    for _ in range(round(PATIENCE_S / POLL_S)):
+        if (found := appeared(without, listed())) is not None:
+            shown = ", ".join(text for text in (found.description, found.maker, found.serial_number) if text)
+            operator.show(f"{found.url}  {shown}")
+            return found
+        wait(POLL_S)
+    others = ", ".join(one.url for one in without) or "none"
+    raise ReachError(
+        f"no port appeared within {PATIENCE_S:.0f} s of plugging in (others: {others}): "
+        "is the cable one for data, and the bridge alive?"
+    )
+
 
 app = typer.Typer(add_completion=False)
 

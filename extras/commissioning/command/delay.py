@@ -1,21 +1,196 @@
-"""The step that measures the computing delay: one joint's set point is moved to and fro, and its error is watched."""
+"""The step that measures the computing delay: one joint's set point is moved to and fro, and its error is watched.
+
+A robot whose port this process holds itself, to measure at its registers. It can be stopped like any run.
+
+The controller's computing delay: from the moment when it takes set points to the moment when it stores results.
+
+A set point is written at some moment, and the memory is read again and again until the error shows it. Only the order
+of events is known: a byte was written between a request and its reply, and a result was stored between the last
+reading without it and the first reading with it. Each such pair bounds the delay from both sides, however slow the
+computer and the line are; pairs at many phases of the period narrow the bounds.
+"""
 
 from __future__ import annotations
 
+import math
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-from daq.contracts.errors import SafetyError
+from daq.contracts.errors import SafetyError, SpecError
+from daq.contracts.limp import GAINS_UNKNOWN, require_drive
+from daq.contracts.quantity import Quantity
+from daq.driver import Controller
 from daq.driver.clock import LockStepClock
+from daq.owner.session import PortSession, port_session
+from daq.runner.arm_control import ArmControl, StoppedError
+from daq.runner.preparation import Consent, MissingConsentError, require_not_stopped
+from daq_cli.app.consent import ConsentPrompt
+from daq_cli.app.context import Invocation, console
 from extras.commissioning.command.bench import Bench
-from extras.commissioning.computing_delay import ComputingDelay, Effect, computing_delay
 from firmware_protocol.commands import Block, ReadBlock
 
 if TYPE_CHECKING:
     from daq.contracts.machine import Machine
-    from daq.driver import Controller
     from daq.teaching.controller_arm import ControllerArm
-    from extras.commissioning.command.held_arm import HeldArm
+    from firmware_protocol.memory_map import MemoryMap
+
+
+Made = TypeVar("Made")
+
+
+@dataclass(frozen=True)
+class HeldArm:
+    """The session that holds the port, and the arm's state."""
+
+    session: PortSession[Controller]
+    control: ArmControl
+
+    @property
+    def controller(self) -> Controller:
+        """The greeted controller."""
+        return self.session.controller
+
+    def end_cause(self) -> str | None:
+        """Returns the cause of a requested end (`daq stop`, a signal), or None."""
+        return self.session.end_cause()
+
+
+@contextmanager
+def held_arm(
+    call: Invocation, asked: ConsentPrompt, prepare: Callable[[HeldArm], Made]
+) -> Iterator[tuple[HeldArm, Made]]:
+    """The robot, whose port this process holds. If a real arm needs consent and a person can be asked, it asks.
+
+    `prepare` makes checks before anything moves; if it refuses, set points and gains stay as they were. Enter on the
+    main thread. Whatever ends the block early freezes the arm.
+    """
+    from daq.config.robot_files import load_memory_map
+
+    robot, memory_map = call.settings.robot.name, load_memory_map(call.settings.robot.memory_map)
+    with ExitStack() as entered:
+
+        def hold(moves_real_arm: bool) -> HeldArm:
+            return entered.enter_context(_held(robot, call.port, memory_map, Consent(moves_real_arm)))
+
+        try:
+            held = hold(asked.given)
+        except MissingConsentError:  # no process has the port while the operator is asked
+            if not asked.for_gains_of(memory_map).agreed(call.port):
+                raise
+            held = hold(True)
+        try:
+            gains = held.controller.gains()
+            require_drive(gains)
+            if not gains:
+                console().print(GAINS_UNKNOWN)
+            prepared = prepare(held)
+        except (SafetyError, SpecError):
+            entered.close()  # without the error, which would freeze the arm
+            raise
+        yield held, prepared
+
+
+@contextmanager
+def _held(robot: str, url: str, memory_map: MemoryMap, consent: Consent) -> Iterator[HeldArm]:
+    """Raises MissingConsentError for a real arm that nobody has agreed to move, SafetyError for one that has been
+    stopped, StoppedError when a stop came before it was reached, LinkError."""
+    with stopped_by_ctrl_z(), port_session(Controller.connect, robot, url, memory_map) as session:
+        consent.require(session.controller)
+        require_not_stopped(session.controller)
+        control = session.take_control()
+        if (cause := session.end_cause()) is not None:
+            control.stop(cause)
+            raise StoppedError(cause)
+        with control.frozen_on_error():
+            yield HeldArm(session, control)
+
+
+@contextmanager
+def stopped_by_ctrl_z() -> Iterator[None]:
+    """With a handler of Python's own, the guardian's wake-up pipe hears of Ctrl-Z as it does of Ctrl-C: a process that
+    the terminal has suspended could not be asked for a stop."""
+    before = signal.signal(signal.SIGTSTP, lambda _number, _frame: None)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTSTP, before)
+
+
+FEWEST = 12
+"""Least number of set points whose effect was seen: a choice."""
+WIDEST_S = 0.006
+"""Width (s) of an interval that is no answer: the shipped machine file says 6 ms ± 2 ms, which is no wider."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One set point and its effect: bounds (s) of the moment when it was written, and of that when the first result
+    with it was stored."""
+
+    written: tuple[float, float]
+    stored: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class ComputingDelay:
+    """Bounds of the delay (s), by `used` set points."""
+
+    low: float
+    high: float
+    used: int
+
+    @property
+    def value(self) -> float:
+        """The middle (s)."""
+        return (self.low + self.high) / 2
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation (s) of a delay that may be anywhere between the bounds."""
+        return (self.high - self.low) / math.sqrt(12)
+
+    def __str__(self) -> str:
+        return f"computing delay: {1e3 * self.low:.2f} to {1e3 * self.high:.2f} ms, by {self.used} set points"
+
+
+def computing_delay(effects: Sequence[Effect], period: float) -> ComputingDelay:
+    """The delay that agrees with the effect of every set point, for a controller with this period (s). Raises SpecError
+    where there is none, or where the set points say too little."""
+    if len(effects) < FEWEST:
+        raise SpecError(f"computing delay: {len(effects)} set points showed an effect, at least {FEWEST} are needed")
+    first, last = _stored_within(effects, period)
+    low, high = 0.0, period
+    for one in effects:
+        turn = round((sum(one.stored) / 2 - (first + last) / 2) / period) * period
+        stored = max(one.stored[0], first + turn), min(one.stored[1], last + turn)
+        low = max(low, stored[0] - period - one.written[1])
+        high = min(high, stored[1] - one.written[0])
+    if low >= high:
+        raise SpecError(
+            f"computing delay: the set points contradict one another (above {1e3 * low:.2f} ms, below "
+            f"{1e3 * high:.2f} ms): the controller does not take set points at one moment of its period"
+        )
+    if high - low > WIDEST_S:
+        raise SpecError(
+            f"computing delay: between {1e3 * low:.2f} and {1e3 * high:.2f} ms: this line, or a "
+            "busy computer, is too slow to say more; close other programs, or leave the step out with --skip delay"
+        )
+    return ComputingDelay(low, high, len(effects))
+
+
+def _stored_within(effects: Sequence[Effect], period: float) -> tuple[float, float]:
+    """Bounds (s) of the moment at which results are stored, in the period of the effect that is known best."""
+    best = min((one.stored for one in effects), key=lambda bounds: bounds[1] - bounds[0])
+    middle = sum(best) / 2
+    low, high = best
+    for one in effects:
+        turn = round((sum(one.stored) / 2 - middle) / period) * period
+        low, high = max(low, one.stored[0] - turn), min(high, one.stored[1] - turn)
+    return (low, high) if low <= high else (high, low)  # crossed bounds: moments that vary by as much
+
 
 STEP = 2
 """Posture units by which the set point is moved: half a degree of a major axis, and 8 counts of its error."""
@@ -38,8 +213,7 @@ def delay(bench: Bench) -> dict[str, Any]:
 
     A stop, Ctrl-C and every fault freeze the arm where it is; it returns to its posture only after the last set point.
     """
-    from extras.commissioning.command.held_arm import held_arm
-    from extras.commissioning.command.machine_text import with_controller
+    from extras.commissioning.command.measured import with_controller
 
     bench.configure()
     joint, period = bench.joints[0], 1e-3 * float(bench.record.steps["period"]["period_ms"])
@@ -54,7 +228,7 @@ def delay(bench: Bench) -> dict[str, Any]:
             arm.set_points({joint: there})
     found = computing_delay([one for one in shown if one is not None], period)
     bench.operator.show(str(found))
-    bench.write_machine(with_controller(bench.machine_text(), {"delay": _line(found)}))
+    bench.write_machine(with_controller(bench.machine(), {"delay": _quantity(found)}))
     return {
         "joint": joint,
         "set_points_that_showed": found.used,
@@ -100,12 +274,10 @@ def _require_following(arm: ControllerArm, machine: Machine) -> None:
         raise arm.freeze_for_fault(str(error)) from error
 
 
-def _line(found: ComputingDelay) -> str:
+def _quantity(found: ComputingDelay) -> Quantity:
     source = "measured from the taking of set points to the storing of results; the drive is taken to change then"
-    return (
-        f'{{ value = {round(found.value, 6)!r}, unit = "s", source = "{source}", low = 0.0, '
-        f"deviation = {round(found.deviation, 6)!r} }}"
-    )
+    value, deviation = round(found.value, 6), round(found.deviation, 6)
+    return Quantity(value=value, unit="s", source=source, low=0.0, deviation=deviation)
 
 
 @dataclass

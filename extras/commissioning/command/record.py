@@ -25,7 +25,7 @@ class Record:
     operator: str = ""
     """Who commissions the arm."""
     identity: dict[str, Any] = field(default_factory=dict)
-    """What identifies the arm that the results belong to (`extras.commissioning.identity`)."""
+    """What identifies the arm that the results belong to (`extras.commissioning.command.arm`)."""
 
     @staticmethod
     def of(folder: Path) -> Record:

@@ -1,18 +1,81 @@
-"""The verdicts on every register, with the evidence for each, and the memory map that follows from them."""
+"""The verdicts on every register, with the evidence for each, and the memory map that follows from them.
+
+Where gains could be: patterns of bytes that hold those which errors and powers show.
+
+The memory map of an arm whose bytes were found in part: a file that a person completes.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from extras.commissioning.memory.bytes import constants, spread
-from extras.commissioning.memory.gains import Columns, gain_columns
 from extras.commissioning.memory.joint import LEAST_EPOCHS, JointEvidence, joint_evidence
 from extras.commissioning.memory.recording import Recording
 from extras.commissioning.memory.relations import Place
-from firmware_protocol.memory_map import GAIN_REGISTERS, JOINTS, MAY_BE_ABSENT, MemoryMap, Register, default_memory_map
+from firmware_protocol.memory_map import (
+    GAIN_REGISTERS,
+    JOINTS,
+    MAY_BE_ABSENT,
+    MemoryMap,
+    Register,
+    addresses_text,
+    default_memory_map,
+)
+from firmware_protocol.units import GAIN_MAX
+
+Columns = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
+"""Offsets of P, I and D of every joint."""
+
+
+def gain_columns(held: NDArray[np.int64], measured: Sequence[int | None]) -> list[Columns]:
+    """Every regular pattern whose P bytes hold the `measured` gains and whose I and D bytes hold 0.
+
+    held: the constant value of each byte, -1 where it cannot be a gain
+    A pattern is three rows, equally far apart, or a record of P, I and D for each joint. With I or D other than 0 a
+    power is not in proportion to its error, and there would be no measured gain.
+    """
+    if any(gain is None or not 1 <= gain <= GAIN_MAX for gain in measured):
+        return []
+    shapes = [tuple(tuple(row * apart + joint for joint in range(JOINTS)) for row in range(3)) for apart in (6, 8, 16)]
+    shapes.append(tuple(tuple(3 * joint + row for joint in range(JOINTS)) for row in range(3)))
+    wanted = np.array([measured, [0] * JOINTS, [0] * JOINTS])
+    found: list[Columns] = []
+    for shape in shapes:
+        offsets = np.array(shape)
+        for start in range(len(held) - int(offsets.max())):
+            if (held[start + offsets] == wanted).all():
+                p, i, d = (tuple((start + row).tolist()) for row in offsets)
+                found.append((p, i, d))
+    return found
+
+
+COMPLETED = "found at this arm, completed by hand"
+"""Name of a map of which a person has filled in a part."""
+
+
+def begun_map_text(found: Findings) -> str:
+    """A map in which what was not found is a question mark: it can be loaded once each is replaced by an address."""
+    lines = ["# Put an address in place of each question mark, as 0xFC40.", "version = 1", f'name = "{COMPLETED}"']
+    lines += [f"base = 0x{found.base:04X}", f"size = 0x{found.size:02X}"]
+    for name, shipped in default_memory_map().registers.items():
+        own = [one for one in found.all if one.register == name]
+        split = any(one.high is not None for one in own)
+        bits = {True: 16, False: 8}[split] if name == "error" else shipped.bits
+        lines += ["", f"[registers.{name}]", f'unit = "{shipped.unit}"', f"bits = {bits}"]
+        lines += [f"signed = {str(shipped.signed).lower()}", f'access = "{shipped.access}"']
+        lines.append(f"low = {addresses_text([one.low for one in own])}")
+        if split:
+            lines.append(f"high = {addresses_text([one.high for one in own])}")
+        origins = ", ".join('"found"' if one.is_found else '"assumed"' for one in own)
+        lines.append(f"provenance = [{origins}]")
+    return "\n".join(lines) + "\n"
+
 
 Verdict = Literal["found", "contradicts", "assumed", "unknown"]
 """found:       the evidence leaves no other byte

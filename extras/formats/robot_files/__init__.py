@@ -6,7 +6,7 @@ PLUGIN = Plugin(
     commands=(
         Command(
             "machine",
-            "Turn URDF into machine files, and models into URDF and MJCF.",
+            "Write machine files, and models as URDF and MJCF.",
             "extras.formats.robot_files.machine_command",
             about="computer",
         ),

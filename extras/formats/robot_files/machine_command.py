@@ -1,4 +1,4 @@
-"""`daq machine`: machines from and to the robot formats of others, URDF and MJCF."""
+"""`daq machine`: new machine files, tidied ones, and machines in the robot formats of others, URDF and MJCF."""
 
 from __future__ import annotations
 
@@ -18,18 +18,30 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from daq.contracts.machine import Machine
+    from daq.contracts.trace import Trace
+    from extras.formats.robot_files.new_machine import Described
     from model.machine_model.model import Model
 
-app = typer.Typer(add_completion=False, help="Turn URDF into machine files, and models into URDF and MJCF.")
+app = typer.Typer(add_completion=False, help="Write machine files, and models as URDF and MJCF.")
 
 OutputFile = Annotated[
     Path | None, typer.Option("--output", "-o", help="File to write; without it, the text goes to standard output.")
 ]
 
 
-@app.command("from-urdf")
-def from_urdf(
-    urdf: Annotated[Path, typer.Argument(help="The URDF; its meshes are not read.")],
+@app.command("new")
+def new(
+    context: typer.Context,
+    name: Annotated[str | None, typer.Argument(help="Name of the machine (default: the robot's of the URDF).")] = None,
+    urdf: Annotated[Path | None, typer.Option(help="A URDF of the robot; its meshes are not read.")] = None,
+    drives: Annotated[
+        str | None,
+        typer.Option(
+            help="Drives, one for all joints or one a joint: names of `daq machine drives`, or torques for a unit of "
+            "what is recorded (0.5 N·m/A). Or a machine file whose drives, friction and sensors are taken, by joint."
+        ),
+    ] = None,
+    record: Annotated[str | None, typer.Option(help="A record of it: joints, unit of the drive, a check.")] = None,
     joints: Annotated[
         str | None, typer.Option(help="Joints that move, such as shoulder,elbow (default: all, if they are one chain).")
     ] = None,
@@ -40,50 +52,240 @@ def from_urdf(
     gravity: Annotated[
         str | None, typer.Option(help="x,y,z in the axes of the URDF's root, m/s² (default: the file's, or 0,0,-9.81).")
     ] = None,
-    drives: Annotated[
-        str | None, typer.Option(help="A machine file whose drives, friction and sensors are taken over, by joint.")
-    ] = None,
-    ask: Annotated[bool, typer.Option("--ask", help="Ask what is known of every joint's drive and friction.")] = False,
-    name: Annotated[str | None, typer.Option(help="Name of the machine (default: the robot's).")] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Machine file to write (default: its name with .toml).")
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Make a machine file of a URDF: kinematics, masses, inertias and limits.
+    """Write a machine file, from a URDF, from names of servos, or from answers to a few questions.
 
-    Drives, friction and sensors are not in a URDF: they are asked for, taken from another machine, or assumptions,
-    which the file marks. Joints that are not named are held.
+    What is not known is an assumption, which the file marks. At the end stands which three numbers would sharpen
+    answers most.
     """
-    from daq.config.machine_text import machine_text
-    from daq.contracts.machine import load_machine
-    from extras.formats.robot_files.joint_questions import asked_parts
-    from extras.formats.robot_files.machine_of_arm import machine_of_arm
-    from extras.formats.robot_files.serial_arm import serial_arm
-    from extras.formats.robot_files.urdf_reader import read_urdf
+    from daq.contracts.machine import load_machine, parse_machine
+    from daq_cli.models.model_input import read_traces
+    from daq_cli.robot.access import robot_of
 
     if output is not None:
         _check_new(output)
+    trace = None if record is None else read_traces(robot_of(context), None, [record])[0]
+    if urdf is None:
+        if name is None:
+            raise SpecError("give a name, or --urdf and a file")
+        text = _described(name, drives, joints, trace)
+    else:
+        text = _of_urdf(urdf, joints, hold, tip, gravity, drives, name, trace)
+    machine = parse_machine(text, "new machine")
+    path = output or Path(f"{machine.name}.toml")
+    _check_new(path)
+    with replacing(path) as part:
+        part.write_text(text, "utf-8")
+    _tell(load_machine(str(path)), path, trace, json)
+
+
+def _described(name: str, drives: str | None, joints: str | None, trace: Trace | None) -> str:
+    """The text of a machine that is described by names of drives, or by answers."""
+    from extras.formats.robot_files.new_machine import Described, check_drive, text_of
+
+    unit = "V" if trace is None else trace.record.drive_unit or "V"
+    given = [] if drives is None else [check_drive(one.strip()) for one in drives.split(",")]
+    if joints is not None:
+        names = _names(joints)
+    elif trace is not None:
+        names = list(trace.record.joint_names) or [f"joint_{joint}" for joint in trace.joints]
+    else:
+        count = len(given) or int(_asked("How many joints?", "1", str.isdecimal, "a whole number"))
+        names = [f"joint_{k + 1}" for k in range(count)]
+    if len(given) not in (0, 1, len(names)):
+        raise SpecError(f"--drives names {len(given)}, and there are {len(names)} joints")
+    if given:
+        each = given * len(names) if len(given) == 1 else given
+        return text_of(name, [Described(one, drive) for one, drive in zip(names, each, strict=True)], unit)
+    console().print("Enter takes what stands in brackets, or leaves a number unknown.")
+    return text_of(name, [_joint_told(one, last=one == names[-1]) for one in names], unit)
+
+
+def _joint_told(name: str, *, last: bool) -> Described:
+    from extras.formats.robot_files.new_machine import GUESSED, Described
+
+    drive = _drive_told(name)
+    mass = _asked(f"{name}: mass of its link [{GUESSED['mass']}]", GUESSED["mass"], _is_of("kg"), "a mass like 0.8 kg")
+    length = _asked(
+        f"{name}: length {'of the link' if last else 'to the next axis'} [{GUESSED['length']}]",
+        GUESSED["length"],
+        _is_of("m"),
+        "a length like 160 mm",
+    )
+    crossed = not last and _asked(
+        f"{name}: is the next axis parallel or crossed? [parallel]",
+        "parallel",
+        ("parallel", "crossed").__contains__,
+        "parallel or crossed",
+    )
+    return Described(name, drive, mass, length, "crossed" if crossed == "crossed" else "parallel")
+
+
+def _drive_told(name: str, slides: bool = False) -> str:
+    from extras.formats.robot_files.new_machine import check_drive
+
+    def is_drive(text: str) -> bool:
+        check_drive(text, slides)
+        return True
+
+    return _asked(f"{name}: its servo or motor, or torque for a unit of drive (0.5 N·m/A) []", "", is_drive, "a drive")
+
+
+def _is_of(unit: str) -> Callable[[str], bool]:
+    from daq.contracts.written_numbers import read_number
+
+    def suits(text: str) -> bool:
+        read_number(text, "", (unit,))
+        return True
+
+    return suits
+
+
+def _asked(question: str, default: str, suits: Callable[[str], bool], wanted: str) -> str:
+    while True:
+        answer = str(typer.prompt(question, default=default, show_default=False, err=True)).strip()
+        try:
+            if answer == default or suits(answer):
+                return answer
+            console().print(f"{answer!r}: answer {wanted}")
+        except (SpecError, ValueError) as error:
+            console().print(printable(str(error)))
+
+
+def _of_urdf(
+    urdf: Path,
+    joints: str | None,
+    hold: str | None,
+    tip: str | None,
+    gravity: str | None,
+    drives: str | None,
+    name: str | None,
+    trace: Trace | None,
+) -> str:
+    """The text of the machine that a URDF describes, with drives from elsewhere."""
+    from daq.config.machine_text import machine_text
+    from daq.contracts.drive_library import library_drives
+    from daq.contracts.machine import load_machine
+    from extras.formats.robot_files.machine_of_arm import machine_of_arm
+    from extras.formats.robot_files.new_machine import check_drive, parts_of, with_gains_of_record
+    from extras.formats.robot_files.serial_arm import serial_arm
+    from extras.formats.robot_files.urdf_reader import read_urdf
+
     pull = None
     if gravity is not None:
         x, y, z = parse_numbers(gravity, "--gravity", 3)
         pull = (x, y, z)
-    other = None if drives is None else load_machine(drives)
+    given = [] if drives is None else [one.strip() for one in drives.split(",")]
+    other = load_machine(given[0]) if len(given) == 1 and not _is_drive(given[0]) else None
     robot = read_urdf(urdf)
     arm = serial_arm(robot, None if joints is None else _names(joints), _held(hold), tip)
-    parts = asked_parts(arm.joints) if ask else {}
-    machine = machine_of_arm(arm, pull, other, parts, name)
-    path = output or Path(f"{machine.name}.toml")
-    _check_new(path)
-    with replacing(path) as part:
-        part.write_text(machine_text(machine), "utf-8")
+    names = [joint.joint.name for joint in arm.joints]
+    slides = {joint.joint.name: joint.joint.kind == "prismatic" for joint in arm.joints}
+    told: dict[str, str] = {}
+    if given and other is None:
+        if len(given) not in (1, len(names)):
+            raise SpecError(f"--drives names {len(given)}, and there are {len(names)} joints")
+        each = given * len(names) if len(given) == 1 else given
+        told = {one: check_drive(drive, slides[one]) for one, drive in zip(names, each, strict=True)}
+    machine = machine_of_arm(arm, pull, other, parts_of(told, slides), name)
+    if trace is not None:
+        machine = with_gains_of_record(machine, trace)
+    library = {k: told[one] for k, one in enumerate(names, 1) if told.get(one) in library_drives()}
+    return machine_text(machine, drives=library)
+
+
+def _is_drive(text: str) -> bool:
+    from daq.contracts.drive_library import library_drives
+    from daq.contracts.written_numbers import is_number
+
+    return text in library_drives() or is_number(text)
+
+
+def _tell(machine: Machine, path: Path, trace: Trace | None, json: bool) -> None:
+    """What is assumed in a new file, what a record says of it, and which numbers matter most."""
+    from daq.contracts.machine_form import defaults_of
+    from daq_cli.models.record_doubts import end_if_doubted, print_record
+    from extras.formats.robot_files.uncertain_numbers import most_uncertain
+    from model.machine_model.model import base_model
+    from model.record_check.check import check_records
+
+    model = base_model(machine)
+    found = [] if trace is None else check_records(model, [trace])
+    moved = trace if trace is not None and trace.drive is not None else None
+    sharpest = most_uncertain(model, moved)[:3]
+    defaults = list(defaults_of(machine))
+    notes = [line for line in machine.notes.split("\n") if line]
     if json:
         print_json(
-            {"file": path, "machine": machine.name, "joints": [j.name for j in machine.joints], **_told(machine)}
+            {
+                "file": path,
+                "machine": machine.name,
+                "joints": [j.name for j in machine.joints],
+                "notes": notes,
+                "defaults": defaults,
+                "sharpest": [{"name": one.parameter.name, "share": one.share} for one in sharpest],
+                "record": [finding.model_dump(mode="json") for finding in found],
+            }
         )
         return
-    console().print(printable(machine.notes))
+    for line in notes:
+        console().print(printable(line))
+    if defaults:
+        console().print(f"Left at defaults: {', '.join(defaults)}.")
+    if found:
+        print_record(found)
+    if sharpest:
+        console().print("Measure first, for their deviations move the torques most:")
+        for number, share in sharpest:
+            stated = f"{number.value:.3g} ± {number.deviation:.2g} {number.unit}"
+            console().print(f"  {number.name} = {stated}: {100 * share:.0f} %")
     print(path)
+    end_if_doubted(found)
+
+
+@app.command("tidy")
+def tidy(
+    file: Annotated[Path, typer.Argument(help="A machine file (.toml), in any form.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write (default: the file itself).")
+    ] = None,
+) -> None:
+    """Write a machine file in the short form: numbers as texts, sources as comments, defaults left out."""
+    from daq.config.machine_text import tidied
+    from daq.contracts.documents import read_text
+
+    text = tidied(read_text(file, f"machine file {file}"), str(file))
+    path = output or file
+    check_folder(path, "--output")
+    with replacing(path) as part:
+        part.write_text(text, "utf-8")
+    print(path)
+
+
+@app.command("drives")
+def drives(
+    search: Annotated[str, typer.Argument(help="Part of a name.")] = "",
+    json: JsonOption = False,
+) -> None:
+    """List the servos and motors that a machine file can name: `drive = "feetech/sts3215-7.4V"`."""
+    from daq.contracts.drive_library import library_drives
+
+    found = [one for one in library_drives().values() if search.lower() in f"{one.name} {one.title}".lower()]
+    if not found:
+        raise SpecError(f"no drive has {search!r} in its name; `daq machine drives` lists all")
+    if json:
+        print_json([{"name": one.name, "title": one.title, **one.parts} for one in found])
+        return
+    width = max(len(one.name) for one in found)
+    for one in found:
+        print(f"{one.name:{width}}  {printable(one.title)}")
+        if len(found) == 1:
+            for part, numbers in one.parts.items():
+                print("\n".join(f"  {part}.{name} = {number}" for name, number in numbers.items()))
 
 
 @app.command("to-urdf")
@@ -124,10 +326,6 @@ def _write(
     if left_out:
         console().print(f"left out: {printable('; '.join(left_out))}")
     print(output if output is not None else text, end="\n" if output is not None else "")
-
-
-def _told(machine: Machine) -> dict[str, list[str]]:
-    return {"notes": machine.notes.split("\n")}
 
 
 def _check_new(path: Path) -> None:

@@ -1,24 +1,94 @@
-"""One bucket of a store that speaks S3, through `obstore`. Every error is one line without a secret in it."""
+"""One bucket of a store that speaks S3, through `obstore`. Every error is one line without a secret in it.
+
+Who the service is at the store: from a file, or from the environment. Never from a request.
+
+Names of objects: people find a trace by them, and no other content ever has the same name.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
+from pydantic import SecretStr, ValidationError
+
 from daq.config.settings import Settings
 from daq.contracts import exit_codes
+from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import DaqError, SpecError
-from extras.lab.archive.credentials import Credentials, load_credentials
+from daq.contracts.frozen import FrozenRecord
 from extras.lab.archive.settings import ArchiveSettings
 
 if TYPE_CHECKING:
     from obstore.store import S3Config, S3Store
+
+
+ACCESS_KEY, SECRET_KEY, SESSION_TOKEN = "AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN"
+"""Environment variables that every client of S3 knows."""
+
+
+class Credentials(FrozenRecord):
+    """The two halves of a key, and the token of one that lasts for a session. Their `repr` shows none of them."""
+
+    access_key: SecretStr
+    secret_key: SecretStr
+    session_token: SecretStr | None = None
+
+
+def load_credentials(settings: ArchiveSettings, environment: Mapping[str, str] | None = None) -> Credentials:
+    """Reads the credentials. Raises SpecError in one line, which repeats none of them."""
+    if settings.credentials is not None:
+        return _of_file(settings)
+    environment = os.environ if environment is None else environment
+    access, secret = environment.get(ACCESS_KEY), environment.get(SECRET_KEY)
+    if not access or not secret:
+        absent = " and ".join(name for name, value in ((ACCESS_KEY, access), (SECRET_KEY, secret)) if not value)
+        raise SpecError(f"archive: no credentials: set {absent} in the environment, or archive.credentials to a file")
+    token = environment.get(SESSION_TOKEN)
+    return Credentials(
+        access_key=SecretStr(access), secret_key=SecretStr(secret), session_token=SecretStr(token) if token else None
+    )
+
+
+def _of_file(settings: ArchiveSettings) -> Credentials:
+    assert settings.credentials is not None
+    what = f"archive.credentials {settings.credentials}"
+    text = read_text(settings.credentials, what)
+    try:
+        data = parse_toml(text, what)
+    except SpecError:
+        # The words of a parser may repeat what it could not read.
+        raise SpecError(f'{what}: is not TOML; write access_key = "…" and secret_key = "…", one a line') from None
+    try:
+        found = Credentials.model_validate(data)
+    except ValidationError as error:
+        names = ", ".join(str(one["loc"][0]) for one in error.errors()[:5])
+        raise SpecError(f"{what}: {names}: allowed are access_key, secret_key and session_token, as text") from None
+    if not found.access_key.get_secret_value() or not found.secret_key.get_secret_value():
+        raise SpecError(f"{what}: access_key or secret_key is empty")
+    return found
+
+
+PLAIN = re.compile(r"[^A-Za-z0-9._-]+")
+DIGITS = 16
+"""Number of digits of the SHA-256 in a name: 64 bits, so that two contents do not meet."""
+LONGEST = 120
+"""Number of characters of the file's name that are kept."""
+
+
+def object_name(prefix: str, robot: str, file: str, created: datetime, sha256: str) -> str:
+    """Returns `PREFIX/ROBOT/YEAR/FILE-SHA256.mcap`, in characters that need no escape in an address."""
+    stem = PLAIN.sub("_", file.removesuffix(".mcap")).strip("._")[:LONGEST] or "trace"
+    parts = (prefix, robot, f"{created.astimezone(UTC).year:04d}", f"{stem}-{sha256[:DIGITS]}.mcap")
+    return "/".join(part for part in parts if part)
+
 
 PIECE = 8 << 20
 """Number of bytes that one request sends or fetches, so that a time limit on a request suits traces of every size."""

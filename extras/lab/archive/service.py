@@ -25,10 +25,8 @@ from daq.contracts.service.archive import ArchiveStatus, TraceArchive, Transfer
 from daq.traces import disk
 from daq.traces.room import RESERVE
 from extras.lab.archive.archived import Archived, ArchivedStore, Local
-from extras.lab.archive.attempts import Attempts
-from extras.lab.archive.bucket import PIECE, ArchiveError, Bucket, Content, DamagedError, RefusedError
-from extras.lab.archive.health import FIRST_PAUSE, LONGEST_PAUSE, Health
-from extras.lab.archive.names import object_name
+from extras.lab.archive.bucket import PIECE, ArchiveError, Bucket, Content, DamagedError, RefusedError, object_name
+from extras.lab.archive.health import FIRST_PAUSE, LONGEST_PAUSE, Attempts, Health
 from extras.lab.archive.settings import ArchiveSettings
 from extras.lab.archive.transfers import Transfers
 from server.catalogue.catalogue import UPLOAD, Catalogue

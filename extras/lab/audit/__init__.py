@@ -16,5 +16,5 @@ PLUGIN = Plugin(
     migrations={"audit": "extras.lab.audit.versions"},
     noted=("extras.lab.audit.log:append_command",),
     parts=("extras.lab.audit.part:AuditPart",),
-    routes=("extras.lab.audit.routes:router",),
+    routes=("extras.lab.audit.part:router",),
 )

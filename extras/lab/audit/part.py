@@ -1,22 +1,80 @@
-"""The audit log of a running service: what it hears of becomes rows."""
+"""The audit log of a running service: what it hears of becomes rows.
+
+Notes the start of the service, and which sections of its configuration have changed since the last one.
+
+The audit log, to be read. No route changes or deletes a row.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Iterable, Sequence
-from typing import Any
+from datetime import datetime
+from importlib.metadata import version
+from typing import Annotated, Any
 
+from fastapi import Query
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
+from pydantic import BaseModel
 from starlette.types import Scope
 
-from daq.contracts.service.audit import AuditNote
-from extras.lab.audit.configuration import begun
-from extras.lab.audit.log import AuditLog
+from daq.config.section import Section
+from daq.config.settings import Settings
+from daq.contracts.service.audit import AuditEntry, AuditNote, Outcome
+from daq.contracts.service.base import Moment, Page
+from extras.lab.audit.log import AuditLog, AuditSearch
 from extras.lab.audit.request import AskedRequest, asked_request
 from extras.lab.audit.words import cleaned
 from extras.lab.audit.writer import AuditWriter
+from server.api.dependencies import CursorOf, Limit, Operator, part
 from server.parts import Part
+from server.problems import PROBLEMS
+from server.routes import Router
 from server.services import Services
+from server.store.address import address_of, masked
+
+STARTED = "start_service"
+
+
+def begun(settings: Settings, audit: AuditLog, now: datetime) -> AuditNote:
+    """Returns a note of the start, with a digest of each section of the configuration. A digest tells whether two are
+    the same, and no word of either."""
+    sections = _digests(settings)
+    before = audit.newest(STARTED)
+    known = json.loads(before.content or "{}").get("configuration", {}) if before is not None else sections
+    changed = sorted(name for name in sections.keys() | known.keys() if sections.get(name) != known.get(name))
+    said = {"version": version("ma2000-daq"), "configuration": sections}
+    return AuditNote(
+        at=now,
+        origin="service",
+        action=STARTED,
+        outcome="done",
+        detail=f"configuration changed: {', '.join(changed)}" if changed else "",
+        content=json.dumps(said, sort_keys=True, separators=(",", ":")),
+    )
+
+
+def _digests(settings: Settings) -> dict[str, str]:
+    found = {}
+    for name in type(settings).model_fields:
+        value = getattr(settings, name)
+        if isinstance(value, Section):
+            said: Any = value.digested()
+        else:
+            said = value.model_dump(mode="json") if isinstance(value, BaseModel) else value
+        if name == "server":
+            # Without its password, which somebody could guess and try against the digest.
+            said |= {"database": masked(address_of(settings.server))}
+        text = json.dumps(said, sort_keys=True, default=_plain)
+        found[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
+    return found
+
+
+def _plain(value: object) -> object:
+    return value.model_dump(mode="json") if isinstance(value, BaseModel) else str(value)
+
 
 KEPT = "audit-waiting.jsonl"
 """File of the rows that could not be written before the service ended."""
@@ -59,3 +117,35 @@ class AuditPart(Part, Collector):
         written.add_metric((), self.writer.written)
         yield written
         yield GaugeMetricFamily("daq_audit_waiting", "Rows of the audit log not written yet.", self.writer.waiting)
+
+
+router = Router(tags=["system"], responses=PROBLEMS)
+FLUSHED_WITHIN = 1.0
+"""Time (s) to write the rows that wait, so that a list has what was asked before it."""
+
+
+def _equals(what: str, longest: int = 200) -> object:
+    return Query(max_length=longest, description=f"Only rows with this {what}.")
+
+
+@router.get("/audit")
+def list_audit(
+    audit: Annotated[AuditPart, part(AuditPart)],
+    _: Operator,
+    actor: Annotated[str | None, _equals("name of a token")] = None,
+    robot: Annotated[str | None, _equals("robot")] = None,
+    action: Annotated[str | None, _equals("action", 64)] = None,
+    subject: Annotated[str | None, _equals("subject")] = None,
+    outcome: Annotated[Outcome | None, Query(description="Only rows with this outcome.")] = None,
+    since: Annotated[Moment | None, Query(description="Only rows from this moment on.")] = None,
+    until: Annotated[Moment | None, Query(description="Only rows before this moment.")] = None,
+    limit: Limit = 50,
+    cursor: CursorOf = None,
+) -> Page[AuditEntry]:
+    """Lists who asked for which change, from where, and what became of it, the newest first. Needs the role operator.
+
+    Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
+    """
+    audit.writer.flush(FLUSHED_WITHIN)
+    search = AuditSearch(actor, robot, action, subject, outcome, since, until)
+    return audit.log.page(search, cursor, limit)

@@ -12,7 +12,7 @@ from sqlalchemy.exc import DatabaseError
 
 from daq_cli.app.database import computers_user
 from extras.lab.backup.places import BackupError
-from server.access.commands import note_command
+from server.access.sessions import note_command
 from server.database_errors import line_of, one_line, open_to_read
 from server.store.address import file_address
 from server.store.engine import BUSY_TIMEOUT_MS, Store

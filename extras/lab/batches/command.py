@@ -1,7 +1,14 @@
-"""`daq batch`: the same fit, validation, simulation or diagnosis of many traces, with a table as result."""
+"""`daq batch`: the same fit, validation, simulation or diagnosis of many traces, with a table as result.
+
+Runs a batch on this computer or on the workers of a URL, and shows how it goes.
+"""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +16,7 @@ import typer
 
 from daq.contracts import exit_codes
 from daq_cli.app import completion
-from daq_cli.app.context import JsonOption
+from daq_cli.app.context import JsonOption, console, print_json, printable
 from daq_cli.commands.fit import (
     BoundOption,
     ConsistentOption,
@@ -28,14 +35,155 @@ from daq_cli.models.model_input import (
     EffectFileOption,
     ExaminedOption,
     MostOption,
+    load_effects,
+    read_model,
 )
 from daq_cli.models.record_doubts import DespiteDoubtsOption
 from daq_cli.robot.access import robot_of
+from daq_cli.robot.operations import RobotAccess
 from extras.lab.batches.executors import LOCAL
-from extras.lab.batches.shown import Asked, run
 
 if TYPE_CHECKING:
-    from extras.lab.batches.study import Study
+    from daq.traces.query import TraceQuery
+    from extras.lab.batches.folder import Row
+    from extras.lab.batches.run import Chosen, Standing, Told
+    from extras.lab.batches.study import Common, Study
+
+
+TELL_EVERY = 10.0
+"""Time (s) between two lines of progress where standard error is no terminal."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A batch as the command line asks for it. `traces`: a folder, or a query for the configured one."""
+
+    traces: str
+    out: Path
+    executor: str
+    model: str | None
+    effect_files: Sequence[Path]
+    as_json: bool
+
+
+def run(robot: RobotAccess, asked: Asked, study: Study) -> bool:
+    """Runs a batch and prints what came out. Returns whether every trace is done."""
+    from daq.executors.workers import ending
+    from extras.lab.batches.executors import LOCAL, open_workers, parse_address
+    from extras.lab.batches.folder import asked_of, opened
+    from extras.lab.batches.run import run_batch
+
+    parse_address(asked.executor)
+    common, chosen = _common(robot, asked, study), _chosen(robot, asked.traces)
+    with opened(asked.out, asked_of(common)) as folder:
+        if all(folder.is_done(one.job.key) for one in chosen):
+            folder.write_tables()
+            _print_end(asked, len(chosen), 0, 0.0)
+            return True
+        if not asked.executor.startswith(LOCAL):
+            console().print(f"waiting for workers of {asked.executor}")
+        with ending(open_workers(asked.executor)) as workers, shown(study.kind) as tell:
+            ended = run_batch(folder, common, chosen, workers, tell)
+    _print_end(asked, ended.before + ended.done, ended.failed, ended.seconds)
+    return not ended.failed
+
+
+def _common(robot: RobotAccess, asked: Asked, study: Study) -> Common:
+    from extras.lab.batches.study import Common
+
+    load_effects(asked.effect_files, robot)
+    return Common(
+        study=study,
+        model=None if asked.model is None else read_model(asked.model).model_dump_json(),
+        machine=robot.machine,
+        limits=robot.call.trace_limits,
+        effect_files=tuple(file.absolute() for file in asked.effect_files),
+    )
+
+
+def _chosen(robot: RobotAccess, text: str) -> list[Chosen]:
+    from extras.lab.batches.run import chosen_traces, require_any
+
+    folder, query = place_and_query(text)
+    summaries, place = robot.list_traces(folder)
+    chosen, remarks = chosen_traces(summaries, query)
+    for remark in remarks:
+        console().print(printable(remark))
+    require_any(chosen, place)
+    return chosen
+
+
+def place_and_query(text: str) -> tuple[Path | None, TraceQuery]:
+    """The folder that a text names, or None and the query that it is instead. Raises SpecError."""
+    from daq.contracts.errors import SpecError
+    from daq.traces.query import TraceQuery, parse_query
+
+    if Path(text).is_dir():
+        return Path(text), TraceQuery()
+    if "/" in text or Path(text).exists():
+        raise SpecError(f"{text}: is no folder of traces; name one, or write a query such as 'ramp since:2026-11-01'")
+    return None, parse_query(text)
+
+
+@contextmanager
+def shown(what: str) -> Iterator[Told]:
+    """Shows a batch's progress: a bar with rate and time left at a terminal, elsewhere a line now and then. Failures
+    are told one by one, in a line each."""
+    with _bar(what) if console().is_terminal else _lines() as progress:
+
+        def tell(standing: Standing, row: Row | None) -> None:
+            if row is not None and row.problem:
+                file = str(row.about.get("file") or row.key)
+                console().print(printable(row.problem if file in row.problem else f"{file}: {row.problem}"))
+            progress(standing)
+
+        yield tell
+
+
+@contextmanager
+def _bar(what: str) -> Iterator[Callable[[Standing], None]]:
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    description, text = (TextColumn(field, markup=False) for field in ("{task.description}", "{task.fields[text]}"))
+    columns = (description, BarColumn(), text)
+    with Progress(*columns, console=console(), transient=True) as bar:
+        task = bar.add_task(what, text="")
+
+        def progress(standing: Standing) -> None:
+            bar.update(task, total=standing.total, completed=standing.total - standing.left, text=str(standing))
+
+        yield progress
+
+
+@contextmanager
+def _lines() -> Iterator[Callable[[Standing], None]]:
+    told = time.monotonic()
+
+    def progress(standing: Standing) -> None:
+        nonlocal told
+        if time.monotonic() - told >= TELL_EVERY:
+            told = time.monotonic()
+            console().print(str(standing))
+
+    yield progress
+
+
+def _print_end(asked: Asked, done: int, failed: int, seconds: float) -> None:
+    from extras.lab.batches.folder import CSV, PARQUET
+
+    tables = [asked.out / CSV, asked.out / PARQUET]
+    written = [file for file in tables if file.exists()]
+    if asked.as_json:
+        print_json(
+            {"folder": asked.out, "done": done, "failed": failed, "tables": written, "seconds": round(seconds, 3)}
+        )
+        return
+    print(f"{done} of {done + failed} traces done, in {seconds:.1f} s: {' and '.join(map(str, written))}")
+    if len(written) < len(tables):
+        console().print("no Parquet: `pip install 'ma2000-daq[tables]'` where daq is installed")
+    if failed:
+        console().print(f"{failed} failed; the same command tries them again")
+
 
 app = typer.Typer(
     add_completion=False,
@@ -53,7 +201,7 @@ TracesOf = Annotated[
 ]
 ExecutorOption = Annotated[
     str,
-    typer.Option("--executor", help="Who computes: local://4 (processes), dask://host:8786, slurm://partition."),
+    typer.Option("--executor", help="Who computes: local://4 (processes), or dask://host:8786."),
 ]
 OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder of the result; a batch in it goes on.")]
 ModelOption = Annotated[

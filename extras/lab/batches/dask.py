@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster: one that a scheduler has, or one of this computer's own."""
+"""Workers of a Dask cluster, which its scheduler has."""
 
 from __future__ import annotations
 
@@ -12,37 +12,26 @@ from typing import Any
 from uuid import uuid4
 
 import dask.config
-from distributed import Client, LocalCluster
+from distributed import Client
 from distributed.cfexecutor import ClientExecutor
-from distributed.deploy.cluster import Cluster
 from distributed.scheduler import KilledWorker
 
 from daq.contracts.errors import ReachError
-from daq.executors.local import cores
 from daq.executors.workers import BlamedError, Workers
-from extras.lab.batches.executors import Address
 from extras.lab.batches.program import PACKAGE, Checked, Program, program_here, refuse_other
 
 PATIENCE = 20.0
 """Time (s) within which a scheduler must answer, and have a worker."""
 LOST = "the connection to Dask's scheduler was lost, and with it the jobs; the same command goes on"
-CONFIGURATION = {"distributed.worker.profile.enabled": False, "distributed.scheduler.work-stealing": False}
-"""Settings of a cluster that is started here: a worker's profiler looks at its threads a hundred times a second, and
-nobody looks at what it finds; no more is given to a worker than it can begin soon, so there is nothing to steal."""
 COUNT_EVERY = 5.0
 """Time (s) between two counts of the workers, which may come and go."""
 
 
 class DaskWorkers(Workers):
-    """Jobs as tasks of Dask, which computes those of a dead worker again elsewhere, three times at most.
+    """Jobs as tasks of Dask, which computes those of a dead worker again elsewhere, three times at most."""
 
-    Args:
-        cluster: what was started for this executor, and ends with it.
-    """
-
-    def __init__(self, client: Client, cluster: Cluster | None = None) -> None:
+    def __init__(self, client: Client) -> None:
         self._client = client
-        self._cluster = cluster
         self._executor = ClientExecutor(client, pure=False)
         self._counted = (-COUNT_EVERY, 0)
         self._lock = threading.Lock()
@@ -70,16 +59,11 @@ class DaskWorkers(Workers):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """As any executor does."""
         self._executor.shutdown(wait=wait and not cancel_futures)
-        self._end()
+        self._client.close()
 
     def abandon(self) -> None:
         """Leaves the scheduler, which forgets the jobs; it may be gone itself."""
-        self._end()
-
-    def _end(self) -> None:
         self._client.close()
-        if self._cluster is not None:
-            self._cluster.close()
 
 
 def _pass_on(future: Future[Any], given: Future[Any]) -> None:
@@ -98,43 +82,25 @@ def _pass_on(future: Future[Any], given: Future[Any]) -> None:
         future.set_result(given.result())
 
 
-def dask_workers(address: Address) -> DaskWorkers:
-    """Connects to a scheduler, or starts a cluster on this computer. Raises ReachError, OtherVersionError."""
-    if address.place:
-        scheme = "tls" if address.kind == "dask+tls" else "tcp"
-        return connected(address.url, f"{scheme}://{address.place}")
-    with dask.config.set(CONFIGURATION):
-        cluster = LocalCluster(
-            n_workers=address.workers or cores(),
-            threads_per_worker=1,
-            host="127.0.0.1",
-            dashboard_address=None,
-            processes=True,
-        )
-    return connected(address.url, cluster.scheduler_address, cluster)
-
-
-def connected(url: str, scheduler: str, cluster: Cluster | None = None, patience: float = PATIENCE) -> DaskWorkers:
+def connected(url: str, scheduler: str) -> DaskWorkers:
     """The workers of a scheduler, once there is one of them and all have this program's version.
 
     Raises ReachError, OtherVersionError.
     """
     try:
-        with dask.config.set({"distributed.comm.timeouts.connect": patience}):
-            client = Client(scheduler, timeout=patience, set_as_default=False, name=PACKAGE)
+        with dask.config.set({"distributed.comm.timeouts.connect": PATIENCE}):
+            client = Client(scheduler, timeout=PATIENCE, set_as_default=False, name=PACKAGE)
     except (OSError, ValueError) as error:
         raise ReachError(f"executor {url}: no scheduler answers at {scheduler}: {_one_line(error)}") from error
     with contextlib.ExitStack() as ended_on_error:
         ended_on_error.callback(client.close)
-        if cluster is not None:
-            ended_on_error.callback(cluster.close)
         try:
-            client.wait_for_workers(1, timeout=patience)
+            client.wait_for_workers(1, timeout=PATIENCE)
         except TimeoutError:
             raise ReachError(f"executor {url}: its scheduler has no worker; start some there") from None
         require_same_versions(client)
         ended_on_error.pop_all()
-    return DaskWorkers(client, cluster)
+    return DaskWorkers(client)
 
 
 def require_same_versions(client: Client) -> None:

@@ -1,10 +1,14 @@
-"""The folder of a batch: what was asked, a line for each trace that is done, whole answers, and the tables."""
+"""The folder of a batch: what was asked, a line for each trace that is done, whole answers, and the tables.
+
+Rows as tables in files: CSV, and Parquet where `pyarrow` is installed.
+"""
 
 from __future__ import annotations
 
+import csv
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
@@ -15,14 +19,43 @@ from pydantic import ValidationError
 from daq.contracts import exit_codes
 from daq.contracts.documents import parse_json, read_text
 from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.extras import is_installed
 from daq.contracts.file_lock import take_lock
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.whole_file import replacing
 from extras.lab.batches.columns import Columns
 from extras.lab.batches.program import program_here
 from extras.lab.batches.study import Answer, Common, Study
-from extras.lab.batches.table import write_csv, write_parquet
 from firmware_protocol.invalid import first_invalid
+
+
+def write_csv(rows: Sequence[Columns], path: Path) -> Path:
+    """Writes CSV as RFC 4180 describes it, with a line of names; an empty cell where a row has no value."""
+    with replacing(path, synced=False) as part, part.open("w", encoding="utf-8", newline="") as stream:
+        table = csv.DictWriter(stream, _names(rows), restval="")
+        table.writeheader()
+        table.writerows(rows)
+    return path
+
+
+def write_parquet(rows: Sequence[Columns], path: Path) -> Path | None:
+    """Writes Parquet. Returns None where `pyarrow` is not installed (extra `tables`), and removes an older table."""
+    if not is_installed("pyarrow"):
+        path.unlink(missing_ok=True)
+        return None
+    import pyarrow
+    from pyarrow import parquet
+
+    columns: dict[str, Any] = {name: pyarrow.array([row.get(name) for row in rows]) for name in _names(rows)}
+    with replacing(path, synced=False) as part:
+        parquet.write_table(pyarrow.table(columns), part)
+    return path
+
+
+def _names(rows: Sequence[Columns]) -> list[str]:
+    """The names of all columns, in the order in which the rows have them."""
+    return list(dict.fromkeys(name for row in rows for name in row))
+
 
 ASKED, ROWS, ANSWERS, CSV, PARQUET = "batch.json", "rows.jsonl", "answers", "table.csv", "table.parquet"
 _HIDDEN_LOCK = ".lock"

@@ -15,10 +15,9 @@ from daq.contracts.progress import Cancel
 from daq.executors.workers import ending
 from daq.traces.catalogue import list_traces
 from daq.traces.query import parse_query
-from extras.lab.batches.choice import chosen_traces, require_any
 from extras.lab.batches.executors import open_workers
 from extras.lab.batches.folder import asked_of, opened
-from extras.lab.batches.run import run_batch
+from extras.lab.batches.run import chosen_traces, require_any, run_batch
 from extras.lab.batches.study import Common, Study
 from firmware_protocol.invalid import first_invalid
 from ma2000.progress import Shown, told

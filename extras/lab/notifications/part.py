@@ -1,11 +1,18 @@
-"""Notifications in a running service: what it hears of becomes messages."""
+"""Notifications in a running service: what it hears of becomes messages.
+
+What people are told of: an end, a fault, and what waits for somebody.
+
+The state of notifications, to be read: only the configuration says who is told.
+"""
 
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Iterable
 from contextlib import suppress
-from typing import cast
+from datetime import datetime
+from typing import Annotated, cast
 
 from prometheus_client import Counter
 from prometheus_client.core import GaugeMetricFamily, Metric
@@ -14,16 +21,81 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from daq.contracts.service.experiments import ENDS, ExperimentState
 from daq.contracts.service.jobs import Job
-from daq.contracts.service.notifications import Notification, Topic
-from daq.owner.messages import Report
+from daq.contracts.service.notifications import Notification, NotificationKind, NotificationStatus, Topic
+from daq.owner.messages import ArmReport, Report
 from extras.lab.notifications.destinations import destinations_of
-from extras.lab.notifications.occasions import Faults, of_experiment, of_job, of_pause
 from extras.lab.notifications.outbox import Outbox
 from extras.lab.notifications.service import Notifier
 from extras.lab.notifications.settings import NotificationSettings
+from server.api.dependencies import Viewer, part
 from server.database_errors import DamagedError
 from server.parts import Part
+from server.problems import PROBLEMS
+from server.routes import Router
 from server.services import Services
+
+
+def kind_of_end(state: ExperimentState) -> NotificationKind:
+    """Returns what an end is: a fault, unless it was done or somebody has cancelled it."""
+    return "done" if state in ("done", "cancelled") else "fault"
+
+
+def of_experiment(robot: str, identity: str, state: ExperimentState, reason: str, at: datetime) -> Notification:
+    """Returns the notification of the end of an experiment."""
+    text = f"{robot}: experiment {identity} is {state}{f': {reason}' if reason else ''}"
+    return Notification(
+        topic="experiment.ended",
+        kind=kind_of_end(state),
+        at=at,
+        text=text,
+        robot=robot,
+        experiment=identity,
+        state=state,
+    )
+
+
+def of_job(job: Job, at: datetime) -> Notification:
+    """Returns the notification of the end of a job."""
+    why = job.reason or job.headline
+    return Notification(
+        topic="job.ended",
+        kind=kind_of_end(job.state),
+        at=at,
+        text=f"{job.robot}: {job.request.kind} {job.id} is {job.state}{f': {why}' if why else ''}",
+        robot=job.robot,
+        job=job.id,
+        state=job.state,
+    )
+
+
+def of_pause(robot: str, reason: str, at: datetime) -> Notification:
+    """Returns the notification that a queue is paused until somebody has looked."""
+    text = f"{robot}: the queue is paused: {reason}"
+    return Notification(topic="queue.paused", kind="attention", at=at, text=text, robot=robot)
+
+
+class Faults:
+    """Notices when an arm comes to a fault. Safe to use from any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._at_fault: set[str] = set()
+
+    def new(self, robot: str, report: Report, at: datetime) -> Notification | None:
+        """Returns the notification of a fault that this report is the first to tell of."""
+        if not isinstance(report, ArmReport):
+            return None
+        with self._lock:
+            was = robot in self._at_fault
+            if report.arm != "fault":
+                self._at_fault.discard(robot)
+                return None
+            self._at_fault.add(robot)
+        if was:
+            return None
+        text = f"{robot}: the arm is at fault: {report.cause}"
+        return Notification(topic="arm.fault", kind="fault", at=at, text=text, robot=robot)
+
 
 log = logging.getLogger("server.notifications")
 
@@ -95,3 +167,13 @@ class Notifications(Part, Collector):
             key: Notification(topic=cast(Topic, one.topic), kind="attention", at=now, text=one.text, robot=one.robot)
             for key, one in self._services.attention().items()
         }
+
+
+router = Router(tags=["system"], responses=PROBLEMS)
+
+
+@router.get("/notifications")
+def get_notifications(notifications: Annotated[Notifications, part(Notifications)], _: Viewer) -> NotificationStatus:
+    """Returns how far the messages to each webhook and each person with e-mail are. The configuration alone says who
+    is told; no request can add or change an address."""
+    return notifications.notifier.status()

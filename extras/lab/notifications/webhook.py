@@ -1,25 +1,135 @@
-"""Posts messages to a webhook, signed as "Standard Webhooks" 1.0 says (https://www.standardwebhooks.com)."""
+"""Posts messages to a webhook, signed as "Standard Webhooks" 1.0 says (https://www.standardwebhooks.com).
+
+Which addresses a webhook may reach: public ones, and those of hosts that the configuration lists.
+
+A webhook makes the service send requests from inside the laboratory's network, so a wrong or hostile address could
+reach what outsiders cannot (server-side request forgery; OWASP's cheat sheet of that name has the rules that are
+applied here). A name is resolved once for an attempt, and the connection goes to the very address that was checked, so
+that a name that changes its address in between (DNS rebinding) gains nothing.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import base64
 import binascii
+import csv
 import hashlib
 import hmac
+import socket
 import ssl
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from datetime import UTC, datetime
+from functools import cache
+from importlib import resources
 from importlib.metadata import version
+from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 from pathlib import Path
 
 import httpx
 
 from daq.contracts.documents import read_text
 from daq.contracts.errors import SpecError
-from extras.lab.notifications.addresses import Address, Resolver, addresses_of, resolve
 from extras.lab.notifications.delivery import DeliveryError, Message
 from extras.lab.notifications.settings import WebhookSettings
+
+Address = IPv4Address | IPv6Address
+Resolver = Callable[[str, int], Iterable[str]]
+BROADCAST = IPv4Address("255.255.255.255")
+MOST_ADDRESSES = 8
+"""Number of addresses of a name that are looked at."""
+METADATA = tuple(
+    map(ip_network, ("169.254.0.0/16", "100.100.100.200", "168.63.129.16", "fd00:ec2::/32", "fd20:ce::254"))
+)
+"""Addresses at which clouds tell a computer its own keys: Amazon, Google, Azure, Oracle and OpenStack (link-local, and
+their own of version 6), Alibaba, Azure's agent."""
+GLOBAL_UNICAST = IPv6Network("2000::/3")
+"""Outside it no address of version 6 is given to anybody (RFC 4291, and IANA's registry of the address space)."""
+ENDS_WITH_IPV4 = tuple(map(IPv6Network, ("::/96", "::ffff:0:0/96", "::ffff:0:0:0/96", "64:ff9b::/96")))
+"""Blocks whose last four bytes are an IPv4 address: compatible (RFC 4291), mapped, translated (RFC 2765), NAT64."""
+LOCAL_NAT64 = IPv6Network("64:ff9b:1::/48")
+LOCAL_NAT64_BYTES = ((6, 7, 9, 10), (7, 9, 10, 11), (9, 10, 11, 12), (12, 13, 14, 15))
+"""Where its addresses have the bytes of an IPv4 address, for prefixes of 48, 56, 64 and 96 bits (RFC 6052)."""
+ISATAP = (b"\x00\x00\x5e\xfe", b"\x02\x00\x5e\xfe")
+"""Bytes 8 to 11 of an address that a router takes apart into the IPv4 address in the last four (RFC 5214)."""
+
+
+class RefusedAddressError(DeliveryError):
+    """A webhook's host has an address that it may not have."""
+
+
+def resolve(host: str, port: int) -> Iterable[str]:
+    """Returns the addresses of a host, as the computer's resolver has them. Raises OSError."""
+    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    return dict.fromkeys(str(place[4][0]) for place in found)
+
+
+def addresses_of(host: str, port: int, *, listed: bool, resolver: Resolver = resolve) -> list[Address]:
+    """Returns the addresses to connect to. Raises DeliveryError for a name that cannot be resolved, and
+    RefusedAddressError if any of its addresses is not allowed.
+
+    Args:
+        listed: whether the configuration lists the host among those that may be private.
+    """
+    try:
+        texts = list(resolver(host, port))[:MOST_ADDRESSES]
+        found = [ip_address(text.partition("%")[0]) for text in texts]
+    except (OSError, UnicodeError, ValueError) as error:
+        why = getattr(error, "strerror", None) or "its name is not valid"
+        raise DeliveryError(f"{host}: has no address: {why}") from error
+    if not found:
+        raise DeliveryError(f"{host}: has no address")
+    for address in found:
+        if why := why_refused(address, listed=listed):
+            raise RefusedAddressError(f"{host}: {why}; notifications.private_hosts lists the hosts that may be private")
+    return found
+
+
+def why_refused(address: Address, *, listed: bool = False) -> str:
+    """Returns why an address may not be reached; an empty text if it may.
+
+    Args:
+        listed: whether the address may be private. Metadata of clouds, multicast and no address at all stay refused.
+    """
+    leads_to = (address, *_embedded(address))
+    if any(one in network for one in leads_to for network in METADATA):
+        return "it leads to a cloud's metadata"
+    # Of several readings of one address (NAT64 with a local prefix), only its owner knows the right one.
+    sure = leads_to if len(leads_to) <= 2 else leads_to[:1]
+    if any(one.is_multicast or one.is_unspecified or one == BROADCAST for one in sure):
+        return "it leads to no single computer"
+    return "" if listed or all(map(_is_public, leads_to)) else "it leads to a private address"
+
+
+def _is_public(address: Address) -> bool:
+    """Whether IANA's table says so. Python's own (`is_global`) is as old as the interpreter."""
+    found = [(network.prefixlen, reachable) for network, reachable in _special() if address in network]
+    if found:
+        return max(found)[1]
+    return isinstance(address, IPv4Address) or address in GLOBAL_UNICAST
+
+
+@cache
+def _special() -> tuple[tuple[IPv4Network | IPv6Network, bool], ...]:
+    text = (resources.files(__package__) / "special_addresses.csv").read_text("utf-8")
+    rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
+    return tuple((ip_network(row["address_block"]), row["globally_reachable"] == "True") for row in rows)
+
+
+def _embedded(address: Address) -> list[IPv4Address]:
+    """Returns the IPv4 addresses to which an IPv6 address may lead, on some computer or router."""
+    if not isinstance(address, IPv6Address):
+        return []
+    packed = address.packed
+    found = [packed[12:]] if packed[8:12] in ISATAP or any(address in network for network in ENDS_WITH_IPV4) else []
+    if address in LOCAL_NAT64:
+        found += [bytes(packed[place] for place in places) for places in LOCAL_NAT64_BYTES]
+    if address.sixtofour is not None:
+        found.append(address.sixtofour.packed)
+    if address.teredo is not None:  # the relay and the client
+        found += [one.packed for one in address.teredo]
+    return [IPv4Address(one) for one in found]
+
 
 WITHIN = 20.0
 """Time (s) for an attempt, from the connection to the status of the answer, whose body is not read."""

@@ -6,6 +6,6 @@ PLUGIN = Plugin(
     settings={"oidc": "extras.lab.oidc.settings:OidcSettings"},
     checks=("extras.lab.oidc.settings:check",),
     migrations={"people": "extras.lab.oidc.versions"},
-    parts=("extras.lab.oidc.part:SigningIn",),
+    parts=("extras.lab.oidc.routes:SigningIn",),
     routes=("extras.lab.oidc.routes:router",),
 )

@@ -1,4 +1,7 @@
-"""Routes of signing in by OpenID Connect, and of leaving."""
+"""Routes of signing in by OpenID Connect, and of leaving.
+
+Signing in to a running service.
+"""
 
 from __future__ import annotations
 
@@ -10,20 +13,40 @@ from fastapi import Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import RedirectResponse
 
+from daq.contracts.extras import require_extra
 from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.system import LoginWays, OpenIdWay, SignedOut
-from extras.lab.oidc.part import SigningIn
 from extras.lab.oidc.people import name_of
-from extras.lab.oidc.sign_in import GOOD_FOR
+from extras.lab.oidc.settings import OidcSettings, require_address
+from extras.lab.oidc.sign_in import GOOD_FOR, SignIns
 from server.access.caller import Caller
-from server.access.session_cookie import is_over_tls, session_cookie, sign_in_cookie
+from server.access.sessions import is_over_tls, session_cookie, sign_in_cookie
 from server.api.dependencies import ServicesDep, Viewer
+from server.parts import Part
 from server.problems import PROBLEMS, ProblemError, not_found
 from server.routes import Router
 from server.services import Services
 
 if TYPE_CHECKING:
     from extras.lab.oidc.provider import Provider
+
+
+class SigningIn(Part):
+    """The provider, and people on their way to it; `provider` is None where the configuration names none."""
+
+    def __init__(self, services: Services) -> None:
+        """Raises SpecError, and MissingExtraError without Authlib."""
+        self.settings = services.settings.section(OidcSettings)
+        self.sign_ins = SignIns(services.clock)
+        self.provider = None
+        self.lets_people_in = self.settings.issuer is not None
+        if self.lets_people_in:
+            require_extra("oidc", "oidc", "authlib")
+            from extras.lab.oidc.provider import open_provider
+
+            address = require_address(self.settings, services.settings.server)
+            self.provider = open_provider(self.settings, address)
+
 
 START = "/api/v1/login/start"
 HOME = "../../../"

@@ -4,5 +4,5 @@ from daq.plugins import Plugin
 
 PLUGIN = Plugin(
     parts=("extras.lab.prometheus.part:Prometheus",),
-    routes_at_root=("extras.lab.prometheus.routes:router",),
+    routes_at_root=("extras.lab.prometheus.part:router",),
 )

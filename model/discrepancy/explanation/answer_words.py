@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from daq.contracts.errors import SpecError
 from model.discrepancy.diagnosis import (
     CLEAR_SHAPE,
     FEWEST_BINS,
     Candidate,
     Diagnosis,
+    Gap,
+    NextExperiment,
     RemainingShape,
     SignalError,
     Step,
@@ -18,20 +19,35 @@ from model.discrepancy.diagnosis import (
     clear_shape,
     in_order,
 )
-from model.discrepancy.explanation.class_words import class_headline, class_of_group, class_words
-from model.discrepancy.explanation.effect_words import called, size_words, sizes_of
-from model.discrepancy.explanation.phrases import METHODS, NOTHING, NOTHING_AT_LENGTH
-from model.discrepancy.explanation.step_words import NOISE_UNKNOWN, reason_text, sentence
-from model.discrepancy.numbers import plain
+from model.discrepancy.explanation.effect_words import (
+    METHODS,
+    NOTHING,
+    NOTHING_AT_LENGTH,
+    PHASES,
+    STAGES,
+    called,
+    class_headline,
+    class_of_group,
+    class_words,
+    plain,
+    size_words,
+    sizes_of,
+)
+from model.discrepancy.explanation.notes import note_words
+from model.discrepancy.explanation.step_words import (
+    NOISE_UNKNOWN,
+    reason_text,
+    sentence,
+    step_with_sentences,
+    where_with_summary,
+)
+from model.discrepancy.thresholds import WITHIN_NOISE
 from model.effects.names import effect_on, joints_in_words, placed
 from model.record_check.finding import doubts_headline, doubts_in, lines_of
 from model.units import shown_unit, with_unit
 
 SHOWN = 3
 """Members of a group that a headline names."""
-WITHIN_NOISE = 3.0
-"""Error of a joint, in deviations of its readings' noise, up to which a model is said to explain it within that: sound
-rigs of other worlds leave up to 2.6, where friction turns."""
 
 
 def headline(found: Diagnosis) -> str:
@@ -73,7 +89,8 @@ def summary(found: Diagnosis) -> str:
         case "unknown-effect":
             said += _unknown(found)
         case _:
-            said += [_undecided(s, found) if s.group else reason_text(s) for s in found.steps if s.adopted]
+            machine = found.model_before.machine
+            said += [_undecided(s, found) if s.group else reason_text(s, machine) for s in found.steps if s.adopted]
             if found.remaining or found.verdict == "partly":
                 said.append("Something is left that none of the known effects explains.")
     return " ".join(said)
@@ -112,8 +129,6 @@ def _undecided(step: Step, found: Diagnosis) -> str:
     """Why several effects are named: they explain the same, within what their evidence can tell apart, or on every
     motion."""
     group = step.group
-    if len(group) < 2:
-        raise SpecError(f"{len(group)} candidates cannot be undecided between; at least 2 are needed")
     named = ", ".join(f"{called(c.effect, c.joints)} ({c.evidence:.0f})" for c in group)
     apart = max(c.evidence for c in group) - min(c.evidence for c in group)
     text = f"{step.where.summary} These explain it, with evidence that differs by no more than {apart:.0f}: {named}."
@@ -263,3 +278,63 @@ def not_a_finding(answer: Diagnosis, where: Where) -> str:
     said += [f"the best, {placed(c.effect, c.joints)}, has evidence {c.total:.0f}" for c in tried]
     because = f": {'; '.join(said)}" if said else ""
     return f"{'' if where.joint is not None else certain}This is not a finding{because}."
+
+
+def with_sentences(answer: Diagnosis) -> Diagnosis:
+    """The answer with its sentences. What has no data, as in older answers, keeps the text that it has."""
+    asked, machine = answer.next_experiment, answer.model_before.machine
+    written = answer.model_copy(
+        update={
+            "steps": tuple(step_with_sentences(s, machine) for s in answer.steps),
+            "gap": None if answer.gap is None else _gap_with_names(answer.gap),
+            "where": None if answer.where is None else where_with_summary(answer.where),
+            "next_experiment": None if asked is None else _experiment_with_reason(asked),
+            "notes": tuple(sentence(note_words(n)) for n in answer.notes_data) or answer.notes,
+        }
+    )
+    return written.model_copy(update={"summary": summary(written)})
+
+
+def _gap_with_names(gap: Gap) -> Gap:
+    """The gap with the names of its stages, and the alternative in words."""
+    names = (STAGES.get(s.kind) or f"+ {placed(s.effect or '', s.joints)}" for s in gap.stages)
+    stages = tuple(s.model_copy(update={"name": name}) for s, name in zip(gap.stages, names, strict=True))
+    without = None if gap.without is None else gap.without.model_copy(update={"text": _without_words(gap)})
+    return gap.model_copy(update={"stages": stages, "without": without})
+
+
+def _without_words(gap: Gap) -> str:
+    """What the numbers would have had to become without the effects, and what that leaves."""
+    without = gap.without
+    assert without is not None
+    errors = []
+    for place, joint in enumerate(gap.joints):
+        factor, unit = shown_unit(gap.units[place])
+        sizes = (without.fitted[place], gap.stages[-1].fitted[place])
+        alone, whole = ("–" if v is None else with_unit(plain(v * factor), unit) for v in sizes)
+        errors.append(f"joint {joint} {alone} (with: {whole})")
+    left = f"Without the effect, fitted numbers alone leave {', '.join(errors)}"
+    if not without.numbers:
+        return f"{left}; no number would have to move by more than a stated deviation."
+    moved = [
+        f"{n.name} {plain(n.without, 3)}{'' if n.unit == '1' else f' {n.unit}'} for {plain(n.stated, 3)} ± "
+        f"{plain(n.deviation)} (with it: {plain(n.fitted, 3)})"
+        for n in without.numbers
+    ]
+    return f"{left}. The numbers would have had to become {'; '.join(moved)}."
+
+
+def _experiment_with_reason(asked: NextExperiment) -> NextExperiment:
+    at = asked.differs_at
+    if asked.information is not None:
+        why = f"it excites what these traces do not, and would add {asked.information:.0f} nats of information on the"
+        why += " arm's parameters"
+    elif at is not None:
+        on_joint = f"on joint {at.joint} " if at.other_joint else ""
+        why = (
+            f"{asked.hardest[0]} and {asked.hardest[1]} would differ by {asked.predicted_separation:.1f} standard "
+            f"deviations with the other parameters refitted, {100 * at.share:.0f} % of it {on_joint}{PHASES[at.phase]}"
+        )
+    else:
+        return asked
+    return asked.model_copy(update={"reason": sentence(f"{asked.description}: {why}")})

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from model.discrepancy.diagnosis import Diagnosis, FoundValue
+from model.discrepancy.verdict import MOST_NUMBERS
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Parameter
 
-MOST = 5
-"""Numbers that are listed."""
 MOVED = 1.0
 """Distance from the file, in stated deviations, that at least one of them must exceed: within it, a fit has found what
 the file says."""
@@ -46,7 +45,7 @@ def most_moved(found: Diagnosis) -> tuple[FittedNumber, ...]:
         if p.deviation and p.name in after and after[p.name].value != p.value
     ]
     numbers.sort(key=lambda n: n.distance, reverse=True)
-    return tuple(numbers[:MOST]) if numbers and numbers[0].distance > MOVED else ()
+    return tuple(numbers[:MOST_NUMBERS]) if numbers and numbers[0].distance > MOVED else ()
 
 
 def stated_numbers(found: Diagnosis) -> Mapping[str, Parameter]:

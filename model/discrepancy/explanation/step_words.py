@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 
+from daq.contracts.joint_text import slides
+from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import UNWRITTEN, FoundValue, Step, Where
-from model.discrepancy.explanation.effect_words import called, shape_in_torques, size_on, size_words
-from model.discrepancy.explanation.pattern_words import pattern_words
-from model.discrepancy.explanation.phrases import PHASES, REFUSALS
-from model.discrepancy.grounds import ControllerEffect, NamedEffect, Reason, Refusal
-from model.discrepancy.numbers import from_to, plain
+from model.discrepancy.explanation.effect_words import PHASES, REFUSALS, from_to, plain, shape_of
+from model.discrepancy.grounds import ControllerEffect, Refusal
 from model.effects.names import capitalised, joints_in_words
+from model.units import shown_unit, with_unit
 
 NOISE_UNKNOWN = 1e6
 """Ratio of a residual to its noise, above which that noise is none: the machine file takes positions for exact, as one
 made of a URDF does, and what rounding leaves is no measure."""
 NOTICEABLE = 0.98
 """Ratio of the errors with and without an effect, above which the effect hardly changes the error."""
-ALL = 0.95
-"""Share of the evidence; with a margin above it, the next best candidate has next to no evidence."""
 LEAST_SHOWN = 5e-4
 """Least share of a mean square that is not shown as 0.0 %."""
 
@@ -46,46 +44,44 @@ def _place(where: Where) -> str:
             f"no joint is off by more than noise; the largest residual is that of joint {worst.joint}, "
             f"{worst.ratio:.2f} times its noise {phase}"
         )
-    if not worst.whole_record and worst.floor is not None:
-        return f"joint {worst.joint}, {phase}: {worst.rms:.2g} {worst.unit} rms against a floor of {worst.floor:.2g}"
     times = f"{plain(worst.ratio)} times its noise"
     if worst.ratio >= NOISE_UNKNOWN:
         times = "and the machine file states no noise of the sensors to compare it with"
-    seen = f"joint {worst.joint}, mostly {phase}: {plain(worst.rms, 3)} {worst.unit} rms, {times}"
+    seen = (
+        f"joint {worst.joint}, {'mostly ' if worst.whole_record else ''}{phase}: {_rms(worst.rms, worst.unit)}, {times}"
+    )
     if largest is None or largest.rms is None:
         return seen
-    return f"{seen}; more is left of joint {largest.joint}, {plain(largest.rms, 3)} {largest.unit} rms"
+    return f"{seen}; more is left of joint {largest.joint}, {_rms(largest.rms, largest.unit)}"
 
 
-def step_with_sentences(step: Step) -> Step:
+def _rms(value: float, unit: str) -> str:
+    factor, shown = shown_unit(unit)
+    return f"{with_unit(plain(value * factor, 3), shown)} rms"
+
+
+def step_with_sentences(step: Step, machine: Machine) -> Step:
     """The step with its reason, its place, and why it was refused."""
     where = where_with_summary(step.where)
     if step.proof is not None:
         where = where.model_copy(update={"summary": sentence(_proof(step))})
     refused = step.rejected_because if step.refusal is None else refusal_words(step.refusal)
-    return step.model_copy(update={"where": where, "reason": reason_text(step), "rejected_because": refused})
+    return step.model_copy(update={"where": where, "reason": reason_text(step, machine), "rejected_because": refused})
 
 
-def reason_text(step: Step) -> str:
-    """What speaks for the effect of a step, in one to three sentences, with the numbers of the step as it is now."""
-    reason, effect = step.reason_data, step.effect or ""
+def reason_text(step: Step, machine: Machine) -> str:
+    """What speaks for the effect of a step, in a sentence, with the numbers of the step as it is now."""
+    reason = step.reason_data
     if step.proof is not None:
         return sentence(f"{_proof(step)}; this needs no model of the arm")
     if reason is None:
         return step.reason
-    if reason.pattern is None or reason.units is None:
-        return sentence(_torque_reason(step, effect, reason))
-    others = [j for j in step.joints if j != reason.joint]
-    alike = f" (and likewise {joints_in_words(others)})" if others else ""
-    size = size_on(reason.joint or 0, effect, step.parameters)
-    named = called(effect) + ("" if size is None else f", {size_words(size)}")
-    seen = f"joint {reason.joint} {pattern_words(reason.pattern, reason.units)}{alike}"
-    sentences = [sentence(f"{seen}: {named}{_taken_off(reason)}")]
-    if reason.rival is not None:
-        sentences.append(sentence(_beaten(reason.rival, step)))
-    if step.where.joint is None or (step.joints and step.where.joint not in step.joints):
-        sentences.append("What shows it is the pattern over the whole record, not one place.")
-    return " ".join(sentences)
+    sliding = all(slides(machine, j) for j in step.joints or machine.modelled_joints)
+    place = f"{joints_in_words(step.joints)}: " if step.joints else ""
+    sizes = (_size(v, several=len(step.joints) > 1, sliding=sliding) for v in step.parameters.values())
+    seen = f"{place}{shape_of(step.effect or '', sliding=sliding)} ({', '.join(sizes)})"
+    taken = _taken_off(step) if reason.removed is None else _removed(reason.removed)
+    return sentence(f"{seen}{taken}")
 
 
 def _proof(step: Step) -> str:
@@ -100,46 +96,30 @@ def _proof(step: Step) -> str:
     return f"joint {joint}: {power} ({samples} of {of} samples)"
 
 
-def _torque_reason(step: Step, effect: str, reason: Reason) -> str:
-    """What speaks for an effect in a balance of torques."""
-    several = len(step.joints) > 1
-    place = f"{joints_in_words(step.joints)}: " if step.joints else ""
-    sizes = (_torque_size(v, several=several, slides=reason.slides) for v in step.parameters.values())
-    seen = f"{place}{shape_in_torques(effect, slides=reason.slides)} ({', '.join(sizes)})"
-    if reason.removed is None:
-        return seen
-    return f"{seen}; it takes {percent_gone(reason.removed, 0)} off the mean square on records not fitted to"
-
-
-def _torque_size(value: FoundValue, *, several: bool, slides: bool) -> str:
+def _size(value: FoundValue, *, several: bool, sliding: bool) -> str:
     on = f" of {joints_in_words(value.joints)}" if several and value.joints else ""
     unit = "" if value.unit == "1" else f" {value.unit}"
     if value.part == "cycles":  # rad of phase per rad (m): cycles a turn, or 2π times those a metre
-        unit = f" rad/m, {plain(value.value / (2 * math.pi), 3)} a metre" if slides else " a turn"
+        unit = f" rad/m, {plain(value.value / (2 * math.pi), 3)} a metre" if sliding else " a turn"
     return f"{value.part}{on} {plain(value.value, 3)}{unit}"
 
 
-def _taken_off(reason: Reason) -> str:
-    if reason.rms is None:
+def _removed(share: float) -> str:
+    return f"; it takes {percent_gone(share, 0)} off the mean square on records not fitted to"
+
+
+def _taken_off(step: Step) -> str:
+    """How far the error falls on the joint of the effect on which it falls most."""
+    own = [e for e in step.rmse_fit if e.before > 0.0 and (not step.joints or e.joint in step.joints)]
+    if not own:
         return ""
-    before, after, unit = reason.rms.before, reason.rms.after, reason.rms.unit
-    if after > NOTICEABLE * before:
-        return f", which hardly changes its rms error: it stays near {plain(after)} {unit}"
-    first, last = from_to(before, after)
-    return f", which takes its rms error from {first} to {last} {unit}"
-
-
-def _beaten(rival: NamedEffect, step: Step) -> str:
-    """How far the next best candidate is behind."""
-    if step.margin >= ALL * step.evidence:
-        return f"no other fitted candidate has a twentieth of its evidence of {step.evidence:.0f}"
-    name = called(rival.effect, rival.joints)
-    if rival.evidence > step.evidence:  # it was ranked first, but came to less when its fit was taken to its end
-        return (
-            f"its completed fit has evidence of {step.evidence:.0f}, less than the {rival.evidence:.0f} of {name}: "
-            "these traces do not tell which of the two it is"
-        )
-    return f"the next best, {name}, has evidence of {rival.evidence:.0f}, and this has {step.evidence:.0f}"
+    most = min(own, key=lambda e: e.after / e.before)
+    factor, unit = shown_unit(most.unit)
+    before, after = from_to(most.before * factor, most.after * factor)
+    named = f"; the rms error of joint {most.joint}"
+    if most.after > NOTICEABLE * most.before:
+        return f"{named} hardly changes: it stays near {with_unit(after, unit)}"
+    return f"{named} falls from {with_unit(before, unit)} to {with_unit(after, unit)}"
 
 
 def refusal_words(refusal: Refusal) -> str:

@@ -10,12 +10,12 @@ from daq.contracts.trace import Trace
 from model.comparison.compare import TraceSignals
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.estimates import torque_unit
-from model.discrepancy.inverse_dynamics.fitting import Data, fit
-from model.discrepancy.inverse_dynamics.likelihood import stretches_of
+from model.discrepancy.inverse_dynamics.fitting import Data, fit, stretches_of
 from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.inverse_dynamics.torque_balance import TorqueBalance
-from model.record_check.check import repaired
+from model.record_check.check import as_used
+from model.record_check.pieces import in_pieces
 
 
 def recorded_and_predicted(
@@ -35,7 +35,7 @@ def recorded_and_predicted(
     cutoffs = [float(note.values["cutoff"]) for note in found.notes_data if note.kind == "cutoff"]
     if found.method != "inverse-dynamics" or not cutoffs:
         return ()
-    whole = [repaired(trace, found.model_before.machine) for trace in traces]
+    whole = in_pieces(as_used(traces, found.model_before.machine))
     return tuple(_efforts(found, trace, cutoffs[0], trace.record.trace_id in held_out) for trace in whole)
 
 

@@ -9,16 +9,15 @@ import numpy as np
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.arrays import Floats
-from model.discrepancy.inverse_dynamics.candidates import list_trials
-from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, fit
-from model.discrepancy.inverse_dynamics.likelihood import noise_model
+from model.discrepancy.inverse_dynamics.candidates import list_trials, take_back
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, TorqueCase, fit, noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
-from model.discrepancy.inverse_dynamics.stated_numbers import take_back
+from model.discrepancy.inverse_dynamics.starts import Start
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
-from model.discrepancy.inverse_dynamics.trial import Start
 from model.effects.library import find_named_effect
 from model.effects.machine_numbers import MACHINE_NUMBERS
+from model.effects.names import effect_on
+from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -119,20 +118,22 @@ def search(
 
     Raises CancelledError when asked to end.
     """
-    slopes = now.slopes()
+    slopes, expected = now.slopes(), _slopes_where_expected(now)
     prober = prepare_probes(now, slopes)
     fitted_model = model.with_values(now.model_values)
     probes: list[Probe] = []
     for trial in list_trials(fitted_model, now, case):
         stop_if(cancel)
-        progress(0.3, f"trying {trial.effect.replace('_', ' ')}{_on(trial.joints)}")
+        progress(0.3, f"trying {effect_on(trial.effect, trial.joints)}")
         probes.append(prober.probe(trial))
     probes.sort(key=lambda p: -p.gain)
-    found = []
+    found: list[Fitted] = []
     for chosen in _shortlist(probes, now):
         stop_if(cancel)
-        progress(0.6, f"fitting {chosen[0].trial.effect.replace('_', ' ')}{_on(_joints(chosen))}")
-        found.append(_fit_effect(fitted_model, now, slopes, chosen))
+        closest = min(found, key=lambda f: f.fit.criterion, default=None)
+        so_far = f"; closest so far: {effect_on(closest.effect, closest.joints)}" if closest else ""
+        progress(0.6, f"fitting {effect_on(chosen[0].trial.effect, _joints(chosen))}{so_far}")
+        found.append(_fit_effect(fitted_model, now, slopes, expected, chosen))
     places = sum(len(p.trial.starts) for p in probes)
     found = _refined(_weigh(found, now, places), cancel)
     weighed = _weigh(found, now, places)
@@ -141,7 +142,7 @@ def search(
         fewer = [p for p in _with_fewer_joints(probes, weighed[0]) if not _is_fitted(p, found)]
         if not fewer:
             break
-        found += _refined([_fit_effect(fitted_model, now, slopes, p) for p in fewer], cancel)
+        found += _refined([_fit_effect(fitted_model, now, slopes, expected, p) for p in fewer], cancel)
         weighed = _weigh(found, now, places)
     return Findings(tuple(weighed), tuple(probes))
 
@@ -169,10 +170,6 @@ def _with_fewer_joints(probes: Sequence[Probe], best: Fitted) -> list[list[Probe
 def _is_fitted(probes: Sequence[Probe], found: Sequence[Fitted]) -> bool:
     """Whether the effect of these probes has been fitted on their joints already."""
     return any((f.effect, f.joints) == (probes[0].trial.effect, _joints(probes)) for f in found)
-
-
-def _on(joints: tuple[int, ...]) -> str:
-    return f" on joint {', '.join(map(str, joints))}" if joints else ""
 
 
 def _joints(probes: Sequence[Probe]) -> tuple[int, ...]:
@@ -216,6 +213,7 @@ def _fit_effect(
     model: Model,
     now: BalanceFit,
     slopes: Slopes,
+    expected: Slopes | None,
     probes: Sequence[Probe],
 ) -> Fitted:
     """An effect on the joints of its probes, fitted together with all unknowns. Its evidence is not known yet.
@@ -224,6 +222,9 @@ def _fit_effect(
     was there twice where it began. It is begun again from no effect at all, which is where that other fit stands, or
     from an effect that has taken back what the tolerances took. Where tolerances are far off without it, it is begun
     from what the file states as well.
+
+    slopes, expected: derivatives by the unknowns of `now`, where it stands and where the file states; None where
+    tolerances are not far off.
     """
     effect, joints = probes[0].trial.effect, _joints(probes)
     lacking = tuple(j for p in probes if not p.trial.stated for j in p.trial.joints)
@@ -241,11 +242,23 @@ def _fit_effect(
         begin = {**now.values, **start, **null, **take_back(effect, own, now)}
         again = fit(balance, unknowns, begin, now.data, now.noise.memory)
         fitted = min(fitted, again, key=lambda f: f.criterion)
-    if now.prior > STRAINED:
-        expected = {u.name: u.expected for u in unknowns if u.deviation is not None}
-        second = fit(balance, unknowns, {**now.values, **start, **expected}, now.data, now.noise.memory)
+    if expected is not None:
+        begin = {**now.values, **start, **_expected_values(unknowns)}
+        second = fit(balance, unknowns, begin, now.data, now.noise.memory, expected)
         fitted = min(fitted, second, key=lambda f: f.criterion)
     return Fitted(effect, joints, wider, own, fitted, 0.0, stated=stated)
+
+
+def _slopes_where_expected(now: BalanceFit) -> Slopes | None:
+    """Derivatives by all unknowns where the file states their values, if tolerances are far from there."""
+    if now.prior <= STRAINED:
+        return None
+    values = {**now.values, **_expected_values(now.unknowns)}
+    return replace(now, values=values, residual=now.balance.residual(values)).slopes()
+
+
+def _expected_values(unknowns: Sequence[Unknown]) -> Start:
+    return {u.name: u.expected for u in unknowns if u.deviation is not None}
 
 
 def _weigh(found: Sequence[Fitted], now: BalanceFit, places: int) -> list[Fitted]:
@@ -288,7 +301,7 @@ def prefer_fewer_joints(found: Sequence[Fitted]) -> list[Fitted]:
         return is_part and bool(other.joints) and best.log_odds - other.log_odds < more * JOINT_GAIN
 
     fewer = sorted((f for f in found if does_as_much(f)), key=lambda f: len(f.joints))
-    return [*fewer[:1], *(f for f in found if not any(f is one for one in fewer[:1]))]
+    return _led_by(fewer[:1], found)
 
 
 def prefer_shorter_laws(found: Sequence[Fitted], before: BalanceFit, lead: float) -> list[Fitted]:
@@ -302,7 +315,11 @@ def prefer_shorter_laws(found: Sequence[Fitted], before: BalanceFit, lead: float
         for f in found[1:]
         if f.joints == best.joints and best.imitates(f, before) and best.log_odds - f.log_odds < lead
     ]
-    return [*shorter[:1], *(f for f in found if not any(f is one for one in shorter[:1]))]
+    return _led_by(shorter[:1], found)
+
+
+def _led_by(first: Sequence[Fitted], found: Sequence[Fitted]) -> list[Fitted]:
+    return [*first, *(f for f in found if not any(f is one for one in first))]
 
 
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:

@@ -77,31 +77,12 @@ def test_the_standard_error_is_that_of_repeated_measurements(rounding: str) -> N
     assert 0.6 < float(np.std(missed)) < 1.2
 
 
-def test_repeating_the_same_errors_adds_no_certainty() -> None:
-    once = estimated(ERRORS, powers_of(1.7, ERRORS))
-    often = estimated(np.tile(ERRORS, 50), powers_of(1.7, np.tile(ERRORS, 50)))
-    assert often.standard_error == once.standard_error
-    assert (often.samples, often.errors) == (50 * len(ERRORS), len(ERRORS))
-
-
-def test_larger_errors_confine_the_gain_more() -> None:
-    small, large = np.arange(-12, 13), np.arange(-60, 61)
-    assert estimated(large, 2 * large).standard_error < estimated(small, 2 * small).standard_error / 5
-
-
 def test_saturated_samples_are_left_out() -> None:
     errors = np.arange(-200, 201)
     result = estimated(errors, powers_of(2, errors))
     assert result.gain == pytest.approx(2)
     assert result.saturated == 2 * (200 - 63)
     assert result.samples == 127
-
-
-def test_saturated_samples_alone_tell_nothing() -> None:
-    errors = np.arange(70, 200)
-    assert refused(errors, powers_of(2, errors)) == (
-        "joint 1: 0 different errors besides 0 and 130 saturated samples, at least 3 unsaturated ones are needed"
-    )
 
 
 def test_errors_of_a_few_counts_cannot_tell() -> None:

@@ -16,30 +16,24 @@ def with_load(**fields: float | None) -> Machine:
     return ARM.model_copy(update={"load": Quantity(unit="kg", source="test", **stated)})
 
 
-@pytest.mark.parametrize("kilograms", [0.4, 1.0, 2.5])
-def test_the_deviation_grows_with_the_load(kilograms: float) -> None:
-    load = carrying(with_load(), kilograms, "told").load
+@pytest.mark.parametrize(
+    ("stated", "kilograms", "deviation"),
+    [
+        ({}, 0.4, 0.04),
+        ({}, 2.5, 0.25),
+        ({}, 0.0, LEAST_DEVIATION),
+        ({"value": 0.0, "deviation": 0.05}, 2.0, 0.05),
+        ({"deviation": None}, 2.0, None),
+    ],
+    ids=["grows with the load", "and with more", "none to a gram", "file without load", "not claimed by the file"],
+)
+def test_the_deviation_is_that_of_the_file_and_grows_with_the_load(
+    stated: dict[str, float | None], kilograms: float, deviation: float | None
+) -> None:
+    load = carrying(with_load(**stated), kilograms, "told").load
     assert load is not None
     assert (load.value, load.source, load.assumed) == (kilograms, "told", False)
-    assert load.deviation == pytest.approx(0.1 * kilograms)
-
-
-def test_an_arm_without_load_is_known_to_a_gram() -> None:
-    load = carrying(with_load(), 0.0, "told").load
-    assert load is not None
-    assert (load.value, load.deviation) == (0.0, LEAST_DEVIATION)
-
-
-def test_beside_a_file_without_load_the_deviation_is_in_kilograms() -> None:
-    load = carrying(with_load(value=0.0, deviation=0.05), 2.0, "told").load
-    assert load is not None
-    assert load.deviation == 0.05
-
-
-def test_what_the_file_does_not_claim_is_not_claimed() -> None:
-    load = carrying(with_load(deviation=None), 2.0, "told").load
-    assert load is not None
-    assert load.deviation is None
+    assert load.deviation == (None if deviation is None else pytest.approx(deviation))
 
 
 def test_a_load_that_the_machine_cannot_carry_is_refused() -> None:

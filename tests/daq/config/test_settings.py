@@ -1,7 +1,6 @@
 """Where settings come from, which goes before which, and that no guard is lost by leaving a limit out."""
 
 import math
-import os
 import re
 from pathlib import Path
 
@@ -17,14 +16,6 @@ from daq.contracts.machine import load_machine
 from firmware_protocol.memory_map import default_memory_map
 
 MAP = Path(__file__).parents[3] / "firmware_protocol" / "memory_map.toml"
-
-
-@pytest.fixture(autouse=True)
-def nothing_configured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    for name in [name for name in os.environ if name.startswith("DAQ_")]:
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "configuration"))
 
 
 def test_the_guides_configuration_can_be_said_and_says_everything() -> None:

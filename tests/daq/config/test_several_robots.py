@@ -1,6 +1,5 @@
 """Several robots in one daq.toml: each has settings of its own, and nothing that only one can have is shared."""
 
-import os
 from pathlib import Path
 
 import pytest
@@ -20,14 +19,6 @@ traces = "old"
 [traces]
 folder = "data"
 """
-
-
-@pytest.fixture(autouse=True)
-def nothing_configured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    for name in [name for name in os.environ if name.startswith("DAQ_")]:
-        monkeypatch.delenv(name)
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "configuration"))
 
 
 def test_each_robot_has_settings_as_if_it_were_the_only_one() -> None:

@@ -57,11 +57,6 @@ def test_no_rate_takes_more_of_the_line_than_may_be_taken_and_none_faster_would_
     assert rate.every == 1 or rate.share * rate.every / (rate.every - 1) > LARGEST_SHARE
 
 
-def test_a_fast_line_is_used_as_before() -> None:
-    rate = line_rate(11520, PERIOD, 6, 6, can_be_compact=True)
-    assert (rate.every, rate.compact) == (1, False)
-
-
 def test_a_rate_is_told_with_its_joints_share_and_stop() -> None:
     words = line_rate(1920, PERIOD, 3, 3, can_be_compact=True).in_words
     assert words == (

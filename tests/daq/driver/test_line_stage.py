@@ -28,7 +28,7 @@ from firmware_protocol.codes import Capability
 from firmware_protocol.commands import FineSetPoints, Hello, Sample, StatusFlag, Stop
 from model.machine_model.model import base_model
 from model.simulation.simulate import simulate
-from tests.daq.servo_bench import Quiet
+from tests.daq.quiet import Quiet
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 COUNT = 50e-6

@@ -11,7 +11,7 @@ from daq.driver.sampling import Deliveries, MemorySampling
 from daq.driver.set_point_watch import SetPointWatch
 from firmware_protocol.commands import Reply, Request, SetPointsTaken, Status, StatusFlag, WriteSetPoints
 from firmware_protocol.joints import JointReading
-from tests.daq.link.scripted import frame_of, scripted_link
+from tests.daq.link.scripted import says, scripted_link
 
 PERIOD_S = 0.02
 READING = ((1, JointReading(500, 2048, 0, 0)),)
@@ -55,12 +55,11 @@ class Bench:
         self.reader = Reader(self.clock)
         self.status = 0
 
-        def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        def answer(request: Request) -> Reply:
             taken = isinstance(request, WriteSetPoints)
-            reply: Reply = SetPointsTaken(7, 0) if taken else Status(7, self.status, 1, 0, 0)
-            return [(0.0, frame_of(sequence, reply))]
+            return SetPointsTaken(7, 0) if taken else Status(7, self.status, 1, 0, 0)
 
-        self.link, self.channel = scripted_link(answer)
+        self.link, self.channel = scripted_link(says(answer))
         deliveries = Deliveries(self.link, self.clock, PERIOD_S, SetPointWatch())
         self.sampling = MemorySampling(deliveries, cast(DoubleReader, self.reader))
 
@@ -84,16 +83,6 @@ def test_periods_that_the_host_was_too_late_for_are_missing() -> None:
     late = bench.sampling.next(1, (1,), {})
     assert (late.tick, late.missing_before) == (5, 3), "period 5 has not ended"
     assert bench.link.counters.missing_samples == 3
-
-
-def test_readings_that_meet_the_change_of_the_memory_move_a_quarter_of_a_period_later_and_stay_there() -> None:
-    bench = Bench()
-    bench.sampling.next(None, (1,), {})
-    bench.reader.disturbed = True
-    bench.sampling.next(1, (1,), {})
-    bench.reader.disturbed = False
-    moved = [bench.sampling.next(tick, (1,), {}).tick_time for tick in (2, 3)]
-    assert moved == pytest.approx([100.0 + 3.25 * PERIOD_S, 100.0 + 4.25 * PERIOD_S])
 
 
 def test_periods_that_have_moved_later_end_later() -> None:

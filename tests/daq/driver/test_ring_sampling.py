@@ -9,26 +9,10 @@ from daq.driver.line_rate import bytes_of_a_snapshot, line_rate
 from daq.driver.sampling import Deliveries, RingSampling
 from daq.driver.set_point_watch import SetPointWatch
 from daq.link import LinkTimeoutError, RequestRefusedError
-from firmware_protocol.commands import (
-    AFTER_NEWEST,
-    CompactReading,
-    CompactSnapshot,
-    MoveAndSample,
-    ReadStatus,
-    Refusal,
-    Refused,
-    Reply,
-    Request,
-    Sample,
-    SetPointsTaken,
-    Snapshot,
-    Status,
-    StatusFlag,
-    WriteSetPoints,
-)
+from firmware_protocol import commands as c
 from firmware_protocol.joints import JointReading
 from tests.daq.driver.test_memory_sampling import HandClock
-from tests.daq.link.scripted import frame_of, scripted_link
+from tests.daq.link.scripted import says, scripted_link
 
 PERIOD_S = 0.02
 FAST, SLOW = 11520.0, 1920.0
@@ -36,22 +20,18 @@ FAST, SLOW = 11520.0, 1920.0
 ON_THE_LINE_S = bytes_of_a_snapshot(1, compact=False) / FAST
 
 
-def whole(tick: int, set_point: int = 500, status: int = 0) -> Snapshot:
+def whole(tick: int, set_point: int = 500, status: int = 0) -> c.Snapshot:
     """Joint 1 in the middle of its range."""
-    return Snapshot(tick, status, ((1, JointReading(set_point, 2048, 0, 0)),))
+    return c.Snapshot(tick, status, ((1, JointReading(set_point, 2048, 0, 0)),))
 
 
 class Bench:
     """A sampling over a script; the clock is moved by hand, and by waiting for a period to come."""
 
-    def __init__(self, answers: Callable[[Request], Reply | None], bytes_per_second: float = FAST) -> None:
+    def __init__(self, answers: Callable[[c.Request], c.Reply | None], bytes_per_second: float = FAST) -> None:
         self.clock = HandClock()
 
-        def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
-            reply = answers(request)
-            return [] if reply is None else [(0.0, frame_of(sequence, reply))]
-
-        self.link, self.channel = scripted_link(answer)
+        self.link, self.channel = scripted_link(says(answers))
         deliveries = Deliveries(self.link, self.clock, PERIOD_S, SetPointWatch())
         self.sampling = RingSampling(
             deliveries,
@@ -59,7 +39,7 @@ class Bench:
         )
 
     @property
-    def asked(self) -> list[Request]:
+    def asked(self) -> list[c.Request]:
         return [request for _, request in self.channel.asked]
 
 
@@ -84,7 +64,7 @@ def test_a_period_to_come_is_asked_for_a_quarter_of_a_period_after_the_one_befor
     next_one(bench, None, at=100.0)
     next_one(bench, 13)
     assert bench.clock.time == pytest.approx(100.0 - ON_THE_LINE_S + (13 - 8 + 0.25) * PERIOD_S)
-    assert bench.asked == [Sample(AFTER_NEWEST, 1), Sample(13, 1)]
+    assert bench.asked == [c.Sample(c.AFTER_NEWEST, 1), c.Sample(13, 1)]
 
 
 def test_the_very_next_period_is_asked_for_at_once() -> None:
@@ -142,51 +122,45 @@ def test_the_newest_sample_is_late_after_one_period_however_long_ago_the_last_on
 
 
 def test_a_board_that_was_reset_has_no_sample_to_believe() -> None:
-    bench = Bench(lambda _: whole(8, status=StatusFlag.RESTARTED))
+    bench = Bench(lambda _: whole(8, status=c.StatusFlag.RESTARTED))
     with pytest.raises(ControllerRestartedError, match="the controller has restarted"):
         next_one(bench, None)
 
 
 def test_a_question_that_nobody_answers_is_a_time_out_unless_the_board_was_reset() -> None:
     with pytest.raises(LinkTimeoutError, match="no reply to Sample"):
-        next_one(Bench(lambda request: Status(7, 0, 3, 0, 0) if isinstance(request, ReadStatus) else None), None)
+        next_one(Bench(lambda request: c.Status(7, 0, 3, 0, 0) if isinstance(request, c.ReadStatus) else None), None)
 
 
 # ---- set points on their way
 
 
-def taken(tick: int, request: Request) -> Reply:
+def taken(tick: int, request: c.Request) -> c.Reply:
     """A board that took the set points in period `tick`, and shows the old ones in period 9."""
-    return SetPointsTaken(tick, 0) if isinstance(request, WriteSetPoints) else whole(9)
+    return c.SetPointsTaken(tick, 0) if isinstance(request, c.WriteSetPoints) else whole(9)
 
 
 @pytest.mark.parametrize(("tick", "missed"), [(8, True), (9, False)])
 def test_set_points_have_to_show_in_the_period_after_the_one_that_took_them(tick: int, missed: bool) -> None:
     bench = Bench(lambda request: taken(tick, request))
     assert bench.sampling.next(8, (1,), {1: 510}).set_points_missed is missed
-    assert bench.asked == [WriteSetPoints(((1, 510),)), Sample(8, 1)]
+    assert bench.asked == [c.WriteSetPoints(((1, 510),)), c.Sample(8, 1)]
 
 
-def compact(tick: int, taken_tick: int, status: int = 0) -> CompactSnapshot:
-    return CompactSnapshot(tick, status, taken_tick & 0xFF, ((1, CompactReading(2048, 0, 0)),))
+def compact(tick: int, taken_tick: int, status: int = 0) -> c.CompactSnapshot:
+    return c.CompactSnapshot(tick, status, taken_tick & 0xFF, ((1, c.CompactReading(2048, 0, 0)),))
 
 
 @pytest.mark.parametrize(("tick", "missed"), [(299, True), (300, False)])
 def test_a_compact_turn_is_one_frame_and_tells_when_its_set_points_were_taken(tick: int, missed: bool) -> None:
     bench = Bench(lambda _: compact(300, tick), SLOW)
     found = bench.sampling.next(299, (1, 2, 3), {1: 510, 2: 520, 3: 530})
-    assert bench.asked == [MoveAndSample(299, 0b111, ((1, 510), (2, 520), (3, 530)))]
+    assert bench.asked == [c.MoveAndSample(299, 0b111, ((1, 510), (2, 520), (3, 530)))]
     assert (found.tick, found.set_points, found.set_points_missed) == (300, {1: 500}, missed)
 
 
-def test_a_compact_question_for_the_newest_waits_for_the_next_period() -> None:
-    bench = Bench(lambda _: compact(300, 299), SLOW)
-    bench.sampling.next(None, (1, 2, 3), {1: 510, 2: 520, 3: 530})
-    assert bench.asked[0] == MoveAndSample(AFTER_NEWEST, 0b111, ((1, 510), (2, 520), (3, 530)))
-
-
 def test_set_points_that_a_compact_turn_is_refused_for_are_not_missed_later() -> None:
-    replies = iter([Refused(MoveAndSample.OPCODE, Refusal.FROZEN)])
+    replies = iter([c.Refused(c.MoveAndSample.OPCODE, c.Refusal.FROZEN)])
     bench = Bench(lambda _: next(replies, whole(9)), SLOW)
     with pytest.raises(RequestRefusedError):
         bench.sampling.next(8, (1, 2, 3), {1: 510, 2: 520, 3: 530})
@@ -194,6 +168,6 @@ def test_set_points_that_a_compact_turn_is_refused_for_are_not_missed_later() ->
 
 
 def test_a_compact_turn_shows_that_the_board_was_reset() -> None:
-    bench = Bench(lambda _: compact(300, 299, StatusFlag.RESTARTED), SLOW)
+    bench = Bench(lambda _: compact(300, 299, c.StatusFlag.RESTARTED), SLOW)
     with pytest.raises(ControllerRestartedError):
         bench.sampling.next(None, (1, 2, 3), {1: 510, 2: 520, 3: 530})

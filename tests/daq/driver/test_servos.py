@@ -6,18 +6,7 @@ import pytest
 
 from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkTimeoutError, RequestRefusedError
-from firmware_protocol.commands import (
-    Capability,
-    FineSetPoints,
-    Hello,
-    ReadStatus,
-    Release,
-    Released,
-    Status,
-    StatusFlag,
-    Stop,
-    Stopped,
-)
+from firmware_protocol import commands as c
 from firmware_protocol.dynamixel import instructions as ask
 from firmware_protocol.dynamixel.control_table import TICKS, HardwareError, Table
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
@@ -48,7 +37,7 @@ def positions(bench: VirtualBench) -> list[int]:
 
 def test_a_bench_says_what_it_is(controller: Controller) -> None:
     assert controller.identity.simulated
-    assert Capability.POLLED in controller.identity.capabilities
+    assert c.Capability.POLLED in controller.identity.capabilities
     assert controller.period_s == 0.001
     assert controller.joints == (1, 2)
     assert controller.gains() == {1: (800, 0, 0), 2: (800, 0, 0)}
@@ -118,27 +107,27 @@ def test_a_stop_holds_where_the_servos_are_and_they_refuse_goals(controller: Con
 
 def test_a_repeat_of_set_points_cannot_undo_a_stop(controller: Controller, bench: VirtualBench) -> None:
     dialect = DynamixelDialect((1, 2))
-    late = FineSetPoints(((1, 2600),), 4096)
+    late = c.FineSetPoints(((1, 2600),), 4096)
     frame = dialect.encode(7, late)
     assert dialect.again(late, frame) == frame
-    dialect.encode(8, Stop())
+    dialect.encode(8, c.Stop())
     bench.bench.receive(dialect.again(late, frame))
     assert goals(bench)[0] != 2600
 
 
 def test_set_points_from_before_a_stop_are_not_repeated_after_its_release(bench: VirtualBench) -> None:
     dialect = DynamixelDialect((1, 2))
-    dialect.feed(bench.bench.receive(dialect.encode(1, Hello(2, 1))))
-    late = FineSetPoints(((1, 2600),), 4096)
+    dialect.feed(bench.bench.receive(dialect.encode(1, c.Hello(2, 1))))
+    late = c.FineSetPoints(((1, 2600),), 4096)
     lost = dialect.encode(2, late)
     replies = {}
-    for request, sequence in ((Stop(), 3), (Release(1), 4)):
+    for request, sequence in ((c.Stop(), 3), (c.Release(1), 4)):
         coming = bench.bench.receive(dialect.encode(sequence, request))
         for _ in range(3):
             bench.sleep_until(bench.now() + 0.002)
             replies |= {number: reply for number, reply in dialect.feed(coming) if number != 2}
             coming = bench.bench.receive(dialect.answer())
-    assert isinstance(replies[4], Released)
+    assert isinstance(replies[4], c.Released)
     bench.bench.receive(dialect.again(late, lost))
     assert goals(bench)[0] != 2600
 
@@ -150,10 +139,10 @@ def test_a_stop_lasts_for_other_hosts_until_it_is_released(bench: VirtualBench) 
     bench.sleep_until(bench.now() + 5.0)
     with bench.controller() as second:
         status = second.status()
-        assert StatusFlag.FROZEN in status.flags
+        assert c.StatusFlag.FROZEN in status.flags
         assert status.stop == 1
         second.release(status.stop)
-        assert StatusFlag.FROZEN not in second.status().flags
+        assert c.StatusFlag.FROZEN not in second.status().flags
         second.set_points({1: 2100})
     assert goals(bench)[0] == 2100
 
@@ -162,7 +151,7 @@ def test_a_stop_by_another_host_is_remembered_until_a_release(controller: Contro
     controller.set_points({1: 2300})
     with bench.controller() as other:
         assert other.stop().acknowledged
-    assert StatusFlag.FROZEN in controller.status().flags
+    assert c.StatusFlag.FROZEN in controller.status().flags
     for servo in bench.bench.servos:
         servo.write(Table.BUS_WATCHDOG.address, b"\0")
     held = goals(bench)
@@ -175,9 +164,9 @@ def test_a_stop_by_another_host_is_remembered_until_a_release(controller: Contro
 
 def test_a_greeting_does_not_forget_a_stop_under_way(bench: VirtualBench) -> None:
     dialect = DynamixelDialect((1, 2))
-    dialect.encode(1, Stop())
-    dialect.feed(bench.bench.receive(dialect.encode(2, Hello(2, 1))))
-    late = FineSetPoints(((1, 2600),), 4096)
+    dialect.encode(1, c.Stop())
+    dialect.feed(bench.bench.receive(dialect.encode(2, c.Hello(2, 1))))
+    late = c.FineSetPoints(((1, 2600),), 4096)
     bench.bench.receive(dialect.encode(3, late))
     assert goals(bench)[0] != 2600
 
@@ -188,30 +177,30 @@ def test_a_release_that_names_an_older_stop_is_refused(controller: Controller, b
     assert controller.stop().acknowledged
     with pytest.raises(RequestRefusedError, match="stop 2 is newer than the one that was to end"):
         controller.release(first)
-    assert StatusFlag.FROZEN in controller.status().flags
+    assert c.StatusFlag.FROZEN in controller.status().flags
     controller.release(first + 1)
-    assert StatusFlag.FROZEN not in controller.status().flags
+    assert c.StatusFlag.FROZEN not in controller.status().flags
 
 
 @pytest.mark.parametrize("steps", range(3))
 def test_a_stop_ends_the_steps_of_a_release_under_way(steps: int) -> None:
     bench = VirtualBench(Options(torque=False))
     dialect = DynamixelDialect((1, 2))
-    dialect.feed(bench.bench.receive(dialect.encode(1, Hello(2, 1))))
-    coming = bench.bench.receive(dialect.encode(2, Release(0)))
+    dialect.feed(bench.bench.receive(dialect.encode(1, c.Hello(2, 1))))
+    coming = bench.bench.receive(dialect.encode(2, c.Release(0)))
     for _ in range(steps):
         assert dialect.feed(coming) == []
         bench.sleep_until(bench.now() + 0.002)
         coming = bench.bench.receive(dialect.answer())
     torque = bench.bench.servos[0].torque
     dialect.feed(coming)
-    coming = bench.bench.receive(dialect.encode(3, Stop()))
+    coming = bench.bench.receive(dialect.encode(3, c.Stop()))
     replies = {}
     for _ in range(4):
         replies |= dict(dialect.feed(coming))
         bench.sleep_until(bench.now() + 0.002)
         coming = bench.bench.receive(dialect.answer())
-    assert isinstance(replies[3], Stopped)
+    assert isinstance(replies[3], c.Stopped)
     if steps < 2:
         assert isinstance(replies[2], ExplainedRefusal)
         assert bench.bench.servos[0].torque == torque
@@ -232,7 +221,7 @@ def test_a_stop_of_another_host_between_the_steps_of_a_release_holds() -> None:
         bench.hearing = stopped_before_the_torque
         with pytest.raises(RequestRefusedError, match="stop 1 is newer"):
             controller.release(controller.status().stop)
-        assert StatusFlag.FROZEN in controller.status().flags
+        assert c.StatusFlag.FROZEN in controller.status().flags
 
 
 def test_a_release_that_was_given_up_takes_no_further_step() -> None:
@@ -240,7 +229,7 @@ def test_a_release_that_was_given_up_takes_no_further_step() -> None:
     with bench.controller() as controller:
         bench.bench.gone.add(2)
         with pytest.raises(LinkTimeoutError):
-            controller.link.request(Release(0), Released)
+            controller.link.request(c.Release(0), c.Released)
         bench.bench.gone.clear()
         controller.status()
         bench.sleep_until(bench.now() + 0.1)
@@ -260,7 +249,7 @@ def test_torque_comes_on_by_a_release_alone_and_moves_nothing() -> None:
     far = bench.bench.servos[0]
     far.write(Table.GOAL_POSITION.address, (100).to_bytes(4, "little"))  # what another program has left
     with bench.controller() as controller:
-        assert StatusFlag.NO_TORQUE in controller.status().flags
+        assert c.StatusFlag.NO_TORQUE in controller.status().flags
         with pytest.raises(RequestRefusedError, match="the torque of servo 1, 2 is off"):
             controller.set_points({1: 2048})
         before = positions(bench)
@@ -326,7 +315,7 @@ def test_a_stop_whose_answers_are_all_lost_still_stops(controller: Controller, b
     assert not controller.stop().acknowledged
     assert positions(bench)[0] - before < 120
     bench.saying = lambda data: data
-    assert StatusFlag.FROZEN in controller.status().flags
+    assert c.StatusFlag.FROZEN in controller.status().flags
 
 
 def test_a_stop_of_a_limp_servo_outside_its_limits_is_confirmed_at_the_limit() -> None:
@@ -348,7 +337,7 @@ def test_a_stop_that_gave_up_writing_writes_again_when_it_is_repeated(bench: Vir
 
 def test_a_repeat_forgets_what_servos_answered_to_the_question_before(bench: VirtualBench) -> None:
     dialect = DynamixelDialect((1, 2))
-    question = ReadStatus()
+    question = c.ReadStatus()
     frame = dialect.encode(1, question)
     first, second = each_packet(bench.bench.receive(frame))
     assert dialect.feed(first) == []
@@ -364,7 +353,7 @@ def test_servos_stop_by_themselves_when_their_host_is_gone(controller: Controlle
     held = positions(bench)
     bench.sleep_until(bench.now() + 1.0)
     assert positions(bench) == held
-    assert StatusFlag.FROZEN in bench.controller().status().flags
+    assert c.StatusFlag.FROZEN in bench.controller().status().flags
 
 
 def test_a_watch_whose_packet_was_damaged_is_begun_with_the_next_set_points(
@@ -381,7 +370,7 @@ def test_a_connection_that_ends_in_good_order_ends_the_watch(bench: VirtualBench
     with bench.controller() as controller:
         controller.set_points({1: 2100})
     bench.sleep_until(bench.now() + 5.0)
-    assert StatusFlag.FROZEN not in bench.controller().status().flags
+    assert c.StatusFlag.FROZEN not in bench.controller().status().flags
 
 
 def test_a_servo_that_drops_off_the_bus_is_named_and_the_other_is_stopped(
@@ -457,9 +446,9 @@ def test_a_late_answer_takes_no_time_back_and_gives_none(bench: VirtualBench) ->
         return bench.bench.receive(encode(ask.sync_read((1, 2), 64, 72)))
 
     def tick(sequence: int, block: bytes) -> int:
-        dialect.encode(sequence, ReadStatus())
+        dialect.encode(sequence, c.ReadStatus())
         ((_, status),) = dialect.feed(block)
-        assert isinstance(status, Status)
+        assert isinstance(status, c.Status)
         return status.tick
 
     early, later, last = told(1.0), told(1.1), told(1.2)

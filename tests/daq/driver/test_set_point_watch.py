@@ -16,10 +16,6 @@ def missed(watch: SetPointWatch, tick: int, joints: tuple[tuple[int, JointReadin
     return watch.seen(tick, joints).missed
 
 
-def test_nothing_is_missed_before_anything_was_sent() -> None:
-    assert not missed(SetPointWatch(), 1, shows(500, 500))
-
-
 def test_the_period_after_the_confirmed_one_must_show_what_was_sent() -> None:
     watch = SetPointWatch()
     watch.confirmed(watch.sending({1: 510}), due=8)

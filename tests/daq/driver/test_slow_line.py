@@ -62,11 +62,6 @@ def test_a_sample_tells_from_which_period_on_its_set_points_were_used(baud: int,
     assert told == {posture: used[posture] for posture in told}
 
 
-def test_a_question_waits_until_the_periods_before_are_over(controller: Controller) -> None:
-    first = controller.next_snapshot()
-    assert controller.next_snapshot(first.tick + 6).tick == first.tick + 7
-
-
 @pytest.mark.parametrize(("late", "missing"), [(0, 0), (1, 0), (2, 1), (3, 1), (4, 1), (5, 2)])
 def test_what_is_missing_is_counted_in_samples(
     controller: Controller, monkeypatch: pytest.MonkeyPatch, late: int, missing: int
@@ -94,8 +89,3 @@ def test_what_a_compact_sample_says_is_what_a_whole_one_says() -> None:
         whole = controller.next_snapshot(compact.tick - 1, JOINTS)
         assert whole.tick == compact.tick
         assert whole.joints == compact.joints
-
-
-def test_a_line_that_carries_every_period_is_asked_for_every_period(controller: Controller) -> None:
-    assert controller.line_rate().every == 1
-    assert controller.line_rate(range(1, 7), range(1, 7)).every == 1

@@ -21,6 +21,22 @@ Answer = Callable[[int, Request], list[tuple[float, bytes]]]
 """(sequence number, request) → bytes to send, each with its delay (s)."""
 
 
+def says(reply: Reply | Callable[[Request], Reply | None], delay: float = 0.0) -> Answer:
+    """Answers every request by this reply, or by what is replied to it; None is silence."""
+
+    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
+        said = reply if isinstance(reply, Reply) else reply(request)
+        return [] if said is None else [(delay, frame_of(sequence, said))]
+
+    return answer
+
+
+def once_silent(reply: Reply, times: int = 1) -> Answer:
+    """Answers by this reply, but for the first requests."""
+    silent = iter(range(times))
+    return says(lambda _: None if next(silent, None) is not None else reply)
+
+
 @dataclass
 class ScriptedChannel:
     """Never sleeps: a read that has to wait moves the clock on."""

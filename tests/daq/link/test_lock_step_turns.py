@@ -9,7 +9,7 @@ from daq.link.timing import RETRIES
 from daq.link.turn_exchange import MarkCounter
 from firmware_protocol.commands import Advance, Advanced, ReadStatus, Request, Status, Stop, Stopped
 from firmware_protocol.dialect import IDLE_MARK
-from tests.daq.link.scripted import frame_of, scripted_link
+from tests.daq.link.scripted import frame_of, once_silent, says, scripted_link
 
 STATUS = Status(7, 0, 1, 0, 0)
 
@@ -43,10 +43,9 @@ def test_a_controller_that_never_answers_uses_up_the_budget_at_once() -> None:
 def test_a_stop_is_two_frames_and_ends_with_two_marks() -> None:
     stopped = Stopped(7, (500,) * 6)
 
-    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
-        return [(0.0, frame_of(sequence, stopped if isinstance(request, Stop) else STATUS))]
-
-    link, channel = scripted_link(answer, lock_step=True)
+    link, channel = scripted_link(
+        says(lambda request: stopped if isinstance(request, Stop) else STATUS), lock_step=True
+    )
     assert link.stop() == stopped
     assert link.request(ReadStatus(), Status) == STATUS
     assert [type(request) for _, request in channel.asked] == [Stop, Stop, ReadStatus]
@@ -77,11 +76,6 @@ def test_marks_are_counted_however_the_bytes_are_cut(turns: list[list[int]], cut
 
 def test_an_advance_that_was_lost_is_repeated_alone() -> None:
     """A newer Advance before it would make it stale."""
-    lost = iter([True])
-
-    def answer(sequence: int, request: Request) -> list[tuple[float, bytes]]:
-        return [] if next(lost, False) else [(0.0, frame_of(sequence, Advanced(20_000, 1)))]
-
-    link, channel = scripted_link(answer, lock_step=True)
+    link, channel = scripted_link(once_silent(Advanced(20_000, 1)), lock_step=True)
     assert link.request(Advance(20_000), Advanced) == Advanced(20_000, 1)
     assert channel.asked == [(0, Advance(20_000))] * 2

@@ -8,16 +8,7 @@ from typing import Any
 import pytest
 
 from daq.link import Link, StopCameFirstError
-from firmware_protocol.commands import (
-    GripperSet,
-    Request,
-    Sample,
-    SetGripper,
-    Snapshot,
-    Stop,
-    Stopped,
-    parse_request,
-)
+from firmware_protocol import commands as c
 from firmware_protocol.framing import FrameDecoder
 from firmware_protocol.joints import JointReading
 from tests.daq.link.scripted import frame_of
@@ -26,8 +17,8 @@ PATIENCE = 60.0
 """Period (s) of the links: how long a request waits by itself for a reply that does not come."""
 WITHIN = 20.0
 """Time (s) within which a thread is woken by a reply, on a machine that does much else: sooner than by its patience."""
-STOPPED = Stopped(9, (500, 501, 502, 503, 504, 505))
-SNAPSHOT = Snapshot(10, 1, ((1, JointReading(500, 2048, 0, 0)),))
+STOPPED = c.Stopped(9, (500, 501, 502, 503, 504, 505))
+SNAPSHOT = c.Snapshot(10, 1, ((1, JointReading(500, 2048, 0, 0)),))
 
 
 class SampleWaitsForStop:
@@ -41,7 +32,7 @@ class SampleWaitsForStop:
 
     def __init__(self) -> None:
         self.sample_waits = threading.Event()
-        self.order: list[type[Request]] = []
+        self.order: list[type[c.Request]] = []
         self._decoder = FrameDecoder()
         self._sample: int | None = None
         self._replies: SimpleQueue[bytes] = SimpleQueue()
@@ -54,15 +45,15 @@ class SampleWaitsForStop:
 
     def write(self, data: bytes) -> None:
         for frame in self._decoder.feed(data):
-            request = parse_request(frame)
+            request = c.parse_request(frame)
             self.order.append(type(request))
-            if isinstance(request, Sample):
+            if isinstance(request, c.Sample):
                 self._sample = frame.sequence
                 self.sample_waits.set()
-            elif isinstance(request, Stop):
+            elif isinstance(request, c.Stop):
                 self._replies.put(frame_of(frame.sequence, STOPPED))
-            elif isinstance(request, SetGripper):
-                self._replies.put(frame_of(frame.sequence, GripperSet()))
+            elif isinstance(request, c.SetGripper):
+                self._replies.put(frame_of(frame.sequence, c.GripperSet()))
 
     def answer_sample(self) -> None:
         assert self._sample is not None
@@ -82,8 +73,8 @@ def test_a_stop_overtakes_a_waiting_sample_and_the_sample_still_arrives() -> Non
     bench = SampleWaitsForStop()
     link = Link(bench)
     link.set_period(PATIENCE)  # the sample's own patience does not come into it
-    samples: list[Snapshot] = []
-    sampler = threading.Thread(target=lambda: samples.append(link.request(Sample(9, 1), Snapshot)))
+    samples: list[c.Snapshot] = []
+    sampler = threading.Thread(target=lambda: samples.append(link.request(c.Sample(9, 1), c.Snapshot)))
     sampler.start()
     assert bench.sample_waits.wait(WITHIN)
     assert link.stop() == STOPPED
@@ -91,8 +82,8 @@ def test_a_stop_overtakes_a_waiting_sample_and_the_sample_still_arrives() -> Non
     bench.answer_sample()
     sampler.join(WITHIN)
     assert samples == [SNAPSHOT]
-    assert bench.order[:3] == [Sample, Stop, Stop]
-    assert set(bench.order[3:]) <= {Stop}, "asked again where the machine is busy"
+    assert bench.order[:3] == [c.Sample, c.Stop, c.Stop]
+    assert set(bench.order[3:]) <= {c.Stop}, "asked again where the machine is busy"
 
 
 def test_while_one_thread_reads_another_that_waits_does_not_read() -> None:
@@ -103,7 +94,7 @@ def test_while_one_thread_reads_another_that_waits_does_not_read() -> None:
 
         def write(self, data: bytes) -> None:
             for frame in self._decoder.feed(data):
-                if isinstance(parse_request(frame), Sample):
+                if isinstance(c.parse_request(frame), c.Sample):
                     self._sample = frame.sequence
                     self.sample_waits.set()
                 elif self.confirmation is None:
@@ -124,7 +115,7 @@ def test_while_one_thread_reads_another_that_waits_does_not_read() -> None:
     bench = SlowToConfirm()
     link = Link(bench)
     link.set_period(PATIENCE)
-    sampler = threading.Thread(target=lambda: link.request(Sample(9, 1), Snapshot))
+    sampler = threading.Thread(target=lambda: link.request(c.Sample(9, 1), c.Snapshot))
     sampler.start()
     assert bench.sample_waits.wait(WITHIN)
     assert link.stop() == STOPPED
@@ -151,7 +142,7 @@ def test_a_reply_that_another_thread_has_read_is_handed_on_at_once() -> None:
     bench = TwoSamples()
     link = Link(bench)
     link.set_period(PATIENCE)  # the patience of both
-    threads = [threading.Thread(target=link.request, args=(Sample(9, 1), Snapshot), daemon=True) for _ in range(2)]
+    threads = [threading.Thread(target=link.request, args=(c.Sample(9, 1), c.Snapshot), daemon=True) for _ in range(2)]
     numbers = []
     for thread in threads:
         thread.start()
@@ -169,16 +160,16 @@ def test_many_threads_share_one_link_and_each_gets_its_own_reply() -> None:
     class Echo(SampleWaitsForStop):
         def write(self, data: bytes) -> None:
             for frame in self._decoder.feed(data):
-                request = parse_request(frame)
-                assert isinstance(request, Sample)
-                self._replies.put(frame_of(frame.sequence, Snapshot(request.after + 1, 0, SNAPSHOT.joints)))
+                request = c.parse_request(frame)
+                assert isinstance(request, c.Sample)
+                self._replies.put(frame_of(frame.sequence, c.Snapshot(request.after + 1, 0, SNAPSHOT.joints)))
 
     link = Link(Echo())
     wrong: list[int] = []
 
     def ask(first: int) -> None:
         ticks = range(first, first + 200)
-        wrong.extend(after for after in ticks if link.request(Sample(after, 1), Snapshot).tick != after + 1)
+        wrong.extend(after for after in ticks if link.request(c.Sample(after, 1), c.Snapshot).tick != after + 1)
 
     threads = [threading.Thread(target=ask, args=(1000 * number,)) for number in range(6)]
     for thread in threads:
@@ -218,8 +209,8 @@ def test_what_was_allowed_before_a_stop_of_another_thread_is_never_written_behin
     link.set_period(PATIENCE)
     link._connection._write_lock = lock  # type: ignore[assignment]
 
-    def close_the_gripper(stops: int) -> GripperSet:
-        return link.request(SetGripper(1), GripperSet, before_stop=stops)
+    def close_the_gripper(stops: int) -> c.GripperSet:
+        return link.request(c.SetGripper(1), c.GripperSet, before_stop=stops)
 
     with ThreadPoolExecutor(2) as pool:
         orders: list[Any] = [(link.stop,), (close_the_gripper, link.stops)]
@@ -232,5 +223,5 @@ def test_what_was_allowed_before_a_stop_of_another_thread_is_never_written_behin
         if stop_is_first:
             assert isinstance(closed.exception(WITHIN), StopCameFirstError)
         else:
-            assert closed.result(WITHIN) == GripperSet()
-    assert bench.order == [SetGripper] * (not stop_is_first) + 2 * [Stop]  # which is written twice at once
+            assert closed.result(WITHIN) == c.GripperSet()
+    assert bench.order == [c.SetGripper] * (not stop_is_first) + 2 * [c.Stop]  # which is written twice at once

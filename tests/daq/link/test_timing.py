@@ -2,7 +2,7 @@
 
 import pytest
 
-from daq.link.timing import LinkTiming, copies_of
+from daq.link.timing import LinkTiming
 from firmware_protocol.commands import Hello, ReadStatus, Request, Sample, Stop
 from firmware_protocol.scale import LineScale
 
@@ -25,10 +25,6 @@ def test_a_greeting_and_a_stop_are_repeated_more_often_than_anything_else() -> N
     patient = LinkTiming(11520.0, retries=60)
     assert [patient.retries_of(request) for request in (ReadStatus(), Hello(2, 1), Stop())] == [60, 60, 50]
     assert LinkTiming(11520.0).period_s == 0.020
-
-
-def test_only_a_stop_is_written_twice_at_once() -> None:
-    assert (copies_of(Stop()), copies_of(ReadStatus())) == (2, 1)
 
 
 def test_a_shared_wire_is_given_the_time_of_its_own_answers() -> None:

@@ -28,12 +28,6 @@ def test_a_status_has_the_rates_of_its_line_and_the_longest_time_of_a_stop(baud:
     assert (found.state, found.counters, found.age) == ("connected", {"requests": 7.0}, 0.5), "the rest is as it was"
 
 
-def test_rates_and_shares_have_three_digits_behind_the_point() -> None:
-    (one, three, six) = with_rates(LINK, 1920.0, identity()).rates
-    assert [rate.samples_per_second for rate in (one, three, six)] == [16.667, 16.667, 12.5]
-    assert [rate.share for rate in (one, three, six)] == [0.608, 0.764, 0.749]
-
-
 def test_a_bridge_that_does_not_see_the_control_period_is_promised_no_rate() -> None:
     found = with_rates(LINK, 1920.0, identity(samples=False))
     assert (found.rates, found.stop_seconds) == ((), pytest.approx(66 / 1920 + 0.010))

@@ -12,7 +12,7 @@ from daq.contracts.errors import SafetyError
 from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.machine import Machine, SampledPid
 from daq.contracts.sample import SampleRow
-from daq.contracts.trace import Trace, TraceEvent
+from daq.contracts.trace import Trace
 from daq.driver import Controller
 from daq.runner.arm_control import ArmControl
 from daq.runner.experiment import RunResult, RunSetup, StopRequests, run_experiment
@@ -20,13 +20,14 @@ from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
 from firmware_protocol.dynamixel.control_table import HardwareError, Table
 from mock_controller.servos.bench import Options
+from tests.daq.quiet import Quiet
 from tests.daq.servo_bench import VirtualBench, pan_tilt
 
 SPEC = ExperimentSpec(trajectory=Ramp(amplitude=math.radians(20.0), duration=0.6), settle=0.2, hold=0.3, joints=(1, 2))
 
 
 @dataclass
-class At:
+class At(Quiet):
     """A bench, its controller, and runs on it. `at_sample[n]` is called when the n-th sample is told."""
 
     bench: VirtualBench
@@ -45,15 +46,9 @@ class At:
         )
         return run_experiment(setup, Consent())
 
-    def progress(self, fraction: float, text: str) -> None:
-        """Nobody looks."""
-
     def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
         self.samples += 1
         self.at_sample.pop(self.samples, lambda: None)()
-
-    def happened(self, event: TraceEvent) -> None:
-        """Read from the trace instead."""
 
 
 @pytest.fixture

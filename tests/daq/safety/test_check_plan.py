@@ -8,15 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.errors import SafetyError, SpecError
+from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.limits import JointLimits, Limits
+from daq.contracts.machine import Machine
 from daq.safety import check_move_to_start, check_plan, largest_step, unchecked
+from daq.safety.planned import planned
 from daq.safety.violation import TOLERANCE
 from daq.trajectories.kinematics import link_ends
 from daq.trajectories.move import plan_move
 from daq.trajectories.planner import plan, start_angles
 from daq.trajectories.set_points import make_plan
 from tests.daq.safety.arms import COUNT, LIMITS, MA2000, REST, limits, plan_of
+from tests.daq.sliding_axis import slide_and_turn
 
 
 def test_the_default_ramp_is_allowed() -> None:
@@ -257,3 +261,64 @@ def test_what_passes_is_within_every_limit(joint: int, offsets: list[float]) -> 
         assert sent
     if not (within and slow and sent):
         assert check_plan(plan, MA2000, LIMITS)
+
+
+# ---- Experiments that are compared before any is run are planned and checked like those that are run.
+
+
+def test_the_set_points_are_those_of_the_plan() -> None:
+    spec = ExperimentSpec()
+    assert np.array_equal(planned(spec, MA2000), plan(spec, MA2000, start_angles(spec, MA2000)).angles)
+
+
+def test_an_experiment_outside_the_limits_is_refused_by_its_first_violation() -> None:
+    with pytest.raises(SafetyError, match=r"joint \d: .*°/s .*allowed are up to"):
+        planned(ExperimentSpec(trajectory=Ramp(amplitude=math.radians(40), duration=0.2)), MA2000)
+
+
+# ---- Joints that slide are checked, moved and shown in metres, never in degrees.
+
+
+@pytest.fixture
+def machine() -> Machine:
+    return slide_and_turn()
+
+
+def ramp(amplitude: dict[int, float], duration: float = 2.0, repeats: int = 1) -> ExperimentSpec:
+    trajectory = Ramp(amplitude=amplitude, duration=duration)
+    return ExperimentSpec(trajectory=trajectory, joints=tuple(amplitude), repeats=repeats)
+
+
+def violations(machine: Machine, spec: ExperimentSpec) -> list[str]:
+    return [str(one) for one in check_plan(plan(spec, machine, start_angles(spec, machine)), machine, machine.limits)]
+
+
+def test_refusals_are_in_millimetres_of_a_joint_that_slides_and_in_degrees_of_one_that_turns(machine: Machine) -> None:
+    found = violations(machine, ramp({1: 0.1, 2: 0.45}, 1.0))
+    assert any("joint 1: 200.00 mm" in one and "allowed are 10.00 mm to 190.00 mm" in one for one in found)
+    assert any("joint 1: 100.0 mm/s" in one and "up to 40.0 mm/s" in one for one in found)
+    assert any("joint 2: 54.43°" in one for one in found)
+    assert not any("°" in one for one in found if one.startswith("joint 1"))
+
+
+def test_a_start_outside_the_range_is_told_in_the_joints_unit(machine: Machine) -> None:
+    with pytest.raises(SpecError, match=r"joint 1: start of 300\.00 mm is outside its range of 0\.00 mm to 204\.75 mm"):
+        plan_move(machine, (0.3, 0.5), (0.1, 0.5))
+
+
+def test_an_amplitude_below_half_a_set_point_is_told_in_the_joints_unit(machine: Machine) -> None:
+    with pytest.raises(SpecError, match=r"half a set point \(0\.025 mm\)"):
+        plan(ramp({1: 1e-5}), machine, (0.1, 0.5))
+
+
+@pytest.mark.parametrize("target", [(0.18, 0.5), (0.1, 0.85), (0.18, 0.85), (0.02, 0.15)], ids=str)
+def test_the_slow_move_to_a_start_keeps_each_joints_own_speed(machine: Machine, target: tuple[float, float]) -> None:
+    move = plan_move(machine, (0.1, 0.5), target)
+    assert check_move_to_start(move, machine, machine.limits) == []
+    speeds = np.abs(np.diff(move.angles, axis=0)).max(axis=0) / move.period
+    assert (speeds <= np.array([0.04, 0.2]) + 1e-6).all()
+    assert (speeds / np.array([0.04, 0.2])).max() == pytest.approx(1.0, abs=0.02)
+
+
+def test_the_way_back_between_repeats_keeps_them_too(machine: Machine) -> None:
+    assert violations(machine, ramp({1: 0.05, 2: 0.3}, repeats=2)) == []

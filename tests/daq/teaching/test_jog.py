@@ -38,13 +38,6 @@ def driven(arm: StandIn, velocities: dict[int, float], held_until: int, periods:
     return told
 
 
-def test_a_joint_moves_at_the_speed_asked_for_while_the_key_is_held() -> None:
-    arm = StandIn()
-    driven(arm, {1: 0.2}, held_until=100, periods=100)
-    assert arm.position[0] - REST[0] == pytest.approx(0.2 * 100 * PERIOD, abs=0.02)
-    assert arm.position[1:] == pytest.approx(REST[1:], abs=0.005)
-
-
 @pytest.mark.parametrize("every", [2, 8])
 def test_a_joint_has_its_speed_however_far_samples_are_apart(every: int) -> None:
     arm = StandIn(every=every)
@@ -77,12 +70,6 @@ def test_it_stops_when_the_key_is_no_longer_refreshed() -> None:
     driven(arm, {1: 0.2}, held_until=50, periods=200)
     assert arm.position[0] - REST[0] <= 0.2 * (50 * PERIOD + DEAD_MAN) + 0.01
     assert arm.position[0] - REST[0] >= 0.2 * 50 * PERIOD
-
-
-def test_nothing_is_sent_without_a_key() -> None:
-    arm = StandIn()
-    jog(arm, MA2000, LIMITS, lambda _row: None, arm.run_for(20), print)
-    assert arm.log == []
 
 
 def test_slow_jogging_adds_up_across_posture_units() -> None:

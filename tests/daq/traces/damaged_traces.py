@@ -3,24 +3,25 @@
 import random
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
 
 import lz4.frame
 import zstandard
 from mcap.opcode import Opcode
 
-from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TraceEvent, TraceRecord
 from daq.traces.layout import RECORDED_SIGNALS
 from daq.traces.recording import Recording
+from tests.daq.traces.samples import record as sound_record
+from tests.daq.traces.samples import row
 
 MAGIC = 8
 HEAD = 9
 SECTOR = 512
 ROWS, ROWS_A_CHUNK, JOINTS = 60, 15, (1, 2)
-PERIOD = 0.02
 BOUNDARIES = (
     0,
     1,
@@ -53,11 +54,24 @@ class Damaged:
     way: str
     data: bytes
 
+    def __str__(self) -> str:
+        return f"{self.original.kind}, {self.way}"
 
-def row(tick: int) -> SampleRow:
-    """A row that can be told from every other."""
-    values = (tick * 0.001 + 0.5, tick * 0.002 - 0.25)
-    return SampleRow(tick, tick * PERIOD, 100 + tick * PERIOD, values, values, (0.0, 0.0), values, (tick, -tick), tick)
+
+@dataclass
+class Tally:
+    """Counts what became of damaged files; the first few of each fault are kept."""
+
+    cases: int = 0
+    ends: Counter[str] = field(default_factory=Counter)
+    faults: Counter[str] = field(default_factory=Counter)
+    examples: list[str] = field(default_factory=list)
+
+    def fault(self, kind: str, file: str, detail: str) -> None:
+        """Counts a fault."""
+        self.faults[kind] += 1
+        if self.faults[kind] <= 3:
+            self.examples.append(f"{kind}: {file}: {detail[:300]}")
 
 
 def recording(record: TraceRecord, close: bool) -> bytes:
@@ -66,7 +80,7 @@ def recording(record: TraceRecord, close: bool) -> bytes:
     made = Recording(stream, record, JOINTS, RECORDED_SIGNALS, {"config.toml": b"[robot]\nname = 'ma2000'\n"})
     made.event(TraceEvent(time=0.0, kind="start", message="recording starts", tick=0))
     for tick in range(ROWS):
-        made.row(row(tick))
+        made.row(row(tick, len(JOINTS)))
         if (tick + 1) % ROWS_A_CHUNK == 0:
             made.flush()
     if close:
@@ -74,10 +88,10 @@ def recording(record: TraceRecord, close: bool) -> bytes:
     return stream.getvalue()
 
 
-def originals(record: TraceRecord) -> list[Original]:
+def originals() -> list[Original]:
     """A finished trace, also with other compressions; one whose name alone was missing; one without an end."""
-    finished = recording(record, close=True)
-    unfinished = recording(record.model_copy(update={"machine": None}), close=False)
+    finished = recording(sound_record(), close=True)
+    unfinished = recording(sound_record(machine=None), close=False)
     return [
         Original("finished", ".mcap", finished),
         Original("finished, by another tool", ".mcap", recompressed(finished, "lz4")),

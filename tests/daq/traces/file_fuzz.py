@@ -6,9 +6,8 @@ of what the file has, or its notes say what is missing. The files of traces them
 
 import itertools
 import random
-from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from daq.teaching.program import load_program
 from daq.traces.csv_table import import_csv
 from model.machine_model.model import base_model
 from model.machine_model.model_file import load_model, save_model
-from tests.daq.traces.damaged_traces import AT_RANDOM
+from tests.daq.traces.damaged_traces import AT_RANDOM, Tally
 
 CASES = 60_000
 ROWS = 60
@@ -53,21 +52,6 @@ class Kind:
     damaged: Path
     read: Read
     data: bytes
-
-
-@dataclass
-class Tally:
-    """Counts; the first few of each fault are kept."""
-
-    ends: Counter[str] = field(default_factory=Counter)
-    faults: Counter[str] = field(default_factory=Counter)
-    examples: list[str] = field(default_factory=list)
-
-    def fault(self, fault: str, kind: Kind, way: str, detail: str) -> None:
-        """Counts a fault."""
-        self.faults[fault] += 1
-        if self.faults[fault] <= 5:
-            self.examples.append(f"{fault}: {kind.name}, {way}: {detail[:300]}")
 
 
 # ---- damage of texts, beside that of disks
@@ -172,10 +156,10 @@ class Campaign:
         except DaqError as error:
             line = str(error)
             if "\n" in line or len(line) > LONGEST_LINE:
-                self.tally.fault("errors of several or endless lines", kind, way, line)
+                self.tally.fault("errors of several or endless lines", f"{kind.name}, {way}", line)
             self.tally.ends["refused"] += 1
         except Exception as error:  # noqa: BLE001  # that is what is counted
-            self.tally.fault("other exceptions", kind, way, repr(error))
+            self.tally.fault("other exceptions", f"{kind.name}, {way}", repr(error))
         else:
             self.tally.ends["read"] += 1
             if isinstance(found, Trace):
@@ -190,9 +174,9 @@ class Campaign:
             expected = ROWS
         said = "INCOMPLETE" in found.record.notes or "left out" in found.record.notes
         if len(found) < expected and not said:
-            self.tally.fault("samples lost without a word", kind, way, f"{len(found)} of {expected}")
+            self.tally.fault("samples lost without a word", f"{kind.name}, {way}", f"{len(found)} of {expected}")
         if kind.name == "bag of MCAP" and not set(found.position[:, 0]) <= set(self._sound[kind.name].position[:, 0]):
-            self.tally.fault("wrong samples", kind, way, found.record.notes)
+            self.tally.fault("wrong samples", f"{kind.name}, {way}", found.record.notes)
 
 
 def damaged(chosen: list[Kind], rng: random.Random) -> Iterator[tuple[Kind, str, bytes]]:

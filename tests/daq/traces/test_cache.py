@@ -7,9 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
-from daq.contracts.trace_limits import TraceLimits
 from daq.traces import cache, reader
 from daq.traces.reader import read_trace
 from tests.daq.traces.samples import write
@@ -40,15 +38,6 @@ def test_the_second_opening_comes_from_the_cache_and_is_the_same(
     assert cache.cache_path(path).exists()
     monkeypatch.setattr(reader, "scan", None)
     assert same(read_trace(path), first)
-
-
-@pytest.mark.parametrize("name", ["file_bytes", "records", "events", "joints"])
-def test_limits_hold_for_a_trace_that_is_in_the_cache(tmp_path: Path, name: str) -> None:
-    path = write(tmp_path / "a.mcap")
-    read_trace(path)
-    assert cache.cache_path(path).exists()
-    with pytest.raises(TraceError, match=rf"traces\.limits\.{name}"):
-        read_trace(path, TraceLimits(**{name: 1}))
 
 
 def test_the_cache_of_other_bytes_of_the_same_size_and_time_is_not_used(tmp_path: Path) -> None:

@@ -25,7 +25,6 @@ from tests.daq.traces.damaged_traces import Original, originals, recompressed, r
 from tests.daq.traces.samples import write
 from tests.daq.traces.test_files_that_are_no_trace import foreign, ours
 from tests.daq.traces.trace_damage import CASES, campaign
-from tests.daq.traces.trace_damage import record as sound_record
 
 HEAD = 9
 SIZE_IN_CHUNK = HEAD + 16
@@ -37,7 +36,7 @@ A_MEGABYTE = 1 << 20
 
 @pytest.fixture(scope="module")
 def sound() -> dict[str, Original]:
-    return {one.kind: one for one in originals(sound_record())}
+    return {one.kind: one for one in originals()}
 
 
 def first_of(data: bytes, opcode: int) -> int:
@@ -50,7 +49,7 @@ def with_number(data: bytes, position: int, value: int) -> bytes:
 
 def bomb(declared: int, size: int, compress: str = "zstd") -> bytes:
     """A trace whose first chunk holds `size` bytes of zeros, and declares `declared`."""
-    data = recompressed(originals(sound_record())[0].data, compress, lambda _: bytes(size))
+    data = recompressed(originals()[0].data, compress, lambda _: bytes(size))
     return with_number(data, first_of(data, Opcode.CHUNK) + SIZE_IN_CHUNK, declared)
 
 
@@ -102,24 +101,13 @@ def test_a_chunk_of_nothing_is_nothing(packed: bytes) -> None:
     assert inflate(CompressedChunk(0, 0, "zstd", memoryview(packed))) == b""
 
 
-def schemas(bodies: list[bytes]) -> bytes:
-    """Records of schemas, all of the same number, with something after their last field."""
-    return b"".join(
-        struct.pack("<BQ", Opcode.SCHEMA, 14 + len(body)) + struct.pack("<HIII", 9, 0, 0, 0) + body for body in bodies
-    )
-
-
 def test_definitions_in_chunks_count_as_records(tmp_path: Path, sound: dict[str, Original]) -> None:
-    many = recompressed(sound["finished"].data, "zstd", lambda chunk: schemas([b""] * 1000) + chunk)
+    schema = struct.pack("<BQHIII", Opcode.SCHEMA, 14, 9, 0, 0, 0)
+    many = recompressed(sound["finished"].data, "zstd", lambda chunk: schema * 1000 + chunk)
     (tmp_path / "b.mcap").write_bytes(many)
     assert read_trace(tmp_path / "b.mcap").record.outcome == "complete"
     line = refused(tmp_path / "a.mcap", many, TraceLimits(records=900))
     assert "there are more than 900 records (traces.limits.records)" in line
-
-
-def test_a_definition_with_bytes_left_over_is_refused(tmp_path: Path, sound: dict[str, Original]) -> None:
-    more = recompressed(sound["finished"].data, "zstd", lambda chunk: schemas([b"12"]) + chunk)
-    assert "a schema has 2 bytes after its last field" in refused(tmp_path / "a.mcap", more)
 
 
 def test_a_bomb_of_two_gibibytes_is_refused_at_once(tmp_path: Path) -> None:
@@ -137,11 +125,8 @@ def test_a_bomb_of_two_gibibytes_is_refused_at_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("metadata", "complaint"),
     [
-        ({"joints": ""}, "joints = '' are not 1 to 99 different numbers of joints"),
         ({"joints": "1 " * 10**6}, "joints = '1 1 1 1"),
-        ({"joints": "1 1"}, "joints = '1 1' are not"),
         ({"joints": "1_0"}, "joints = '1_0' are not"),
-        ({"joints": " ".join(map(str, range(1, 101)))}, "are not 1 to 99 different"),
         ({"record": "[" * 10**5}, "its metadata is not that of a trace"),
         ({"record": '{"a":' * 10**5}, "its metadata is not that of a trace"),
         ({"record": "9" * 10**5}, "its metadata is not that of a trace"),
@@ -149,8 +134,6 @@ def test_a_bomb_of_two_gibibytes_is_refused_at_once(tmp_path: Path) -> None:
         (ours(memory_map={"a": 1e308 * 10}), "its metadata is not that of a trace"),
         (ours(created="9999-12-31T23:59:59-14:00"), "a moment of the years 1970 to 2261 is expected"),
         (ours(created="0001-01-01T00:00:00+14:00"), "a moment of the years 1970 to 2261 is expected"),
-        (ours(created="2026-11-21T05:14:42"), "created = 2026-11-21T05:14:42 has no time zone"),
-        (ours(trace_id="../../x"), "its number '../../x' is not letters, digits, - and _"),
         (ours(format="x"), "its metadata is not that of a trace: format"),
         (ours(format=10**400), "of a newer version"),
     ],
@@ -186,12 +169,9 @@ def test_events_made_to_do_harm_get_one_line(tmp_path: Path, sound: dict[str, Or
     ("field", "value", "complaint"),
     [
         ("position", 1e308, "position = 1e+308, allowed is ±1e+09 rad or m"),
-        ("set_point", -1e300, "set_point = -1e+300, allowed is ±1e+09 rad or m"),
         ("drive", float("inf"), "drive = inf, allowed is ±1e+09 V, N·m or N"),
-        ("position", float("nan"), "position = nan, allowed is"),
         ("host_time", 1e300, "host_time = 1e+300, allowed is ±4e+09 s"),
         ("tick", 2**63 - 1, "tick = 9.22337e+18, allowed is ±9.01e+15 control periods"),
-        ("tick", -(2**63), "tick = -9.22337e+18, allowed is"),
         ("time", 1e308, "time = 1e+308, allowed is ±4e+09 s"),
         ("time", -1e-320, "it has to increase by 1e-09 s at least"),
     ],
@@ -228,31 +208,6 @@ def test_a_record_of_a_slow_line_that_does_not_tell_each_sample_s_set_points_is_
     line = refused(tmp_path / "b.mcap", recompressed(path.read_bytes(), "zstd", changed))
     assert left_out >= 1
     assert "the topics do not have the same ticks" in line
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("file_bytes", 1000),
-        ("chunk_bytes", 1000),
-        ("total_bytes", 10_000),
-        ("records", 300),
-        ("events", 1),
-        ("joints", 2),
-        ("metadata_bytes", 1000),
-        ("attachments", 0),
-        ("attachment_bytes", 10),
-    ],
-)
-def test_every_limit_is_named_by_the_setting_that_moves_it(
-    tmp_path: Path, sound: dict[str, Original], name: str, value: int
-) -> None:
-    path = write(tmp_path / "a.mcap", 200)
-    if name.startswith("attachment"):
-        path.write_bytes(sound["finished"].data)
-    assert read_trace(path).record.outcome == "complete"
-    with pytest.raises(TraceError, match=rf"\(traces\.limits\.{name}\)"):
-        read_trace(path, TraceLimits(**{name: value}))
 
 
 def test_a_trace_with_messages_outside_of_chunks_is_not_read_as_an_empty_one(tmp_path: Path) -> None:
@@ -315,14 +270,6 @@ def test_a_pipe_of_the_name_of_a_part_file_is_told_and_not_waited_for(tmp_path: 
     assert [one.state for one in list_traces(tmp_path)] == ["unreadable", "unreadable"]
     with pytest.raises(TraceError, match="it is no file"):
         read_trace(tmp_path / "b.mcap")
-
-
-def test_a_part_file_is_never_complete_even_when_only_its_name_was_missing(
-    tmp_path: Path, sound: dict[str, Original]
-) -> None:
-    path = tmp_path / "a.mcap.part"
-    path.write_bytes(sound["finished"].data)
-    assert read_trace(path).record.outcome is None
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,8 @@ import json
 import pytest
 
 from daq.contracts.errors import TraceError
-from daq.contracts.trace import TRACE_FORMAT
 from daq.contracts.trace_limits import TraceLimits
-from daq.traces.metadata import NewerTraceError, extent_of, joints_of, record_of, signals_of
+from daq.traces.metadata import extent_of, joints_of, record_of, signals_of
 from tests.daq.traces.samples import record
 
 LIMITS = TraceLimits(joints=6)
@@ -24,12 +23,6 @@ def test_outcome_and_counters_come_from_the_end() -> None:
     ended = record_of(start(), END, "a")
     assert (ended.outcome, ended.counters) == ("stopped", {"retries": 2})
     assert record_of(start(), END | {"outcome": ""}, "a").outcome is None
-
-
-def test_a_newer_format_is_named_as_such() -> None:
-    assert record_of(start(format=TRACE_FORMAT), None, "a").trace_id == record().trace_id
-    with pytest.raises(NewerTraceError, match=f"a: has format {TRACE_FORMAT + 1} of a newer version"):
-        record_of(start(format=TRACE_FORMAT + 1), None, "a")
 
 
 @pytest.mark.parametrize(

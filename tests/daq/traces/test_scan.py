@@ -10,14 +10,13 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces.reader import read_trace
 from daq.traces.scan import scan
-from tests.daq.traces.damaged_traces import HEAD, originals, records
-from tests.daq.traces.trace_damage import record as sound_record
+from tests.daq.traces.damaged_traces import HEAD, JOINTS, originals, records
 
 
 @pytest.fixture(scope="module")
 def data() -> bytes:
     """A finished trace with attachments."""
-    (found,) = (one.data for one in originals(sound_record()) if one.kind == "finished")
+    (found,) = (one.data for one in originals() if one.kind == "finished")
     return found
 
 
@@ -36,6 +35,8 @@ LARGEST: dict[str, Callable[[bytes], int]] = {
     "metadata_bytes": lambda data: max(map(len, bodies(data, Opcode.METADATA))),
     "attachments": lambda data: len(bodies(data, Opcode.ATTACHMENT)),
     "attachment_bytes": lambda data: sum(map(len, bodies(data, Opcode.ATTACHMENT))),
+    "events": lambda _: 1,
+    "joints": lambda _: len(JOINTS),
 }
 """How much of everything a file holds."""
 

@@ -7,18 +7,14 @@ deleted.
 
 import itertools
 import random
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from daq.contracts.errors import TraceError
-from daq.contracts.machine import load_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from daq.traces.catalogue import list_traces
 from daq.traces.layout import ALL_SIGNALS
 from daq.traces.reader import read_trace
@@ -28,6 +24,7 @@ from tests.daq.traces.damaged_traces import (
     Choice,
     Damaged,
     Original,
+    Tally,
     at_boundaries,
     at_random,
     inside_chunks,
@@ -36,36 +33,6 @@ from tests.daq.traces.damaged_traces import (
 )
 
 CASES = 22_000
-CREATED = datetime(2026, 11, 21, 5, 14, 42, tzinfo=UTC)
-
-
-@dataclass
-class Tally:
-    """Counts; the first few of each fault are kept."""
-
-    cases: int = 0
-    ends: Counter[str] = field(default_factory=Counter)
-    faults: Counter[str] = field(default_factory=Counter)
-    examples: list[str] = field(default_factory=list)
-
-    def fault(self, kind: str, damaged: Damaged, detail: str) -> None:
-        """Counts a fault."""
-        self.faults[kind] += 1
-        if self.faults[kind] <= 3:
-            self.examples.append(f"{kind}: {damaged.original.kind}, {damaged.way}: {detail}")
-
-
-def record() -> TraceRecord:
-    """The record of a run on the mock, with a machine."""
-    return TraceRecord(
-        trace_id="ab12cd34ef56",
-        created=CREATED,
-        software="benchmark",
-        source="mock",
-        period=0.02,
-        drive_unit="V",
-        machine=load_machine("ma2000"),
-    )
 
 
 def differs(trace: Trace, original: Trace) -> str | None:
@@ -104,7 +71,7 @@ class Campaign:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.tally = Tally()
-        self.originals = originals(record())
+        self.originals = originals()
         self._sound = {one.kind: self._read_whole(one) for one in self.originals}
 
     def _read_whole(self, original: Original) -> Trace:
@@ -138,11 +105,11 @@ class Campaign:
             return action()
         except TraceError as error:
             if "\n" in str(error):
-                self.tally.fault("errors of several lines", damaged, str(error))
+                self.tally.fault("errors of several lines", str(damaged), str(error))
             self.tally.ends["refused"] += 1
             return None
         except Exception as error:  # noqa: BLE001  # that is what is counted
-            self.tally.fault("other exceptions", damaged, repr(error))
+            self.tally.fault("other exceptions", str(damaged), repr(error))
             return None
 
     def _judge(self, damaged: Damaged, path: Path, trace: Trace | None) -> None:
@@ -150,14 +117,14 @@ class Campaign:
             return
         original = self._sound[damaged.original.kind]
         if wrong := wrong_samples(trace, original):
-            self.tally.fault("wrong samples", damaged, f"{wrong} of {len(trace)}")
+            self.tally.fault("wrong samples", str(damaged), f"{wrong} of {len(trace)}")
         different = differs(trace, original)
         self.tally.ends["read, the same" if different is None else "read, less"] += 1
         if trace.record.outcome == "complete" and (different or path.suffix == ".part"):
-            self.tally.fault("called complete", damaged, str(different))
+            self.tally.fault("called complete", str(damaged), str(different))
         finished = damaged.original.suffix == ".mcap"
         if finished and different and verify(path).trustworthy:
-            self.tally.fault("called trustworthy", damaged, different)
+            self.tally.fault("called trustworthy", str(damaged), different)
 
     def _salvaged(self, damaged: Damaged) -> None:
         made = self.folder / "a.mcap"
@@ -165,13 +132,13 @@ class Campaign:
         if not made.exists():
             self.tally.ends["put aside"] += 1
             if [one.name for one in kept] != ["a.mcap.part.unreadable"]:
-                self.tally.fault("part files lost or left", damaged, str(sorted(self.folder.iterdir())))
+                self.tally.fault("part files lost or left", str(damaged), str(sorted(self.folder.iterdir())))
             return
         self.tally.ends["salvaged"] += 1
         trace = self._guarded(damaged, lambda: read_trace(made))
         self._judge(damaged, made, trace)
         if trace is None or trace.record.outcome != "interrupted":
-            self.tally.fault("salvaged traces that are none", damaged, str(made))
+            self.tally.fault("salvaged traces that are none", str(damaged), str(made))
 
 
 def on_purpose(sound: list[Original], chosen: Choice) -> Iterator[Damaged]:

@@ -33,11 +33,6 @@ def test_staircase_goes_up_and_down_in_equal_steps_and_dwells_on_each() -> None:
     assert marked(planned, "reversal") == [6]
 
 
-def test_a_staircase_of_one_step_goes_up_and_back() -> None:
-    planned = motion(joints=(1,), trajectory={"kind": "staircase", "amplitude": 0.1, "steps": 1, "dwell": 0.02})
-    assert offsets(planned) == pytest.approx([0, 0.1, 0])
-
-
 def test_staircase_that_does_not_come_back_ends_at_the_amplitude() -> None:
     move = {"kind": "staircase", "amplitude": -0.3, "steps": 3, "dwell": 0.02, "back": False}
     planned = motion(joints=(1,), trajectory=move)
@@ -172,9 +167,3 @@ def test_sequence_goes_on_from_where_each_piece_ended_on_its_own_joints() -> Non
         ("ramp_end", 15, None),
         ("end", 15, None),
     ]
-
-
-def test_pause_alone_stands_still() -> None:
-    planned = motion(joints=(1,), trajectory={"kind": "pause", "duration": 0.2})
-    assert len(planned) == 11
-    assert (planned.postures == planned.postures[0]).all()

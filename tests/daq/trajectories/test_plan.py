@@ -217,8 +217,3 @@ def test_a_move_to_a_start_arrives_together_and_never_exceeds_its_speed(
     assert made.angles[-1] == pytest.approx(representable_angles(MA2000, target.tolist()))
     assert np.abs(np.diff(made.angles, axis=0)).max(initial=0) <= speed * PERIOD * (1 + 1e-9)
     assert set(made.moving) == {joint + 1 for joint in np.flatnonzero(made.postures[0] != made.postures[-1])}
-
-
-def test_no_way_to_go_is_a_plan_of_one_set_point() -> None:
-    made = plan_move(MA2000, REST.tolist(), REST.tolist())
-    assert (len(made), made.moving, made.duration) == (1, (), 0)

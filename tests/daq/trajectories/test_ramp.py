@@ -21,10 +21,6 @@ def test_all_joints_arrive_together_whatever_their_amplitudes() -> None:
     assert fraction == pytest.approx(np.repeat(np.linspace(0, 1, 26)[:, None], 3, axis=1))
 
 
-def test_a_duration_of_whole_periods_takes_exactly_that_many() -> None:
-    assert len(motion(trajectory={"kind": "ramp", "duration": 0.6})) == 31
-
-
 def test_a_ramp_of_one_period_is_one_set_point_and_a_shorter_one_is_none() -> None:
     assert len(motion(trajectory={"kind": "ramp", "duration": PERIOD, "amplitude": 0.01})) == 2
     with pytest.raises(SpecError, match=r"ramp: duration: 0.019 s is too short"):

@@ -140,11 +140,6 @@ def test_a_line_that_takes_no_bytes_is_given_up(listener: socket.socket) -> None
             channel.write(bytes(1 << 25))
 
 
-def test_reconnection_delays_double_up_to_a_limit() -> None:
-    delays = ReconnectDelay(0.1, 5.0).delays()
-    assert [next(delays) for _ in range(10)] == [0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0, 5.0]
-
-
 @pytest.mark.parametrize(("first", "longest"), [(0.0, 1.0), (-1.0, 1.0), (2.0, 1.0)])
 def test_delays_that_make_no_sense_are_refused(first: float, longest: float) -> None:
     with pytest.raises(ValueError, match="must be above 0 and ascending"):

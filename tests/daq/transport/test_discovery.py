@@ -2,7 +2,7 @@
 
 from serial.tools.list_ports_common import ListPortInfo
 
-from daq.transport import FoundPort, parse_port_url, ports
+from daq.transport import FoundPort, ports
 
 
 def test_found_ports_are_named_by_urls_in_order() -> None:
@@ -12,8 +12,3 @@ def test_found_ports_are_named_by_urls_in_order() -> None:
         FoundPort("serial:///dev/ttyS0", "ttyS0", None, None),
         FoundPort("serial:///dev/ttyUSB1", "USB serial", "Maker", "42"),
     )
-
-
-def test_every_port_of_this_machine_has_a_url_that_can_be_used() -> None:
-    for port in ports():
-        parse_port_url(port.url)

@@ -10,24 +10,18 @@ from model.machine_model.model_file import load_model
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import SINGLE_AXIS
 
-ROD = 'link = { shape = "rod", mass = { value = 0.8, unit = "kg", source = "scales", low = 0.0, deviation = 0.08 } }'
+ROD = 'link = { mass = "0.8 ± 0.08 kg" }'
 MOMENTS = ("link1.inertia_xx", "link1.inertia_yy", "link1.inertia_zz")
 
 
 def machine(tmp_path: Path, zz: float) -> Path:
     """The single axis with a body: 6 cm thick and 30 cm long, but for the moment about its axis."""
 
-    def number(value: float, unit: str) -> str:
-        return f'{{ value = {value}, unit = "{unit}", source = "drawing" }}'
-
-    centre = ", ".join(number(v, "m") for v in (-0.15, 0.0, 0.0))
-    inertia = ", ".join(number(v, "kg·m²") for v in (0.0005, 0.006, zz, 0.0, 0.0, 0.0))
-    mass = number(0.8, "kg")
     text = SINGLE_AXIS.read_text("utf-8")
     assert ROD in text
     file = tmp_path / "body.toml"
     file.write_text(
-        text.replace(ROD, f'link = {{ shape = "body", mass = {mass}, centre = [{centre}], inertia = [{inertia}] }}'),
+        text.replace(ROD, f"link = {{ mass = 0.8, centre = [-0.15, 0.0, 0.0], inertia = [0.0005, 0.006, {zz}] }}"),
         "utf-8",
     )
     return file

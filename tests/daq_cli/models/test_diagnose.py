@@ -8,8 +8,8 @@ import pytest
 from daq_cli.models.diagnosis_text import WIDTH, answer_text
 from daq_cli.robot.experiment import read_spec
 from model.discrepancy.diagnosis import Diagnosis, DifferencePlace, Suspicion
+from model.discrepancy.explanation.answer_words import with_sentences
 from model.discrepancy.explanation.notes import on_stated_numbers
-from model.discrepancy.explanation.renderer import with_sentences
 from model.discrepancy.grounds import Note
 from model.discrepancy.options import DiagnosisOptions
 from model.fitting.unknowns import Unknown

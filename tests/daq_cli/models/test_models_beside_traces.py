@@ -65,7 +65,7 @@ def test_a_fitted_model_is_kept_when_the_comparison_fails(
 
 def test_compare_names_the_parameter_that_differs(daq: CommandLine, tmp_path: Path) -> None:
     heavier = tmp_path / "heavier.toml"
-    heavier.write_text(SINGLE_AXIS.read_text().replace("value = 0.8, unit", "value = 1.2, unit"))
+    heavier.write_text(SINGLE_AXIS.read_text().replace("0.8 ± 0.08 kg", "1.2 ± 0.08 kg"))
     trace = write_csv(tmp_path / "sine.csv")
     simulated = tmp_path / "simulated.csv"
     daq("simulate", SINGLE_AXIS, trace, "-o", simulated)

@@ -18,22 +18,18 @@ LENGTH, PERIOD, SAMPLES = 0.3, 0.01, 600
 NOISE_COUNTS = 20.0
 TRUTH = {"link1.mass": 0.93, "joint1.viscous_friction.coefficient": 0.03, "joint1.drive.inertia": 0.0043}
 MACHINE = f"""
-version = 1
 name = "rod"
 title = "A hanging rod"
 gravity = [9.81, 0.0, 0.0]
-modelled_joints = [1]
-controller = {{ kind = "none" }}
 
 [[joints]]
 name = "axis"
-kind = "revolute"
-geometry = {{ a = {{ value = {LENGTH}, unit = "m", source = "test" }}, alpha = {{ value = 0.0, unit = "rad", source = "test" }}, d = {{ value = 0.0, unit = "m", source = "test" }}, theta = {{ value = 0.0, unit = "rad", source = "test" }} }}
-link = {{ shape = "rod", mass = {{ value = 0.8, unit = "kg", source = "test", low = 0.0, deviation = 0.2 }} }}
-drive = {{ kind = "gain", gain = {{ value = 1.0, unit = "N·m/V", source = "test" }}, inertia = {{ value = 0.003, unit = "kg·m²", source = "test", low = 0.0, deviation = 0.003 }} }}
-friction = {{ viscous = {{ value = 0.02, unit = "N·m·s/rad", source = "test", low = 0.0, deviation = 0.02 }} }}
-sensor = {{ bits = 16, range = {{ value = 6.283185307179586, unit = "rad", source = "test" }}, at_zero = {{ value = -3.141592653589793, unit = "rad", source = "test" }}, noise = {{ value = {NOISE_COUNTS}, unit = "count", source = "test" }} }}
-"""  # noqa: E501
+geometry = {{ a = {LENGTH} }}
+link = {{ mass = "0.8 ± 0.2 kg" }}
+drive = {{ gain = "1 N·m/V", inertia = "0.003 ± 0.003 kg·m²" }}
+friction = {{ viscous = "0.02 ± 0.02 N·m·s/rad" }}
+sensor = {{ bits = 16, noise = {NOISE_COUNTS} }}
+"""
 MASS, VISCOUS, ROTOR = TRUTH
 
 

@@ -11,17 +11,18 @@ from typing import cast
 import pytest
 import typer
 
+from daq.config.machine_text import machine_text
 from daq.contracts.errors import SafetyError, SpecError
 from daq.contracts.machine import BoardPid, load_machine, parse_machine
+from daq.contracts.quantity import Quantity
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import Invocation
-from extras.commissioning.command.addresses import addresses_of
 from extras.commissioning.command.bench import Bench, Commissioner
 from extras.commissioning.command.by_hand import potentiometers
-from extras.commissioning.command.machine_text import machine_file_text, with_controller, with_limits, with_sensors
+from extras.commissioning.command.measured import with_controller, with_limits, with_sensors
 from extras.commissioning.command.periods import Periods
 from extras.commissioning.command.record import Record
-from extras.commissioning.command.sheet import acceptance_sheet, memory_picture
+from extras.commissioning.command.sheet import acceptance_sheet, addresses_of, memory_picture
 from extras.commissioning.command.steps import STEPS, lacking, resting_on, step_named
 from extras.commissioning.memory.procedure import Task, is_alive, release, switched_off_and_on
 from extras.commissioning.person.memory_page import UnprovedWriteError, open_page
@@ -123,9 +124,9 @@ def test_a_step_that_was_left_out_is_counted_apart_and_shows_its_reason_in_place
 
 
 def test_limits_are_made_narrower_by_end_stops_and_never_wider() -> None:
-    text = machine_file_text("ma2000")
-    before = parse_machine(text).limits
-    limits = parse_machine(with_limits(text, {1: (1.0, 9.0), 3: (-9.0, 2.0)})).limits
+    machine = load_machine("ma2000")
+    before = machine.limits
+    limits = with_limits(machine, {1: (1.0, 9.0), 3: (-9.0, 2.0)}).limits
     assert (limits.joint(1).low, limits.joint(1).high) == (1.0, before.joint(1).high)
     assert (limits.joint(3).low, limits.joint(3).high) == (before.joint(3).low, 2.0)
     assert limits.joint(2) == before.joint(2)
@@ -133,10 +134,11 @@ def test_limits_are_made_narrower_by_end_stops_and_never_wider() -> None:
 
 
 def test_what_was_measured_of_the_controller_stands_in_the_machine_file_once() -> None:
-    text = machine_file_text("ma2000")
-    line = '{ value = 0.9, unit = "1", source = "measured", deviation = 0.01 }'
+    machine = load_machine("ma2000")
+    gain = Quantity(value=0.9, unit="1", source="measured", deviation=0.01)
     for _ in range(2):
-        text = with_controller(text, {"dac_counts_per_adc_count": line, "gains": str([[3, 0, 0]] * 6)})
+        machine = with_controller(machine, {"dac_counts_per_adc_count": gain, "gains": ((3, 0, 0),) * 6})
+    text = machine_text(machine)
     controller = parse_machine(text).controller
     assert isinstance(controller, BoardPid)
     assert controller.dac_counts_per_adc_count.value == 0.9
@@ -147,7 +149,7 @@ def test_what_was_measured_of_the_controller_stands_in_the_machine_file_once() -
 
 def test_measured_sensors_stand_in_the_machine_file() -> None:
     sensor = Potentiometer(2, -1, Interval(0.5, 0.01), Interval(4.7, 0.02), Interval(0.0, 0.0), 0.0, (), (), ())
-    machine = parse_machine(with_sensors(machine_file_text("ma2000"), [sensor]))
+    machine = parse_machine(machine_text(with_sensors(load_machine("ma2000"), [sensor])))
     found, untouched = machine.joint(2).sensor, machine.joint(1).sensor
     assert found is not None
     assert (found.direction, found.range.value, found.at_zero.value) == (-1, 4.7, 0.5)

@@ -7,7 +7,7 @@ import pytest
 from daq.contracts.errors import ReachError
 from daq.transport.discovery import FoundPort
 from daq.transport.url import TransportError
-from extras.commissioning.command.port import port_by_plugging
+from extras.commissioning.command.commission import port_by_plugging
 from extras.commissioning.command.record import FILE, Record
 from tests.daq_cli.invoke import CommandLine
 from tests.extras.commissioning.test_commission import MOCK, Hand

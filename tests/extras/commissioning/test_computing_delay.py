@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.contracts.errors import SpecError
-from extras.commissioning.computing_delay import FEWEST, ComputingDelay, Effect, computing_delay
+from extras.commissioning.command.delay import FEWEST, ComputingDelay, Effect, computing_delay
 
 PERIOD = 0.02
 

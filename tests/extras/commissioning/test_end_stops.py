@@ -5,7 +5,7 @@ import math
 import pytest
 
 from daq.contracts.errors import SpecError
-from extras.commissioning.end_stops import MARGIN, end_stops_of
+from extras.commissioning.command.by_hand import MARGIN, end_stops_of
 from firmware_protocol.units import JointCalibration
 
 RISING = JointCalibration(1, math.radians(270), math.radians(45))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from extras.commissioning.identity import (
+from extras.commissioning.command.arm import (
     Identity,
     same_adapter,
     same_bytes,

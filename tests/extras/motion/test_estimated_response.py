@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import StateSpace, lsim
 
-from extras.motion.estimated_response import estimated_loop
+from extras.motion.learning import estimated_loop
 
 PERIOD = 0.02
 Floats = NDArray[np.float64]

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from daq.contracts.trace import Trace
+from extras.thesis.command import as_text
 from extras.thesis.reproduction import Reproduction, reproduce_thesis
-from extras.thesis.text import as_text
 
 PAGE = Path(__file__).parents[3] / "docs" / "thesis.md"
 SLOW = "nelder_mead"

@@ -4,9 +4,16 @@ import pytest
 
 from daq.contracts.machine import load_machine
 from extras.thesis.figures import influence_tables
-from extras.thesis.published_fidelity import basis_of_symbol, recomputed_fidelities
-from extras.thesis.published_models import model_of, unfitted
-from extras.thesis.tables import BASIC, LADDER, SYMBOLS, VISCOUS_AND_COULOMB
+from extras.thesis.tables import (
+    BASIC,
+    LADDER,
+    SYMBOLS,
+    VISCOUS_AND_COULOMB,
+    basis_of_symbol,
+    model_of,
+    recomputed_fidelities,
+    unfitted,
+)
 from model import layout as at
 from model.simulation.bodies import rod_arm_body
 

@@ -3,9 +3,9 @@
 import pytest
 
 from daq.contracts.errors import SpecError
+from extras.thesis.command import as_text
 from extras.thesis.ladder import Ladder
 from extras.thesis.reproduction import Reproduction, reproduce_thesis
-from extras.thesis.text import as_text
 
 
 @pytest.fixture(scope="module")

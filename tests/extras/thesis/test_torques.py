@@ -10,7 +10,8 @@ from model.machine_model.model import Model
 from model.simulation.chain_of_model import chain_of
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
-from tests.model.validation.synthetic import arm, ramp_trace
+from tests.model.fitting.imagined import arm
+from tests.model.validation.synthetic import ramp_trace
 
 K = 12
 RNG = np.random.default_rng(4)

@@ -1,57 +1,16 @@
 """What each request does, and what is refused."""
 
-import struct
 from pathlib import Path
 
 import pytest
 
-from firmware_protocol.commands import (
-    AFTER_NEWEST,
-    ALL_JOINTS,
-    Advance,
-    Advanced,
-    Block,
-    BlockWritten,
-    Capability,
-    ErrorsPositionsPowers,
-    Gains,
-    GainsSet,
-    GripperSet,
-    Hello,
-    HelloReply,
-    OutputsWritten,
-    Process,
-    ReadBlock,
-    ReadProcess,
-    ReadStatus,
-    Refusal,
-    Refused,
-    Release,
-    Released,
-    ReportErrorsPositionsPowers,
-    ReportGains,
-    Request,
-    Sample,
-    SetGains,
-    SetGripper,
-    SetPointsTaken,
-    Snapshot,
-    Status,
-    StatusFlag,
-    Stop,
-    Stopped,
-    WriteBlock,
-    WriteOutputs,
-    WriteSetPoints,
-    parse_reply,
-    to_frame,
-)
+from firmware_protocol import commands as c
 from firmware_protocol.framing import Frame, encode_frame
 from firmware_protocol.units import counts_to_posture
 from mock_controller.board.parameters import default_board_text
 from mock_controller.bridge.bridge import WAIT_LIMIT_PERIODS, Bridge
 from mock_controller.timeline import Timeline
-from tests.mock.host import LockStepHost, RealTimeHost
+from tests.mock.host import LockStepHost
 
 
 @pytest.fixture
@@ -59,53 +18,28 @@ def host() -> LockStepHost:
     return LockStepHost()
 
 
-def refusal(reply: object) -> Refusal:
-    assert isinstance(reply, Refused)
-    return Refusal(reply.reason)
+def refusal(reply: object) -> c.Refusal:
+    assert isinstance(reply, c.Refused)
+    return c.Refusal(reply.reason)
 
 
 def test_hello_tells_what_the_bridge_can_do(host: LockStepHost) -> None:
-    everything = Capability.SAMPLE | Capability.COMPACT | Capability.LOCK_STEP | Capability.SIMULATED
-    reply = host.ask(Hello(2, 77))
-    assert isinstance(reply, HelloReply)
-    assert reply == HelloReply(2, everything, 20_000, 64, 1, 77, reply.session)
+    everything = c.Capability.SAMPLE | c.Capability.COMPACT | c.Capability.LOCK_STEP | c.Capability.SIMULATED
+    reply = host.ask(c.Hello(2, 77))
+    assert isinstance(reply, c.HelloReply)
+    assert reply == c.HelloReply(2, everything, 20_000, 64, 1, 77, reply.session)
     assert reply.session != 0
-    without = LockStepHost(sample=False).ask(Hello(2, 78))
-    assert isinstance(without, HelloReply)
-    assert without == HelloReply(2, Capability.LOCK_STEP | Capability.SIMULATED, 20_000, 0, 1, 78, without.session)
-
-
-def test_a_host_of_another_version_is_told_in_words_that_version_1_understands(host: LockStepHost) -> None:
-    everything = Capability.SAMPLE | Capability.COMPACT | Capability.LOCK_STEP | Capability.SIMULATED
-    for payload in (b"", b"\x01", b"\x03" + bytes(20)):
-        (answer,) = host.device.bridge.receive(Frame(7, Hello.OPCODE, payload))
-        assert struct.unpack("<BHIBH", answer.payload) == (2, everything, 20_000, 64, 1)
-    assert host.ask(SetGains(2, 5, 1, 3)) == GainsSet(), "the session goes on"
-    (answer,) = host.device.bridge.receive(Frame(7, Stop.OPCODE, b""))
-    assert len(answer.payload) == struct.calcsize("<I6H"), "a stop is confirmed to it as version 1 did"
-
-
-@pytest.mark.parametrize(
-    ("first", "second"),
-    [
-        (WriteOutputs(1, 1), WriteSetPoints(((1, 520),))),
-        (SetGripper(1), SetGains(1, 3, 0, 0)),
-        (WriteBlock(0xFC78, b"1"), Release(0)),
-    ],
-)
-def test_no_command_is_obeyed_without_a_session(first: Request, second: Request) -> None:
-    host = LockStepHost(greeted=False)
-    before = bytes(host.board.memory.get(0xFC00 + offset) for offset in range(0x80))
-    for request in (first, second):
-        assert refusal(host.ask(request)) is Refusal.BAD_SESSION
-    assert bytes(host.board.memory.get(0xFC00 + offset) for offset in range(0x80)) == before
-    assert isinstance(host.ask(Stop()), Stopped), "a stop needs none"
+    without = LockStepHost(sample=False).ask(c.Hello(2, 78))
+    assert isinstance(without, c.HelloReply)
+    assert without == c.HelloReply(
+        2, c.Capability.LOCK_STEP | c.Capability.SIMULATED, 20_000, 0, 1, 78, without.session
+    )
 
 
 def test_the_session_ends_with_the_connection(host: LockStepHost) -> None:
-    assert host.ask(SetGripper(1)) == GripperSet()
+    assert host.ask(c.SetGripper(1)) == c.GripperSet()
     host.pace.hang_up()
-    assert refusal(host.ask(SetGripper(0))) is Refusal.BAD_SESSION
+    assert refusal(host.ask(c.SetGripper(0))) is c.Refusal.BAD_SESSION
 
 
 @pytest.mark.parametrize("first_number", [0xFFFFFFFF, 0])
@@ -113,22 +47,22 @@ def test_no_session_and_no_stop_has_the_number_0(host: LockStepHost, first_numbe
     bridge = Bridge(Timeline(host.board, host.device.faults), first_number=first_number)
     numbers = set()
     for nonce in range(3):
-        reply = parse_reply(bridge.receive(to_frame(0, Hello(2, nonce)))[0])
-        assert isinstance(reply, HelloReply)
-        bridge.receive(to_frame(0, Stop()))
-        status = parse_reply(bridge.receive(to_frame(0, ReadStatus()))[0])
-        assert isinstance(status, Status)
+        reply = c.parse_reply(bridge.receive(c.to_frame(0, c.Hello(2, nonce)))[0])
+        assert isinstance(reply, c.HelloReply)
+        bridge.receive(c.to_frame(0, c.Stop()))
+        status = c.parse_reply(bridge.receive(c.to_frame(0, c.ReadStatus()))[0])
+        assert isinstance(status, c.Status)
         numbers |= {reply.session, status.stop}
     assert len(numbers) == 6
     assert 0 not in numbers
 
 
 def test_set_points_are_in_the_memory_and_taken_by_the_next_period(host: LockStepHost) -> None:
-    taken = host.ask(WriteSetPoints(((1, 520), (3, 480))))
-    assert isinstance(taken, SetPointsTaken)
+    taken = host.ask(c.WriteSetPoints(((1, 520), (3, 480))))
+    assert isinstance(taken, c.SetPointsTaken)
     assert host.board.memory.values("set_point")[0:3:2] == [520, 480]
-    snapshot = host.ask(Sample(taken.tick, ALL_JOINTS))
-    assert isinstance(snapshot, Snapshot)
+    snapshot = host.ask(c.Sample(taken.tick, c.ALL_JOINTS))
+    assert isinstance(snapshot, c.Snapshot)
     readings = dict(snapshot.joints)
     assert snapshot.tick == taken.tick + 1
     assert (readings[1].set_point, readings[3].set_point) == (520, 480)
@@ -136,155 +70,95 @@ def test_set_points_are_in_the_memory_and_taken_by_the_next_period(host: LockSte
 
 
 def test_bytes_that_are_poked_can_be_peeked(host: LockStepHost) -> None:
-    assert host.ask(WriteBlock(0xFC78, b"\x01\x02\x03")) == BlockWritten()
-    assert host.ask(ReadBlock(0xFC77, 5)) == Block(b"\x00\x01\x02\x03\x00")
+    assert host.ask(c.WriteBlock(0xFC78, b"\x01\x02\x03")) == c.BlockWritten()
+    assert host.ask(c.ReadBlock(0xFC77, 5)) == c.Block(b"\x00\x01\x02\x03\x00")
 
 
-@pytest.mark.parametrize("request_", [ReadBlock(0xFBFF, 1), ReadBlock(0xFC7F, 2), WriteBlock(0xFC7F, b"ab")])
-def test_memory_ends_where_the_map_says(host: LockStepHost, request_: Request) -> None:
+@pytest.mark.parametrize("request_", [c.ReadBlock(0xFBFF, 1), c.ReadBlock(0xFC7F, 2), c.WriteBlock(0xFC7F, b"ab")])
+def test_memory_ends_where_the_map_says(host: LockStepHost, request_: c.Request) -> None:
     before = host.board.time_us
-    assert refusal(host.ask(request_)) is Refusal.BAD_ADDRESS
+    assert refusal(host.ask(request_)) is c.Refusal.BAD_ADDRESS
     assert host.board.time_us == before
 
 
 def test_gains_are_written_and_reported(host: LockStepHost) -> None:
-    assert host.ask(SetGains(2, 5, 1, 3)) == GainsSet()
-    assert host.ask(ReportGains()) == Gains(((2, 0, 0), (5, 1, 3), *(((2, 0, 0),) * 4)))
-
-
-def test_report_of_errors_positions_and_powers_is_what_the_memory_holds(host: LockStepHost) -> None:
-    host.ask(WriteSetPoints(((2, 400),)))
-    host.ask(Advance(19_000))
-    report = host.ask(ReportErrorsPositionsPowers(0b10))
-    assert isinstance(report, ErrorsPositionsPowers)
-    ((joint, reading),) = report.joints
-    assert joint == 2
-    assert reading.set_point == 400
-    assert reading.position == host.board.memory.values("position")[1]
-    assert reading.power == host.board.memory.values("power")[1]
+    assert host.ask(c.SetGains(2, 5, 1, 3)) == c.GainsSet()
+    assert host.ask(c.ReportGains()) == c.Gains(((2, 0, 0), (5, 1, 3), *(((2, 0, 0),) * 4)))
 
 
 def test_process_outputs_change_only_in_the_mask_and_inputs_are_read(host: LockStepHost) -> None:
     host.board.set_process_inputs(0b1010_0000)
-    assert host.ask(WriteOutputs(0b0011, 0b0001)) == OutputsWritten()
-    assert host.ask(WriteOutputs(0b0110, 0b0100)) == OutputsWritten()
-    assert host.ask(SetGripper(1)) == GripperSet()
-    host.ask(Advance(20_000))
-    assert host.ask(ReadProcess()) == Process(0b1010_0000, 0b0101, 1)
+    assert host.ask(c.WriteOutputs(0b0011, 0b0001)) == c.OutputsWritten()
+    assert host.ask(c.WriteOutputs(0b0110, 0b0100)) == c.OutputsWritten()
+    assert host.ask(c.SetGripper(1)) == c.GripperSet()
+    host.ask(c.Advance(20_000))
+    assert host.ask(c.ReadProcess()) == c.Process(0b1010_0000, 0b0101, 1)
     assert host.board.gripper_closed
 
 
 def test_stop_freezes_the_measured_posture_and_refuses_set_points_until_release(host: LockStepHost) -> None:
-    host.ask(WriteSetPoints(((1, 600),)))
-    host.ask(Advance(310_000))
-    stopped = host.ask(Stop())
-    assert isinstance(stopped, Stopped)
+    host.ask(c.WriteSetPoints(((1, 600),)))
+    host.ask(c.Advance(310_000))
+    stopped = host.ask(c.Stop())
+    assert isinstance(stopped, c.Stopped)
     newest = host.board.snapshots.newest()
     assert newest is not None
     assert list(stopped.postures) == [counts_to_posture(counts) for counts in newest.positions]
     assert host.board.memory.values("set_point") == list(stopped.postures)
-    assert refusal(host.ask(WriteSetPoints(((1, 600),)))) is Refusal.FROZEN
-    assert refusal(host.ask(WriteBlock(0xFC00, b"\x00"))) is Refusal.FROZEN
-    assert host.ask(WriteBlock(0xFC78, b"\x00")) == BlockWritten()
-    snapshot = host.ask(Sample(stopped.tick, 1))
-    assert isinstance(snapshot, Snapshot)
-    assert snapshot.status & StatusFlag.FROZEN
-    assert host.ask(Stop()) == stopped
-    status = host.ask(ReadStatus())
-    assert isinstance(status, Status)
-    assert refusal(host.ask(Release(status.stop - 1))) is Refusal.OTHER_STOP
-    assert host.ask(Release(status.stop)) == Released()
-    assert host.ask(Release(status.stop)) == Released()
-    assert isinstance(host.ask(WriteSetPoints(((1, 600),))), SetPointsTaken)
-
-
-def test_a_sample_seen_is_not_seen_again_and_a_lost_reply_costs_nothing(host: LockStepHost) -> None:
-    host.ask(Advance(200_000))
-    first = host.ask(Sample(3, 1))
-    assert isinstance(first, Snapshot)
-    assert first.tick == 4
-    assert host.ask(Sample(3, 1)) == first
-    ticks = []
-    for _ in range(20):
-        reply = host.ask(Sample(ticks[-1] if ticks else 4, 1))
-        assert isinstance(reply, Snapshot)
-        ticks.append(reply.tick)
-    assert ticks == list(range(5, 25))
-
-
-def test_the_next_sample_may_be_asked_for_whatever_has_been_seen(host: LockStepHost) -> None:
-    host.ask(Advance(207_000))
-    tick = host.board.tick
-    reply = host.ask(Sample(AFTER_NEWEST, 1))
-    assert isinstance(reply, Snapshot)
-    assert reply.tick == tick + 1
-
-
-def test_after_a_brown_out_a_sample_comes_from_the_new_life(host: LockStepHost) -> None:
-    host.ask(Hello(2, 1))
-    host.ask(Advance(500_000))
-    host.board.brown_out()
-    reply = host.ask(Sample(25, 1))
-    assert isinstance(reply, Snapshot)
-    assert reply.tick == 1
-    assert reply.status & StatusFlag.RESTARTED
-    status = host.ask(ReadStatus())
-    assert isinstance(status, Status)
-    assert status.boots == 2
-    assert refusal(host.ask(SetGripper(1))) is Refusal.BAD_SESSION
-    host.ask(Hello(2, 1))
-    assert host.ask(SetGripper(1)) == GripperSet()
-    assert not host.ask(ReadStatus()).status & StatusFlag.RESTARTED  # type: ignore[attr-defined]
+    assert refusal(host.ask(c.WriteSetPoints(((1, 600),)))) is c.Refusal.FROZEN
+    assert refusal(host.ask(c.WriteBlock(0xFC00, b"\x00"))) is c.Refusal.FROZEN
+    assert host.ask(c.WriteBlock(0xFC78, b"\x00")) == c.BlockWritten()
+    snapshot = host.ask(c.Sample(stopped.tick, 1))
+    assert isinstance(snapshot, c.Snapshot)
+    assert snapshot.status & c.StatusFlag.FROZEN
+    assert host.ask(c.Stop()) == stopped
+    status = host.ask(c.ReadStatus())
+    assert isinstance(status, c.Status)
+    assert refusal(host.ask(c.Release(status.stop - 1))) is c.Refusal.OTHER_STOP
+    assert host.ask(c.Release(status.stop)) == c.Released()
+    assert host.ask(c.Release(status.stop)) == c.Released()
+    assert isinstance(host.ask(c.WriteSetPoints(((1, 600),))), c.SetPointsTaken)
 
 
 def test_a_sample_that_waits_in_vain_is_refused(tmp_path: Path) -> None:
     slow = tmp_path / "board.toml"
     slow.write_text(default_board_text().replace("reset = { value = 100000", "reset = { value = 2000000"), "utf-8")
     host = LockStepHost(board=slow)
-    host.ask(Advance(100_000))
+    host.ask(c.Advance(100_000))
     host.board.brown_out()
-    assert refusal(host.ask(Sample(5, 1))) is Refusal.NOTHING_NEW
+    assert refusal(host.ask(c.Sample(5, 1))) is c.Refusal.NOTHING_NEW
     assert host.board.time_us == 100_000 + WAIT_LIMIT_PERIODS * 20_000
-
-
-def test_what_the_bridge_cannot_do_is_refused() -> None:
-    blind = LockStepHost(sample=False)
-    assert refusal(blind.ask(Sample(0, 1))) is Refusal.NOT_CAPABLE
-    clocked = RealTimeHost()
-    clocked.send(1, Advance(1))
-    ((_, _, reply),) = clocked.wait(1000)
-    assert refusal(reply) is Refusal.NOT_CAPABLE
 
 
 @pytest.mark.parametrize(
     ("opcode", "payload", "reason"),
     [
-        (0x55, b"", Refusal.UNKNOWN_OPCODE),
-        (0x90, b"", Refusal.UNKNOWN_OPCODE),
-        (0x02, b"\x00\xfc", Refusal.BAD_LENGTH),
-        (0x04, b"\x01\xf4\x01", Refusal.BAD_LENGTH),
-        (0x04, bytes(8) + b"\x01\xe8\x03", Refusal.BAD_VALUE),
-        (0x04, bytes(8) + b"\x40\x00\x00", Refusal.BAD_VALUE),
-        (0x07, bytes(8) + b"\x01\x15\x00\x00", Refusal.BAD_VALUE),
-        (0x02, b"\xff\xff\x02", Refusal.BAD_ADDRESS),
-        (0x03, bytes(8) + b"\x7f\xfc12", Refusal.BAD_ADDRESS),
-        (0x01, b"\x02\x00", Refusal.BAD_LENGTH),
-        (0x10, b"\x00\x00\x00\x00\x00", Refusal.BAD_VALUE),
+        (0x55, b"", c.Refusal.UNKNOWN_OPCODE),
+        (0x90, b"", c.Refusal.UNKNOWN_OPCODE),
+        (0x02, b"\x00\xfc", c.Refusal.BAD_LENGTH),
+        (0x04, b"\x01\xf4\x01", c.Refusal.BAD_LENGTH),
+        (0x04, bytes(8) + b"\x01\xe8\x03", c.Refusal.BAD_VALUE),
+        (0x04, bytes(8) + b"\x40\x00\x00", c.Refusal.BAD_VALUE),
+        (0x07, bytes(8) + b"\x01\x15\x00\x00", c.Refusal.BAD_VALUE),
+        (0x02, b"\xff\xff\x02", c.Refusal.BAD_ADDRESS),
+        (0x03, bytes(8) + b"\x7f\xfc12", c.Refusal.BAD_ADDRESS),
+        (0x01, b"\x02\x00", c.Refusal.BAD_LENGTH),
+        (0x10, b"\x00\x00\x00\x00\x00", c.Refusal.BAD_VALUE),
     ],
 )
 def test_a_whole_frame_that_is_wrong_is_refused(
-    host: LockStepHost, opcode: int, payload: bytes, reason: Refusal
+    host: LockStepHost, opcode: int, payload: bytes, reason: c.Refusal
 ) -> None:
     before = bytes(host.board.memory.get(0xFC00 + offset) for offset in range(0x80))
     output = host.turn(encode_frame(Frame(7, opcode, payload)))
-    assert host.dialect.feed(output) == [(7, Refused(opcode, reason))]
+    assert host.dialect.feed(output) == [(7, c.Refused(opcode, reason))]
     assert bytes(host.board.memory.get(0xFC00 + offset) for offset in range(0x80)) == before
     assert host.device.bridge.refused == {reason.name: 1}
 
 
 def test_an_advance_lets_time_pass_once(host: LockStepHost) -> None:
-    assert host.ask(Advance(123_456), sequence=5) == Advanced(123_456, 7)
-    assert host.ask(Advance(123_456), sequence=5) == Advanced(123_456, 7)
-    assert host.ask(Advance(0), sequence=6) == Advanced(123_456, 7)
-    assert host.ask(Advance(0), sequence=4) == Advanced(123_456, 7), "the time may always be asked for"
-    assert refusal(host.ask(Advance(1), sequence=4)) is Refusal.STALE
+    assert host.ask(c.Advance(123_456), sequence=5) == c.Advanced(123_456, 7)
+    assert host.ask(c.Advance(123_456), sequence=5) == c.Advanced(123_456, 7)
+    assert host.ask(c.Advance(0), sequence=6) == c.Advanced(123_456, 7)
+    assert host.ask(c.Advance(0), sequence=4) == c.Advanced(123_456, 7), "the time may always be asked for"
+    assert refusal(host.ask(c.Advance(1), sequence=4)) is c.Refusal.STALE

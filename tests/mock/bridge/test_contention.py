@@ -2,16 +2,7 @@
 
 from random import Random
 
-from firmware_protocol.commands import (
-    Advance,
-    ReadBlock,
-    ReportErrorsPositionsPowers,
-    Request,
-    SetGains,
-    Stop,
-    WriteBlock,
-    WriteSetPoints,
-)
+from firmware_protocol import commands as c
 from tests.mock.host import LockStepHost
 
 SIX = tuple((joint, 500) for joint in range(1, 7))
@@ -21,18 +12,18 @@ def busy(sample: bool, seed: int) -> LockStepHost:
     """A host that has accessed the memory at 400 random moments."""
     host, dice = LockStepHost(sample=sample, seed=seed), Random(seed)
     for _ in range(400):
-        host.ask(Advance(dice.randrange(3000)))
-        accesses: list[Request] = [
-            WriteSetPoints(SIX),
-            ReadBlock(0xFC00, 48),
-            WriteBlock(0xFC74, b"12345678"),
-            ReportErrorsPositionsPowers(63),
-            SetGains(1, 2, 0, 0),
-            Stop(),
+        host.ask(c.Advance(dice.randrange(3000)))
+        accesses: list[c.Request] = [
+            c.WriteSetPoints(SIX),
+            c.ReadBlock(0xFC00, 48),
+            c.WriteBlock(0xFC74, b"12345678"),
+            c.ReportErrorsPositionsPowers(63),
+            c.SetGains(1, 2, 0, 0),
+            c.Stop(),
         ]
         request = dice.choice(accesses)
         host.ask(request)
-        if isinstance(request, Stop):
+        if isinstance(request, c.Stop):
             host.release()
     return host
 

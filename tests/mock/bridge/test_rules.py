@@ -4,27 +4,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from firmware_protocol.commands import (
-    PROTOCOL_VERSION,
-    Hello,
-    HelloReply,
-    ReadStatus,
-    Refusal,
-    Refused,
-    Release,
-    Released,
-    Reply,
-    Request,
-    SetPointsTaken,
-    Stamp,
-    Status,
-    StatusFlag,
-    Stop,
-    Stopped,
-    WriteSetPoints,
-    parse_reply,
-    to_frame,
-)
+from firmware_protocol import commands as c
 from firmware_protocol.framing import Frame
 from tests.mock.host import make_device
 
@@ -47,38 +27,38 @@ class Conversation(RuleBasedStateMachine):
         self.recorded: list[tuple[Frame, bool]] = []
         """Frames, and whether each may still be obeyed: of the present session, and none after it."""
 
-    def ask(self, request: Request, sequence: int, stamp: Stamp) -> Reply:
-        frame = to_frame(sequence, request, stamp)
+    def ask(self, request: c.Request, sequence: int, stamp: c.Stamp) -> c.Reply:
+        frame = c.to_frame(sequence, request, stamp)
         (answer,) = self.device.bridge.receive(frame)
         assert answer.sequence == sequence
         self.recorded.append((frame, False))
-        return parse_reply(answer)
+        return c.parse_reply(answer)
 
-    def expected(self, stamp: Stamp) -> Refusal | None:
+    def expected(self, stamp: c.Stamp) -> c.Refusal | None:
         if self.session == 0 or stamp.session != self.session:
-            return Refusal.BAD_SESSION
+            return c.Refusal.BAD_SESSION
         if stamp.number < self.newest:
-            return Refusal.STALE
+            return c.Refusal.STALE
         self.newest = stamp.number
         return None
 
     @rule(sequence=SEQUENCES, number=NUMBERS, posture=st.integers(0, 999), foreign=st.booleans())
     def write(self, sequence: int, number: int, posture: int, foreign: bool) -> None:
-        stamp = Stamp(self.session + foreign, number)
+        stamp = c.Stamp(self.session + foreign, number)
         refusal = self.expected(stamp)
-        reply = self.ask(WriteSetPoints(((2, posture),)), sequence, stamp)
+        reply = self.ask(c.WriteSetPoints(((2, posture),)), sequence, stamp)
         if refusal is None and self.frozen:
-            refusal = Refusal.FROZEN
+            refusal = c.Refusal.FROZEN
         if refusal is None:
-            assert isinstance(reply, SetPointsTaken)
+            assert isinstance(reply, c.SetPointsTaken)
             self.set_point = posture
         else:
-            assert reply == Refused(WriteSetPoints.OPCODE, refusal)
+            assert reply == c.Refused(c.WriteSetPoints.OPCODE, refusal)
 
     @rule(sequence=SEQUENCES)
     def stop(self, sequence: int) -> None:
-        reply = self.ask(Stop(), sequence, Stamp(0, 0))
-        assert isinstance(reply, Stopped)
+        reply = self.ask(c.Stop(), sequence, c.Stamp(0, 0))
+        assert isinstance(reply, c.Stopped)
         if self.frozen:
             assert reply.postures[1] == self.set_point
         self.frozen = True
@@ -88,16 +68,16 @@ class Conversation(RuleBasedStateMachine):
 
     @rule(sequence=SEQUENCES, number=NUMBERS, other=st.booleans())
     def release(self, sequence: int, number: int, other: bool) -> None:
-        stamp = Stamp(self.session, number)
-        refusal = self.expected(stamp) or (Refusal.OTHER_STOP if other else None)
-        reply = self.ask(Release(self.stop_number ^ other), sequence, stamp)
-        assert reply == (Released() if refusal is None else Refused(Release.OPCODE, refusal))
+        stamp = c.Stamp(self.session, number)
+        refusal = self.expected(stamp) or (c.Refusal.OTHER_STOP if other else None)
+        reply = self.ask(c.Release(self.stop_number ^ other), sequence, stamp)
+        assert reply == (c.Released() if refusal is None else c.Refused(c.Release.OPCODE, refusal))
         self.frozen = self.frozen and refusal is not None
 
     @rule(sequence=SEQUENCES, nonce=st.integers(0, 3))
     def hello(self, sequence: int, nonce: int) -> None:
-        reply = self.ask(Hello(PROTOCOL_VERSION, nonce), sequence, Stamp(0, 0))
-        assert isinstance(reply, HelloReply)
+        reply = self.ask(c.Hello(c.PROTOCOL_VERSION, nonce), sequence, c.Stamp(0, 0))
+        assert isinstance(reply, c.HelloReply)
         assert reply.nonce == nonce
         if self.session and nonce == self.nonce:
             assert reply.session == self.session
@@ -117,29 +97,29 @@ class Conversation(RuleBasedStateMachine):
     def replay(self, data: st.DataObject) -> None:
         """Whatever was recorded, except the newest command itself and greetings and stops, changes nothing at all."""
         frame, _ = data.draw(st.sampled_from(self.recorded))
-        if frame.opcode in (Hello.OPCODE, Stop.OPCODE):
+        if frame.opcode in (c.Hello.OPCODE, c.Stop.OPCODE):
             return
-        stamp = Stamp.parse(frame.payload)
+        stamp = c.Stamp.parse(frame.payload)
         self.expected(stamp)
         (answer,) = self.device.bridge.receive(frame)
-        if stamp != Stamp(self.session, self.newest):
-            assert isinstance(parse_reply(answer), Refused)
-        elif frame.opcode == WriteSetPoints.OPCODE and not self.frozen:
+        if stamp != c.Stamp(self.session, self.newest):
+            assert isinstance(c.parse_reply(answer), c.Refused)
+        elif frame.opcode == c.WriteSetPoints.OPCODE and not self.frozen:
             self.set_point = int.from_bytes(frame.payload[9:11], "little")
-        elif frame.opcode == Release.OPCODE and frame.payload[8:] == self.stop_number.to_bytes(4, "little"):
+        elif frame.opcode == c.Release.OPCODE and frame.payload[8:] == self.stop_number.to_bytes(4, "little"):
             self.frozen = False
 
-    def status(self) -> Status:
-        (answer,) = self.device.bridge.receive(to_frame(0, ReadStatus()))
-        reply = parse_reply(answer)
-        assert isinstance(reply, Status)
+    def status(self) -> c.Status:
+        (answer,) = self.device.bridge.receive(c.to_frame(0, c.ReadStatus()))
+        reply = c.parse_reply(answer)
+        assert isinstance(reply, c.Status)
         return reply
 
     @invariant()
     def status_and_memory_are_those_of_the_commands_obeyed(self) -> None:
         status = self.status()
-        assert bool(status.status & StatusFlag.FROZEN) == self.frozen == self.board.frozen
-        assert bool(status.status & StatusFlag.RESTARTED) == self.restarted
+        assert bool(status.status & c.StatusFlag.FROZEN) == self.frozen == self.board.frozen
+        assert bool(status.status & c.StatusFlag.RESTARTED) == self.restarted
         assert self.board.memory.values("set_point")[1] == self.set_point
 
 

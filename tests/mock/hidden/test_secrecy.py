@@ -13,25 +13,10 @@ from mock_controller.modifications.library import LIBRARY
 from mock_controller.options import OptionsError, read_options
 from tests.mock.host import LockStepHost, make_device
 from tests.mock.process.running import RunningMock
+from tests.mock.process.test_control import RecordedProcess
 
 SEED = compose_seed(8, Kind.PAIR, Load.LIGHT)
 ASKED = ("help", "state", "counts", "snapshots", "fault_list", "modifications")
-
-
-class Quiet:
-    """A process that has nothing to say."""
-
-    def disconnect(self, seconds: float | None) -> None: ...
-
-    def reconnect(self) -> None: ...
-
-    def kill(self) -> None: ...
-
-    def clock(self) -> dict[str, Any]:
-        return {}
-
-    def lost_bytes(self) -> int:
-        return 0
 
 
 def give_aways(seed: int) -> list[str]:
@@ -49,7 +34,7 @@ def test_the_control_port_tells_nothing(kind: Kind) -> None:
     device = make_device(secret=seed)
     device.board.write_set_points({1: 510, 2: 340})
     device.board.run_until(200_000)
-    control = Control(device, Quiet())
+    control = Control(device, RecordedProcess())
     said = b"".join(control.execute(json.dumps({"do": name}).encode()) for name in ASKED).decode()
     assert not [word for word in give_aways(seed) if word in said]
     state = json.loads(control.execute(b'{"do": "state"}'))

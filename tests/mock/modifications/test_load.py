@@ -65,6 +65,14 @@ def test_a_cable_pulls_on_one_side_of_where_it_is_slack(stiffness: float) -> Non
     assert cable.joint_torque(0.0, 0.4 - side * 0.2, 9.0) == 0.0
 
 
+def test_a_preload_turns_a_joint_that_is_free_with_a_constant_torque() -> None:
+    plant = plant_with(effect("constant_torque", joint=1, torque=4.0), parameters=without_friction())
+    begun = plant.joint_angles[0]
+    plant.advance([0.0] * 6, 100_000)
+    assert plant.joint_angles[0] > begun
+    assert effect("constant_torque", joint=1, torque=4.0).joint_torque(9.0, 1.0, -2.0) == 4.0
+
+
 def test_a_disturbance_keeps_its_frequency_whatever_the_arm_does() -> None:
     push = effect("periodic_disturbance", joint=1, amplitude=3.0, frequency=2.0, phase=0.0)
     assert push.joint_torque(0.125, 1.0, 2.0) == pytest.approx(3.0)

@@ -2,13 +2,15 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import pytest
 
+from mock_controller.hidden.arm import Load, loaded
 from mock_controller.modification import Modification
 from mock_controller.modifications import ModificationError, build_modifications
 from mock_controller.plant import Plant, PlantError, default_plant
+from mock_controller.plant.parameters import default_plant_text, parse_plant
+from mock_controller.quantities import DataFileError
 
 LOW = (math.pi, 0.3, 0.2, 0.0, 0.0, 0.0)
 
@@ -31,19 +33,6 @@ def test_compliant_gear_tends_to_the_rigid_one_as_it_hardens() -> None:
     assert hard < soft / 10
 
 
-def test_backlash_shows_as_lost_motion_on_reversal() -> None:
-    play = 0.03
-    rigid = Plant(default_plant(), angles=LOW)
-    loose = Plant(default_plant(), build_modifications([("backlash", {"joint": 1, "play": play})]), angles=LOW)
-    ranges = []
-    for plant in (rigid, loose):
-        plant.advance([0.4, 0, 0, 0, 0, 0], 600_000)
-        high = plant.joint_angles[0]
-        plant.advance([-0.4, 0, 0, 0, 0, 0], 600_000)
-        ranges.append(high - plant.joint_angles[0])
-    assert ranges[1] < ranges[0] - 0.3 * play
-
-
 def test_coupling_too_hard_for_the_step_is_refused() -> None:
     with pytest.raises(PlantError, match=r"joint 6: coupling .* too hard"):
         Plant(default_plant(), build_modifications([("joint_compliance", {"joint": 6, "compliance": 1e-3})]))
@@ -55,54 +44,6 @@ def test_dead_zone_swallows_small_voltages_and_shortens_large_ones() -> None:
     assert plant.motor_volts[:2] == pytest.approx((1.4, 0.0))
     plant.advance([0.5, -0.5, 0, 0, 0, 0], 1000)
     assert plant.motor_volts[:2] == pytest.approx((14.0, -12.0))
-
-
-@dataclass
-class Push:
-    name = "push"
-    newton_metres: float
-
-    def external_torque(self, time_s: float, angles: Sequence[float], rates: Sequence[float]) -> list[float]:
-        return [self.newton_metres if time_s < 0.1 else 0.0, 0, 0, 0, 0, 0]
-
-
-@dataclass
-class WeakMotor:
-    name = "weak_motor"
-    joint: int
-    factor: float
-
-    def torque_change(self, torque: float, time_s: float, angle: float, rate: float) -> float:
-        return (self.factor - 1.0) * torque
-
-
-@dataclass
-class Dry:
-    name = "dry"
-    joint: int
-    factor: float
-
-    def friction_level(self, level: float, angle: float, rate: float) -> float:
-        return self.factor * level
-
-
-def test_torque_from_outside_moves_the_joint_it_acts_on() -> None:
-    pushed = Plant(default_plant(), [Push(20.0)], angles=(math.pi, math.pi / 2, 0, 0, 0, 0))
-    pushed.advance([0.0] * 6, 100_000)
-    assert pushed.joint_angles[0] > math.pi + 0.01
-
-
-def test_effects_with_no_strength_reproduce_the_plain_plant() -> None:
-    plain = moved()
-    for neutral in (Push(0.0), WeakMotor(1, 1.0), Dry(2, 1.0)):
-        assert moved([neutral]) == pytest.approx(plain, abs=1e-9)
-
-
-def test_friction_and_motor_effects_act_on_their_joint() -> None:
-    plain = moved()
-    weak, dry = moved([WeakMotor(1, 0.5)]), moved([Dry(3, 4.0)])
-    assert weak[0] < plain[0] - 1e-3
-    assert abs(dry[2] - plain[2]) > 1e-3
 
 
 @pytest.mark.parametrize(
@@ -120,3 +61,62 @@ def test_friction_and_motor_effects_act_on_their_joint() -> None:
 def test_wrong_requests_are_refused_in_one_line(name: str, values: dict[str, object], says: str) -> None:
     with pytest.raises(ModificationError, match=says):
         build_modifications([(name, values)])
+
+
+# ---- Gears that give, at the waist of an upright arm with a light load: the lightest link there is.
+
+UPRIGHT = (math.pi, math.pi / 2, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("backlash", {"play": 0.002, "stiffness": 2e4, "damping": 10.0}),
+        ("joint_compliance", {"compliance": 8e-5, "damping": 4.0}),
+    ],
+)
+def test_its_contact_does_not_swing_itself_up(name: str, values: dict[str, float]) -> None:
+    effects = build_modifications([(name, {"joint": 1, **values})])
+    plant = Plant(loaded(default_plant(), Load.LIGHT), effects, UPRIGHT)
+    fastest = 0.0
+    for period in range(50):
+        plant.advance([0.3 if period % 10 < 5 else -0.3, *[0.0] * 5], 20_000)
+        if period > 10:
+            fastest = max(fastest, abs(plant.joint_rates[0]))
+    assert 0.05 < fastest < 1.0
+
+
+def test_time_counts_whole_steps_however_they_are_cut() -> None:
+    plant = Plant(default_plant(), build_modifications([("backlash", {"joint": 1, "play": 0.002})]))
+    plant.advance([0.0] * 6, 6000)
+    assert plant.time_us == 6000
+
+
+# ---- The plant's data file: every number with unit and source, anything odd refused in one line.
+
+
+def test_every_number_says_whether_it_is_documented_or_assumed() -> None:
+    _, provenance = parse_plant(default_plant_text())
+    assert len(provenance) == 13 + 2 + 2 + 66
+    by_name = {entry.name: entry for entry in provenance}
+    assert by_name["rigid_body.m2"].kind == "documented"
+    assert by_name["joint_4.gear_ratio"].kind == "assumed"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('unit = "kg"', 'unit = "g"', "rigid_body.m1: unit is 'g', must be 'kg'"),
+        ("documented: table 7.9", "table 7.9", "source must be"),
+        ("value = 28.0", "value = -1", "amplifier.gain: value is -1, allowed are"),
+        ("value = 28.0", "value = nan", "amplifier.gain: value is nan"),
+        ("[amplifier]", "[amplifire]", "amplifier.gain: must be"),
+        ("[amplifier]", "[amplifier]\ncolour = 3", "amplifier.colour: not a quantity"),
+        ('value = 45, unit = "deg"', 'value = 340, unit = "deg"', "lower_stop 340.0 deg must be below"),
+        ("[amplifier]", "[amplifier", "not TOML"),
+    ],
+)
+def test_faulty_file_is_refused_in_one_line(old: str, new: str, says: str) -> None:
+    with pytest.raises(DataFileError, match=says) as caught:
+        parse_plant(default_plant_text().replace(old, new, 1))
+    assert "\n" not in str(caught.value)

@@ -8,20 +8,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from firmware_protocol.commands import (
-    AFTER_NEWEST,
-    Hello,
-    HelloReply,
-    Refusal,
-    Refused,
-    Request,
-    Sample,
-    SetPointsTaken,
-    Snapshot,
-    Stop,
-    Stopped,
-    WriteSetPoints,
-)
+from firmware_protocol import commands as c
 from tests.mock.process.running import RunningMock, SerialHost
 
 WHERE = pytest.mark.parametrize("where", [("--pty",), ("--tcp", "127.0.0.1:0")], ids=["pty", "tcp"])
@@ -30,15 +17,15 @@ WHERE = pytest.mark.parametrize("where", [("--pty",), ("--tcp", "127.0.0.1:0")],
 @WHERE
 def test_requests_are_answered_in_real_time(where: tuple[str, ...]) -> None:
     with RunningMock(*where) as mock, SerialHost(mock.url) as host:
-        assert isinstance(host.ask(Hello(2, 1)), HelloReply)
-        first = host.ask(Sample(AFTER_NEWEST, 7))
-        assert isinstance(first, Snapshot)
-        assert isinstance(host.ask(WriteSetPoints(((1, 510),))), SetPointsTaken)
-        second = host.ask(Sample(first.tick, 7))
-        assert isinstance(second, Snapshot)
+        assert isinstance(host.ask(c.Hello(2, 1)), c.HelloReply)
+        first = host.ask(c.Sample(c.AFTER_NEWEST, 7))
+        assert isinstance(first, c.Snapshot)
+        assert isinstance(host.ask(c.WriteSetPoints(((1, 510),))), c.SetPointsTaken)
+        second = host.ask(c.Sample(first.tick, 7))
+        assert isinstance(second, c.Snapshot)
         assert second.tick == first.tick + 1
-        assert isinstance(host.ask(Stop()), Stopped)
-        assert host.ask(WriteSetPoints(((1, 510),))) == Refused(WriteSetPoints.OPCODE, Refusal.FROZEN)
+        assert isinstance(host.ask(c.Stop()), c.Stopped)
+        assert host.ask(c.WriteSetPoints(((1, 510),))) == c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.FROZEN)
         state = mock.control("state")
         assert state["frozen"] is True
         assert state["stop"]["frozen_us"] - state["stop"]["received_us"] < 1_000
@@ -51,9 +38,9 @@ def test_lock_step_repeats_to_the_bit_from_one_process_to_the_next(where: tuple[
     faults = ("--fault", "flip:rate=0.1,seed=1", "--fault", "drop:rate=0.05", "--fault", "junk:rate=0.1")
 
     def everything_said() -> list[bytes]:
-        requests: list[Request] = [Hello(2, 1)]
+        requests: list[c.Request] = [c.Hello(2, 1)]
         for posture in range(500, 540):
-            requests += [WriteSetPoints(((1, posture), (2, 333))), Sample(AFTER_NEWEST, 63)]
+            requests += [c.WriteSetPoints(((1, posture), (2, 333))), c.Sample(c.AFTER_NEWEST, 63)]
         with RunningMock(*where, "--lock-step", "--seed", "7", *faults) as mock, SerialHost(mock.url) as host:
             return [host.turn(number, request) for number, request in enumerate(requests)]
 
@@ -65,16 +52,16 @@ def test_hosts_come_and_go(where: tuple[str, ...]) -> None:
     with RunningMock(*where, "--lock-step") as mock:
         for _ in range(3):
             with SerialHost(mock.url) as host:
-                assert isinstance(host.ask(Hello(2, 1)), HelloReply)
+                assert isinstance(host.ask(c.Hello(2, 1)), c.HelloReply)
                 host.port.write(b"\0\x05half a frame" if where[0] == "--tcp" else b"")
 
 
 def test_a_second_host_is_turned_away_from_the_tcp_port() -> None:
     with RunningMock("--tcp", "127.0.0.1:0", "--lock-step") as mock, SerialHost(mock.url) as host:
-        host.ask(Hello(2, 1))
+        host.ask(c.Hello(2, 1))
         with SerialHost(mock.url) as second, pytest.raises(serial.SerialException):
             second.port.read(1)
-        assert isinstance(host.ask(Hello(2, 1)), HelloReply)
+        assert isinstance(host.ask(c.Hello(2, 1)), c.HelloReply)
 
 
 def test_a_pseudo_terminal_takes_one_host_at_a_time() -> None:
@@ -87,23 +74,23 @@ def test_the_line_is_cut_and_comes_back(where: tuple[str, ...], tmp_path: Path) 
     link = ("--link", str(tmp_path / "arm")) if where[0] == "--pty" else ()
     with RunningMock(*where, *link) as mock:
         with SerialHost(mock.url) as host:
-            host.ask(Hello(2, 1))
+            host.ask(c.Hello(2, 1))
             assert mock.control("disconnect")["ok"]
             with pytest.raises((serial.SerialException, OSError, AssertionError)):
-                host.ask(Hello(2, 1))
+                host.ask(c.Hello(2, 1))
         with pytest.raises(serial.SerialException):
             SerialHost(mock.url)
         assert mock.control("reconnect")["ok"]
         assert mock.next_line()["url"] == mock.url
         with SerialHost(mock.url) as host:
-            assert isinstance(host.ask(Hello(2, 1)), HelloReply)
+            assert isinstance(host.ask(c.Hello(2, 1)), c.HelloReply)
 
 
 def test_a_fault_cuts_the_line_for_a_while(tmp_path: Path) -> None:
     with RunningMock("--pty", "--link", str(tmp_path / "arm"), "--fault", "disconnect:start=0.1,seconds=0.1") as mock:
         assert mock.next_line()["url"] == mock.url
         with SerialHost(mock.url) as host:
-            assert isinstance(host.ask(Hello(2, 1)), HelloReply)
+            assert isinstance(host.ask(c.Hello(2, 1)), c.HelloReply)
         assert mock.control("counts")["faults"] == {"disconnect": {"board": 1}}
 
 

@@ -140,10 +140,10 @@ def test_a_record_that_excites_all_tells_all_and_the_fitted_model_has_their_valu
 
 def test_a_motor_other_than_the_files_is_judged_as_one_that_the_file_states(tmp_path: Path) -> None:
     """The residual of a torque balance is told in the unit of the stated drive, base parameters are joint torques."""
-    text, as_stated = (EXAMPLES / "single_axis.toml").read_text("utf-8"), "gain = { value = 0.5,"
+    text, as_stated = (EXAMPLES / "single_axis.toml").read_text("utf-8"), 'gain = "0.5 N·m/V"'
     assert as_stated in text
     other = tmp_path / "single_axis.toml"
-    other.write_text(text.replace(as_stated, "gain = { value = 0.7,"), "utf-8")
+    other.write_text(text.replace(as_stated, 'gain = "0.7 N·m/V"'), "utf-8")
     names = [name for name in rod().by_name if name.endswith("drive.gain")]
     fitted = rod().with_values(dict.fromkeys(names, 0.7))
     found = base_parameters(fitted, [swinging(1)]).excitation

@@ -6,7 +6,6 @@ drive, and no error.
 """
 
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numba
@@ -14,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import Machine, parse_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
+from tests.model.imported import imported
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ COUNT = 2 * np.pi / 2**14
 """rad"""
 LENGTHS, MASSES, WAIST = (0.4, 0.35), (3.2, 2.1), 0.09
 """Of the two rods, m and kg; inertia of the waist, kg·m²."""
-RESISTANCE, TORQUE_CONSTANT, BACK_EMF, ROTOR = 2.1, 0.055, 0.055, 4.2e-5
+RESISTANCE = 2.1
 VISCOUS, COULOMB = (2.4e-4, 2.2e-4, 1.8e-4), (1.1, 1.4, 0.7)
 """Motor side, N·m·s/rad; at the joint, N·m."""
 
@@ -35,8 +35,8 @@ def machine(*, rounded: bool = True, limit: float = LIMIT, period: float = PERIO
     """The machine file as its lab would write it. Without `rounded`, it does not speak of rounding and limit (V)."""
     lines = (Path(__file__).parent / "outside_arm.toml").read_text("utf-8").splitlines()
     kept = [line for line in lines if rounded or not line.startswith(("drive_resolution", "output_limit"))]
-    text = "\n".join(kept).replace(f"value = {LIMIT}", f"value = {limit}")
-    return parse_machine(text.replace(f"period = {{ value = {PERIOD}", f"period = {{ value = {period}"))
+    text = "\n".join(kept).replace(f'"{LIMIT:g} V"', f'"{limit} V"')
+    return parse_machine(text.replace(f'period = "{1e3 * PERIOD:g} ms"', f'period = "{period} s"'))
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,8 @@ class OutsideArm:
     """Numbers of one arm, in SI units.
 
     Args:
-        load: kg at the end, unknown to the machine file. load_share: share of the gravity torque that rubs.
-        dead_zone: V. stiffness: N·m/rad of a spring to posture 0. resolution, limit: of the controller's output, V.
-        flux: share that magnets still have. factor: of the controller's gains. lost: share of its set points that it
-        does not get.
+        dead_zone: V. resolution, limit: of the controller's output, V. factor: of the controller's gains. lost: share
+        of its set points that it does not get.
     """
 
     mass: Floats = field(default_factory=lambda: np.array([18.0, *MASSES]))
@@ -55,12 +53,7 @@ class OutsideArm:
     coulomb: Floats = field(default_factory=lambda: np.array(COULOMB))
     resistance: Floats = field(default_factory=lambda: np.full(3, RESISTANCE))
     delay: float = 0.002
-    load: float = 0.0
-    load_share: Floats = field(default_factory=lambda: np.zeros(3))
     dead_zone: Floats = field(default_factory=lambda: np.zeros(3))
-    stiffness: Floats = field(default_factory=lambda: np.zeros(3))
-    back_emf: Floats = field(default_factory=lambda: np.full(3, BACK_EMF))
-    flux: Floats = field(default_factory=lambda: np.ones(3))
     resolution: float = RESOLUTION
     limit: float = LIMIT
     factor: Floats = field(default_factory=lambda: np.ones(3))
@@ -120,63 +113,24 @@ def record(arm: OutsideArm, seed: int, duration: float = 17.0) -> Trace:
     for k in range(1, len(used)):
         used[k] = np.where(losses[k], used[k - 1], used[k])
     position, drive = np.zeros_like(used), np.zeros_like(used)
-    dynamics = np.concatenate(
-        [
-            *(arm.mass, arm.viscous, arm.coulomb, arm.resistance, arm.load_share, arm.dead_zone, arm.stiffness),
-            *(arm.back_emf, arm.flux),
-        ]
-    )
-    _run(
-        used,
-        noise,
-        dynamics.reshape(9, 3),
-        np.array([arm.delay, arm.load, arm.resolution, arm.limit, arm.period]),
-        arm.factor,
-        position,
-        drive,
-    )
-    made = TraceRecord(
-        trace_id=f"outside-{seed}",
-        created=datetime(2020, 1, 1, tzinfo=UTC),
-        software="-",
-        source="imported",
-        robot="outside",
-        period=arm.period,
-        drive_unit="V",
-    )
+    numbers = np.array([arm.mass, arm.viscous, arm.coulomb, arm.resistance, arm.dead_zone])
+    shared = np.array([arm.delay, arm.resolution, arm.limit, arm.period])
+    _run(used, noise, numbers, shared, arm.factor, position, drive)
+    made = imported(f"outside-{seed}", period=arm.period, drive_unit="V")
     time = arm.period * np.arange(len(used))
     return Trace(made, (1, 2, 3), time, position, set_point=set_points, drive=drive)
 
 
 @numba.njit
-def _solve(a: Floats, b: Floats) -> Floats:
-    """x of a x = b for three unknowns, by Cramer's rule."""
-    c0 = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
-    c1 = a[1, 2] * a[2, 0] - a[1, 0] * a[2, 2]
-    c2 = a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0]
-    determinant = a[0, 0] * c0 + a[0, 1] * c1 + a[0, 2] * c2
-    x = np.empty(3)
-    for k in range(3):
-        m = a.copy()
-        m[:, k] = b
-        x[k] = (
-            m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
-            - m[0, 1] * (m[1, 0] * m[2, 2] - m[1, 2] * m[2, 0])
-            + m[0, 2] * (m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0])
-        ) / determinant
-    return x
-
-
-@numba.njit
-def _balance(q: Floats, v: Floats, p: Floats, load: float, inertia: Floats, bias: Floats, weight: Floats) -> None:
+def _balance(q: Floats, v: Floats, p: Floats, inertia: Floats, bias: Floats, weight: Floats) -> None:
     """Fills mass matrix, velocity torques and gravity torques (the torques that hold the arm)."""
     l2, l3, m2, m3 = 0.4, 0.35, p[0, 1], p[0, 2]
     c2, s2, c23, s23 = np.cos(q[1]), np.sin(q[1]), np.cos(q[1] + q[2]), np.sin(q[1] + q[2])
     c3, s3 = np.cos(q[2]), np.sin(q[2])
     r2, r3 = l2 * c2, l3 * c23
-    upper = m2 / 3 + m3 + load
-    both = 0.5 * m3 + load
-    lower = m3 / 3 + load
+    upper = m2 / 3 + m3
+    both = 0.5 * m3
+    lower = m3 / 3
     inertia[:] = 0.0
     inertia[0, 0] = 0.5 * p[0, 0] * 0.01 + upper * r2 * r2 + 2 * both * r2 * r3 + lower * r3 * r3
     b = both * l2 * l3
@@ -194,23 +148,23 @@ def _balance(q: Floats, v: Floats, p: Floats, load: float, inertia: Floats, bias
     g = 9.81
     weight[0] = 0.0
     weight[2] = g * both * l3 * c23
-    weight[1] = g * (0.5 * m2 + m3 + load) * l2 * c2 + weight[2]
+    weight[1] = g * (0.5 * m2 + m3) * l2 * c2 + weight[2]
 
 
 @numba.njit
-def _rates(q: Floats, v: Floats, volts: Floats, p: Floats, load: float, stuck: Floats) -> Floats:
+def _rates(q: Floats, v: Floats, volts: Floats, p: Floats, stuck: Floats) -> Floats:
     """Accelerations. A joint that is stuck (1) stays at rest as long as its friction can hold it."""
     gears = (90.0, 110.0, 80.0)
     inertia, bias, weight = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
-    _balance(q, v, p, load, inertia, bias, weight)
+    _balance(q, v, p, inertia, bias, weight)
     torque, level = np.zeros(3), np.zeros(3)
     for j in range(3):
         u = volts[j]
-        u = u - p[5, j] if u > p[5, j] else (u + p[5, j] if u < -p[5, j] else 0.0)
-        gain = gears[j] * p[8, j] * 0.055 / p[3, j]
-        torque[j] = gain * (u - p[8, j] * p[7, j] * gears[j] * v[j]) - p[1, j] * gears[j] ** 2 * v[j] - p[6, j] * q[j]
+        u = u - p[4, j] if u > p[4, j] else (u + p[4, j] if u < -p[4, j] else 0.0)
+        gain = gears[j] * 0.055 / p[3, j]
+        torque[j] = gain * (u - 0.055 * gears[j] * v[j]) - p[1, j] * gears[j] ** 2 * v[j]
         torque[j] -= bias[j] + weight[j]
-        level[j] = p[2, j] + p[4, j] * abs(weight[j])
+        level[j] = p[2, j]
     held = stuck.copy()
     for _ in range(4):
         a, b = inertia.copy(), torque.copy()
@@ -221,7 +175,7 @@ def _rates(q: Floats, v: Floats, volts: Floats, p: Floats, load: float, stuck: F
                 a[j, :] = 0.0
                 a[j, j] = 1.0
                 b[j] = 0.0
-        found = _solve(a, b)
+        found = np.linalg.solve(a, b)
         freed = False
         for j in range(3):
             if held[j] == 1.0:
@@ -230,7 +184,6 @@ def _rates(q: Floats, v: Floats, volts: Floats, p: Floats, load: float, stuck: F
                     needed -= inertia[j, i] * found[i]
                 if abs(needed) > level[j]:
                     held[j] = 0.0
-                    torque[j] = torque[j]
                     freed = True
         if not freed:
             break
@@ -243,14 +196,14 @@ def _run(
 ) -> None:
     step, count = 0.00025, 2 * np.pi / 2**14
     gains_p, gains_d = (90.0, 110.0, 70.0), (4.0, 5.0, 2.5)
-    delay, load, resolution, limit, period = shared
+    delay, resolution, limit, period = shared
     q, v = used[0].copy(), np.zeros(3)
     inertia, bias, weight = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
-    _balance(q, v, p, load, inertia, bias, weight)
+    _balance(q, v, p, inertia, bias, weight)
     volts, stuck, last = np.zeros(3), np.ones(3), np.zeros(3)
     gears = (90.0, 110.0, 80.0)
     for j in range(3):
-        volts[j] = weight[j] * p[3, j] / (gears[j] * p[8, j] * 0.055)
+        volts[j] = weight[j] * p[3, j] / (gears[j] * 0.055)
         if abs(weight[j]) <= p[2, j]:
             volts[j] = 0.0
         q[j] -= volts[j] / gains_p[j]
@@ -274,10 +227,10 @@ def _run(
             acting = volts if done < delay - 1e-12 else command
             for j in range(3):
                 stuck[j] = 1.0 if v[j] == 0.0 else 0.0
-            k1 = _rates(q, v, acting, p, load, stuck)
-            k2 = _rates(q + 0.5 * h * v, v + 0.5 * h * k1, acting, p, load, stuck)
-            k3 = _rates(q + 0.5 * h * (v + 0.5 * h * k1), v + 0.5 * h * k2, acting, p, load, stuck)
-            k4 = _rates(q + h * (v + 0.5 * h * k2), v + h * k3, acting, p, load, stuck)
+            k1 = _rates(q, v, acting, p, stuck)
+            k2 = _rates(q + 0.5 * h * v, v + 0.5 * h * k1, acting, p, stuck)
+            k3 = _rates(q + 0.5 * h * (v + 0.5 * h * k1), v + 0.5 * h * k2, acting, p, stuck)
+            k4 = _rates(q + h * (v + 0.5 * h * k2), v + h * k3, acting, p, stuck)
             after = v + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             q = q + h * v + h * h / 6 * (k1 + k2 + k3)
             for j in range(3):

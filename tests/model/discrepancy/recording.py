@@ -6,26 +6,13 @@ from urllib.parse import urlencode
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine
-from daq.contracts.sample import SampleRow
-from daq.contracts.trace import Trace, TraceEvent
+from daq.contracts.trace import Trace
 from daq.driver import Controller
 from daq.runner.arm_control import ArmControl
 from daq.runner.experiment import RunSetup, StopRequests, run_experiment
 from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
-
-
-class Unheard:
-    """Nobody listens to the runs."""
-
-    def progress(self, fraction: float, text: str) -> None:
-        """How far the run is."""
-
-    def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
-        """A recorded control period."""
-
-    def happened(self, event: TraceEvent) -> None:
-        """An event."""
+from tests.daq.quiet import Quiet
 
 
 def recorded(
@@ -37,7 +24,7 @@ def recorded(
     with Controller.connect(f"mock://?{options}") as controller:
         for spec in specs:
             run = RunSetup(
-                controller, ArmControl(controller), spec, machine, machine.limits, folder, Unheard(), StopRequests()
+                controller, ArmControl(controller), spec, machine, machine.limits, folder, Quiet(), StopRequests()
             )
             result = run_experiment(run, Consent())
             assert result.outcome == "complete", result.reason

@@ -2,12 +2,20 @@
 
 import re
 
+import numpy as np
 import pytest
 
-from daq.contracts.errors import SpecError
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.options import DiagnosisOptions, check_options
+from daq.contracts.errors import SpecError, TraceError
+from daq.contracts.machine import load_machine
+from daq.trajectories.planner import plan, start_angles
+from daq.trajectories.presets import PRESETS
+from model.discrepancy.carried_load import with_load
+from model.discrepancy.excitation import own_frequencies
+from model.discrepancy.options import DiagnosisOptions, TorqueOptions, check_options
+from model.discrepancy.workflow import diagnose
 from model.effects.library import add_own, remove_own
+from model.machine_model.model import base_model
+from tests.daq.trajectories.machines import MA2000
 from tests.model.discrepancy.own_effects import own_effect
 from tests.model.fitting import imagined
 
@@ -47,3 +55,55 @@ def test_an_effect_of_the_users_own_must_be_on_a_joint_that_is_looked_on() -> No
             check_options(DiagnosisOptions(effects=("grease",), joints=(1, 3)), imagined.arm())
     finally:
         remove_own("grease")
+
+
+# ---- Frequencies that are the motion's own, at which no disturbance can be told from what goes with the motion.
+
+PERIOD = 0.02
+TRIED = np.arange(0.1, 6.0, 0.02)
+
+
+def test_of_a_sine_only_its_frequency_is_its_own() -> None:
+    time = np.arange(0.0, 20.0, PERIOD)
+    speeds = np.stack([np.cos(2 * np.pi * 0.5 * time), np.zeros_like(time)], axis=1)
+    own = TRIED[own_frequencies(TRIED, [speeds], PERIOD)]
+    assert own.size
+    assert np.abs(own - 0.5).max() < 0.1
+    beside = speeds + 0.05 * np.random.default_rng(1).standard_normal(speeds.shape)
+    assert np.array_equal(TRIED[own_frequencies(TRIED, [beside], PERIOD)], own)
+
+
+def test_a_joint_at_rest_has_none() -> None:
+    assert not own_frequencies(TRIED, [np.zeros((500, 2))], PERIOD).any()
+
+
+def test_the_presets_that_move_on_many_frequencies_have_none() -> None:
+    for name in ("diagnostic", "pseudo-random", "sweep", "ramp", "held-out"):
+        spec = PRESETS[name].spec
+        angles = plan(spec, MA2000, start_angles(spec, MA2000)).angles[:, :3]
+        found = TRIED[own_frequencies(TRIED, [np.diff(angles, axis=0)], PERIOD)]
+        assert not found.size, name
+
+
+# ---- What a diagnosis refuses, in one line.
+
+
+def test_a_trace_that_is_both_fitted_to_and_held_out_is_refused() -> None:
+    record = imagined.trace(imagined.arm())
+    with pytest.raises(TraceError, match="both fitted to and held out"):
+        diagnose(imagined.arm(), [record], [record])
+
+
+# ---- A load that is stated for the arm: the model expects it.
+
+
+def test_a_stated_load_is_expected_of_the_arm() -> None:
+    arm = base_model(load_machine("ma2000"))
+    light = with_load(arm.with_values({"load.mass": 1.0, "link2.mass": 0.9}), 0.5)
+    assert light.parameter("load.mass").value == 0.5
+    assert light.parameter("link2.mass").value == 0.9
+    before = arm.parameter("load.mass")
+    assert before.deviation is not None
+    assert light.parameter("load.mass").deviation == pytest.approx(0.5 / before.value * before.deviation)
+    with pytest.raises(SpecError, match="has no load"):
+        with_load(base_model(load_machine("ma2000").model_copy(update={"load": None})), 1.0)

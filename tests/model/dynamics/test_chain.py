@@ -1,13 +1,26 @@
 """A chain that cannot exist is refused in one line that says what and where."""
 
+import cmath
+import math
 from dataclasses import replace
 
+import numba
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from model.dynamics import recursive
+from model.dynamics.dual import DUAL_STEP, LARGEST_ANGLE, reciprocal, sin_cos
+from model.dynamics.inertial_influence import (
+    PARAMETERS,
+    acting_parameters,
+    parameter_name,
+    parameters_about_joint,
+    torque_sensitivities,
+)
 from model.kinematics.chain import Chain, ChainError, Joint, JointKind, Link
-from tests.model.dynamics.chains import TABLE_7_9, random_chain, random_link
+from tests.model.dynamics.chains import TABLE_7_9, random_chain, random_link, random_state
 
 BODY = random_link(np.random.default_rng(0))
 
@@ -86,3 +99,116 @@ def test_the_load_acts_as_one_more_point_of_the_last_link() -> None:
 def test_an_arm_of_rods_out_of_range_is_refused(change: dict[str, object], message: str) -> None:
     with pytest.raises(ChainError, match=message):
         replace(TABLE_7_9, **change)  # type: ignore[arg-type]
+
+
+# ---- Elementary functions in real and dual numbers.
+
+
+@numba.njit
+def compiled_sin_cos(x: complex) -> tuple[complex, complex]:
+    return sin_cos(x)
+
+
+@numba.njit(error_model="numpy")
+def compiled_reciprocal(x: complex) -> complex:
+    return reciprocal(x)
+
+
+@given(st.floats(-LARGEST_ANGLE, LARGEST_ANGLE))
+@example(0.0)
+@example(math.pi / 4)
+@example(-math.pi / 2)
+@example(3 * math.pi)
+def test_sine_and_cosine_are_right_to_the_last_digits(x: float) -> None:
+    s, c = compiled_sin_cos(x)
+    assert abs(s - math.sin(x)) <= 2.3e-16
+    assert abs(c - math.cos(x)) <= 2.3e-16
+
+
+@given(st.floats(-100.0, 100.0), st.floats(-10.0, 10.0))
+def test_dual_sine_and_cosine_carry_the_derivative(x: float, slope: float) -> None:
+    s, c = compiled_sin_cos(complex(x, DUAL_STEP * slope))
+    assert s.imag / DUAL_STEP == pytest.approx(slope * math.cos(x), abs=1e-14)
+    assert c.imag / DUAL_STEP == pytest.approx(-slope * math.sin(x), abs=1e-14)
+
+
+@pytest.mark.parametrize("x", [0.7, 0.7 + DUAL_STEP * 1j])
+def test_interpreted_functions_agree_with_compiled_ones(x: complex) -> None:
+    assert sin_cos(x) == pytest.approx(compiled_sin_cos(x), abs=1e-15)
+    assert sin_cos(x) == pytest.approx((cmath.sin(x), cmath.cos(x)), abs=1e-15)
+    assert reciprocal(x) == pytest.approx(compiled_reciprocal(x), abs=1e-15)
+
+
+@given(st.floats(0.01, 100.0))
+def test_dual_reciprocal_carries_the_derivative(x: float) -> None:
+    r = compiled_reciprocal(complex(x, DUAL_STEP))
+    assert r.imag / DUAL_STEP == pytest.approx(-1 / x**2, rel=1e-14)
+
+
+def test_an_angle_that_is_not_a_number_stays_so() -> None:
+    assert all(math.isnan(v) for v in compiled_sin_cos(math.nan))
+
+
+# ---- Tables 5.1 and 5.2: which inertial parameters act on which joint.
+
+STATES = [random_state(seed, 3) for seed in range(10)]
+WAIST_STILL = [(q, v * [0, 1, 1], a * [0, 1, 1]) for q, v, a in STATES]
+
+
+def arm_of_any_links() -> Chain:
+    rng = np.random.default_rng(8)
+    return replace(TABLE_7_9.chain(), links=tuple(random_link(rng) for _ in range(3)))
+
+
+def all_of(link: int) -> set[str]:
+    return {parameter_name(link, which) for which in range(len(PARAMETERS))}
+
+
+def test_table_5_1_holds_for_shoulder_and_elbow() -> None:
+    _, shoulder, elbow = acting_parameters(arm_of_any_links(), STATES)
+    assert set(shoulder) == all_of(2) - {"c2z"} | all_of(3)
+    assert set(elbow) == all_of(3) - {"c3z"}
+
+
+def test_table_5_1_names_too_many_parameters_for_the_waist() -> None:
+    # It lists all of links 2 and 3. The shoulder lies on the waist's axis, so mass and centre of link 2 have no
+    # arm there, and I*zz acts about axes that are at right angles to the waist.
+    waist = acting_parameters(arm_of_any_links(), STATES)[0]
+    assert set(waist) == {"I1yy"} | all_of(2) - {"m2", "c2x", "c2y", "c2z", "I2zz"} | all_of(3) - {"I3zz"}
+
+
+def test_table_5_2_holds_for_shoulder_and_elbow() -> None:
+    _, shoulder, elbow = acting_parameters(arm_of_any_links(), WAIST_STILL)
+    assert set(shoulder) == {"m2", "c2x", "c2y", "I2zz", "m3", "c3x", "c3y", "I3zz"}
+    assert set(elbow) == {"m3", "c3x", "c3y", "I3zz"}
+
+
+@pytest.mark.parametrize("which", range(len(PARAMETERS)))
+def test_sensitivity_is_the_change_of_the_torque(which: int) -> None:
+    """Against a finite change of the body itself, made of point masses so that nothing is shared."""
+    chain = arm_of_any_links()
+    exact = torque_sensitivities(chain, STATES[0])[:, 2, which]
+    q, v, a = STATES[0]
+    step = 1e-6
+    sides = [recursive.inverse_dynamics(changed(chain, which, s * step), q, v, a) for s in (1, -1)]
+    np.testing.assert_allclose(exact, (sides[0] - sides[1]) / (2 * step), rtol=1e-6, atol=1e-6)
+
+
+def changed(chain: Chain, which: int, change: float) -> recursive.ChainArrays:
+    """Link 3's parameter about its joint changed, in the packed form about the frame's own origin."""
+    mass, cx, cy, cz, *inertia = parameters_about_joint(chain, 3) + change * np.eye(10)[which]
+    a3, d3 = chain.joints[2].a, chain.joints[2].d
+    x, y, z = cx - a3, cy, cz - d3
+    about_centre = np.array(inertia) - mass * outer(cx, cy, cz)
+    arrays = chain.arrays()
+    arrays.inertial[2] = [mass, mass * x, mass * y, mass * z, *(about_centre + mass * outer(x, y, z))]
+    return arrays
+
+
+def outer(x: float, y: float, z: float) -> np.ndarray:
+    return np.array([y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y])
+
+
+def test_a_prismatic_joint_is_refused() -> None:
+    with pytest.raises(ChainError, match="joint 1 is prismatic"):
+        torque_sensitivities(random_chain(1, 2, "prismatic"), random_state(1, 2))

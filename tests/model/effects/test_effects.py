@@ -74,16 +74,6 @@ def test_at_its_expected_size_an_effect_moves_the_arm_or_its_reading(
     assert difference > (2e-5 if name in SLIGHT else 2e-4)
 
 
-def test_a_weakened_magnet_takes_more_volts_to_hold_a_load(model: Model) -> None:
-    """A joint at rest has no back-EMF and no viscous friction: what is missing there is torque."""
-    rest, joint = ramp_inputs(model.machine), 2
-    sound, weak = (
-        run(with_(model, "weakened_magnet", joint, loss=loss), rest).power[-20:, joint - 1].mean()
-        for loss in (0.0, 0.3)
-    )
-    assert 0.7 * weak == pytest.approx(sound, rel=0.1)
-
-
 def test_a_back_emf_constant_that_changes_alone_is_refused_in_one_line(model: Model) -> None:
     """Also from a saved model, which has the effect by its old name."""
     with pytest.raises(SpecError, match=r"back_emf_error: no longer in the library: .* one magnet; .* weakened_magnet"):
@@ -100,45 +90,6 @@ def test_unknown_names_are_refused_in_one_line(model: Model) -> None:
         model.with_effect("backlash", (4,))
     with pytest.raises(SpecError, match="allowed are"):
         model.with_effect("coulomb_friction", (1,), {"torque": -1.0})
-
-
-def test_friction_of_every_kind_takes_energy_out(model: Model, inputs: RunInputs) -> None:
-    """More drive is needed at the same speed: the mean power in the ramp rises with each."""
-    still = run(model, inputs).power[25:40, 1].mean()
-    for name, values in {
-        "coulomb_friction": {"torque": 3.0},
-        "stribeck_friction": {"torque": 3.0, "speed": 1.2},
-        "gear_loss": {"loss": 0.3},
-        "viscous_friction": {"coefficient": 4e-4},
-    }.items():
-        assert run(with_(model, name, **values), inputs).power[25:40, 1].mean() > still + 1
-
-
-@pytest.mark.parametrize("difference", [4.0, -4.0])
-def test_direction_dependent_friction_hinders_one_way_only(model: Model, inputs: RunInputs, difference: float) -> None:
-    bare, one_way = run(model, inputs), run(with_(model, "direction_dependent_friction", difference=difference), inputs)
-    forwards, backwards = one_way.power[[30, 75], 1] - bare.power[[30, 75], 1]
-    if difference > 0:
-        assert forwards > 0.5
-        assert abs(backwards) < 0.5
-    else:
-        assert backwards < -0.5
-        assert abs(forwards) < 0.5
-
-
-def test_a_sticking_joint_holds_until_the_breakaway_torque(model: Model) -> None:
-    inputs = ramp_inputs(model.machine, amplitude=np.deg2rad(0.6))
-    level = 50.0
-    stuck = run(with_(model, "stiction", joint=1, breakaway=level), inputs)
-    assert np.ptp(stuck.position[:, 0]) < np.deg2rad(0.1)
-    assert np.ptp(run(model, inputs).position[:, 0]) > np.deg2rad(0.4)
-
-
-def test_backlash_leaves_the_link_behind_by_the_gap_when_the_load_is_light(model: Model, inputs: RunInputs) -> None:
-    gap = 0.03
-    loose = run(with_(model, "backlash", joint=1, gap=gap), inputs)
-    rigid = run(model, inputs)
-    assert 0.3 * gap < np.abs(loose.position - rigid.position)[:, 0].max() < 2 * gap
 
 
 def test_compliance_tends_to_a_rigid_joint_as_it_vanishes(model: Model, inputs: RunInputs) -> None:
@@ -169,37 +120,6 @@ def test_inductance_tends_to_none_as_it_vanishes(model: Model, inputs: RunInputs
         for v in (1e-2, 1e-3, 1e-6)
     ]
     assert errors[0] > 5 * errors[1] > 25 * errors[2]
-
-
-def test_sensor_effects_move_the_reading_as_their_equations_say(model: Model, inputs: RunInputs) -> None:
-    joint = model.vector[at.slot(1, 0) : at.slot(2, 0)]
-    for name, values in {
-        "potentiometer_offset": {"offset": 0.01},
-        "potentiometer_gain": {"relative": 0.02},
-        "potentiometer_nonlinearity": {"bend_1": 0.01, "bend_2": -0.004, "bend_3": 0.002, "bend_4": 0.001},
-    }.items():
-        found = run(with_(model, name, joint=1, **values), inputs)
-        q = found.position[:, 0]
-        x = np.pi * (q - joint[at.AT_ZERO]) / joint[at.RANGE]
-        expected = {
-            "potentiometer_offset": 0.01 + 0 * q,
-            "potentiometer_gain": 0.02 * (q - joint[at.AT_ZERO] - joint[at.RANGE] / 2),
-            "potentiometer_nonlinearity": 0.01 * np.sin(x)
-            - 0.004 * np.sin(2 * x)
-            + 0.002 * np.sin(3 * x)
-            + 0.001 * np.sin(4 * x),
-        }[name]
-        assert np.abs(found.reading[:, 0] - q - expected).max() < 1e-12
-
-
-def test_a_whole_period_of_delay_is_the_drive_of_the_period_before(model: Model, inputs: RunInputs) -> None:
-    """Half a period of delay, twice, is one: parts and wholes are the same thing."""
-    whole = run(with_(model, "input_delay", joint=3, time=0.02), inputs).position
-    parts = run(
-        with_(model.with_values({"controller.delay": 0.016}), "input_delay", joint=3, time=0.01), inputs
-    ).position
-    assert np.abs(whole[:20] - run(model, inputs).position[:20])[:, 2].max() > 1e-4
-    assert np.abs(whole - parts)[:, 2].max() < 0.05 * np.abs(whole - run(model, inputs).position)[:, 2].max()
 
 
 def test_shared_effects_have_one_parameter_for_all_their_joints(model: Model) -> None:

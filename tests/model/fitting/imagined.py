@@ -1,16 +1,15 @@
 """Records of an arm that is the model itself, with noise drawn and readings rounded: what a fit must get right
 first."""
 
-from datetime import UTC, datetime
-
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import Machine, load_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model.machine_model.model import Model, base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
+from tests.model.imported import imported
 
 PERIOD = 0.02
 STARTS = ((3.1, 0.7, 0.0), (2.6, 1.7, -1.0), (3.6, 2.2, -0.6), (3.0, 1.2, 0.8))
@@ -53,14 +52,7 @@ def trace(
     """One record of `model` as the arm."""
     wanted = set_points(number, seconds) if points is None else points
     joints = model.machine.modelled_joints
-    record = TraceRecord(
-        trace_id=f"imagined-{number}-{seed}",
-        created=datetime(2026, 1, 1, tzinfo=UTC),
-        software="test",
-        source="imported",
-        period=PERIOD,
-        gains=dict.fromkeys(joints, gains),
-    )
+    record = imported(f"imagined-{number}-{seed}", period=PERIOD, gains=dict.fromkeys(joints, gains))
     time = PERIOD * np.arange(len(wanted))
     asked = Trace(
         record, joints, time, wanted, set_point=wanted, drive=np.zeros_like(wanted), tick=np.arange(len(wanted))

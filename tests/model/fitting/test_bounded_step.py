@@ -10,10 +10,6 @@ DESCENT = np.array([2.0, -3.0, 1.0])
 FAR = np.full(3, 100.0)
 
 
-def test_without_a_bound_in_the_way_the_step_is_newton_s() -> None:
-    np.testing.assert_allclose(bounded_step(CURVATURE, DESCENT, -FAR, FAR), np.linalg.solve(CURVATURE, DESCENT))
-
-
 @pytest.mark.parametrize(("held", "bound"), [(0, 0.2), (1, -0.4), (2, 0.1)])
 def test_one_that_meets_its_bound_stays_there_and_the_others_take_it_into_account(held: int, bound: float) -> None:
     low, high = -FAR, FAR.copy()

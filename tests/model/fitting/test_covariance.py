@@ -33,18 +33,6 @@ def test_intervals_hold_with_correlated_residuals_where_the_plain_ones_fail() ->
     assert 0.88 < robust < 0.98
 
 
-def test_the_prior_alone_gives_its_own_variance() -> None:
-    scores = [np.zeros((10, 2))]
-    covariance = sandwich(np.zeros((2, 2)), scores, np.array([4.0, 1.0]))
-    np.testing.assert_allclose(np.diag(covariance), [0.25, 1.0])
-
-
-def test_never_smaller_than_the_noise_alone_explains() -> None:
-    J = np.ones((100, 1))
-    lucky = [1e-6 * J]
-    assert sandwich(J.T @ J, lucky, np.zeros(1))[0, 0] >= 0.01 * (1 - 1e-9)
-
-
 def test_what_the_data_say_nothing_of_is_wide_and_never_of_negative_variance() -> None:
     """Two columns that are one but for rounding, and no prior to speak of; warnings are errors in this suite."""
     rng = np.random.default_rng(3)

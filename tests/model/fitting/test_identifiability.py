@@ -109,14 +109,6 @@ def test_a_nuisance_blurs_the_parameter_it_resembles_as_far_as_its_prior_allows(
     assert [p.name for p in report.parameters] == ["a"]
 
 
-def test_estimates_that_move_together_form_a_group() -> None:
-    rng = RANDOM()
-    base = rng.normal(size=(500, 1))
-    J = np.concatenate([base, base + 0.05 * rng.normal(size=(500, 1)), rng.normal(size=(500, 1))], axis=1)
-    report = judged(20 * J, np.ones(3), [unknown(n, "V", 1.0, 1.0) for n in ("a", "b", "c")])
-    assert report.correlated == (("a", "b"),)
-
-
 @pytest.mark.parametrize(
     ("unit", "power"),
     [("kg", 1), ("kg·m²", 1), ("N·m/A", 1), ("N·m·s/rad", 1), ("m", 0), ("V·s/rad", 0), ("rad/(N·m)", -1), ("1", 0)],

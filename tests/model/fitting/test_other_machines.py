@@ -1,17 +1,18 @@
 """Fits of one joint that slides or whose speed is measured: what is compared, in which unit, and what is told of it."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import DaqError, SpecError, TraceError
 from daq.contracts.machine import Machine, parse_machine
 from daq.contracts.trace import Trace
 from model.fitting.fit import fit, fit_problem
 from model.fitting.noise import noise_effect
-from model.fitting.options import FitOptions
+from model.fitting.options import FitOptions, Prior
 from model.fitting.records import resolution
 from model.fitting.result import FitResult, is_result, load_result
 from model.fitting.simulated import SimulatedProblem
@@ -19,6 +20,7 @@ from model.machine_model.model import Model, base_model
 from model.machine_model.model_file import save_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
+from tests.model.fitting.imagined import arm, changed, trace
 from tests.model.simulation.machines import PENDULUM, SLIDE
 from tests.model.simulation.records import trace_of
 
@@ -168,3 +170,82 @@ def test_a_result_is_told_from_a_model(sliding: FitResult, tmp_path: Path) -> No
     assert (tmp_path / "fit.json").read_text("utf-8").endswith("}\n")
     with pytest.raises(SpecError, match=r"absent/fit\.json: cannot be written: No such file or directory"):
         sliding.save(tmp_path / "absent" / "fit.json")
+
+
+# ---- Wrong input to a fit: one clear error, never a number that looks like a result.
+
+SOME = FitOptions(parameters=("load.mass",), sensor_bend=False, replicas=0, rounds=1)
+
+
+@pytest.fixture(scope="module")
+def good() -> Trace:
+    return trace(arm(), 0, 3.0)
+
+
+def refused(given: list[Trace], options: FitOptions = SOME) -> str:
+    with pytest.raises(DaqError) as error:
+        fit(arm(), given, options)
+    text = str(error.value)
+    assert "\n" not in text
+    return text
+
+
+def test_no_trace() -> None:
+    assert "at least one" in refused([])
+
+
+def test_the_same_trace_twice(good: Trace) -> None:
+    assert "more than once" in refused([good, good])
+
+
+def test_a_value_that_is_not_finite_is_refused(good: Trace) -> None:
+    position = good.position.copy()
+    position[17, 1] = np.nan
+    with pytest.raises(TraceError, match="not finite at sample 17"):
+        fit(arm(), [changed(good, position=position)], SOME)
+
+
+def test_a_trace_without_one_joint_is_refused(good: Trace) -> None:
+    columns = {n: getattr(good, n)[:, :2] for n in ("position", "set_point", "error", "drive")}
+    assert "joint 3 is not in it" in refused([changed(good, joints=(1, 2), **columns)])
+
+
+@pytest.mark.parametrize("signals", [("position", "set_point"), ("position",), ("set_point",)])
+def test_degrees_for_radians(good: Trace, signals: tuple[str, ...]) -> None:
+    text = refused([changed(good, **{n: np.degrees(getattr(good, n)) for n in signals})])
+    assert "rad" in text
+    assert "degrees" in text or "apart throughout" in text
+
+
+def test_no_set_points(good: Trace) -> None:
+    assert "set points" in refused([changed(good, set_point=None)])
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        FitOptions(parameters=("load.weight",)),
+        FitOptions(held=("nothing.*",)),
+        FitOptions(bounds={"load.weight": (0, 1)}),
+        FitOptions(priors={"load.weight": Prior(expected=1, deviation=1)}),
+    ],
+)
+def test_an_unknown_parameter_name_is_refused(good: Trace, options: FitOptions) -> None:
+    assert "not in this model" in refused([good], options)
+
+
+def test_nothing_left_to_fit(good: Trace) -> None:
+    assert "nothing to fit" in refused([good], FitOptions(held=("*",)))
+
+
+def test_a_result_of_a_newer_version(tmp_path: Path) -> None:
+    (tmp_path / "new.json").write_text(json.dumps({"format": 99}), "utf-8")
+    with pytest.raises(SpecError, match="format 99 is newer"):
+        load_result(tmp_path / "new.json")
+
+
+@pytest.mark.parametrize("text", ["", "[1, 2]", "{}", '{"format": 1, "model": 3}'])
+def test_a_file_that_is_no_result(tmp_path: Path, text: str) -> None:
+    (tmp_path / "other.json").write_text(text, "utf-8")
+    with pytest.raises(SpecError):
+        load_result(tmp_path / "other.json")

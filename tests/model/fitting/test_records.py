@@ -2,18 +2,18 @@
 
 import re
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import numpy as np
 import pytest
 
 from daq.contracts.errors import TraceError
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model.fitting.records import noise_floor, records_of
 from model.machine_model.model import base_model
 from model.record_check.check import check_records
 from model.record_check.readings import sensor_deviation
 from tests.model.fitting.imagined import PERIOD, STARTS, arm, machine
+from tests.model.imported import imported
 
 COUNT = 1.5 * np.pi / 4096
 
@@ -24,14 +24,7 @@ def record_of(ticks: list[int], rise: float = 0.3, still: int = 30, drive: float
     motion = np.clip((tick - still) / 100.0, 0.0, None) * rise
     points = np.tile(STARTS[0], (len(tick), 1)) + motion[:, None]
     wave = drive * np.stack([np.sin(tick), np.cos(tick), tick % 5], axis=1)
-    record = TraceRecord(
-        trace_id="made",
-        created=datetime(2026, 1, 1, tzinfo=UTC),
-        software="test",
-        source="imported",
-        period=PERIOD,
-        gains=dict.fromkeys((1, 2, 3), (2, 0, 0)),
-    )
+    record = imported(period=PERIOD, gains=dict.fromkeys((1, 2, 3), (2, 0, 0)))
     return Trace(
         record, (1, 2, 3), PERIOD * tick, points.copy(), set_point=points, error=0 * points, drive=wave, tick=tick
     )

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from model.fitting.whitening import Whitener, autocovariance, fitted_whitener, white
+from model.fitting.whitening import Whitener, autocovariance, fitted_whitener
 
 
 def autoregressive(seed: int, count: int, weights: tuple[float, ...], deviation: float) -> NDArray[np.float64]:
@@ -49,10 +49,6 @@ def test_runs_are_not_joined_across_a_gap() -> None:
     assert autocovariance(runs, 1)[1] == pytest.approx(18 / 20)
 
 
-def test_whitening_white_noise_only_scales_it() -> None:
-    np.testing.assert_allclose(white(2.0).whitened(np.array([2.0, -4.0])), [1.0, -2.0])
-
-
 def test_coloured_undoes_whitened_and_makes_noise_of_the_fitted_size() -> None:
     whitener = fitted_whitener([autoregressive(3, 20_000, (0.9, -0.5), 2.0)], 4, floor=1e-6)
     made = whitener.coloured(np.random.default_rng(5).normal(size=20_000))
@@ -72,11 +68,3 @@ def test_coloured_noise_follows_its_own_past() -> None:
     whitener = Whitener((np.zeros(0), np.array([0.5]), np.array([0.6, -0.2])), np.array([4.0, 2.0, 3.0]))
     found = whitener.coloured(np.array([1.0, 0.0, 0.0, 0.0]))
     np.testing.assert_allclose(found, [3.0, 1.8, 0.6 * 1.8 - 0.2 * 3, 0.6 * 0.48 - 0.2 * 1.8])
-
-
-def test_few_samples_are_not_asked_for_a_long_memory() -> None:
-    def orders(count: int) -> int:
-        return fitted_whitener([autoregressive(7, count, (0.9, -0.5), 1.0)], 8, floor=1e-6).order
-
-    assert (orders(19), orders(39)) == (0, 1)
-    assert orders(4000) >= 2

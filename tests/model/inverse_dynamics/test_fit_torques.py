@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import load_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.arrays import Floats
 from model.effects.library import library
@@ -20,6 +19,7 @@ from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import Model, base_model
 from model.reports.page import write_report
 from model.reports.torque_report import torque_report
+from tests.model.imported import imported
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 LENGTH, MASS, ROTOR, VISCOUS, COULOMB = 0.3, 0.93, 0.0043, 0.03, 0.05
@@ -45,14 +45,7 @@ def swinging(seed: int, *, torque: bool = True, law: Law | None = None) -> Trace
     if law is not None:
         needed = law(needed, angle, speed)
     drive = np.interp(time + 0.003, time, needed) / 0.5  # it acts after 1 ms and is held for 4 ms
-    record = TraceRecord(
-        trace_id=f"swing{seed}",
-        created=datetime(2024, 1, 1, tzinfo=UTC),
-        software="test",
-        source="imported",
-        period=0.004,
-        drive_unit="V",
-    )
+    record = imported(f"swing{seed}", period=0.004, drive_unit="V")
     return Trace(
         record,
         (1,),
@@ -208,6 +201,7 @@ LAWS: dict[str, tuple[str, float, Law]] = {
         lambda t, q, v: t + 0.2 * np.abs(MASS * 9.81 * LENGTH / 2 * np.sin(q)) * np.sign(v),
     ),
     "direction_dependent_viscous_friction": ("difference", -0.02, lambda t, _q, v: t + 0.02 * np.minimum(v, 0.0)),
+    "constant_torque": ("torque", 0.3, lambda t, _q, _v: t - 0.3),
     "one_sided_spring": ("stiffness", -0.6, lambda t, q, _v: t + 0.6 * np.minimum(q, 0.0)),
     "direction_dependent_gear_loss": ("difference", 0.15, lambda t, _q, v: np.where(t * v > 0, t / 0.85, t)),
 }

@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq.contracts.machine import Machine
 from model.arrays import Floats
-from model.discrepancy.inverse_dynamics.likelihood import stretches_of
+from model.discrepancy.inverse_dynamics.fitting import stretches_of
 from model.inverse_dynamics.recorded_motion import RecordedMotion, derivative, low_pass, turns_round
 from tests.model.discrepancy.inverse_dynamics.rigs import bench_machine, slide_machine
 from tests.model.inverse_dynamics.driven_slide import CUTOFF, PERIOD, TIME, controlled, motion_of
@@ -160,12 +160,6 @@ def test_a_torque_that_is_missing_elsewhere_is_kept() -> None:
     assert not (far & record.at_limit[:, 0]).any()
     assert share_left(record, np.where(far, np.sin(9.0 * time), 0.0)) > 0.9
     assert share_left(record, 0.3 + np.sin(2.0 * time)) > 0.6, "what acts all the time is kept between"
-
-
-def test_without_a_limit_torques_are_as_they_were() -> None:
-    record = motion_of(4.0 * np.sin(2.7 * TIME))
-    torque = np.random.default_rng(5).standard_normal((len(record.moving), 1))
-    assert record.subtract_unknown(torque) is torque
 
 
 def test_a_joint_with_too_many_pieces_is_not_known_at_all() -> None:

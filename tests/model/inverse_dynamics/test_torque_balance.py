@@ -14,7 +14,6 @@ from model.fitting.choice import chosen_unknowns
 from model.fitting.options import FitOptions
 from model.inverse_dynamics.link_motion import link_motion
 from model.inverse_dynamics.recorded_motion import recorded_motion
-from model.inverse_dynamics.smoothing import low_pass
 from model.inverse_dynamics.torque_balance import TorqueBalance, _follow_with_lag
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
@@ -58,13 +57,6 @@ def test_derivatives_are_those_of_the_residual() -> None:
     for u in unknowns:
         far = balance.residual({**values, u.name: 2 * u.start})
         np.testing.assert_allclose(balance.slope(values, here, u)[0] * u.start, far[0] - here[0], atol=1e-9)
-
-
-def test_the_low_pass_keeps_what_is_slow_takes_what_is_fast_and_delays_nothing() -> None:
-    time = 0.001 * np.arange(4000)
-    slow, fast = np.sin(2 * np.pi * 1.0 * time), np.sin(2 * np.pi * 60.0 * time)
-    inside = slice(300, -300)
-    np.testing.assert_allclose(low_pass(slow + fast, 12.0, 0.001)[inside], slow[inside], atol=1e-3)
 
 
 def test_records_that_cannot_be_compared_are_refused() -> None:
@@ -141,7 +133,3 @@ def test_a_gear_that_damps_follows_a_straight_torque_late(time_constant: float) 
     followed = _follow_with_lag(2.0 * time, time_constant, period)
     lag = time_constant * (1.0 - np.exp(-time / time_constant)) if time_constant else np.zeros_like(time)
     np.testing.assert_allclose(followed, 2.0 * (time - lag), atol=1e-12)
-
-
-def test_a_gear_that_damps_holds_what_is_constant() -> None:
-    np.testing.assert_allclose(_follow_with_lag(np.full(50, 3.0), 0.01, 0.004), 3.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import UTC, datetime
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -12,12 +11,13 @@ from types import ModuleType
 import numpy as np
 
 from daq.contracts.machine import Machine, load_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from daq.trajectories.presets import preset
 from tests.model.discrepancy import outside_arm
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.recording import recorded
+from tests.model.imported import imported
 from trials.rigs.folder import write_world
 
 ROOT = Path(__file__).parents[3]
@@ -57,8 +57,7 @@ def line_stage(_folder: Path) -> tuple[Machine, Trace]:
         stage.advance_to(k + 1)
         rows.append([(a.goal * program.COUNT, a.counts * program.COUNT, 24 * a.pwm / program.FULL) for a in stage.axes])
     asked, position, drive = np.moveaxis(np.array(rows), 2, 0)
-    moment = datetime(2024, 1, 1, tzinfo=UTC)
-    record = TraceRecord(trace_id="stage", created=moment, software="test", source="imported", period=0.001)
+    record = imported("stage", period=0.001)
     return _machine("line_stage"), Trace(record, (1, 2), time, position, set_point=asked, drive=drive)
 
 

@@ -22,6 +22,11 @@ def answer() -> tuple[Diagnosis, Comparison]:
 
 
 @pytest.fixture
+def found(answer: tuple[Diagnosis, Comparison]) -> Diagnosis:
+    return answer[0]
+
+
+@pytest.fixture(autouse=True)
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures cost seconds; what the words say does not need them."""
     for module in ("diagnosis_map", "diagnosis_pictures", "gap", "motion", "motion_closer"):
@@ -32,7 +37,10 @@ def words(page: str) -> str:
     return re.sub(r"\s+", " ", re.sub(r"<svg.*?</svg>|<style.*?</style>|<[^>]+>", " ", page, flags=re.DOTALL))
 
 
-def test_the_page_tells_the_whole_story_in_order(answer: tuple[Diagnosis, Comparison]) -> None:
+def test_the_page_tells_the_whole_story_in_order(
+    answer: tuple[Diagnosis, Comparison], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.undo()  # with its figures
     found, comparison = answer
     report = diagnosis_report(found, comparison)
     assert [s.title for s in report.sections] == [
@@ -57,9 +65,8 @@ def test_the_page_tells_the_whole_story_in_order(answer: tuple[Diagnosis, Compar
     assert "<script" not in page
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_the_gap_of_the_closed_loop_comes_first(answer: tuple[Diagnosis, Comparison]) -> None:
-    report = diagnosis_report(answer[0])
+def test_the_gap_of_the_closed_loop_comes_first(found: Diagnosis) -> None:
+    report = diagnosis_report(found)
     assert report.sections[0].title == "How the gap shrinks"
     table = next(b for b in report.sections[0].blocks if isinstance(b, Table))
     assert table.head == (
@@ -73,7 +80,6 @@ def test_the_gap_of_the_closed_loop_comes_first(answer: tuple[Diagnosis, Compari
     assert [(row[0].text, row[1].text) for row in table.rows[2:4]] == [("fitted to", "2"), ("held out", "2")]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_the_page_says_which_method_was_used_and_denies_no_simulation_that_it_shows(
     answer: tuple[Diagnosis, Comparison],
 ) -> None:
@@ -90,7 +96,6 @@ def test_the_page_says_which_method_was_used_and_denies_no_simulation_that_it_sh
     assert "There is no overlay, since the loop was not simulated" in words(html(diagnosis_report(torques)))
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_the_page_calls_traces_by_their_files_where_these_are_known(answer: tuple[Diagnosis, Comparison]) -> None:
     found, comparison = answer
     (fitted,), (held,) = found.traces, found.holdout
@@ -102,9 +107,7 @@ def test_the_page_calls_traces_by_their_files_where_these_are_known(answer: tupl
     assert "bench_1.csv, joint 2" in said
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_a_step_that_was_not_taken_says_why(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
+def test_a_step_that_was_not_taken_says_why(found: Diagnosis) -> None:
     step = found.steps[0].model_copy(update={"adopted": False, "rejected_because": "the held-out error rises"})
     report = diagnosis_report(found.model_copy(update={"verdict": "unknown-effect", "steps": (step,)}))
     text = words(html(report))
@@ -114,9 +117,7 @@ def test_a_step_that_was_not_taken_says_why(answer: tuple[Diagnosis, Comparison]
     assert "Σλ²" not in text
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_a_group_is_named_as_one_that_cannot_be_told_apart(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
+def test_a_group_is_named_as_one_that_cannot_be_told_apart(found: Diagnosis) -> None:
     step = found.steps[0]
     grouped = step.model_copy(update={"effect": None, "group": step.candidates[:2]})
     text = words(diagnosis_page(found.model_copy(update={"verdict": "ambiguous", "steps": (grouped,)})))
@@ -124,9 +125,7 @@ def test_a_group_is_named_as_one_that_cannot_be_told_apart(answer: tuple[Diagnos
     assert "What adding it did" not in text
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_an_answer_without_steps_has_a_page(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
+def test_an_answer_without_steps_has_a_page(found: Diagnosis) -> None:
     bare = found.model_copy(
         update={"verdict": "nothing-significant", "steps": (), "remaining": (), "next_experiment": None, "holdout": ()}
     )
@@ -136,7 +135,6 @@ def test_an_answer_without_steps_has_a_page(answer: tuple[Diagnosis, Comparison]
     assert EFFECT not in text.split("model after")[0]
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_that_nothing_is_significant_is_proved(answer: tuple[Diagnosis, Comparison]) -> None:
     found, comparison = answer
     step = found.steps[0]
@@ -165,9 +163,7 @@ def test_that_nothing_is_significant_is_proved(answer: tuple[Diagnosis, Comparis
     assert "tables above" not in text
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_what_is_left_after_the_steps_has_a_map(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
+def test_what_is_left_after_the_steps_has_a_map(found: Diagnosis) -> None:
     left = found.steps[0].where.model_copy(update={"joint": None, "phase": None, "summary": "No joint is off."})
     report = diagnosis_report(found.model_copy(update={"where": left, "remaining": ()}))
     blocks = next(s for s in report.sections if s.title == "What remains").blocks
@@ -176,20 +172,16 @@ def test_what_is_left_after_the_steps_has_a_map(answer: tuple[Diagnosis, Compari
     assert "What was tried" not in [s.title for s in report.sections]
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_the_same_map_is_shown_once(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
+def test_the_same_map_is_shown_once(found: Diagnosis) -> None:
     step = found.steps[0].model_copy(update={"adopted": False})
     page = words(diagnosis_page(found.model_copy(update={"steps": (step, step), "verdict": "unknown-effect"})))
     assert page.count("in windows of 0.3 s") == 1
     assert "As before step 1: nothing was added in between." in page
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_what_was_fitted_and_refused_is_no_promise_of_a_later_step(
-    answer: tuple[Diagnosis, Comparison], monkeypatch: pytest.MonkeyPatch
+    found: Diagnosis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found, _ = answer
     shown: list[list[tuple[str, bool]]] = []
 
     def picture(candidates: object, *_: object) -> Picture:
@@ -205,11 +197,7 @@ def test_what_was_fitted_and_refused_is_no_promise_of_a_later_step(
     assert shown[1] == shown[0][1:]
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_what_the_controllers_numbers_prove_has_no_candidates_and_no_errors(
-    answer: tuple[Diagnosis, Comparison],
-) -> None:
-    found, _ = answer
+def test_what_the_controllers_numbers_prove_has_no_candidates_and_no_errors(found: Diagnosis) -> None:
     step = found.steps[0]
     zero = tuple(e.model_copy(update={"before": 0.0, "after": 0.0}) for e in step.rmse_fit)
     proof = step.candidates[0].model_copy(update={"refitted": False, "misfit": None})
@@ -227,18 +215,15 @@ def test_what_the_controllers_numbers_prove_has_no_candidates_and_no_errors(
     assert "noise floor" not in text
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_experiments_that_were_run_are_listed(answer: tuple[Diagnosis, Comparison]) -> None:
+def test_experiments_that_were_run_are_listed(found: Diagnosis) -> None:
     run = Acquired(experiment="ramp", trace="abc", file="f", outcome="stopped", duration=8.25, reason="tells most")
-    report = diagnosis_report(answer[0].model_copy(update={"acquired": (run,)}))
+    report = diagnosis_report(found.model_copy(update={"acquired": (run,)}))
     table = next(s for s in report.sections if s.title == "What was run").blocks[0]
     assert isinstance(table, Table)
     assert [c.text for c in table.rows[0]] == ["ramp", "8.2 s", "stopped", "abc", "tells most"]
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_an_experiment_that_separates_nothing_promises_no_separation(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
+def test_an_experiment_that_separates_nothing_promises_no_separation(found: Diagnosis) -> None:
     assert found.next_experiment is not None
     asked = found.next_experiment.model_copy(update={"separates": (), "predicted_separation": 0.0})
     text = words(diagnosis_page(found.model_copy(update={"next_experiment": asked})))
@@ -247,8 +232,7 @@ def test_an_experiment_that_separates_nothing_promises_no_separation(answer: tup
     assert "predicted separation" not in text
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_where_no_motion_would_tell_the_page_says_what_would(answer: tuple[Diagnosis, Comparison]) -> None:
+def test_where_no_motion_would_tell_the_page_says_what_would(found: Diagnosis) -> None:
     members = tuple(PlacedEffect(effect=e, joints=(2,)) for e in ("viscous_friction", "weakened_magnet"))
     untold = Inseparable(
         members=members,
@@ -259,15 +243,13 @@ def test_where_no_motion_would_tell_the_page_says_what_would(answer: tuple[Diagn
         shares="torque-with-speed",
         told_by=("current-clamp",),
     )
-    report = diagnosis_report(answer[0].model_copy(update={"next_experiment": None, "inseparable": (untold,)}))
+    report = diagnosis_report(found.model_copy(update={"next_experiment": None, "inseparable": (untold,)}))
     (text,) = next(s for s in report.sections if s.title == "What to run next").blocks
     assert isinstance(text, Text)
     assert text.text.endswith("What would tell them: a current clamp on the motor's lead.")
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_a_page_about_torques_does_not_speak_of_a_simulation(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
+def test_a_page_about_torques_does_not_speak_of_a_simulation(found: Diagnosis) -> None:
     step = found.steps[0]
     errors = tuple(e.model_copy(update={"unit": "N·m"}) for e in step.rmse_fit)
     balanced = step.model_copy(update={"rmse_fit": errors, "rmse_holdout": ()})
@@ -282,7 +264,6 @@ def test_a_page_about_torques_does_not_speak_of_a_simulation(answer: tuple[Diagn
     assert "There is no overlay" in text
 
 
-@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(
     ("verdict", "method", "controlled", "says"),
     [
@@ -296,9 +277,8 @@ def test_a_page_about_torques_does_not_speak_of_a_simulation(answer: tuple[Diagn
     ],
 )
 def test_a_page_without_an_experiment_says_why(
-    answer: tuple[Diagnosis, Comparison], verdict: str, method: str, controlled: bool, says: str
+    found: Diagnosis, verdict: str, method: str, controlled: bool, says: str
 ) -> None:
-    found = answer[0]
     before = found.model_before
     if not controlled:
         machine = before.machine.model_copy(update={"controller": NoController(kind="none")})
@@ -311,9 +291,7 @@ def test_a_page_without_an_experiment_says_why(
     assert ("--next" in text.text) == ("--next" in says)
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_what_has_no_clear_shape_is_not_told_as_one(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
+def test_what_has_no_clear_shape_is_not_told_as_one(found: Diagnosis) -> None:
     shape = found.remaining[0]
     few = shape.model_copy(
         update={"against": "time", "centres": (1.0, 2.0), "torque": (0.1, 0.2), "deviation": (0.1, 0.1)}
@@ -329,31 +307,25 @@ def test_what_has_no_clear_shape_is_not_told_as_one(answer: tuple[Diagnosis, Com
     assert "What is left has no shape that these traces show" in words(diagnosis_page(nothing))
 
 
-def test_never_more_than_all_of_it_is_gone(answer: tuple[Diagnosis, Comparison]) -> None:
-    step = answer[0].steps[0].model_copy(update={"excess_removed_holdout": 1.002})
+def test_never_more_than_all_of_it_is_gone(found: Diagnosis) -> None:
+    step = found.steps[0].model_copy(update={"excess_removed_holdout": 1.002})
     assert gap(step).endswith("all of the held-out variance beyond noise is gone.")
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_several_steps_are_numbered(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
+def test_several_steps_are_numbered(found: Diagnosis) -> None:
     titles = [s.title for s in diagnosis_report(found.model_copy(update={"steps": found.steps * 2})).sections]
     assert "Step 1: where they disagree" in titles
     assert "Step 2: what adding it did" in titles
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_the_answer_survives_json(answer: tuple[Diagnosis, Comparison]) -> None:
-    found, _ = answer
+def test_the_answer_survives_json(found: Diagnosis) -> None:
     again = Diagnosis.model_validate_json(found.model_dump_json())
     assert again.steps == found.steps
     assert again.model_after.identity == found.model_after.identity
     assert diagnosis_page(again) == diagnosis_page(found)
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_warnings_come_first_and_are_not_told_again(answer: tuple[Diagnosis, Comparison]) -> None:
-    found = answer[0]
+def test_warnings_come_first_and_are_not_told_again(found: Diagnosis) -> None:
     notes = (Note(kind="cutoff", values={"cutoff": 12.0}), Note(kind="resting-left-out", warning=True))
     doubted = found.model_copy(update={"notes_data": notes, "notes": ("Below 12 Hz.", "Rest is left out.")})
     sections = {s.title: s.blocks for s in diagnosis_report(doubted).sections}
@@ -362,7 +334,6 @@ def test_warnings_come_first_and_are_not_told_again(answer: tuple[Diagnosis, Com
     assert sections["What to know about this answer"] == (Points(("Below 12 Hz.",)),)
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_efforts_are_recorded_and_predicted(answer: tuple[Diagnosis, Comparison]) -> None:
     found, comparison = answer
     efforts = [replace(s, signal="effort", units=("N·m",) * len(s.units), set_point=None) for s in comparison.signals]

@@ -29,6 +29,8 @@ def test_every_option_of_a_shown_command_exists(page: Path) -> None:
     commands = shown_commands(page)
     assert commands
     for name, *words in commands:
+        if name not in subcommands() and not (ROOT / "extras").exists():
+            continue
         command = typer.main.get_command(import_module(subcommands()[name].module).app)
         if (inner := getattr(command, "commands", None)) is not None:
             command = inner[words[0]]

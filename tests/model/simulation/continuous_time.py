@@ -59,13 +59,14 @@ PERIOD, COUNTS, GAIN = 0.02, 4096, 2.0
     REST,
     CABLE,
     SLACK,
+    CONSTANT,
     SHAKE_S,
     SHAKE_C,
     SHAKE_F,
     LAGS,
     GIVES,
     STICKS,
-) = range(38)
+) = range(39)
 # Columns of the state. X is the relative rise of the resistance.
 Q, V, Z, I, M, W, X, STUCK = range(8)  # noqa: E741 (a current)
 
@@ -142,6 +143,7 @@ def _rates(t: float, s: Floats, volts: Floats, p: Floats, body: Floats, rate: Fl
         if a[LOSS_DIRECTION] * motor * z > 0:
             link -= abs(a[LOSS_DIRECTION] * motor) * z
         link += a[RIPPLE_S] * sin(a[RIPPLE_N] * q) + a[RIPPLE_C] * cos(a[RIPPLE_N] * q) - a[SPRING] * (q - a[REST])
+        link += a[CONSTANT]
         link -= max(a[CABLE], 0.0) * max(q - a[SLACK], 0.0) - min(a[CABLE], 0.0) * min(q - a[SLACK], 0.0)
         turn = 2 * np.pi * a[SHAKE_F] * t
         link += a[SHAKE_S] * sin(turn) + a[SHAKE_C] * cos(turn)
@@ -329,6 +331,7 @@ def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
                 of("spring_torque.rest"),
                 of("one_sided_spring.stiffness"),
                 of("one_sided_spring.rest"),
+                of("constant_torque.torque"),
                 of("periodic_disturbance.sine"),
                 of("periodic_disturbance.cosine"),
                 of("periodic_disturbance.frequency"),

@@ -67,6 +67,7 @@ CASES = (
     Case(
         "one_sided_spring", tuple({"stiffness": k, "rest": q + 0.1} for k, q in zip((9, -40, 9), START, strict=True)), 1
     ),
+    _of("constant_torque", "torque", (0.6, -1.8, 0.4), 2),
     _of("periodic_disturbance", "sine", (0.6, 1.8, 0.4), 2, cosine=0.3, frequency=2.0),
     _of("potentiometer_gain", "relative", (0.06, 0.06, 0.06), 2),
     _of("potentiometer_offset", "offset", (0.067, 0.067, 0.067), 3),

@@ -1,13 +1,12 @@
 """Records that tests and benchmarks simulate: set points a period at a time, made here, measured nowhere."""
 
-from datetime import UTC, datetime
-
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.machine import Machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model.simulation.inputs import RunInputs, inputs_of
+from tests.model.imported import imported
 
 PERIOD = 0.02
 START = (np.pi, np.pi / 4, 0.0)
@@ -17,9 +16,7 @@ START = (np.pi, np.pi / 4, 0.0)
 def trace_of(set_points: NDArray[np.float64], period: float = PERIOD, **signals: NDArray[np.float64]) -> Trace:
     """A trace with these set points (k, n) rad, positions equal to them unless given."""
     k, n = set_points.shape
-    record = TraceRecord(
-        trace_id="made", created=datetime(2024, 1, 1, tzinfo=UTC), software="test", source="imported", period=period
-    )
+    record = imported(period=period)
     signals = {"position": set_points.copy(), **signals}
     return Trace(
         record, tuple(range(1, n + 1)), period * np.arange(k), set_point=set_points, tick=np.arange(k), **signals

@@ -1,19 +1,19 @@
 """What a run takes from a record: the grid of periods, and what is held or interpolated between samples."""
 
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import load_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import base_model
 from model.simulation.inputs import RunInputs, inputs_of
 from model.simulation.prepared import Options, prepare
 from model.simulation.simulate import at_rows
+from tests.model.imported import imported
 
 MACHINE = load_machine("ma2000")
 START = np.array([3.1, 0.7, 0.0])
@@ -24,9 +24,7 @@ def trace_of(
 ) -> Trace:
     """A record with samples at these periods; positions rise by a degree a period."""
     rows = np.array(ticks)
-    record = TraceRecord(
-        trace_id="made", created=datetime(2026, 1, 1, tzinfo=UTC), software="test", source="imported", period=0.02
-    )
+    record = imported(period=0.02)
     whole = rows.astype(np.int64) if (rows == np.round(rows)).all() else None
     position = START + np.radians(rows)[:, None]
     signals = {"set_point": set_point, "drive": drive, "velocity": velocity}
@@ -67,14 +65,6 @@ def test_a_record_that_tells_when_set_points_were_taken_is_believed() -> None:
     record = whole.record.model_copy(update={"every": 4})
     found = inputs_of(replace(whole, record=record, tick=whole.tick + 100, taken=told), MACHINE).set_points[:, 0]
     assert found.tolist() == 3 * [0.0] + 2 * [0.1] + 9 * [0.2] + 3 * [0.3]
-
-
-def test_where_a_record_does_not_know_when_set_points_were_taken_it_was_right_after_the_sample_before() -> None:
-    wanted = np.array([0.0, 0.1, 0.2])[:, None] * np.ones(3)
-    whole = trace_of([0, 4, 8], wanted, None)
-    record = whole.record.model_copy(update={"every": 4})
-    found = inputs_of(replace(whole, record=record, taken=np.zeros(3, dtype=np.int64)), MACHINE).set_points[:, 0]
-    assert found.tolist() == [0.0] + 4 * [0.1] + 4 * [0.2]
 
 
 def test_without_set_points_or_drive_the_reading_or_zero_is_held() -> None:

@@ -42,11 +42,6 @@ def test_the_functions_of_a_winding_are_means_of_its_exponential(x: float) -> No
         assert value == pytest.approx(exact, rel=1e-9)
 
 
-def test_the_functions_of_a_winding_are_smooth_where_the_series_ends() -> None:
-    below, above = (plain(joint_torques.winding_functions)(0.05 * (1 + e)) for e in (-1e-9, 1e-9))
-    np.testing.assert_allclose(below, above, rtol=1e-8)
-
-
 WINDING = joint(RESISTANCE=1.5, INDUCTANCE=0.012, GEAR=50.0, TORQUE_CONSTANT=0.04, BACK_EMF=0.04)
 WARM = 0.2
 

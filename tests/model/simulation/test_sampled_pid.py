@@ -1,7 +1,6 @@
 """What a machine file states of a sampled PID is what its simulation does."""
 
 from dataclasses import replace
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -10,12 +9,13 @@ import pytest
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, parse_machine
 from daq.contracts.quantity import Quantity
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import Simulation, sensitivities, simulate
+from tests.model.imported import imported
 from tests.model.simulation import machines
 
 PERIOD = 0.01
@@ -34,9 +34,7 @@ def slide(**stated: Any) -> Machine:
 
 def record(set_points: Floats, **more: Any) -> Trace:
     """A record of these set points."""
-    made = TraceRecord(
-        trace_id="made", created=datetime(2020, 1, 1, tzinfo=UTC), software="-", source="imported", period=PERIOD
-    )
+    made = imported(period=PERIOD)
     time = PERIOD * np.arange(len(set_points))
     return Trace(made, (1,), time, set_points, set_point=set_points, **more)
 
@@ -53,6 +51,13 @@ def test_the_drive_is_rounded_to_its_resolution() -> None:
     drive = run(slide(drive_resolution=quantity(0.14, "V"))).drive / 0.14
     assert np.allclose(drive, np.round(drive), atol=1e-9)
     assert np.ptp(drive) > 10
+
+
+def test_an_error_within_the_dead_band_moves_nothing() -> None:
+    still, moved = (run(slide(dead_band=quantity(band, "m"))).drive for band in (0.21, 0.19))
+    assert not still.any()
+    assert np.abs(moved).max() > 8.0
+    assert run(slide(dead_band=quantity(0.21, "m")), quantise=False).drive.any()
 
 
 def test_the_drive_stays_within_the_limit_of_the_output() -> None:

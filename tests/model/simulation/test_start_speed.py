@@ -1,19 +1,19 @@
 """Where a record begins in motion, from readings alone; and where it does not, whatever moves it then."""
 
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from daq.contracts.machine import Machine, NoController, load_machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import base_model
 from model.simulation.inputs import inputs_of
 from model.simulation.simulate import simulate
 from model.simulation.start_speed import speed_at_start
+from tests.model.imported import imported
 
 AXIS = load_machine(str(Path(__file__).parents[3] / "examples" / "single_axis.toml"))
 DRIVEN = AXIS.model_copy(update={"controller": NoController(kind="none")})
@@ -22,9 +22,7 @@ PERIOD = 0.005
 
 
 def trace_of(position: Floats, drive: Floats | None = None) -> Trace:
-    record = TraceRecord(
-        trace_id="made", created=datetime(2026, 1, 1, tzinfo=UTC), software="test", source="imported", period=PERIOD
-    )
+    record = imported(period=PERIOD)
     drive = np.zeros(len(position)) if drive is None else drive
     time = PERIOD * np.arange(len(position))
     return Trace(record, (1,), time, position[:, None], drive=drive[:, None])

@@ -45,6 +45,7 @@ SIZES: dict[str, tuple[int | None, dict[str, float]]] = {
     "centre_of_mass": (2, {"shift": 0.1}),
     "base_tilt": (None, {"about_x": 0.1, "about_y": 0.15}),
     "spring_torque": (2, {"stiffness": 20.0, "neutral": 0.79}),
+    "constant_torque": (2, {"torque": 5.0}),
     "one_sided_spring": (2, {"stiffness": -20.0, "slack": 0.79}),
     "periodic_disturbance": (3, {"amplitude": 1.2, "frequency": 2.5, "phase": 0.0}),
     "potentiometer_gain": (3, {"error": -0.1}),

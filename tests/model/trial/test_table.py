@@ -28,11 +28,6 @@ def test_three_hundred_clean_cases_without_an_alarm_bound_it_at_one_and_a_quarte
     assert (found.low, found.high) == (0.0, pytest.approx(0.01222, abs=1e-4))
 
 
-def test_a_case_without_the_question_does_not_count_in_its_rate() -> None:
-    assert rate([None, True, None]).cases == 1
-    assert str(rate([None])) == "no cases"
-
-
 def test_quantiles_ignore_missing_values() -> None:
     found = quantiles([None, *map(float, range(101))])
     assert (found.cases, found.tenth, found.median, found.ninety_fifth, found.largest) == (101, 10, 50, 95, 100)
@@ -89,10 +84,6 @@ def test_the_page_shows_every_rate_with_its_interval(table: TrialTable) -> None:
 
 def test_a_table_without_cases_says_that_none_was_scored() -> None:
     assert as_markdown(trial_table([])) == "No case has been scored yet.\n"
-
-
-def test_a_table_survives_json(table: TrialTable) -> None:
-    assert TrialTable.model_validate_json(table.model_dump_json()) == table
 
 
 def test_every_case_is_a_line_that_can_be_counted_again() -> None:

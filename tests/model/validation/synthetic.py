@@ -1,25 +1,16 @@
 """Traces that a model makes of itself, so that the truth behind them is known."""
 
 from dataclasses import replace
-from datetime import UTC, datetime
 
 import numpy as np
 
-from daq.contracts.machine import load_machine
-from daq.contracts.trace import Trace, TraceRecord
-from model.machine_model.model import Model, base_model
-from model.simulation.prepared import Options
-from model.simulation.simulate import simulate
+from daq.contracts.trace import Trace
+from model.machine_model.model import Model
+from tests.model.fitting import imagined
 
-PERIOD = 0.02
 START = (np.pi, np.pi / 4, 0.0)
 REST_BEFORE = 40
 """Periods."""
-
-
-def arm() -> Model:
-    """The MA2000 as its machine file describes it."""
-    return base_model(load_machine("ma2000"))
 
 
 def ramp_trace(plant: Model, seconds: float = 1.6, seed: int = 0, *, held: bool = False) -> Trace:
@@ -27,14 +18,14 @@ def ramp_trace(plant: Model, seconds: float = 1.6, seed: int = 0, *, held: bool 
 
     `held`: it begins with the arm held by its drive, as a real one does; else with no drive, and it sinks at first.
     """
-    time = PERIOD * np.arange(round(seconds / PERIOD))
+    time = imagined.PERIOD * np.arange(round(seconds / imagined.PERIOD))
     rise = np.radians(21.6) * np.clip((time - 0.2) / 0.65, 0, 1)
     return _run(plant, np.array(START) + rise[:, None], seed, held)
 
 
 def swinging_trace(plant: Model, seconds: float = 6.0, seed: int = 0, *, held: bool = False) -> Trace:
     """Two sines a joint, out of step; `held` as above."""
-    time = np.maximum(PERIOD * np.arange(round(seconds / PERIOD)) - 0.2, 0)
+    time = np.maximum(imagined.PERIOD * np.arange(round(seconds / imagined.PERIOD)) - 0.2, 0)
     waves = [
         np.sin(2 * np.pi * (0.4 + 0.13 * j) * time) + 0.5 * np.sin(2 * np.pi * (1.1 + 0.2 * j) * time) for j in range(3)
     ]
@@ -43,7 +34,7 @@ def swinging_trace(plant: Model, seconds: float = 6.0, seed: int = 0, *, held: b
 
 def multisine_trace(plant: Model, seconds: float = 12.0, seed: int = 0, *, held: bool = False) -> Trace:
     """Six tones a joint between 0.1 and 0.8 Hz, of 20°, 14° and 20°; other phases with every seed; `held` as above."""
-    time = np.maximum(PERIOD * np.arange(round(seconds / PERIOD)) - 0.2, 0)
+    time = np.maximum(imagined.PERIOD * np.arange(round(seconds / imagined.PERIOD)) - 0.2, 0)
     phases = np.random.default_rng([seed, 1]).uniform(0, 2 * np.pi, (6, 3))
     tones = np.linspace(0.1, 0.8, 6)
     waves = sum(np.sin(2 * np.pi * f * time[:, None] + p) - np.sin(p) for f, p in zip(tones, phases, strict=True))
@@ -53,32 +44,8 @@ def multisine_trace(plant: Model, seconds: float = 12.0, seed: int = 0, *, held:
 
 def _run(plant: Model, set_points: np.ndarray, seed: int, held: bool) -> Trace:
     before = REST_BEFORE if held else 0
-    set_points = np.concatenate([np.repeat(set_points[:1], before, axis=0), set_points])
-    count = len(set_points)
-    record = TraceRecord(
-        trace_id=f"synthetic-{seed}",
-        created=datetime(2026, 1, 1, tzinfo=UTC),
-        software="test",
-        source="imported",
-        period=PERIOD,
+    whole = imagined.trace(
+        plant, seed=seed, points=np.concatenate([np.repeat(set_points[:1], before, axis=0), set_points])
     )
-    trace = Trace(
-        record=record,
-        joints=(1, 2, 3),
-        time=PERIOD * np.arange(count),
-        position=np.tile(START, (count, 1)),
-        set_point=set_points,
-        drive=np.zeros((count, 3)),
-        tick=np.arange(count),
-    )
-    noise = 0.3 * np.random.default_rng(seed).standard_normal((count, 3))
-    run = simulate(plant, trace, Options(noise=noise))
-    kept = slice(before, None)
-    return replace(
-        trace,
-        time=trace.time[kept],
-        tick=np.arange(count)[kept],
-        set_point=set_points[kept],
-        position=run.reading[kept],
-        drive=run.drive[kept],
-    )
+    signals = ("time", "tick", "set_point", "position", "drive")
+    return replace(whole, error=None, **{name: getattr(whole, name)[before:] for name in signals})

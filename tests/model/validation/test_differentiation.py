@@ -1,13 +1,23 @@
 """Derivatives of sampled positions are exact averages of the true ones, with known noise."""
 
+import math
+import threading
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from daq.contracts.errors import SpecError
+from daq.contracts.progress import CancelledError
 from model import layout as at
 from model.validation import differentiation as d
 from model.validation.acceleration_model import averaged_volts
-from tests.model.validation.synthetic import arm
+from model.validation.criterion import contribution, required_deviation
+from model.validation.doubling import TOLERANCE, doubling_changes
+from model.validation.expected_deviation import expected_deviation, gaussian_share
+from tests.model.fitting.imagined import arm
 
 PERIOD = 0.02
 TIME = PERIOD * np.arange(200)
@@ -80,3 +90,136 @@ def test_the_derivative_of_averaged_volts_by_the_delay_is_exact() -> None:
         moved[at.DELAY] += step
         steps.append(averaged_volts(drive, PERIOD, moved))
     np.testing.assert_allclose(exact[5:-5], ((steps[0] - steps[1]) / 2e-7)[5:-5], rtol=1e-5, atol=1e-4)
+
+
+# ---- σ from a doubling change, τ′ from a parameter, λ² from both.
+
+
+def test_required_variance_is_one_and_a_half_squares_at_half_damping() -> None:
+    assert required_deviation(0.4) ** 2 == pytest.approx(1.5 * 0.4**2)
+
+
+@pytest.mark.parametrize(("damping", "factor"), [(0.25, 4 * 0.25 * 1.25 / 1.5), (1.0, 8 / 3)])
+def test_required_variance_at_other_dampings(damping: float, factor: float) -> None:
+    assert required_deviation(1.0, damping) ** 2 == pytest.approx(factor)
+
+
+@pytest.mark.parametrize("damping", [0.0, -0.5, math.inf, math.nan])
+def test_a_damping_ratio_that_is_not_positive_is_refused(damping: float) -> None:
+    with pytest.raises(SpecError, match="must be positive"):
+        required_deviation(1.0, damping)
+
+
+def test_an_insensitive_parameter_contributes_nothing() -> None:
+    assert contribution(None, 0.3) == 0.0
+    assert contribution(0.6, 0.3) == pytest.approx(0.25)
+
+
+def test_both_conventions_differ_by_the_root_of_two() -> None:
+    assert gaussian_share("three_sigma") / gaussian_share("source") == pytest.approx(math.sqrt(2))
+    assert gaussian_share("three_sigma") == pytest.approx(1 / 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "basis"),
+    [
+        ("link2.length", 0.03, "length"),
+        ("link1.radius", 0.03, "length"),
+        ("load.mass", 0.10, "mass"),
+        ("link3.mass", 0.10, "mass"),
+        ("joint2.motor.back_emf_constant", 1 / (3 * math.sqrt(2)), "gaussian"),
+        ("joint2.viscous_friction.coefficient", 1 / (3 * math.sqrt(2)), "gaussian"),
+        ("joint2.load_dependent_friction.arm", 1 / (3 * math.sqrt(2)), "gaussian"),
+    ],
+)
+def test_expected_deviations_follow_the_source(name: str, share: float, basis: str) -> None:
+    parameter = arm().parameter(name)
+    deviation, found = expected_deviation(parameter, "source")
+    assert (deviation / parameter.value, found) == (pytest.approx(share), basis)
+
+
+def test_a_parameter_around_zero_takes_its_stated_deviation_or_is_refused() -> None:
+    offset = arm().with_effect("potentiometer_offset", (1,)).parameter("joint1.potentiometer_offset.offset")
+    assert expected_deviation(offset, "source") == (offset.deviation, "stated")
+    with pytest.raises(SpecError, match="no expected deviation"):
+        expected_deviation(replace(offset, deviation=None), "source")
+
+
+# ---- The changes that double an error, found on functions whose answer is known.
+
+BEST = np.array([2.0, 5.0])
+LOW, HIGH, FIRST = np.array([0.0, 0.0]), np.array([1e3, 1e3]), np.array([0.1, 0.1])
+
+
+@given(down=st.floats(1e-3, 1.9), up=st.floats(1e-3, 100), first=st.floats(1e-4, 10))
+@settings(max_examples=50, deadline=None)
+def test_a_lopsided_parabola_is_doubled_where_it_should_be(down: float, up: float, first: float) -> None:
+    def errors(points: np.ndarray) -> np.ndarray:
+        change = points[:, 0] - BEST[0]
+        return 3e-4 * (1 + (change / np.where(change < 0, down, up)) ** 2)
+
+    least, (found, other) = doubling_changes(errors, BEST, LOW, HIGH, np.array([first, 0.1]))
+    assert least == pytest.approx(3e-4)
+    assert found.down == pytest.approx(down, rel=2 * TOLERANCE)
+    assert found.up == pytest.approx(up, rel=2 * TOLERANCE)
+    assert found.mean == pytest.approx((down + up) / 2, rel=2 * TOLERANCE)
+    assert (other.down, other.up, other.mean) == (None, None, None)
+
+
+def test_a_bound_on_one_side_leaves_the_other_side_alone() -> None:
+    def errors(points: np.ndarray) -> np.ndarray:
+        return 1 + ((points[:, 0] - BEST[0]) / 30) ** 2 + 0 * points[:, 1]
+
+    found = doubling_changes(errors, BEST, LOW, HIGH, FIRST)[1][0]
+    assert found.down is None
+    assert found.mean == found.up == pytest.approx(30, rel=2 * TOLERANCE)
+
+
+def test_a_run_that_diverges_counts_as_doubled() -> None:
+    def errors(points: np.ndarray) -> np.ndarray:
+        return np.where(points[:, 0] > 2.7, np.nan, 1.0)
+
+    assert doubling_changes(errors, BEST, LOW, HIGH, FIRST)[1][0].up == pytest.approx(0.7, rel=2 * TOLERANCE)
+
+
+def test_an_error_with_a_step_is_doubled_at_the_step() -> None:
+    def errors(points: np.ndarray) -> np.ndarray:
+        return np.where(points[:, 0] > 3.0, 1e9, 1.0)
+
+    assert doubling_changes(errors, BEST, LOW, HIGH, FIRST)[1][0].up == pytest.approx(1.0, rel=2 * TOLERANCE)
+
+
+def test_an_error_that_falls_shows_that_the_point_was_no_minimum() -> None:
+    def errors(points: np.ndarray) -> np.ndarray:
+        return 1 + (points[:, 0] - 2.5) ** 2
+
+    assert doubling_changes(errors, BEST, LOW, HIGH, FIRST)[1][0].lowest < 0.9
+
+
+def test_searches_run_together_in_few_rounds() -> None:
+    sizes = []
+
+    def errors(points: np.ndarray) -> np.ndarray:
+        sizes.append(len(points))
+        return 1 + ((points - BEST) ** 2).sum(axis=1)
+
+    doubling_changes(errors, BEST, LOW, HIGH, FIRST)
+    assert sizes[:2] == [1, 4]
+    assert len(sizes) < 15
+
+
+def test_an_exact_fit_cannot_be_doubled() -> None:
+    with pytest.raises(SpecError, match="mean squared error is 0"):
+        doubling_changes(lambda points: np.zeros(len(points)), BEST, LOW, HIGH, FIRST)
+
+
+def test_parameters_outside_their_bounds_are_refused() -> None:
+    with pytest.raises(SpecError, match="within finite bounds"):
+        doubling_changes(lambda points: np.ones(len(points)), BEST, BEST + 1, HIGH, FIRST)
+
+
+def test_a_search_can_be_cancelled() -> None:
+    now = threading.Event()
+    now.set()
+    with pytest.raises(CancelledError):
+        doubling_changes(lambda points: np.ones(len(points)), BEST, LOW, HIGH, FIRST, cancel=now)

@@ -9,7 +9,8 @@ from model.machine_model.model import Model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 from model.validation.fidelity import validate_by_distortion
-from tests.model.validation.synthetic import arm, ramp_trace
+from tests.model.fitting.imagined import arm
+from tests.model.validation.synthetic import ramp_trace
 
 K_B2 = "joint2.motor.back_emf_constant"
 NAMES = ("link1.mass", "link1.radius", "link3.mass", "joint1.motor.back_emf_constant", K_B2)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from starlette.types import Message
 
-from server.access.turns import AT_ONCE, Turn, Turns
+from server.access.gate import AT_ONCE, Turn, Turns
 
 LIST = "/api/v1/robots/ma2000/experiments"
 

@@ -9,7 +9,7 @@ from typing import Any
 import jsonschema_rs  # schemathesis's own: an opinion that is independent of pydantic's
 import pytest
 
-from server.api.problem_examples import PROBLEM_EXAMPLES
+from server.api.documented import PROBLEM_EXAMPLES
 from server.app import bare_app
 
 JSON = ("application/json", "application/problem+json")

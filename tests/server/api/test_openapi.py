@@ -12,7 +12,6 @@ from typing import Any
 import httpx
 import pytest
 
-from daq.plugins import Plugin
 from server.api import description
 from server.app import bare_app
 from server.clock import SystemClock
@@ -104,21 +103,6 @@ def test_no_request_waits_while_the_api_description_is_built() -> None:
     assert times == 1
 
 
-def test_the_description_is_made_before_anybody_asks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(description, "AFTER", 0.0)
-    app, made = bare_app(None), threading.Event()
-    described = description.Described(app)
-
-    def slow() -> dict[str, Any]:
-        made.set()
-        return {}
-
-    app.openapi = slow  # type: ignore[method-assign]
-    described.begin_soon()
-    assert made.wait(60)
-    described.close()
-
-
 def test_a_description_that_failed_is_made_again() -> None:
     app = bare_app(None)
     answers = iter([MemoryError(), {}])
@@ -133,45 +117,6 @@ def test_a_description_that_failed_is_made_again() -> None:
     making = description.Described(app)
     assert isinstance(making.begin().exception(60), MemoryError)
     assert [making.begin().result(60) for _ in range(2)] == [b"{}", b"{}"]
-
-
-def test_a_description_is_kept_for_the_next_start_until_the_program_changes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    app, kept, times = bare_app(None), tmp_path / "openapi.json", 0
-
-    def build() -> dict[str, Any]:
-        nonlocal times
-        times += 1
-        return {"made": times}
-
-    app.openapi = build  # type: ignore[method-assign]
-
-    def told() -> bytes:
-        return description.Described(app, kept).begin().result(60)
-
-    assert [told(), told()] == [b'{"made":1}'] * 2
-    kept.write_bytes(kept.read_bytes()[:-1])  # a power cut
-    assert told() == b'{"made":2}'
-    monkeypatch.setattr(description, "sources_digest", lambda: b"another")
-    assert [told(), told()] == [b'{"made":3}'] * 2
-    monkeypatch.setattr(description, "sources_digest", lambda: b"third")
-    kept.unlink()
-    kept.mkdir()
-    assert told() == b'{"made":4}', "it cannot be kept"
-
-
-def test_the_routes_of_a_plug_in_and_its_files_are_of_the_program(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    module = tmp_path / "mine_of_a_lab.py"
-    module.write_text("router = 1\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    before = description.sources_digest()
-    monkeypatch.setattr(description, "plugins", lambda: (Plugin(routes=("mine_of_a_lab:router",)),))
-    added = description.sources_digest()
-    module.write_text("router = 12\n")
-    assert len({before, added, description.sources_digest()}) == 3
 
 
 CHECKS = "status_code_conformance,content_type_conformance,response_schema_conformance"

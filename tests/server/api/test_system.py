@@ -16,7 +16,7 @@ from sqlalchemy import event
 from sqlalchemy.exc import OperationalError
 
 from server.clock import SystemClock
-from server.readiness import KEPT_FOR, Readiness
+from server.services import KEPT_FOR, Readiness
 from server.store.engine import Store
 from tests.server.clocks import HandClock
 from tests.server.inside import service_inside
@@ -38,7 +38,7 @@ def _read_only(**_: object) -> NoReturn:
 def test_a_disk_that_cannot_be_written_is_not_ready_and_only_who_may_see_the_robot_is_told_why(
     api: httpx.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.readiness.KEPT_FOR", 0.0)
+    monkeypatch.setattr("server.services.KEPT_FOR", 0.0)
     address = api.base_url.join("/readyz")
     healthy = {"database": "", "traces": "", "room": "", "robot ma2000": ""}
     assert api.get(address).json()["checks"].items() >= healthy.items()

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from server.jobs.service import worker_processes
-from server.jobs.yielding import NICENESS
+from server.jobs.shared_workers import NICENESS
 
 FOREVER = """
 from server.jobs.service import worker_processes

@@ -19,7 +19,7 @@ from server.bounded.messages import Limits, ReadModel, ReadUpload
 from server.bounded.process import LONGEST_LINE, answer_order
 from server.bounded.workers import ExhaustedError, Workers
 from server.problems import ProblemError
-from tests.daq.traces.test_formats import FORMAT_1
+from tests.daq.traces.test_salvage import FORMAT_1
 from tests.server.hostile_files import bomb, hostile_tables, hostile_traces, sound_trace, table
 from tests.server.service import Service
 

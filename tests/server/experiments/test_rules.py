@@ -16,10 +16,8 @@ from daq.contracts.service.experiments import ENDS
 from daq.contracts.service.robot import RobotIdentity
 from daq.owner.messages import ArmReport
 from daq.trajectories.planner import plan, start_angles
-from server.experiments.length import LONGEST, least_length, points_of
-from server.experiments.order import Waiting, next_due
-from server.experiments.schedule import Plan, first, following, is_due, zone_here
-from server.experiments.states import Event, IllegalEventError, advance, after_restart
+from server.experiments.schedule import LONGEST, Plan, first, following, is_due, least_length, points_of, zone_here
+from server.experiments.states import Event, IllegalEventError, Waiting, advance, after_restart, next_due
 from server.problems import ProblemError
 from server.queue.readiness import Circumstances, what_is_missing
 

@@ -12,10 +12,10 @@ from model.discrepancy.diagnosis import Where
 from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.thresholds import THRESHOLDS
 from model.effects.library import library
-from server.jobs import headlines
-from server.jobs.diagnosis_data import diagnosis_data
+from server.jobs import results
 from server.jobs.overlays import LEAST_POINTS, overlay, overlays
 from server.jobs.results import DiagnosisData, JobResult
+from server.jobs.work import diagnosis_data
 from tests.model.discrepancy.answers import an_answer
 from tests.server.service import Service
 
@@ -97,7 +97,7 @@ def test_why_a_clear_dependence_is_no_finding_is_told_with_what_came_nearest() -
 
 def test_the_headline_of_a_comparison_tells_the_errors() -> None:
     _, comparison = an_answer(4.0)
-    assert headlines.of_comparison(comparison).startswith("error before ")
+    assert results.of_comparison(comparison).startswith("error before ")
     assert len(overlays(comparison.signals)) == 2
 
 

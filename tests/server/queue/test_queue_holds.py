@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from server.queue.attendance import ATTENDANCE
+from server.queue.context import ATTENDANCE
 from server.queue.service import QueueService
 from server.robot.control import LEASE_TIME
 from tests.server.queue.bench import CALM, REAL, TOO_LONG, Bench

@@ -10,7 +10,7 @@ from daq.contracts.service.robot import RobotIdentity
 from daq.contracts.trace import TraceEvent
 from daq.owner.messages import EventHappened, Opened, Progress
 from server.problems import ProblemError
-from server.queue.attendance import ATTENDANCE, Attendance
+from server.queue.context import ATTENDANCE, Attendance
 from tests.server.clocks import HandClock
 from tests.server.queue.bench import CALM, REAL, SPEC, Bench, done
 

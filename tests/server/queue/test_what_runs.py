@@ -6,7 +6,7 @@ from daq.contracts.service.experiments import ExperimentRequest
 from daq.owner.messages import Answer, HaltRun
 from server.experiments.states import Event
 from server.problems import ProblemError
-from server.queue.attendance import ATTENDANCE
+from server.queue.context import ATTENDANCE
 from tests.server.meanwhile import raising
 from tests.server.queue.bench import AT_ONCE, FULL, REAL, SPEC, TOO_LONG, Bench, done
 

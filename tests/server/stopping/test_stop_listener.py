@@ -31,8 +31,8 @@ from server.access.origin import beside
 from server.access.sessions import SessionStore
 from server.access.stop_gate import StopGate, TokensCannotBeReadError
 from server.access.tokens import KnownTokens, TokenStore
-from server.listening import ListenError, listening
 from server.problems import ProblemError
+from server.serve import ListenError, listening
 from server.stopping.door import StopDoor
 from server.stopping.listener import StopListener
 from server.stopping.messages import Begin

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import pytest
 
 from server.stopping.messages import NEWS, Stopped
-from server.stopping.teller import Teller
+from server.stopping.process import Teller
 
 
 def stop(number: int) -> Stopped:

@@ -2,8 +2,7 @@
 
 import pytest
 
-from extras.commissioning.memory.findings import Finding, Findings
-from extras.commissioning.memory.map_text import begun_map_text
+from extras.commissioning.memory.findings import Finding, Findings, begun_map_text
 from firmware_protocol.errors import MemoryMapError
 from firmware_protocol.memory_map import SINGLE_REGISTERS, default_memory_map, parse_memory_map
 

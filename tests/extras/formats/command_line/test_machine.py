@@ -7,12 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from daq.contracts.machine import load_machine
+from daq.contracts.machine import Body, Machine, PlainGain, load_machine
 from tests.daq_cli.hostile import FILES, hostile_file, refuses
 from tests.daq_cli.invoke import CommandLine
 
+Floats = NDArray[np.float64]
 EXAMPLE = Path(__file__).parents[4] / "examples" / "reach_arm.urdf"
 
 
@@ -23,7 +26,7 @@ def urdf() -> str:
 
 @pytest.mark.parametrize("kind", FILES)
 def test_a_file_that_is_no_urdf_is_refused_in_one_line(daq: CommandLine, kind: str) -> None:
-    refuses(daq("machine", "from-urdf", hostile_file(kind, ".urdf")))
+    refuses(daq("machine", "new", "--urdf", hostile_file(kind, ".urdf")))
 
 
 @pytest.mark.parametrize(
@@ -41,18 +44,21 @@ def test_a_file_that_is_no_urdf_is_refused_in_one_line(daq: CommandLine, kind: s
         ("--joints turn --gravity 0,0", "--gravity '0,0': write 3 numbers, separated by commas"),
         ("--joints turn --tip foot", "--tip foot: is no link that the last joint carries; it carries column, boom"),
         ("--joints turn --drives nothing.toml", "machine 'nothing.toml': no such file"),
+        ("--joints turn,lift --drives 1N·m/A,1N·m/A,1N·m/A", "--drives names 3, and there are 2 joints"),
+        ("--joints turn,lift --drives 1N·m/A,feetech/sts", "drive 'feetech/sts' is not in the library; did you mean"),
+        ("--joints reach --drives 1N·m/A", "drive: unit is 'N·m/A', must be 'N/V'"),
         ("--joints turn --drives ma2000", "drives of ma2000: none of its joints (waist, shoulder"),
-        ("--joints turn --name Turn", "arm.urdf: name: found 'Turn', must match"),
+        ("Turn --joints turn", "arm.urdf: name: found 'Turn', must match"),
         ("--joints turn -o arm.urdf", "arm.urdf: is there already; name another file with -o"),
         ("--joints turn -o there/arm.toml", "there is no folder"),
     ],
 )
 def test_wrong_input_is_refused_in_one_line(daq: CommandLine, urdf: str, words: str, said: str) -> None:
-    daq("machine", "from-urdf", urdf, *words.split()).complains(2, said)
+    daq("machine", "new", "--urdf", urdf, *words.split()).complains(2, said)
 
 
 def test_json_tells_file_joints_and_notes(daq: CommandLine, urdf: str) -> None:
-    said = daq("machine", "from-urdf", urdf, "--joints", "lift,reach", "--gravity", "9.81,0,0", "--json")
+    said = daq("machine", "new", "--urdf", urdf, "--joints", "lift,reach", "--gravity", "9.81,0,0", "--json")
     answer = json.loads(said.out)
     assert (answer["file"], answer["machine"], answer["joints"]) == ("reach-arm.toml", "reach-arm", ["lift", "reach"])
     assert "Held: turn at 0, left_finger at 0, right_finger at 0." in answer["notes"]
@@ -77,46 +83,108 @@ def test_text_goes_to_standard_output_unless_a_file_is_named(daq: CommandLine) -
 
 
 ANSWERS = """\
-0.4
+2
+robotis/xm430
+robotis/xm430-w350
+150 g ± 10 %
+40 furlong·kg
+40 mm
+across
+crossed
 
-current
-0.05
-zero
-100
-1e-5
-
-
-weird
-other
-volts
-V
-2.5
-0.01
+0.12 kg
+160 mm
 """
-"""Of joint turn: viscous, no Coulomb, a current with constant, gear (once wrong) and rotor; of lift: gains in volts."""
+"""Of joint 1: drive, length and axis are once wrong; of joint 2 the drive is not known."""
 
 
-def test_what_is_asked_becomes_part_of_the_file(urdf: str) -> None:
+def test_what_is_asked_becomes_the_file() -> None:
     program = "import sys; from daq_cli.app.command import main; main(sys.argv[1:])"
-    command = [sys.executable, "-c", program, "machine", "from-urdf", urdf, "--joints", "turn,lift", "--ask"]
-    environment = os.environ | {"PYTHONPATH": str(EXAMPLE.parents[1])}
     done = subprocess.run(
-        command, input=ANSWERS, capture_output=True, text=True, timeout=60, env=environment, check=False
+        [sys.executable, "-c", program, "machine", "new", "pan-tilt"],
+        input=ANSWERS,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env=os.environ | {"PYTHONPATH": str(EXAMPLE.parents[1])},
+        check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert "1 'zero': write a number" in done.stderr
-    assert "'weird': answer torque, current, other, or Enter" in done.stderr
-    assert "'volts': answer V, A, N·m, N, count, %, 1, or Enter for V" in done.stderr
-    turn, lift = load_machine("reach-arm.toml").joints
-    assert turn.drive.kind == "current"
-    assert (turn.drive.torque_constant.value, turn.drive.gear_ratio.value) == (0.05, 100.0)
-    assert turn.drive.rotor_inertia is not None
-    assert turn.drive.rotor_inertia.value == 1e-5
-    assert turn.friction.viscous is not None
-    assert turn.friction.viscous.value == 0.4
-    assert turn.friction.coulomb is None
-    assert lift.drive.kind == "gain"
-    assert (lift.drive.gain.value, lift.drive.gain.unit) == (2.5, "N·m/V")
-    assert lift.friction.viscous is not None
-    assert lift.friction.viscous.source == "arm.urdf"
-    assert "Assumed of lift: no Coulomb friction." in done.stderr
+    assert "drive 'robotis/xm430' is not in the library; did you mean" in done.stderr
+    assert "unit is 'furlong·kg', must be 'm'" in done.stderr
+    assert "'across': answer parallel or crossed" in done.stderr
+    assert "Measure first, for their deviations move the torques most:" in done.stderr
+    assert Path("pan-tilt.toml").read_text("utf-8").splitlines() == [
+        'name = "pan-tilt"',
+        "",
+        "[[joints]]",
+        'name = "joint_1"',
+        'geometry = { a = "40 mm", alpha = "90 deg" }',
+        'link = { mass = "150 g ± 10 %" }',
+        'drive = "robotis/xm430-w350"',
+        "",
+        "[[joints]]",
+        'name = "joint_2"',
+        'geometry = { a = "160 mm" }',
+        'link = { mass = "0.12 kg" }',
+        'drive = { gain = "1 N·m/V ± 50 %, assumed: nothing is known of it" }',
+        'friction = { viscous = "0 ± 0.1 N·m·s/rad, guess", coulomb = "0 ± 0.1 N·m, guess" }',
+    ]
+
+
+def test_names_of_servos_make_a_file_and_say_what_to_measure(daq: CommandLine) -> None:
+    said = daq("machine", "new", "head", "--joints", "pan,tilt", "--drives", "feetech/sts3215-7.4V", "--json")
+    answer = json.loads(said.out)
+    machine = load_machine("head.toml")
+    assert [joint.name for joint in machine.joints] == ["pan", "tilt"]
+    assert machine.controller.kind == "pid"
+    assert len(answer["sharpest"]) == 3
+    assert answer["defaults"][0] == "controller.delay 0 s"
+    daq("machine", "new").complains(2, "give a name, or --urdf and a file")
+
+
+def test_the_gain_of_unknown_drives_is_that_of_a_record(daq: CommandLine, urdf: str) -> None:
+    """Currents of 0.25 A per N·m of the load's weight, as a record of the turned arm shows them."""
+    time = 0.01 * np.arange(2000)
+    lift = 0.45 + 0.6 * np.sin(0.4 * time)
+    daq("machine", "new", "--urdf", urdf, "--joints", "lift", "-o", "lift.toml")
+    friction = 0.5 * np.sign(np.cos(0.4 * time))
+    current = 0.25 * (weight_of(load_machine("lift.toml"), lift) + friction)
+    table = [f"{t:.2f},{q:.6f},{i:.6f}" for t, q, i in zip(time, lift, current, strict=True)]
+    Path("run.csv").write_text("\n".join(["time,position_1,drive_1", *table, ""]), "utf-8")
+    Path("run.toml").write_text('drive_unit = "A"\n', "utf-8")
+    said = daq("machine", "new", "--urdf", urdf, "--joints", "lift", "--record", "run.csv", "-o", "driven.toml")
+    gain = load_machine("driven.toml").joint(1).drive
+    assert isinstance(gain, PlainGain)
+    assert gain.gain.unit == "N·m/A"
+    assert gain.gain.value == pytest.approx(4.0, rel=0.03)
+    assert "it explains" in gain.gain.source
+    assert said.code == 0
+
+
+def weight_of(machine: Machine, angles: Floats) -> Floats:
+    """Torque that holds one turning body against gravity, by its Denavit-Hartenberg parameters."""
+    joint = machine.joint(1)
+    assert isinstance(joint.link, Body)
+    alpha, a, d = joint.geometry.alpha.value, joint.geometry.a.value, joint.geometry.d.value
+    x, y, z = (c.value for c in joint.link.centre)
+    own = np.array([a + x, np.cos(alpha) * y - np.sin(alpha) * z, d + np.sin(alpha) * y + np.cos(alpha) * z])
+    turn = angles + joint.geometry.theta.value
+    east = np.cos(turn) * own[0] - np.sin(turn) * own[1]
+    north = np.sin(turn) * own[0] + np.cos(turn) * own[1]
+    return -joint.link.mass.value * (east * machine.gravity[1] - north * machine.gravity[0])
+
+
+def test_a_file_is_tidied_where_it_lies_or_elsewhere(daq: CommandLine) -> None:
+    shutil.copy(EXAMPLE.parent / "pan_tilt.toml", "mine.toml")
+    before = Path("mine.toml").read_text("utf-8")
+    assert daq("machine", "tidy", "mine.toml", "-o", "other.toml").out == "other.toml\n"
+    assert Path("other.toml").read_text("utf-8") == before
+    Path("mine.toml").write_text(before.replace("bits = 12", "bits = 99"), "utf-8")
+    daq("machine", "tidy", "mine.toml").complains(2, "joints.1.sensor.bits: found 99, must be at most 32")
+
+
+def test_drives_are_listed_and_one_is_shown_with_its_numbers(daq: CommandLine) -> None:
+    assert len(daq("machine", "drives").out.splitlines()) >= 25
+    assert "drive.torque_constant = 0.115 N·m/A ± 15 %" in daq("machine", "drives", "ak80-9").out
+    daq("machine", "drives", "nobody").complains(2, "no drive has 'nobody' in its name")

@@ -13,8 +13,7 @@ from urllib.parse import urlsplit
 
 import boto3
 
-from extras.lab.archive.bucket import Bucket
-from extras.lab.archive.credentials import Credentials
+from extras.lab.archive.bucket import Bucket, Credentials
 from extras.lab.archive.settings import ArchiveSettings
 
 STORE = """

@@ -9,9 +9,8 @@ import pytest
 
 from daq.config.settings import load_settings
 from daq.contracts.errors import SpecError
-from extras.lab.archive.credentials import load_credentials
+from extras.lab.archive.bucket import load_credentials, object_name
 from extras.lab.archive.health import pause_after
-from extras.lab.archive.names import object_name
 from extras.lab.archive.settings import ArchiveSettings
 from tests.extras.lab.archive.store import ACCESS, SECRET
 

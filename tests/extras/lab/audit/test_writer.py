@@ -10,8 +10,7 @@ from sqlalchemy import text
 
 from daq.contracts.service.audit import AuditEntry
 from extras.lab.audit.log import AuditLog, AuditSearch
-from extras.lab.audit.repeats import COUNTED_FOR, MOST_KEYS, Repeats
-from extras.lab.audit.writer import AuditWriter
+from extras.lab.audit.writer import COUNTED_FOR, MOST_KEYS, AuditWriter, Repeats
 from server.store.engine import Store
 from tests.extras.lab.audit.notes import made_note
 

@@ -11,15 +11,13 @@ import sys
 from pathlib import Path
 
 from daq.contracts.errors import DaqError
-from daq.contracts.service.jobs import SimulateStudy
 from daq.executors.workers import ending
 from daq.traces.catalogue import list_traces
 from daq.traces.query import TraceQuery
-from extras.lab.batches.choice import chosen_traces
 from extras.lab.batches.executors import open_workers
 from extras.lab.batches.folder import Row, asked_of, opened
-from extras.lab.batches.run import Standing, run_batch
-from extras.lab.batches.study import Common
+from extras.lab.batches.run import Standing, chosen_traces, run_batch
+from extras.lab.batches.study import Common, SimulateStudy
 from tests.extras.lab.batches.traces import MACHINE
 
 AFTER = 5

@@ -7,7 +7,7 @@ from distributed import LocalCluster
 from daq.contracts.errors import ReachError
 from daq.executors import done_in_any_order
 from daq.executors.workers import ending
-from extras.lab.batches.dask import connected
+from extras.lab.batches import dask
 from tests.daq.executors.by_hand import square
 
 
@@ -18,13 +18,16 @@ def fails(number: int) -> int:
 
 def main() -> None:
     """Prints what came out."""
-    cluster = LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None)
-    with ending(connected("dask://", cluster.scheduler_address, cluster)) as workers:
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
+        ending(dask.connected("dask://", cluster.scheduler_address)) as workers,
+    ):
         squares = sorted(future.result() for _, future in done_in_any_order(workers, square, range(6)))
         ((_task, failed),) = done_in_any_order(workers, fails, [3])
         found = {"count": workers.count(), "squares": squares, "failed": repr(failed.exception())}
+    dask.PATIENCE = 0.2
     try:
-        connected("dask://127.0.0.1:9", "tcp://127.0.0.1:9", patience=0.2)
+        dask.connected("dask://127.0.0.1:9", "tcp://127.0.0.1:9")
     except ReachError as error:
         found["refused"] = str(error)
     print(json.dumps(found))

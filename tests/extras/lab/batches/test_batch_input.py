@@ -7,7 +7,7 @@ import pytest
 from daq.contracts.service.jobs import DiagnoseStudy
 from daq_cli.robot.operations import RobotAccess
 from extras.lab.batches import command
-from extras.lab.batches.shown import Asked
+from extras.lab.batches.command import Asked
 from extras.lab.batches.study import Study
 from tests.daq_cli.invoke import CommandLine
 

@@ -16,12 +16,10 @@ from daq.traces.catalogue import list_traces
 from daq.traces.query import TraceQuery
 from daq.traces.reader import read_trace
 from daq_cli.models.service_jobs import _given
-from extras.lab.batches.choice import chosen_traces
 from extras.lab.batches.folder import BatchFolder, BatchInUseError, asked_of, opened
-from extras.lab.batches.run import Chosen, Standing, run_batch
+from extras.lab.batches.run import Chosen, Standing, chosen_traces, run_batch
 from extras.lab.batches.study import Answer, Common, SimulateStudy
-from model.discrepancy.inverse_dynamics.options import torque_options
-from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.options import DiagnosisOptions, torque_options
 from model.fitting.options import FitOptions
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from extras.lab.batches.table import write_parquet
+from extras.lab.batches.folder import write_parquet
 
 
 def test_no_parquet_of_an_earlier_run_stays_where_none_can_be_written(

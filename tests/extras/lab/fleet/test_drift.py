@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from daq.contracts.service.fleet import FittedNumber
-from extras.lab.fleet.drift import CHANCE, Pair, changes_of
+from extras.lab.fleet.comparison import CHANCE, Pair, changes_of
 
 
 def number(value: float, deviation: float = 0.01, unit: str = "N·m", name: str = "a") -> FittedNumber:

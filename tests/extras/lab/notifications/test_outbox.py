@@ -14,8 +14,8 @@ from daq.contracts.service.notifications import Notification
 from daq.owner.messages import ArmReport
 from extras.lab.notifications.delivery import DeliveryError, Message
 from extras.lab.notifications.destinations import Destination
-from extras.lab.notifications.occasions import Faults
 from extras.lab.notifications.outbox import PAUSES, Outbox, pause_after
+from extras.lab.notifications.part import Faults
 from extras.lab.notifications.service import Notifier, message_of
 from server.clock import SystemClock
 from server.store.engine import Store

@@ -19,11 +19,18 @@ from standardwebhooks import WebhookVerificationError
 from daq.config.settings import load_settings
 from daq.contracts.errors import SpecError
 from daq.contracts.service.notifications import Notification
-from extras.lab.notifications.addresses import RefusedAddressError, addresses_of, resolve, why_refused
 from extras.lab.notifications.delivery import DeliveryError
 from extras.lab.notifications.service import message_of
 from extras.lab.notifications.settings import WebhookSettings
-from extras.lab.notifications.webhook import Webhook, load_secret, signature_of
+from extras.lab.notifications.webhook import (
+    RefusedAddressError,
+    Webhook,
+    addresses_of,
+    load_secret,
+    resolve,
+    signature_of,
+    why_refused,
+)
 from tests.extras.lab.notifications.receivers import SECRET, receiver, secret_file
 from tests.server.authority import Authority
 

@@ -1,5 +1,15 @@
-"""A browser, as the tests of the page have it."""
+"""A browser for one file of tests. It ends with the file: while it is there, no other test can start one."""
 
-from tests.server.dashboard.conftest import browser, driver
+from collections.abc import Iterator
 
-__all__ = ["browser", "driver"]
+import pytest
+from playwright.sync_api import Browser
+
+from tests.server.dashboard.browser import WITHOUT_3D, chromium, playwright
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """The system's Chromium, without 3-D."""
+    with playwright() as driver, chromium(driver, *WITHOUT_3D) as found:
+        yield found

@@ -8,7 +8,7 @@ from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from daq.contracts.service.jobs import CompareRequest, Job
-from extras.lab.prometheus.counts import Counts
+from extras.lab.prometheus.part import Counts
 from tests.server.service import Service
 
 NOON = datetime(2026, 3, 2, 12, 0, tzinfo=UTC)

@@ -2,17 +2,22 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
+from daq.contracts.progress import Never
 from model.arrays import Floats
 from model.discrepancy.candidates.candidate_fit import (
     CandidateFit,
+    Fit,
     diverged_from_prior,
+    fit_several_joints,
     judge,
+    nearest,
     polish,
     refit,
     restart,
@@ -23,6 +28,7 @@ from model.discrepancy.candidates.probing import Probe, probe
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.search import converge, point_at
+from model.discrepancy.thresholds import THRESHOLDS
 from tests.model.fitting import imagined
 
 DELAY = 0.015
@@ -155,3 +161,56 @@ def test_lifting_a_prior_brings_no_more_than_the_prior_costs() -> None:
     assert lifted.cost < before.point.cost - 50, "the other fit is astray"
     counted = with_evidence(before, found, lifted)
     assert counted.evidence + counted.price == pytest.approx(0.04)
+
+
+# ---- One effect on several joints: found on all of them at once, and not where only one has it.
+
+LOSS = 0.2
+
+
+@cache
+def before(joints: tuple[int, ...]) -> tuple[Fit, tuple[Probe, ...]]:
+    """A record of an arm whose gears lose so much on these joints, its tolerance fit, and gear loss probed there."""
+    arm = imagined.arm().with_effect("gear_loss", joints, {"loss": LOSS})
+    given = point_at(*observe(imagined.arm(), [imagined.trace(arm, seconds=8.0)]))
+    fitted = judge(converge(given, 4))
+    probes = probe(fitted.point, hypotheses(fitted.point.model, ("gear_loss",), (1, 2, 3)))
+    return fitted, tuple(probes)
+
+
+@cache
+def fits(joints: tuple[int, ...]) -> tuple[tuple[CandidateFit, ...], tuple[CandidateFit, ...]]:
+    """Of gear loss on every joint alone, and on several."""
+    fitted, probes = before(joints)
+    singles = [r for r in (refit(fitted, p) for p in probes) if r is not None]
+    return tuple(singles), tuple(fit_several_joints(fitted, singles, probes, THRESHOLDS, Never()))
+
+
+def test_an_effect_on_three_joints_is_found_on_all_of_them() -> None:
+    singles, several = fits((1, 2, 3))
+    best = max(several, key=lambda r: r.evidence)
+    assert best.hypothesis.joints == (1, 2, 3)
+    assert best.evidence > max(r.evidence for r in singles) + THRESHOLDS.significant
+    for joint in (1, 2, 3):
+        found = best.fit.point.value(f"joint{joint}.gear_loss.loss")
+        assert abs(found - LOSS) < 0.25 * LOSS
+
+
+def test_an_effect_on_one_joint_is_found_on_no_other() -> None:
+    singles, several = fits((2,))
+    assert max(singles, key=lambda r: r.evidence).hypothesis.joints == (2,)
+    assert several == ()
+
+
+@pytest.mark.slow
+def test_an_effect_on_two_joints_is_not_found_on_the_third() -> None:
+    _, several = fits((1, 3))
+    assert max(several, key=lambda r: r.evidence).hypothesis.joints == (1, 3)
+
+
+def test_a_fit_begins_from_the_start_that_explains_more() -> None:
+    fitted, probes = before((2,))
+    right = next(p for p in probes if p.hypothesis.joints == (2,))
+    wrong = replace(right, start=dict.fromkeys(right.start, 0.9))
+    assert nearest(fitted.point, [wrong, right]) is right
+    assert nearest(fitted.point, [right, wrong]) is right

@@ -12,12 +12,10 @@ from daq.contracts.progress import Never, silent
 from daq.contracts.trace import Trace
 from daq.safety.planned import planned
 from daq.trajectories.offered import offered_experiments
-from daq_cli.trial.experiments import trial_experiment
 from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, refit
-from model.discrepancy.candidates.decision import decide
 from model.discrepancy.candidates.library import Hypothesis
 from model.discrepancy.candidates.probing import Probe
-from model.discrepancy.candidates.ranking import Ranking, rank
+from model.discrepancy.candidates.ranking import Ranking, decide, rank
 from model.discrepancy.experiment_design.next_experiment import (
     ExperimentChooser,
     best_experiment,
@@ -25,7 +23,7 @@ from model.discrepancy.experiment_design.next_experiment import (
     most_information,
     rivals_of,
 )
-from model.discrepancy.explanation.note_words import note_words
+from model.discrepancy.explanation.notes import note_words
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.case import build_case
@@ -34,6 +32,7 @@ from model.discrepancy.output_error.search import Point, converge, descend, poin
 from model.discrepancy.thresholds import THRESHOLDS
 from model.machine_model.model import Model
 from tests.model.fitting import imagined
+from trials.blind.experiments import trial_experiment
 
 EXPERIMENTS = {e.name: e for e in offered_experiments()}
 FRICTION = ("coulomb_friction", "stribeck_friction")

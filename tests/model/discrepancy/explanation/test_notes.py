@@ -6,23 +6,29 @@ from typing import get_args
 import pytest
 
 from model.discrepancy.diagnosis import Phase
-from model.discrepancy.explanation import phrases
-from model.discrepancy.explanation.note_words import WHOLE, WRITTEN, note_words
-from model.discrepancy.explanation.notes import on_drives_at_limit, on_named_numbers, on_stated_numbers, on_unfinished
-from model.discrepancy.grounds import Method, Note, NoteKind, PatternKind, RefusalKind
+from model.discrepancy.explanation import effect_words
+from model.discrepancy.explanation.notes import (
+    WHOLE,
+    WRITTEN,
+    note_words,
+    on_drives_at_limit,
+    on_named_numbers,
+    on_stated_numbers,
+    on_unfinished,
+)
+from model.discrepancy.grounds import Method, Note, NoteKind, RefusalKind
+from model.discrepancy.output_error.noise_model import note_on_noise
 from model.discrepancy.output_error.observation import observe
-from model.discrepancy.output_error.shown_noise import note_on_noise
 from model.fitting.unknowns import Unknown
 from tests.model.fitting import imagined
 
 
 def test_every_kind_of_note_and_pattern_has_its_words() -> None:
-    assert {*phrases.NOTES, *WHOLE} == set(get_args(NoteKind))
-    assert set(WRITTEN) <= set(phrases.NOTES)
-    assert set(phrases.PATTERNS) == set(get_args(PatternKind))
-    assert set(phrases.REFUSALS) == set(get_args(RefusalKind))
-    assert set(phrases.PHASES) == set(get_args(Phase))
-    assert set(phrases.METHODS) == set(get_args(Method))
+    assert {*effect_words.NOTES, *WHOLE} == set(get_args(NoteKind))
+    assert set(WRITTEN) <= set(effect_words.NOTES)
+    assert set(effect_words.REFUSALS) == set(get_args(RefusalKind))
+    assert set(effect_words.PHASES) == set(get_args(Phase))
+    assert set(effect_words.METHODS) == set(get_args(Method))
 
 
 def test_a_record_that_ended_early_is_named() -> None:

@@ -5,15 +5,15 @@ masses and a spring, the six-joint arm a cloud of points whose accelerations are
 """
 
 from collections.abc import Callable, Mapping
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from daq.contracts.machine import Machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model.arrays import Floats
+from tests.model.imported import imported
 
 Wanted = Callable[[float], tuple[float, float, float]]
 
@@ -23,13 +23,42 @@ def quantity(value: float, unit: str, **more: Any) -> dict[str, Any]:
     return {"value": value, "unit": unit, "source": "test", **more}
 
 
+def geometry(a: float = 0.0, alpha: float = 0.0, d: float = 0.0) -> dict[str, Any]:
+    """Denavit and Hartenberg's numbers of a joint (m, rad, m)."""
+    return {
+        "a": quantity(a, "m"),
+        "alpha": quantity(alpha, "rad"),
+        "d": quantity(d, "m"),
+        "theta": quantity(0.0, "rad"),
+    }
+
+
+def body(mass: dict[str, Any], inertia: list[dict[str, Any]] | None = None) -> dict[str, Any]:
+    """A link whose centre is its frame's origin, without moments of inertia unless they are given."""
+    nothing = [quantity(0.0, "kg·m²")] * 6
+    return {"shape": "body", "mass": mass, "centre": [quantity(0.0, "m")] * 3, "inertia": inertia or nothing}
+
+
+def machine_of(name: str, title: str, gravity: list[float], *joints: dict[str, Any]) -> Machine:
+    """Joints that are all modelled, and a controller that nobody knows."""
+    return Machine.model_validate(
+        {
+            "version": 1,
+            "name": name,
+            "title": title,
+            "gravity": gravity,
+            "modelled_joints": list(range(1, len(joints) + 1)),
+            "controller": {"kind": "none"},
+            "joints": joints,
+        }
+    )
+
+
 def trace_of(
     name: str, time: Floats, position: Floats, drive: Floats, unit: Any, velocity: Floats | None = None
 ) -> Trace:
     """A trace (k, n) as an import would give it."""
-    record = TraceRecord(
-        trace_id=name, created=datetime(2024, 1, 1, tzinfo=UTC), software="test", source="imported", drive_unit=unit
-    )
+    record = imported(name, drive_unit=unit)
     joints = tuple(range(1, position.shape[1] + 1))
     return Trace(record, joints, time, position, drive=drive, velocity=velocity)
 
@@ -70,35 +99,14 @@ ENCODER = 5e-6
 
 def slide_machine() -> Machine:
     """One prismatic joint along the horizontal, 0.6 m of travel."""
-    return Machine.model_validate(
-        {
-            "version": 1,
-            "name": "slide",
-            "title": "Sliding axis",
-            "gravity": [0.0, -9.81, 0.0],
-            "modelled_joints": [1],
-            "controller": {"kind": "none"},
-            "joints": [
-                {
-                    "name": "slide",
-                    "kind": "prismatic",
-                    "geometry": {
-                        "a": quantity(0.0, "m"),
-                        "alpha": quantity(0.0, "rad"),
-                        "d": quantity(0.0, "m"),
-                        "theta": quantity(0.0, "rad"),
-                    },
-                    "link": {
-                        "shape": "body",
-                        "mass": quantity(12.0, "kg", low=0.1, deviation=0.6),
-                        "centre": [quantity(0.0, "m")] * 3,
-                        "inertia": [quantity(0.0, "kg·m²")] * 6,
-                    },
-                    "drive": {"kind": "gain", "gain": quantity(1.0, "N/N")},
-                }
-            ],
-        }
-    )
+    slide = {
+        "name": "slide",
+        "kind": "prismatic",
+        "geometry": geometry(),
+        "link": body(quantity(12.0, "kg", low=0.1, deviation=0.6)),
+        "drive": {"kind": "gain", "gain": quantity(1.0, "N/N")},
+    }
+    return machine_of("slide", "Sliding axis", [0.0, -9.81, 0.0], slide)
 
 
 def slide_trace(seed: int, hidden: Mapping[str, float], duration: float = 16.0) -> Trace:
@@ -148,52 +156,31 @@ BENCH = {
 
 def bench_machine() -> Machine:
     """A motor with a flywheel; the sensor measures speed."""
-    return Machine.model_validate(
-        {
-            "version": 1,
-            "name": "bench",
-            "title": "Motor bench",
-            "gravity": [0.0, 0.0, -9.81],
-            "modelled_joints": [1],
-            "controller": {"kind": "none"},
-            "joints": [
-                {
-                    "name": "shaft",
-                    "kind": "revolute",
-                    "geometry": {
-                        "a": quantity(0.0, "m"),
-                        "alpha": quantity(0.0, "rad"),
-                        "d": quantity(0.0, "m"),
-                        "theta": quantity(0.0, "rad"),
-                    },
-                    "link": {
-                        "shape": "body",
-                        "mass": quantity(0.1, "kg"),
-                        "centre": [quantity(0.0, "m")] * 3,
-                        "inertia": [quantity(0.0, "kg·m²")] * 6,
-                    },
-                    "drive": {
-                        "kind": "dc_motor",
-                        "resistance": quantity(2.0, "Ω"),
-                        "inductance": quantity(1e-3, "H"),
-                        "torque_constant": quantity(0.05, "N·m/A"),
-                        "back_emf_constant": quantity(0.05, "V·s/rad", deviation=0.001),
-                        "rotor_inertia": quantity(2e-4, "kg·m²", low=0.0, deviation=1e-5),
-                        "gear_ratio": quantity(1.0, "1"),
-                        "amplifier_gain": quantity(1.0, "1"),
-                        "dac_full_scale": quantity(12.0, "V"),
-                    },
-                    "friction": {"viscous_motor_side": quantity(1e-5, "N·m·s/rad", low=0.0, deviation=1e-5)},
-                    "sensor": {
-                        "bits": 16,
-                        "range": quantity(800.0, "rad"),
-                        "at_zero": quantity(-400.0, "rad"),
-                        "measures": "velocity",
-                    },
-                }
-            ],
-        }
-    )
+    shaft = {
+        "name": "shaft",
+        "kind": "revolute",
+        "geometry": geometry(),
+        "link": body(quantity(0.1, "kg")),
+        "drive": {
+            "kind": "dc_motor",
+            "resistance": quantity(2.0, "Ω"),
+            "inductance": quantity(1e-3, "H"),
+            "torque_constant": quantity(0.05, "N·m/A"),
+            "back_emf_constant": quantity(0.05, "V·s/rad", deviation=0.001),
+            "rotor_inertia": quantity(2e-4, "kg·m²", low=0.0, deviation=1e-5),
+            "gear_ratio": quantity(1.0, "1"),
+            "amplifier_gain": quantity(1.0, "1"),
+            "dac_full_scale": quantity(12.0, "V"),
+        },
+        "friction": {"viscous_motor_side": quantity(1e-5, "N·m·s/rad", low=0.0, deviation=1e-5)},
+        "sensor": {
+            "bits": 16,
+            "range": quantity(800.0, "rad"),
+            "at_zero": quantity(-400.0, "rad"),
+            "measures": "velocity",
+        },
+    }
+    return machine_of("bench", "Motor bench", [0.0, 0.0, -9.81], shaft)
 
 
 def bench_trace(seed: int, hidden: Mapping[str, float], duration: float = 20.0) -> Trace:
@@ -224,42 +211,20 @@ GEARED = {"link": 0.05, "rotor": 0.04, "weight": 1.2, "stiffness": 0.0, "damping
 
 def geared_machine() -> Machine:
     """A revolute joint with a rotor behind a gear, and a link that hangs at zero."""
-    mass, centre = 0.6116, 0.2
-    return Machine.model_validate(
-        {
-            "version": 1,
-            "name": "geared",
-            "title": "Geared arm",
-            "gravity": [9.81, 0.0, 0.0],
-            "modelled_joints": [1],
-            "controller": {"kind": "none"},
-            "joints": [
-                {
-                    "name": "arm",
-                    "kind": "revolute",
-                    "geometry": {
-                        "a": quantity(centre, "m"),
-                        "alpha": quantity(0.0, "rad"),
-                        "d": quantity(0.0, "m"),
-                        "theta": quantity(0.0, "rad"),
-                    },
-                    "link": {
-                        "shape": "body",
-                        "mass": quantity(mass, "kg", low=0.01, deviation=0.03),
-                        "centre": [quantity(0.0, "m")] * 3,
-                        "inertia": [quantity(0.0, "kg·m²")] * 2
-                        + [quantity(0.05 - mass * centre**2, "kg·m²", low=0.0, deviation=0.002)]
-                        + [quantity(0.0, "kg·m²")] * 3,
-                    },
-                    "drive": {
-                        "kind": "gain",
-                        "gain": quantity(1.0, "N·m/N·m"),
-                        "inertia": quantity(0.04, "kg·m²", low=0.0, deviation=0.002),
-                    },
-                }
-            ],
-        }
-    )
+    mass, centre, nothing = 0.6116, 0.2, quantity(0.0, "kg·m²")
+    own = quantity(0.05 - mass * centre**2, "kg·m²", low=0.0, deviation=0.002)
+    arm = {
+        "name": "arm",
+        "kind": "revolute",
+        "geometry": geometry(a=centre),
+        "link": body(quantity(mass, "kg", low=0.01, deviation=0.03), [nothing, nothing, own, *3 * [nothing]]),
+        "drive": {
+            "kind": "gain",
+            "gain": quantity(1.0, "N·m/N·m"),
+            "inertia": quantity(0.04, "kg·m²", low=0.0, deviation=0.002),
+        },
+    }
+    return machine_of("geared", "Geared arm", [9.81, 0.0, 0.0], arm)
 
 
 def geared_trace(seed: int, hidden: Mapping[str, float], duration: float = 16.0) -> Trace:
@@ -328,12 +293,7 @@ def six_machine(deviation: float = 0.04) -> Machine:
             {
                 "name": f"axis {k + 1}",
                 "kind": "revolute",
-                "geometry": {
-                    "a": quantity(a, "m"),
-                    "alpha": quantity(alpha, "rad"),
-                    "d": quantity(d, "m"),
-                    "theta": quantity(0.0, "rad"),
-                },
+                "geometry": geometry(a, alpha, d),
                 "link": {
                     "shape": "body",
                     "mass": quantity(MASSES[k], "kg", low=0.0, deviation=deviation * MASSES[k]),
@@ -351,17 +311,7 @@ def six_machine(deviation: float = 0.04) -> Machine:
                 },
             }
         )
-    return Machine.model_validate(
-        {
-            "version": 1,
-            "name": "six",
-            "title": "Six-joint arm",
-            "gravity": [0.0, 0.0, -9.81],
-            "modelled_joints": [1, 2, 3, 4, 5, 6],
-            "controller": {"kind": "none"},
-            "joints": joints,
-        }
-    )
+    return machine_of("six", "Six-joint arm", [0.0, 0.0, -9.81], *joints)
 
 
 def _frames(q: Floats) -> list[tuple[Floats, Floats]]:

@@ -1,16 +1,22 @@
-"""A diagnosis by inverse dynamics as far as its first search."""
+"""Diagnoses by inverse dynamics: as far as the first search, and of an independent test rig."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
+from daq.contracts.machine import load_machine
 from daq.contracts.progress import Never, silent
-from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from daq.traces.csv_table import import_csv
+from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.discrepancy.inverse_dynamics.fitting import TorqueCase
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.discrepancy.options import TorqueOptions
+from model.discrepancy.output_error.controller_evidence import judge_controller
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
+from trials.rigs.folder import write_world
 
 
 def sliding(hidden: Mapping[str, float], options: TorqueOptions) -> TorqueWorkflow:
@@ -21,3 +27,11 @@ def sliding(hidden: Mapping[str, float], options: TorqueOptions) -> TorqueWorkfl
     fitted, held = (recorded_motions([t], model.machine, cutoff) for t in traces)
     case = TorqueCase(fitted, held, torque_noise(model, traces, cutoff), options)
     return TorqueWorkflow(model, case, judge_controller(model, traces), silent, Never())
+
+
+def diagnosed_rig(folder: Path, kind: str, seed: int, case: str | None = None, effect: str | None = None) -> Diagnosis:
+    """One record of an independent test rig diagnosed, the other held out, from the files that its lab has."""
+    write_world(folder, kind, seed, case, effect)
+    lab = folder / "lab"
+    training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
+    return diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])

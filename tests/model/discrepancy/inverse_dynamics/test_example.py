@@ -38,14 +38,6 @@ def test_the_guide_shows_the_example_machine() -> None:
     assert shown[1] == (ROOT / "examples" / "linear_axis.toml").read_text("utf-8")
 
 
-def test_a_record_of_speeds_alone_has_their_integral_as_position(tmp_path: Path) -> None:
-    trace = import_csv(written(tmp_path)[0])
-    assert trace.velocity is not None
-    assert trace.position[0, 0] == 0.0
-    assert trace.position[-1, 0] == pytest.approx(np.trapezoid(trace.velocity[:, 0], trace.time), abs=1e-6)
-    assert "integrals" in trace.record.notes
-
-
 def test_the_example_names_the_friction_that_the_rig_hides(tmp_path: Path) -> None:
     first, second = (import_csv(path) for path in written(tmp_path))
     model = base_model(load_machine(str(ROOT / "examples" / "motor_bench.toml")))

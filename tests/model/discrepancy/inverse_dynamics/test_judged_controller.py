@@ -4,22 +4,23 @@ The controllers and the joints that they move are written out here: nothing of `
 """
 
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 import pytest
 
 from daq.contracts.machine import Machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.inverse_dynamics.judged_controller import JudgedController, judge_controller
+from model.discrepancy.inverse_dynamics.answer import _unseen
 from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.output_error.controller_evidence import JudgedController, judge_controller
 from model.discrepancy.workflow import diagnose
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.inverse_dynamics.rigs import quantity
+from tests.model.imported import imported
 
 PERIOD, SUBSTEPS = 0.01, 10
 """Of control, s, and integrations within it."""
@@ -112,14 +113,7 @@ def recorded(
             rub = COULOMB * np.tanh(v / 1e-3) + VISCOUS * v
             v += PERIOD / SUBSTEPS * (drive[k] - rub) / MASS
             q += PERIOD / SUBSTEPS * v
-    record = TraceRecord(
-        trace_id=f"{law}{seed}",
-        created=datetime(2024, 1, 1, tzinfo=UTC),
-        software="test",
-        source="imported",
-        period=PERIOD,
-        drive_unit="N",
-    )
+    record = imported(f"{law}{seed}", period=PERIOD, drive_unit="N")
     shown = slice(begun, None)
     return Trace(
         record,
@@ -141,7 +135,7 @@ def test_a_sound_controller_gives_no_finding_and_excludes_its_effects(law: str, 
     found = judged(law, begun=begun)
     assert found.findings == ()
     assert set(found.settled) == BOTH
-    assert set(found.not_looked_for) == set(NOT_IN_TORQUES) - BOTH
+    assert set(_unseen(found)) == set(NOT_IN_TORQUES) - BOTH
 
 
 @pytest.mark.parametrize("begun", [0, 300])
@@ -166,7 +160,7 @@ def test_the_drive_of_another_law_proves_and_excludes_nothing() -> None:
     found = judge_controller(base_model(machine("pid")), [recorded("cascade")])
     assert found.findings == ()
     assert found.settled == ()
-    assert found.not_looked_for == NOT_IN_TORQUES
+    assert _unseen(found) == NOT_IN_TORQUES
 
 
 def test_without_a_controller_nothing_is_judged() -> None:

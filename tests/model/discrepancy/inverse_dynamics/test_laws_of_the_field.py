@@ -4,11 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from daq.contracts.machine import load_machine
-from daq.traces.csv_table import import_csv
-from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.machine_model.model import base_model
-from trials.rigs.folder import write_world
+from tests.model.discrepancy.inverse_dynamics.searches import diagnosed_rig
 
 
 @pytest.mark.timeout(300)
@@ -40,10 +36,7 @@ def test_a_law_is_named_and_its_size_found(
     value: float,
     tmp_path: Path,
 ) -> None:
-    write_world(tmp_path, kind, seed, effect=drawn)
-    lab = tmp_path / "lab"
-    training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
-    found = diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])
+    found = diagnosed_rig(tmp_path, kind, seed, effect=drawn)
     assert found.verdict == "named", found.summary
     (step,) = [s for s in found.steps if s.adopted]
     assert (step.effect, step.joints) == (effect, joints)
@@ -54,10 +47,7 @@ def test_a_law_is_named_and_its_size_found(
 @pytest.mark.timeout(300)
 def test_a_payload_that_was_fitted_as_a_mass_is_named(tmp_path: Path) -> None:
     """Stated masses have taken it over by eight of their deviations: of the payload itself, a small rest shows."""
-    write_world(tmp_path, "axis-current", 908)
-    lab = tmp_path / "lab"
-    training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
-    found = diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])
+    found = diagnosed_rig(tmp_path, "axis-current", 908)
     assert [(s.effect, s.joints) for s in found.steps if s.adopted] == [("payload", ())], found.summary
     assert found.steps[0].parameters["load.payload.mass"].value == pytest.approx(0.1112, rel=0.1)
 
@@ -67,10 +57,7 @@ def test_a_payload_that_was_fitted_as_a_mass_is_named(tmp_path: Path) -> None:
 def test_drives_at_a_limit_that_no_file_states_are_no_gear_loss(tmp_path: Path) -> None:
     """A sound arm of the fourth registered trial, which was called gear loss: at their limits its drives gave less than
     is recorded. That is now found beside all else, and told."""
-    write_world(tmp_path, "planar-current-table", 49091369852550, "sound")
-    lab = tmp_path / "lab"
-    training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
-    found = diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])
+    found = diagnosed_rig(tmp_path, "planar-current-table", 49091369852550, "sound")
     assert (found.verdict, found.steps) == ("nothing-significant", ()), found.summary
     (note,) = [note for note in found.notes_data if note.kind == "drive-at-limit"]
     assert [joint for joint, _ in note.values["shares"]] == [1, 2]

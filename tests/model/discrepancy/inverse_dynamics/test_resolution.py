@@ -11,7 +11,6 @@ import pytest
 
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
-from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.resolution import (
@@ -26,7 +25,7 @@ from model.discrepancy.inverse_dynamics.search import Fitted
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
-from trials.rigs.folder import write_world
+from tests.model.discrepancy.inverse_dynamics.searches import diagnosed_rig
 
 SAMPLE = 0.002
 """s between the samples of `slide_trace`."""
@@ -231,10 +230,7 @@ def test_a_variance_above_the_noise_without_a_shape_is_no_unknown_effect() -> No
 def test_a_sound_rig_of_another_world_is_sound(kind: str, seed: int, tmp_path: Path) -> None:
     """Bristles in its friction, a current loop behind its drive, positions alone: noise of accelerations was called a
     compliance, and friction near reversals Stribeck friction."""
-    write_world(tmp_path, kind, seed, "sound")
-    lab = tmp_path / "lab"
-    training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
-    found = diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])
+    found = diagnosed_rig(tmp_path, kind, seed, "sound")
     assert found.verdict == "nothing-significant", found.summary
 
 

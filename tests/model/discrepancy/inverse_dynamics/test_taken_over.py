@@ -6,23 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from daq.contracts.machine import load_machine
-from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.priors import prior_cost, prior_distance
+from model.discrepancy.inverse_dynamics.tolerances import prior_cost, prior_distance
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
-from trials.rigs.folder import write_world
-
-
-def of_world(folder: Path, kind: str, seed: int, case: str | None = None) -> Diagnosis:
-    write_world(folder, kind, seed, case)
-    lab = folder / "lab"
-    training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
-    return diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])
+from tests.model.discrepancy.inverse_dynamics.searches import diagnosed_rig
 
 
 def friction(effect: str | None = "coulomb_friction", low: float = 0.0) -> Unknown:
@@ -79,7 +70,7 @@ def rigs_noise(found: Diagnosis) -> float:
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_quadratic_drag_is_no_viscous_friction(tmp_path: Path) -> None:
-    found = of_world(tmp_path, "axis-current", 505)
+    found = diagnosed_rig(tmp_path, "axis-current", 505)
     assert found.verdict == "unknown-effect", found.summary
 
 
@@ -87,7 +78,7 @@ def test_quadratic_drag_is_no_viscous_friction(tmp_path: Path) -> None:
 @pytest.mark.timeout(300)
 def test_friction_that_has_driven_tolerances_far_off_is_fitted_from_the_files_numbers(tmp_path: Path) -> None:
     """Ninefold friction: from where it has driven the others, its own fit finds no way back."""
-    found = of_world(tmp_path, "arm-steps", 41820768092437, "single")
+    found = diagnosed_rig(tmp_path, "arm-steps", 41820768092437, "single")
     assert [(s.effect, s.joints) for s in found.steps if s.adopted] == [("coulomb_friction", (3,))], found.summary
 
 
@@ -95,7 +86,7 @@ def test_friction_that_has_driven_tolerances_far_off_is_fitted_from_the_files_nu
 @pytest.mark.timeout(300)
 def test_quadratic_drag_is_not_more_viscous_friction_with_no_coulomb_friction(tmp_path: Path) -> None:
     """Both together left six times the noise, in a shape that explains most of it."""
-    found = of_world(tmp_path, "arm-sweep", 260802698626061, "open")
+    found = diagnosed_rig(tmp_path, "arm-sweep", 260802698626061, "open")
     assert found.verdict == "unknown-effect", found.summary
 
 
@@ -110,7 +101,7 @@ def test_quadratic_drag_is_not_more_viscous_friction_with_no_coulomb_friction(tm
     ],
 )
 def test_rigs_of_other_worlds(kind: str, seed: int, effect: str, joints: tuple[int, ...], tmp_path: Path) -> None:
-    found = of_world(tmp_path, kind, seed)
+    found = diagnosed_rig(tmp_path, kind, seed)
     assert found.verdict == "named", found.summary
     assert [(s.effect, s.joints) for s in found.steps if s.adopted] == [(effect, joints)]
 
@@ -119,7 +110,7 @@ def test_rigs_of_other_worlds(kind: str, seed: int, effect: str, joints: tuple[i
 @pytest.mark.timeout(300)
 def test_a_shifted_centre_that_a_load_imitates_is_a_group_with_it(tmp_path: Path) -> None:
     """The world's own judge tells a payload from this centre of mass with d′ = 1.9, every other law with more."""
-    found = of_world(tmp_path, "axis-current", 506)
+    found = diagnosed_rig(tmp_path, "axis-current", 506)
     assert found.verdict == "ambiguous", found.summary
     assert [{c.effect for c in s.group} for s in found.steps if s.adopted] == [{"centre_of_mass", "payload"}]
 
@@ -127,5 +118,30 @@ def test_a_shifted_centre_that_a_load_imitates_is_a_group_with_it(tmp_path: Path
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_friction_at_a_place_is_not_within_noise(tmp_path: Path) -> None:
-    found = of_world(tmp_path, "arm-current", 505)
+    found = diagnosed_rig(tmp_path, "arm-current", 505)
     assert found.verdict == "unknown-effect", found.summary
+
+
+# ---- Rigs of which only one of two records shows the effect well.
+
+
+@pytest.mark.slow
+def test_a_ripple_of_which_the_others_show_less_than_a_wave_keeps_its_name(tmp_path: Path) -> None:
+    found = diagnosed_rig(tmp_path, "planar-current-via", 8874690243275, "single")
+    assert [(s.effect, s.joints) for s in found.steps if s.adopted] == [("torque_ripple", (2,))], found.summary
+
+
+@pytest.mark.slow
+def test_a_drag_that_looks_viscous_in_one_motion_is_contradicted_by_another(tmp_path: Path) -> None:
+    """Quadratic drag, which the library has no law for."""
+    found = diagnosed_rig(tmp_path, "axis-current-steps", 278342827514058, "open")
+    assert found.verdict == "unknown-effect", found.summary
+    assert not [s for s in found.steps if s.adopted]
+
+
+@pytest.mark.slow
+def test_friction_that_only_one_record_shows_beside_a_loss_is_taken_back(tmp_path: Path) -> None:
+    """What a loss leaves where motion turns looks like Stribeck friction in steps, and not in a slow ramp."""
+    found = diagnosed_rig(tmp_path, "axis-current-steps", 54738089683743, "single")
+    assert found.verdict == "named"
+    assert [s.effect for s in found.steps if s.adopted] == ["gear_loss"], found.summary

@@ -1,5 +1,6 @@
 """What a lab's own rig shows and no effect is: the ends of a record, the motion's own frequencies, friction that fades
-at no recorded speed, sizes at their bounds; and what is said of records that do not suit their file."""
+at no recorded speed, sizes at their bounds; and what is said of records that do not suit their file.
+"""
 
 from dataclasses import replace
 from itertools import cycle
@@ -16,11 +17,16 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.starts import narrowed
 from model.discrepancy.inverse_dynamics.step_record import excess_removed
+from model.discrepancy.options import TorqueOptions
+from model.fitting.options import FitOptions
+from model.inverse_dynamics import repeats
+from model.inverse_dynamics.fit import fit_torques
+from model.inverse_dynamics.repeats import LEAST_OF_TORQUE
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
+from tests.model.discrepancy.units import in_unit, recorded
 
 
 def of_slide(*traces: Trace, options: TorqueOptions | None = None) -> Diagnosis:
@@ -115,3 +121,123 @@ def test_times_in_another_unit_are_said_to_be_that() -> None:
     trace = rigs.slide_trace(1, {})
     with pytest.raises(SpecError, match="times are in s, positions in rad or m"):
         of_slide(replace(trace, time=1000.0 * trace.time))
+
+
+# ---- When an effect that has the evidence is taken, and when it is not.
+
+FRICTION = ("coulomb_friction",)
+
+
+def slide(training: Trace, held_out: Trace | None = None, options: TorqueOptions | None = None) -> Diagnosis:
+    other = [] if held_out is None else [held_out]
+    return diagnose_torques(base_model(rigs.slide_machine()), [training], other, options)
+
+
+def traces(**hidden: float) -> tuple[Trace, Trace]:
+    return rigs.slide_trace(1, hidden), rigs.slide_trace(2, hidden)
+
+
+@pytest.mark.parametrize(("coulomb", "suspected"), [(0.002, False), (0.014, True)])
+def test_a_suspicion_needs_a_twentieth_of_what_is_left(coulomb: float, suspected: bool) -> None:
+    """Both have more evidence than a suspicion asks for: a force so small explains little of what noise leaves."""
+    found = slide(*traces(coulomb=coulomb), TorqueOptions(effects=FRICTION, least_evidence=1e6))
+    assert found.candidates[0].effect == "coulomb_friction"
+    assert found.candidates[0].evidence > 12.0
+    assert (found.suspicion is not None) is suspected, found.summary
+    assert found.verdict == ("suspected" if suspected else "nothing-significant")
+
+
+@pytest.mark.parametrize("share", [LEAST_OF_TORQUE, 0.05])
+def test_noise_is_a_share_of_the_torque_of_the_drive_at_least(share: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(repeats, "LEAST_OF_TORQUE", share)
+    training, held_out = traces()
+    assert training.drive is not None
+    found = slide(training, held_out, TorqueOptions(effects=FRICTION))
+    floor, least = found.rmse_fit[0].floor, share * float(np.sqrt(np.mean(training.drive**2)))
+    assert floor >= 0.95 * least
+    if share > 0.01:
+        assert floor == pytest.approx(least, rel=0.05)
+
+
+def asking_for_more(trace: Trace) -> Trace:
+    """The record of a drive that asked for its largest force, 1.3 times what acted, wherever much was needed."""
+    assert trace.drive is not None
+    limit = float(np.quantile(np.abs(trace.drive), 0.93))
+    at = np.abs(trace.drive) > limit
+    return replace(trace, drive=np.where(at, np.sign(trace.drive) * 1.3 * limit, trace.drive))
+
+
+def test_what_a_drive_at_a_limit_does_not_give_is_no_effect_and_is_told() -> None:
+    training, held_out = (asking_for_more(trace) for trace in traces())
+    found = slide(training, held_out)
+    assert not any(s.adopted for s in found.steps), found.summary
+    assert found.verdict == "nothing-significant", found.summary
+    (note,) = [note for note in found.notes_data if note.kind == "drive-at-limit"]
+    ((joint, share),) = note.values["shares"]
+    assert joint == 1
+    assert share == pytest.approx(0.07, abs=0.02)
+    assert any("stands at its largest value" in text and "of joint 1's time" in text for text in found.notes)
+
+
+def test_without_a_limit_no_note_speaks_of_one() -> None:
+    found = slide(*traces(), TorqueOptions(effects=FRICTION))
+    assert not [note for note in found.notes_data if note.kind == "drive-at-limit"]
+
+
+# ---- No answer depends on the unit of the recorded drive; an offset and too short a record are told as what they are.
+
+RUBBING = {"coulomb": 6.0, "viscous": 15.0}
+
+
+def pushed(trace: Trace, force: float) -> Trace:
+    """The same record with a constant force that the drive has to bear."""
+    assert trace.drive is not None
+    return replace(trace, drive=trace.drive + force)
+
+
+def test_a_fit_of_torques_is_the_same_in_every_unit_of_the_drive() -> None:
+    sizes = []
+    for factor in (1.0, 1e-2, 1e3):
+        model = base_model(in_unit(rigs.slide_machine(), factor)).with_effect("coulomb_friction", (1,))
+        traces = [recorded(rigs.slide_trace(1, RUBBING, duration=10.0), factor)]
+        found = {p.name: p for p in fit_torques(model, traces, options=FitOptions()).parameters}
+        friction = found["joint1.coulomb_friction.torque"]
+        sizes.append((friction.model_value, friction.expected_deviation))
+    assert sizes[1:] == [pytest.approx(sizes[0], rel=1e-4)] * 2
+
+
+@pytest.mark.slow
+def test_friction_is_named_beside_a_constant_force_which_is_told_as_a_group() -> None:
+    """The force correlates over any distance: taken for noise, it would leave next to no independent samples."""
+    fitted, held = (pushed(rigs.slide_trace(seed, RUBBING, duration=10.0), 4.0) for seed in (1, 2))
+    found = diagnose_torques(base_model(rigs.slide_machine()), [fitted], [held])
+    adopted = [s for s in found.steps if s.adopted]
+    assert {"coulomb_friction"} <= {s.effect for s in adopted}
+    constant = next(s for s in adopted if s.effect != "coulomb_friction" and s.group)
+    assert {"base_tilt", "direction_dependent_friction"} <= {c.effect for c in constant.group}
+
+
+def test_a_tilted_base_is_in_the_group_of_a_constant_force_whatever_its_parameters_cost() -> None:
+    """A tilt has two parameters, friction by direction has one: on an axis that slides along x both are the same force,
+    and what the second parameter costs is more than the lead that is asked for here."""
+    fitted, held = (pushed(rigs.slide_trace(seed, RUBBING, duration=10.0), 4.0) for seed in (1, 2))
+    named = ("coulomb_friction", "base_tilt", "direction_dependent_friction")
+    asked = TorqueOptions(least_margin=2.0, effects=named)
+    found = diagnose_torques(base_model(rigs.slide_machine()), [fitted], [held], asked)
+    step = next(s for s in found.steps if s.adopted and s.effect != "coulomb_friction")
+    evidence = {c.effect: c.evidence for c in step.group}
+    assert set(evidence) == {"base_tilt", "direction_dependent_friction"}, found.summary
+    assert max(evidence.values()) - min(evidence.values()) > asked.least_margin
+
+
+def test_an_effect_that_lacks_evidence_alone_is_suspected() -> None:
+    trace = rigs.slide_trace(1, {"coulomb": 6.0}, duration=4.0)
+    strict = TorqueOptions(least_evidence=2000.0, effects=("coulomb_friction", "payload"))
+    found = diagnose_torques(base_model(rigs.slide_machine()), [trace], options=strict)
+    assert found.verdict == "suspected", found.summary
+    assert found.suspicion is not None
+    assert found.suspicion.effect == "coulomb_friction"
+    assert found.suspicion.evidence < found.suspicion.needed == pytest.approx(2000.0, rel=1e-3)
+    assert found.suspicion.seconds >= 5.0
+    assert found.summary.startswith("Suspected: Coulomb friction on joint 1, evidence ")
+    assert Diagnosis.model_validate_json(found.model_dump_json()) == found

@@ -63,10 +63,6 @@ def test_lost_set_points_are_counted(sound: Trace) -> None:
     assert np.allclose(restored.set_point, used)
 
 
-def test_there_is_no_finding_without_the_controllers_numbers(sound: Trace) -> None:
-    assert check_controller([imagined.changed(sound, error=None, power_raw=None)], imagined.machine()) == ()
-
-
 BOTH = ("wrong_gain", "lost_set_points")
 
 

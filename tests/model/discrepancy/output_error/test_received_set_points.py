@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from daq.contracts.machine import Machine
-from daq.contracts.trace import Trace, TraceRecord
+from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.output_error.controller_evidence import (
     ControllerFinding,
@@ -21,6 +20,7 @@ from model.discrepancy.output_error.controller_evidence import (
 )
 from model.discrepancy.output_error.sampled_controller import with_errors
 from tests.model.discrepancy import outside_arm
+from tests.model.imported import imported
 
 PERIOD = outside_arm.PERIOD
 BOTH = {"wrong_gain", "lost_set_points"}
@@ -87,15 +87,7 @@ def recorded(loop: Loop, seed: int, count: int = 600) -> tuple[Trace, float]:
     sent, position = motion(seed, count)
     used = loop.used(sent, seed)
     drive = loop.outputs(used, position)
-    record = TraceRecord(
-        trace_id=f"made-{seed}",
-        created=datetime(2020, 1, 1, tzinfo=UTC),
-        software="-",
-        source="imported",
-        robot="outside",
-        period=PERIOD,
-        drive_unit="V",
-    )
+    record = imported(f"made-{seed}", period=PERIOD, drive_unit="V")
     moved = np.abs(np.diff(sent, prepend=sent[0])) > 3 * outside_arm.COUNT
     share = float((used != sent)[moved].sum() / max(1, moved.sum()))
     time: Floats = np.arange(count, dtype=np.float64) * PERIOD

@@ -2519,18 +2519,6 @@ export interface components {
             [key: string]: unknown;
         };
         /**
-         * ErrorFall
-         * @description Root mean square error of a joint without an effect and with it, in `unit`.
-         */
-        ErrorFall: {
-            /** Before */
-            before: number;
-            /** After */
-            after: number;
-            /** Unit */
-            unit: string;
-        };
-        /**
          * EventMessage
          * @description Something that happened to the robot or its queue.
          */
@@ -4605,31 +4593,6 @@ export interface components {
             positions: number[][];
         };
         /**
-         * Pattern
-         * @description A pattern in the residual of one joint, with the numbers that a person would read off a plot, in SI units.
-         *
-         *     `share`: of the residual's mean square that the pattern takes off.
-         */
-        Pattern: {
-            /**
-             * Kind
-             * @enum {string}
-             */
-            kind: "bends_with_position" | "drives_otherwise" | "fails_at_high_drive" | "goes_with_position" | "goes_with_weight" | "grows_with_time" | "is_off" | "jolts" | "lags_after_turns" | "lags_alike" | "lags_always" | "lags_one_way" | "lags_under_drive" | "lags_under_load" | "lags_when_slow" | "lags_with_speed" | "late_at_changes" | "stays_off" | "sticks" | "stops_short" | "swings_with_position" | "swings_with_time" | "swings_with_time_and_at_rest";
-            /**
-             * Numbers
-             * @default {}
-             */
-            numbers?: {
-                [key: string]: number;
-            };
-            /**
-             * Share
-             * @default 0
-             */
-            share?: number;
-        };
-        /**
          * Pause
          * @description No motion for `duration`: a piece of a sequence.
          */
@@ -5037,55 +5000,15 @@ export interface components {
             duration?: number;
         };
         /**
-         * ReadingUnits
-         * @description Units in which people read the numbers of one joint.
-         *
-         *     factor: from rad (m) to ° (mm). unit: of its residual. place_unit: of its position. least: rad (m), the smallest
-         *     deviation that can be read off a plot; 0 for no limit. turns: whether the joint turns; otherwise it slides.
-         */
-        ReadingUnits: {
-            /** Factor */
-            factor: number;
-            /** Unit */
-            unit: string;
-            /** Place Unit */
-            place_unit: string;
-            /** Drive Unit */
-            drive_unit: string;
-            /** Torque Unit */
-            torque_unit: string;
-            /**
-             * Least
-             * @default 0
-             */
-            least?: number;
-            /**
-             * Turns
-             * @default true
-             */
-            turns?: boolean;
-        };
-        /**
          * Reason
-         * @description What speaks for the effect of a step, beside what the step itself holds: its parameters, evidence and place.
+         * @description What speaks for the effect of a step, beside what the step itself holds: its parameters, evidence and errors.
          *
-         *     By simulation: the `pattern` that `joint` shows most clearly, in `units`, and the fall of its error, `rms`. By
-         *     balancing torques: `removed`, the share of the mean square that is gone on records not fitted to; `slides` says that
-         *     the effect's joints slide, so that torques are forces. `rival` is the next best that would be another answer.
+         *     `removed`: by balancing torques, the share of the mean square that is gone on records not fitted to. `rival`: the
+         *     next best that would be another answer.
          */
         Reason: {
-            /** Joint */
-            joint?: number | null;
-            pattern?: components["schemas"]["Pattern"] | null;
-            units?: components["schemas"]["ReadingUnits"] | null;
-            rms?: components["schemas"]["ErrorFall"] | null;
             /** Removed */
             removed?: number | null;
-            /**
-             * Slides
-             * @default false
-             */
-            slides?: boolean;
             rival?: components["schemas"]["NamedEffect"] | null;
         };
         /**
@@ -5570,6 +5493,8 @@ export interface components {
             output_limit?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
             /** Set Point Resolution */
             set_point_resolution?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
+            /** Dead Band */
+            dead_band?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
             /** Gain Error */
             gain_error?: components["schemas"]["Quantity"] | components["schemas"]["Quantity"][] | null;
         };

@@ -1,0 +1,196 @@
+"""Numbers as people write them in a machine file: `"0.8 ± 0.08 kg, scales"`."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pint
+
+UNSTATED = "source not stated"
+"""Source of a number behind which nothing is written."""
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_WRITTEN = re.compile(
+    rf"(?P<value>{_NUMBER})\s*(?:(?:±|\+/?-)\s*(?P<deviation>{_NUMBER})\s*(?P<percent>%(?=\s*[^\s,\[%]))?)?"
+    rf"\s*(?P<unit>[^\s,\[±+-][^,\[±]*?)?\s*(?:(?:±|\+/?-)\s*(?P<share>{_NUMBER})\s*(?P<of>%|[^\s,\[%][^,\[%]*?))?"
+    rf"\s*(?:\[\s*(?P<low>{_NUMBER})?\s*to\s*(?P<high>{_NUMBER})?\s*\])?\s*(?:,\s*(?P<source>.*?))?\s*",
+    re.DOTALL,
+)
+EXAMPLE = '"0.8 ± 0.08 kg" or "0.8 kg ± 10 % [0 to 2], its source"'
+_COMMON = {
+    ("deg", "rad"): math.pi / 180.0,
+    ("°", "rad"): math.pi / 180.0,
+    ("mm", "m"): 1e-3,
+    ("g", "kg"): 1e-3,
+    ("ms", "s"): 1e-3,
+    ("mH", "H"): 1e-3,
+}
+"""Factors of common units; files that use no others load without pint, whose import takes half a second."""
+NUMBERS = ("value", "low", "high", "deviation")
+"""Fields of a number that have its unit."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """The units that a field's number may have in the model, as a mark of its type.
+
+    sliding: those on a joint that slides, where they are others.
+    """
+
+    allowed: tuple[str, ...]
+    sliding: tuple[str, ...] = ()
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number as people write it."""
+    return _WRITTEN.fullmatch(_plain_signs(text)) is not None
+
+
+def read_number(written: str | float, comment: str, allowed: Sequence[str]) -> dict[str, Any]:
+    """The fields of a `Quantity` for a number as it is written, in the first of the `allowed` units that suits it.
+
+    comment: the source of a number that states none. Raises ValueError.
+    """
+    text = _plain_signs(written) if isinstance(written, str) else repr(float(written))
+    match = _WRITTEN.fullmatch(text)
+    if match is None:
+        raise ValueError(f"found {written!r:.80}, must be a number like {EXAMPLE}")
+    found: dict[str, Any] = {"value": float(match["value"])}
+    for side in ("low", "high"):
+        if match[side] is not None:
+            found[side] = float(match[side])
+    found["unit"] = (match["unit"] or "").strip()
+    share = match["percent"] is not None or match["of"] == "%"
+    if match["of"] not in (None, "%", found["unit"]):
+        raise ValueError(f"found {written!r:.80}: the deviation's unit must be {found['unit']} or %")
+    if (deviation := match["deviation"] or match["share"]) is not None:
+        found["deviation"] = _short(abs(found["value"]) * float(deviation) / 100) if share else float(deviation)
+    if not found["unit"]:
+        if len(allowed) != 1:
+            raise ValueError(f"found {written!r:.80}, which has no unit: write {' or '.join(allowed)}")
+        found["unit"] = allowed[0]
+    source = match["source"] or comment or UNSTATED
+    assumed = re.match(r"(?:assumed: |guess\b(?:: )?)(.*)", source, re.DOTALL)
+    if assumed is not None:
+        found["assumed"] = True
+        source = assumed[1] if ": " in source[:9] and assumed[1] else source
+    return converted(found | {"source": source}, allowed)
+
+
+def converted(number: Mapping[str, Any], allowed: Sequence[str]) -> dict[str, Any]:
+    """A number's fields in the first of the `allowed` units that its own suits. Raises ValueError."""
+    unit = _written_alike(str(number["unit"]))
+    for one in allowed:
+        if _written_alike(one) == unit:
+            return {**number, "unit": one}
+    for one in allowed:
+        found = _factor(unit, one)
+        if found is not None:
+            factor, inverse = found
+            return _inverted(number, one, factor) if inverse else _scaled(number, one, factor)
+    raise ValueError(f"unit is {number['unit']!r}, must be {' or '.join(map(repr, allowed))}, or one that converts")
+
+
+def _scaled(number: Mapping[str, Any], unit: str, factor: float) -> dict[str, Any]:
+    own = {name: _short(number[name] * factor) for name in NUMBERS if number.get(name) is not None}
+    return {**number, **own, "unit": unit}
+
+
+def _inverted(number: Mapping[str, Any], unit: str, factor: float) -> dict[str, Any]:
+    """A speed constant as a back-EMF constant: 1/x, with the relative deviation of x."""
+    value = number["value"]
+    if value == 0.0:
+        raise ValueError(f"value 0 {number['unit']} has no reciprocal in {unit}")
+    own = {"value": _short(factor / value)}
+    for side, other in (("low", "high"), ("high", "low")):
+        if number.get(other):
+            own[side] = _short(factor / number[other])
+    if number.get("deviation") is not None:
+        own["deviation"] = _short(abs(number["deviation"] * factor / value**2))
+    return {**number, "low": None, "high": None, **own, "unit": unit}
+
+
+def _short(value: float) -> float:
+    """The number without the digits that only the conversion has added."""
+    rounded = float(f"{value:.12g}")
+    return rounded if abs(rounded - value) <= 5e-16 * abs(value) else value
+
+
+@cache
+def _registry() -> pint.UnitRegistry[Any]:
+    import pint  # half a second, for files alone that are not in SI units
+
+    registry: pint.UnitRegistry[Any] = pint.UnitRegistry(cache_folder=None)
+    registry.define("@alias turn = rev")
+    return registry
+
+
+@cache
+def _factor(unit: str, target: str) -> tuple[float, bool] | None:
+    """What a number in `unit` is multiplied by to be in `target`; and whether it is its reciprocal that is.
+
+    A radian is a number, except where an angle itself is meant. Pounds and kilograms are forces where a force is meant
+    (kg·cm, lb·in), as data sheets write them.
+    """
+    if (unit, target) in _COMMON:
+        return _COMMON[unit, target], False
+    import pint
+
+    registry = _registry()
+    try:
+        given, wanted = (registry.Quantity(1.0, _for_pint(name)).to_root_units() for name in (unit, target))
+    except Exception:  # noqa: BLE001 - pint's errors of a text have no common class
+        return None
+    assert isinstance(given, pint.Quantity)
+    pull = registry.Quantity(1.0, "standard_gravity").to_root_units()
+    for inverse, own in ((False, given), (True, 1 / given), (False, given * pull)):
+        ratio = own / wanted
+        angles = dict(ratio.units._units)
+        rest = angles.pop("radian", 0)
+        plain = target in ("1", "%", "count", "rad")
+        if not angles and (not rest or ("rad" in target and not plain)) and not (inverse and plain):
+            return float(ratio.magnitude), inverse
+    return None
+
+
+def _for_pint(unit: str) -> str:
+    return "dimensionless" if unit == "1" else unit.replace("·", "*")
+
+
+def _written_alike(unit: str) -> str:
+    """One spelling of a unit: middle dots for products, raised digits for powers."""
+    text = re.sub(r"\s*(?:\*(?!\*)|⋅|∙|•|·)\s*", "·", unit.strip()).replace("Ω", "Ω").replace("\u00b5", "µ")
+    text = re.sub(r"(?:\^|\*\*)([23])", lambda m: "²³"[int(m[1]) - 2], text)
+    text = re.sub(r"(?<=[A-Za-z])[.-](?=[A-Za-z])", "·", re.sub(r"\bohms?\b", "Ω", text))  # oz-in, kgf.cm
+    return re.sub(r"\b([mkµ]?N|k?g|kgf|ozf?|lbf?)(c?m|in)(?![a-z])", r"\1·\2", text)
+
+
+def _plain_signs(text: str) -> str:
+    return text.strip().replace("−", "-")
+
+
+def number_text(number: Mapping[str, Any], *, natural_low: bool = True) -> str:
+    """A number in the short form, without its source; `natural_low`: a lower bound of 0 goes without saying."""
+    unit = "" if number["unit"] == "1" else f" {number['unit']}"
+    deviation = "" if number.get("deviation") is None else f" ± {_digits(number['deviation'])}"
+    low, high = number.get("low"), number.get("high")
+    if natural_low and low == 0.0 and high is None:
+        low = None
+    sides = "" if low is None and high is None else f" [{_bound(low)}to{_bound(high, ' ')}]"
+    return f"{_digits(number['value'])}{deviation}{unit}{sides}"
+
+
+def _bound(value: float | None, before: str = "") -> str:
+    if value is None:
+        return ""
+    return f"{before}{_digits(value)}" if before else f"{_digits(value)} "
+
+
+def _digits(value: float) -> str:
+    text = repr(float(value))
+    return text.removesuffix(".0")

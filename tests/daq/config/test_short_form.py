@@ -1,0 +1,205 @@
+"""A machine file in the words of a data sheet: numbers with units, defaults, joints like others, and back to text."""
+
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from daq.config.machine_text import machine_text, tidied
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import Machine, load_machine, parse_machine, shipped_machines
+from daq.contracts.toml_places import places_of
+from daq.contracts.written_numbers import read_number
+
+ROOT = Path(__file__).parents[3]
+FILES = sorted([*ROOT.glob("examples/*.toml"), *ROOT.glob("daq/contracts/machines/*.toml")])
+SHORT = """
+name = "rod"
+[[joints]]
+name = "axis"
+link = { mass = "0.8 ± 10 % kg", centre = ["-150 mm", 0.0, 0.0] }  # scales
+drive = { resistance = "2 ohm", torque_constant = "5 N·cm/A", supply_limit = "12 V" }  # data sheet
+sensor = "14 bits"
+"""
+
+
+@pytest.mark.parametrize(
+    ("written", "allowed", "value"),
+    [
+        ("160 mm", ("m",), 0.16),
+        ("90 deg", ("rad", "m"), 1.5707963267948966),
+        ("25 kg·cm", ("N·m",), 2.4516625),
+        ("25 kg-cm", ("N·m",), 2.4516625),
+        ("100 oz-in", ("N·m",), 0.7061551814226),
+        ("8 lb·in", ("N·m",), 0.903878632221),
+        ("60 rpm/V", ("V·s/rad",), 0.159154943091895),
+        ("8 V/krpm", ("V·s/rad",), 0.0763943726841),
+        ("0.3 kgf·cm/A", ("N·m/A",), 0.02941995),
+        ("12 mNm/A", ("N·m/A",), 0.012),
+        ("30 gcm²", ("kg·m²",), 3e-6),
+        ("30 g*cm^2", ("kg·m²",), 3e-6),
+        ("0.82 mH", ("H",), 0.00082),
+        ("-0.5", ("1",), -0.5),
+        ("−1.5e-2 m", ("m",), -0.015),
+    ],
+)
+def test_units_of_data_sheets_are_converted(written: str, allowed: tuple[str, ...], value: float) -> None:
+    found = read_number(written, "", allowed)
+    assert found["value"] == pytest.approx(value, rel=1e-12)
+    assert found["unit"] == allowed[0]
+
+
+def test_deviation_bounds_and_source_are_read_with_the_number() -> None:
+    found = read_number("6 ± 2 ms [0 to 20], assumed: computing time", "ignored", ("s",))
+    assert found == {
+        "value": 0.006,
+        "deviation": 0.002,
+        "low": 0.0,
+        "high": 0.02,
+        "unit": "s",
+        "source": "computing time",
+        "assumed": True,
+    }
+    assert read_number("60 rpm/V ± 10 %", "comment", ("V·s/rad",))["deviation"] == pytest.approx(0.0159154943)
+    assert read_number("5 ± 1 %", "", ("%",))["deviation"] == 1.0
+    assert read_number("160 mm ± 1 mm", "", ("m",))["deviation"] == 0.001
+    assert read_number(0.8, "guess", ("kg",)) == {"value": 0.8, "unit": "kg", "source": "guess", "assumed": True}
+
+
+@pytest.mark.parametrize(
+    ("written", "allowed"),
+    [
+        ("12 V/rad", ("V",)),
+        ("10 deg", ("V", "A", "1")),
+        ("1 count", ("rad", "m")),
+        ("1 kg", ("N·m",)),
+        ("0 rpm/V", ("V·s/rad",)),
+        ("3", ("rad", "m")),
+        ("eight kg", ("kg",)),
+        ("160 mm ± 1 m", ("m",)),
+    ],
+)
+def test_what_is_no_such_quantity_is_refused(written: str, allowed: tuple[str, ...]) -> None:
+    with pytest.raises(ValueError, match=r"unit|number|reciprocal"):
+        read_number(written, "", allowed)
+
+
+def test_what_a_file_leaves_out_is_zero_or_the_usual_and_the_comment_is_the_source() -> None:
+    machine = parse_machine(SHORT)
+    joint, motor = machine.joint(1), machine.joint(1).dc_motor
+    assert (machine.title, machine.modelled_joints, machine.controller.kind) == ("rod", (1,), "none")
+    assert (joint.kind, joint.geometry.a.value, joint.link.shape) == ("revolute", 0.0, "body")
+    assert joint.link.mass.deviation == pytest.approx(0.08)
+    assert joint.link.mass.source == "scales"
+    assert (motor.torque_constant.value, motor.back_emf_constant.value) == (0.05, 0.05)
+    assert (motor.dac_full_scale.value, motor.gear_ratio.value, motor.inductance.assumed) == (12.0, 1.0, True)
+    assert joint.sensor is not None
+    assert joint.sensor.at_zero.value == pytest.approx(-3.14159265)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_a_machine_is_written_and_read_back_as_it_was(path: Path) -> None:
+    machine = load_machine(str(path))
+    again = parse_machine(machine_text(machine))
+    assert numbers(again) == numbers(machine)
+    assert machine_text(again) == machine_text(machine)
+
+
+def test_tidying_keeps_comments_and_changes_nothing_twice() -> None:
+    text = (ROOT / "examples" / "pan_tilt.toml").read_text("utf-8")
+    assert tidied(text, "pan_tilt.toml") == text
+    old = """# A rod.
+version = 1
+name = "rod"
+title = "rod"
+gravity = [0.0, 0.0, -9.81]
+modelled_joints = [1]
+controller = { kind = "none" }
+[[joints]]
+# Weighed twice.
+name = "axis"
+kind = "revolute"
+geometry = { a = { value = 0.3, unit = "m", source = "ruler" }, alpha = { value = 0.0, unit = "rad", source = "planar" }, d = { value = 0.0, unit = "m", source = "planar" }, theta = { value = 0.0, unit = "rad", source = "down" } }
+link = { shape = "rod", mass = { value = 0.8, unit = "kg", source = "scales", low = 0.0, deviation = 0.08 } }
+drive = { kind = "gain", gain = { value = 0.5, unit = "N·m/V", source = "data sheet" } }
+"""  # noqa: E501
+    assert tidied(old, "rod.toml").splitlines() == [
+        "# A rod.",
+        "",
+        'name = "rod"',
+        "",
+        "# Weighed twice.",
+        "[[joints]]",
+        'name = "axis"',
+        'geometry = { a = "0.3 m" }  # ruler',
+        'link = { mass = "0.8 ± 0.08 kg" }  # scales',
+        'drive = { gain = "0.5 N·m/V" }  # data sheet',
+    ]
+    with pytest.raises(SpecError, match=r"my.toml: line 1: colour: there is no such field"):
+        tidied(f'colour = "red"\n{old}', "my.toml")
+
+
+def test_a_motor_behind_an_inverse_unit_keeps_its_relative_deviation() -> None:
+    text = SHORT.replace('torque_constant = "5 N·cm/A"', 'back_emf_constant = "100 rpm/V ± 5 %"')
+    motor = parse_machine(text).joint(1).dc_motor
+    assert motor.torque_constant.value == pytest.approx(0.0954929659)
+    assert motor.torque_constant.deviation == pytest.approx(0.05 * 0.0954929659)
+
+
+KEYS = st.text(st.sampled_from("ab-_\"' .#"), min_size=1, max_size=3)
+VALUES = st.recursive(
+    st.sampled_from(["1", "-2.5", "true", '"#a\\"]"', "'b}'", '"""c\n\n#"""', "1979-05-27T07:32:00Z"]),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=3).map(lambda parts: "[\n# comment\n" + ",\n".join(parts) + "\n]"),
+        st.dictionaries(st.sampled_from("xyz"), inner, max_size=3).map(
+            lambda table: f"{{ {', '.join(f'{k} = {v}' for k, v in table.items())} }}"
+        ),
+    ),
+    max_leaves=6,
+)
+
+
+@given(st.dictionaries(KEYS, VALUES, max_size=4), st.lists(st.dictionaries(KEYS, VALUES, max_size=2), max_size=3))
+def test_places_are_those_of_every_value_that_tomllib_reads(table: dict[str, str], rows: list[dict[str, str]]) -> None:
+    def lines(entries: dict[str, str]) -> list[str]:
+        return [f"{_quoted(key)} = {value} # behind" for key, value in entries.items()]
+
+    text = "\n".join([*lines(table), *(line for row in rows for line in ("[[rows_]]", *lines(row)))])
+    data = tomllib.loads(text)
+    places = places_of(text)
+    assert set(places.lines) == {path for path in paths(data) if path not in {(), ("rows_",)}}
+    assert all(1 <= line <= text.count("\n") + 1 for line in places.lines.values())
+
+
+def _quoted(key: str) -> str:
+    return '"' + key.replace('"', '\\"') + '"'
+
+
+def paths(data: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    yield path
+    for key, value in data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ():
+        yield from paths(value, (*path, key))
+
+
+def numbers(machine: Machine) -> dict[str, Any]:
+    """A machine without sources, and without bounds that go without saying."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            kept = {k: plain(v) for k, v in value.items() if k not in ("source", "assumed")}
+            return kept | {"low": None} if kept.get("low") == 0.0 and "value" in kept and kept["high"] is None else kept
+        return [plain(one) for one in value] if isinstance(value, list | tuple) else value
+
+    found = plain(machine.model_dump())
+    assert isinstance(found, dict)
+    return found
+
+
+def test_what_ships_is_written_as_it_would_be_tidied() -> None:
+    assert "ma2000" in shipped_machines()
+    path = ROOT / "daq" / "contracts" / "machines" / "ma2000.toml"
+    assert len(tidied(path.read_text("utf-8"), path.name).splitlines()) < 160

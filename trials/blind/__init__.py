@@ -1,0 +1,16 @@
+"""The blind trial of `daq blind`: its stages, each in a process of its own, and the data between them."""
+
+from daq.plugins import Command, Plugin
+
+PLUGIN = Plugin(
+    commands=(
+        Command(
+            "blind",
+            "Hide effects in the mock, diagnose blindly, and score.",
+            "trials.blind.command",
+            about="computer",
+            needs="model",
+            group="Model",
+        ),
+    )
+)

@@ -1,0 +1,226 @@
+"""The trial, case by case: detectability, recording, diagnosis, scoring. Each stage is carried out once, and its
+result kept."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import takewhile
+from pathlib import Path
+from typing import Any
+
+from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.file_lock import take_lock
+from daq.contracts.machine import Machine
+from daq.executors import Workers, done_in_any_order
+from daq.executors.each import growing
+from daq.traces.reader import read_trace
+from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
+from model.discrepancy.diagnosis import Acquired, NextExperiment
+from model.machine_model.model import base_model
+from model.trial.score import Score, score, score_of_failure
+from model.trial.table import TrialTable, trial_table
+from model.trial.truth import Detectability, parse_truth
+from trials.blind.experiments import machine_with_load, trial_experiment, write_set_points
+from trials.blind.folder import STAGES, Stage, TrialFolder
+from trials.blind.mock_side import TrialStageError, detect, reveal
+from trials.blind.recording import Recorded, record
+from trials.blind.sealed import DIAGNOSER, DiagnosisFailedError, SealedAnswer, diagnose_sealed
+from trials.blind.sharpness import sealed_answer, with_rivals, work_out_sharpness
+
+ROBOT_TIME = 60.0
+"""Robot time in s that a trial may spend on further experiments."""
+Progress = Callable[[int, str], None]
+
+
+@contextmanager
+def _alone(folder: Path, load: int) -> Iterator[None]:
+    """Keeps other processes that use this folder from working on the same load within the block."""
+    folder.mkdir(exist_ok=True)
+    with (folder / f".load-{load}").open("ab") as lock:
+        take_lock(lock, waits=True)
+        yield
+
+
+@dataclass(frozen=True)
+class CaseStage:
+    """A stage of a case, to be carried out by any process; `folder` has the results of the case's stages before."""
+
+    stage: Stage
+    seed: int
+    folder: TrialFolder
+
+
+@dataclass
+class Campaign:
+    """One trial. `machine` describes the arm from which every diagnosis begins, before a load is announced."""
+
+    folder: TrialFolder
+    machine: Machine
+    diagnoser: Sequence[str] = DIAGNOSER
+    until: Stage = "score"
+    experiment: Callable[[str], ExperimentSpec] = trial_experiment
+    """The experiment of a name."""
+    recorder: Callable[[int, str, ExperimentSpec, Machine, Path], Recorded] = record
+
+    def run(self, seeds: Sequence[int], workers: Workers, progress: Progress, seconds: float | None = None) -> int:
+        """Carries out the stages that are left of all cases; `progress` is called after every case. This process alone
+        writes the lines; the workers must see the folder. After `seconds` no further stage is begun.
+
+        Returns how many are not done, because a process of theirs failed; they are tried again next time.
+        """
+        end = math.inf if seconds is None else time.monotonic() + seconds
+        write_set_points(self.experiment(self._seen_by), self.machine, self._set_points)
+        ended, failed = 0, 0
+        left = deque[CaseStage]()
+
+        def go_on(seed: int, first: bool) -> None:
+            nonlocal ended
+            if (stage := self._next_stage(seed)) is not None:
+                put = left.append if first else left.appendleft
+                put(CaseStage(stage, seed, self.folder.of_case(seed)))
+            else:
+                ended += 1
+                progress(ended, f"{self.folder.name_of(seed)}: done")
+
+        for seed in self.folder.in_order(seeds):
+            go_on(seed, first=True)
+        anywhere = replace(self, folder=TrialFolder(self.folder.path, self.folder.asked))
+        in_time = takewhile(lambda _: time.monotonic() < end, growing(left))
+        for task, future in done_in_any_order(workers, anywhere._carry_out, in_time):
+            try:
+                self.folder.add(task.stage, future.result())
+            except (TrialStageError, BrokenExecutor) as error:
+                ended, failed = ended + 1, failed + 1
+                progress(ended, f"{self.folder.name_of(task.seed)}: {error}")
+            else:
+                go_on(task.seed, first=False)
+        return failed
+
+    @property
+    def _seen_by(self) -> str:
+        return "diagnostic" if self.folder.asked.acquire else self.folder.asked.experiment
+
+    @property
+    def _set_points(self) -> Path:
+        """File of the set points for which effects must be detectable."""
+        return self.folder.path / f"{self._seen_by}.csv"
+
+    def _next_stage(self, seed: int) -> Stage | None:
+        """The first stage of a case that is left; None where there is none, or the case ended before it."""
+        for stage in STAGES[: STAGES.index(self.until) + 1]:
+            if self.folder.row(stage, seed) is None:
+                recorded = self.folder.row("record", seed)
+                return None if recorded is not None and recorded["outcome"] != "complete" else stage
+        return None
+
+    def _carry_out(self, task: CaseStage) -> dict[str, Any]:
+        """Carries out a stage in a worker, and returns its line."""
+        return replace(self, folder=task.folder)._stage(task.stage, task.seed)
+
+    def scores(self) -> list[Score]:
+        """The scores of all cases in the folder."""
+        self.folder.reload()
+        rows = self.folder.rows("score")
+        return [with_rivals(Score.model_validate(row), self.folder.row("sharpness", row["seed"])) for row in rows]
+
+    def table(self) -> TrialTable:
+        """The table of all scores."""
+        scores = self.scores()
+        return trial_table(scores, sum(row["outcome"] != "complete" for row in self.folder.rows("record")))
+
+    def _stage(self, stage: Stage, seed: int) -> dict[str, Any]:
+        if stage == "detect":
+            tangents = self.folder.path / "tangents"
+            # The first of a load works out its tangents, which takes a minute; the others read them.
+            with _alone(tangents, seed % 10):
+                return detect(seed, self._set_points, tangents)
+        if stage == "record":
+            return self._record(seed)
+        if stage == "sharpness":
+            return work_out_sharpness(self.folder, seed, self._machine(seed), self.experiment)
+        return self._diagnose(seed) if stage == "diagnose" else self._score(seed)
+
+    def _row(self, stage: Stage, seed: int) -> dict[str, Any]:
+        row = self.folder.row(stage, seed)
+        assert row is not None
+        return row
+
+    def _machine(self, seed: int) -> Machine:
+        """The machine with the load that this arm is announced to carry."""
+        return machine_with_load(self.machine, self._row("detect", seed)["load_kg"])
+
+    def _record(self, seed: int) -> dict[str, Any]:
+        begun = time.monotonic()
+        runs = [self._run(seed, name) for name in (self.folder.asked.experiment, "held-out")]
+        failed = next((run for run in runs if run.outcome != "complete"), None)
+        return {
+            "seed": seed,
+            "case": self.folder.name_of(seed),
+            "outcome": "complete" if failed is None else failed.outcome,
+            "reason": "" if failed is None else failed.reason,
+            "trace": runs[0].file.name,
+            "held_out": runs[1].file.name,
+            "robot_seconds": runs[0].duration,
+            "seconds": time.monotonic() - begun,
+        }
+
+    def _run(self, seed: int, name: str) -> Recorded:
+        return self.recorder(seed, name, self.experiment(name), self._machine(seed), self.folder.path / "traces")
+
+    def _diagnose(self, seed: int) -> dict[str, Any]:
+        """The sealed answer, the last one where further experiments were run. Its file and hash are written before
+        the truth is revealed."""
+        recorded, case = self._row("record", seed), self.folder.name_of(seed)
+        traces = [self.folder.path / "traces" / recorded["trace"]]
+        row: dict[str, Any] = {"seed": seed, "case": case}
+        budget, runs, answers = ROBOT_TIME if self.folder.asked.acquire else 0.0, list[Acquired](), list[SealedAnswer]()
+        try:
+            answers.append(self._answer(seed, traces, recorded["held_out"], runs))
+            while (asked := next_to_run(answers[-1].read(), runs, budget)) is not None:
+                runs.append(self._further(seed, asked, len(runs) + 1))
+                if runs[-1].outcome == "complete":
+                    traces.append(Path(runs[-1].file))
+                    answers.append(self._answer(seed, traces, recorded["held_out"], runs))
+        except DiagnosisFailedError as error:
+            return {**row, "failure": str(error), "seconds": sum(given.seconds for given in answers)}
+        file = self.folder.path / "answers" / f"{case}.json"
+        file.write_bytes(answers[-1].text)
+        return {
+            **row,
+            "answer": file.name,
+            "sha256": answers[-1].digest,
+            "seconds": sum(given.seconds for given in answers),
+            "robot_seconds": recorded["robot_seconds"] + budget - time_left(runs, budget),
+            "traces": [trace.name for trace in traces],
+            "further": [
+                {"experiment": r.experiment, "trace": Path(r.file).name, "outcome": r.outcome, "duration": r.duration}
+                for r in runs
+            ],
+        }
+
+    def _answer(self, seed: int, traces: list[Path], held_out: str, runs: Sequence[Acquired]) -> SealedAnswer:
+        left = time_left(runs, ROBOT_TIME) if self.folder.asked.acquire else None
+        model = base_model(self._machine(seed))
+        return diagnose_sealed(traces, self.folder.path / "traces" / held_out, model, self.diagnoser, left)
+
+    def _further(self, seed: int, asked: NextExperiment, number: int) -> Acquired:
+        """Runs the experiment that an answer asks for on the same arm."""
+        made = self.recorder(seed, f"further {number}", asked.spec, self._machine(seed), self.folder.path / "traces")
+        return as_run(asked, read_trace(made.file), made.file, made.outcome)
+
+    def _score(self, seed: int) -> dict[str, Any]:
+        """Reveals the truth and scores the answer, which must be the one that was sealed."""
+        sealed = self._row("diagnose", seed)
+        seen = Detectability.model_validate(self._row("detect", seed))
+        if "failure" in sealed:
+            found = score_of_failure(parse_truth(reveal(seed)), seen, sealed["seconds"])
+        else:
+            answer = sealed_answer(self.folder, seed).read()
+            found = score(parse_truth(reveal(seed)), seen, answer, self._machine(seed))
+        return found.model_dump(mode="json")
