@@ -1,4 +1,4 @@
-"""What speaks for and against an answer, as data. `explanation/renderer.py` alone makes sentences from it."""
+"""What speaks for and against an answer, as data. `explanation/answer_words.py` alone makes sentences from it."""
 
 from __future__ import annotations
 
@@ -66,25 +66,15 @@ RefusalKind = Literal[
 ]
 
 
-class NamedEffect(FrozenRecord):
-    """An effect, its joints (none: of the whole machine), and its evidence."""
-
-    effect: str
-    joints: tuple[int, ...]
-    evidence: float
-
-
 class Reason(FrozenRecord):
     """What speaks for the effect of a step, beside what the step itself holds: its parameters, evidence and errors.
 
-    `removed`: by balancing torques, the share of the mean square that is gone on records not fitted to. `rival`: the
-    next best that would be another answer.
+    `removed`: by balancing torques, the share of the mean square that is gone on records not fitted to.
     """
 
     model_config = ConfigDict(extra="ignore")
     """Older answers have more."""
     removed: float | None = None
-    rival: NamedEffect | None = None
 
 
 class ControllerEffect(StrEnum):

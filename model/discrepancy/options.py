@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Protocol
+from typing import TYPE_CHECKING, Annotated
 
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
 from daq.contracts.errors import SpecError
-from daq.contracts.frozen import SpokenRecord
+from daq.contracts.frozen import FrozenRecord, SpokenRecord
 from model.discrepancy.grounds import Method
 from model.effects.library import effect
 
@@ -21,7 +21,7 @@ class DiagnosisOptions(SpokenRecord):
     effects: candidates by name; None for the whole library and loaded effects of the user's own.
     joints: on these joints only; None for all that the model moves.
     most_steps: effects that may be added, one after another.
-    method: how model and records are compared; None: as machine and traces allow (`method_choice`).
+    method: how model and records are compared; None: as machine and traces allow (`workflow.choose_method`).
     fitted: candidates per step that are fitted after the probes.
     polished: how many of the best fits are taken to their ends.
     despite_doubts: compute although a record is doubted; the verdict stays `check-the-record`.
@@ -36,19 +36,7 @@ class DiagnosisOptions(SpokenRecord):
     despite_doubts: bool = False
 
 
-class SearchOptions(Protocol):
-    """Options of either method that limit the search to effects and joints."""
-
-    @property
-    def effects(self) -> tuple[str, ...] | None:
-        """Names; None for all."""
-
-    @property
-    def joints(self) -> tuple[int, ...] | None:
-        """Numbers from 1; None for all that the model moves."""
-
-
-def check_options(options: SearchOptions, model: Model) -> None:
+def check_options(options: DiagnosisOptions | TorqueOptions, model: Model) -> None:
     """Raises SpecError for options that leave nothing to look for.
 
     That is a joint that the model does not move, an effect that is not in the library, or a user's own effect that acts
@@ -72,3 +60,37 @@ def check_options(options: SearchOptions, model: Model) -> None:
 
 def _listed(joints: tuple[int, ...]) -> str:
     return ", ".join(map(str, joints))
+
+
+class TorqueOptions(FrozenRecord):
+    """How to diagnose from torques.
+
+    cutoff: of the low-pass, Hz; None: the highest at which noise of the acceleration stays small.
+    effects: names to try; None: every effect of the library, and the user's own, that acts on recorded torque.
+    joints: joints to look on; None for all that the model moves.
+    most_steps: most effects that are added, one after the other.
+    least_evidence: least fall of −2 log posterior by an effect, after the cost of its parameters and of the places
+        searched.
+    echo: share of the evidence from earlier steps on the same joints, which a further effect must bring in addition:
+        where the law of an effect is not exactly the rig's, what is left is no effect of its own.
+    least_margin: least lead in evidence over every other answer, for an effect to be named alone.
+    least_share: least share by which the mean square of the torque on held-out records must fall.
+    """
+
+    cutoff: Annotated[FiniteFloat, Field(gt=0)] | None = None
+    effects: tuple[str, ...] | None = None
+    joints: tuple[int, ...] | None = None
+    most_steps: Annotated[int, Field(ge=1, le=20)] = 8
+    least_evidence: FiniteFloat = 30.0
+    echo: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.02
+    least_margin: FiniteFloat = 12.0
+    least_share: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.01
+
+
+def torque_options(options: DiagnosisOptions | TorqueOptions | None) -> TorqueOptions:
+    """Returns the options of any diagnosis as options of this one, whose own number of steps holds where none is given:
+    an arm of six joints has friction on each of them."""
+    if isinstance(options, DiagnosisOptions):
+        given = {"most_steps": options.most_steps} if "most_steps" in options.model_fields_set else {}
+        return TorqueOptions(effects=options.effects, joints=options.joints, **given)
+    return options or TorqueOptions()

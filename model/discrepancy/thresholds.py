@@ -14,6 +14,13 @@ FEEDBACK_SHARE_FOR_ERRORS = 0.5
 """The same where errors are reported and judged, held-out ones above all: nearer to what the model alone would do."""
 
 
+CHANCES = 3
+"""Candidates of one ranking that records not fitted to may refuse before the search ends."""
+WITHIN_NOISE = 3.0
+"""Residual of a joint, in deviations of noise, that may be noise alone: sound rigs leave up to 2.6, where
+friction turns (docs/how-well.md)."""
+
+
 @dataclass(frozen=True)
 class Thresholds:
     """What it takes to say something.

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Literal, TypeVar
 
-from model.discrepancy.diagnosis import SignalError, Step, Verdict
+from daq.contracts.machine import Machine
+from model.discrepancy.diagnosis import Gap, GapNumber, GapStage, GapWithout, SignalError, Step, Verdict
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.thresholds import Thresholds
+from model.machine_model.model import base_model
 from model.machine_model.record_verdict import SCATTER
 
 LEAST_EXCESS = 0.25
@@ -106,3 +109,57 @@ def withdrawn(step: Step, unexplained_joints: Sequence[int]) -> Step:
     """The step, not taken into the model after all."""
     why = Refusal(kind="only-resembles", joints=tuple(unexplained_joints))
     return step.model_copy(update={"adopted": False, "refusal": why}) if step.adopted else step
+
+
+MOST_NUMBERS = 5
+"""Numbers of a file that are listed."""
+Fitted = TypeVar("Fitted")
+Errors = dict[str, tuple[float | None, ...]]
+"""Root mean squares by joint, on traces `fitted` to and on `held_out` ones."""
+
+
+def gap_of(
+    measure: Literal["closed-loop", "torques"],
+    joints: Sequence[tuple[int, str, float]],
+    errors: Callable[[Fitted], Errors],
+    given: Fitted,
+    first: Fitted,
+    taken: Sequence[tuple[Step, Fitted]],
+    end: Fitted,
+    numbers: tuple[GapNumber, ...],
+) -> Gap:
+    """The gap of a diagnosis.
+
+    Args:
+        joints: each with its unit and noise. errors: of a fit. given, first: before anything was fitted, and
+            before any effect was added. taken: the adopted steps, each with the fit without those after it, its numbers
+            within what the file states. end: the last fit. numbers: as `gap_numbers`, of `first`.
+    """
+    effects = (GapStage(kind="effect", effect=s.effect, joints=s.joints, **errors(after)) for s, after in taken)
+    return Gap(
+        measure=measure,
+        joints=tuple(joint for joint, _, _ in joints),
+        units=tuple(unit for _, unit, _ in joints),
+        noise=tuple(noise for _, _, noise in joints),
+        stages=(
+            GapStage(kind="given", **errors(given)),
+            *effects,
+            GapStage(kind="refitted" if taken else "fitted", **errors(end)),
+        ),
+        without=GapWithout(**errors(first), numbers=numbers) if taken else None,
+    )
+
+
+def gap_numbers(machine: Machine, without: Mapping[str, float], fitted: Mapping[str, float]) -> tuple[GapNumber, ...]:
+    """Numbers of a machine file that would have had to move by more than a stated deviation, the furthest first.
+
+    Args:
+        without, fitted: values by name, fitted without and with the effects.
+    """
+    found = [
+        GapNumber(name=p.name, unit=p.unit, stated=p.value, deviation=p.deviation, without=value, fitted=fitted[p.name])
+        for p in base_model(machine).parameters
+        if p.deviation and p.name in fitted and (value := without.get(p.name)) is not None
+    ]
+    moved = [n for n in found if abs(n.without - n.stated) > n.deviation]
+    return tuple(sorted(moved, key=lambda n: abs(n.without - n.stated) / n.deviation, reverse=True)[:MOST_NUMBERS])

@@ -23,7 +23,7 @@ from model.comparison.difference import differences
 from model.discrepancy.explanation.answer_words import not_a_finding
 from model.discrepancy.explanation.step_words import where_with_summary
 from model.discrepancy.localisation.disagreement import locate
-from model.discrepancy.localisation.residuals import Residuals
+from model.discrepancy.localisation.phases import Residuals
 from model.discrepancy.localisation.statistics import chance_significance
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import placed

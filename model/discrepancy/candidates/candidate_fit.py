@@ -7,34 +7,32 @@ costs: ln n for every free parameter (BIC), and for a tone 2 ln of the number of
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import groupby
 
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from model.discrepancy.candidates.library import Hypothesis
+from daq.contracts.progress import Cancel, stop_if
+from model.discrepancy.candidates.library import Hypothesis, on_joints
 from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.tones import tones_tried
 from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.noise_model import AutoregressiveNoise, fit_noise_model
+from model.discrepancy.output_error.noise_model import LARGER, AutoregressiveNoise, fit_noise_model
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.search import STRAINED, Point, converge, descend, point_at
+from model.discrepancy.output_error.search import LAST_STEPS, STEPS, Point, converge, descend, point_at
+from model.discrepancy.thresholds import Thresholds
 from model.fitting.unknowns import Unknown
+from model.machine_model.record_verdict import FAR_OFF
 
-STEPS = 8
-"""Steps of a search for a candidate's fit."""
-POLISHING = 4
-"""Steps of each search that runs a fit to convergence."""
 LOST = 1.1
 """Fits that end above this multiple of the baseline cost are discarded as not converged."""
 AGAIN = 3
 """Most searches of a restarted fit; the best candidate is run to convergence later."""
 BETTER = 3.0
 """Least fall of the cost with which a fit counts as better; a smaller one is a move along a flat valley."""
-STRANGE = 1.15
-"""Misfit from which a fit is restarted: it has not explained the record, and may have ended in a wrong minimum."""
 SHAPE_PRIOR = 3.0
 """Prior width of a parameter that only shapes an effect, in its expected deviations: it keeps the parameter from
 running away where the effect is too small to show its shape."""
@@ -75,17 +73,10 @@ class CandidateFit:
 
 
 def same_answer(one: CandidateFit, better: CandidateFit) -> bool:
-    """Whether a candidate is the same answer as one ranked above it."""
-    return says_no_more(one.hypothesis.name, one.hypothesis.joints, better.hypothesis.name, better.hypothesis.joints)
-
-
-def says_no_more(
-    effect: str | None, joints: Sequence[int], of_better: str | None, joints_of_better: Sequence[int]
-) -> bool:
-    """Whether an effect is the same answer as one ranked above it: the same effect on the same or fewer joints, or on
+    """Whether a candidate is the same answer as one ranked above it: the same effect on the same or fewer joints, or on
     more, which then brought nothing."""
-    own, others = set(joints), set(joints_of_better)
-    return effect == of_better and (own <= others or own > others)
+    own, others = set(one.hypothesis.joints), set(better.hypothesis.joints)
+    return one.hypothesis.name == better.hypothesis.name and (own <= others or own > others)
 
 
 def cannot_be_told(rival: CandidateFit, best: CandidateFit, margin: float) -> bool:
@@ -188,13 +179,26 @@ def polish(before: Fit, found: CandidateFit) -> CandidateFit:
     joints = found.hypothesis.joints or point.model.machine.modelled_joints
     near = [k for k, u in enumerate(point.unknowns) if not u.joints or set(u.joints) & set(joints)]
     free = _indices(point.unknowns, [p.name for p in found.hypothesis.free])
+    known = set(free) <= set(near)
+    return _improved(
+        before, found, lambda: descend(point.with_new_tangents(near), LAST_STEPS, free, changing_known=known)
+    )
+
+
+def finish(before: Fit, found: CandidateFit) -> CandidateFit:
+    """The fit, run to convergence, with all derivatives computed anew."""
+    return _improved(before, found, lambda: converge(found.fit.point, LAST_STEPS))
+
+
+def _improved(before: Fit, found: CandidateFit, work: Callable[[], Point | None], least: float = 0.0) -> CandidateFit:
+    """The fit, or the one that some work on it leads to, where that costs less by more than `least`."""
     try:
-        begun = point.with_new_tangents(near)
-        point = descend(begun, POLISHING, free, changing_known=set(free) <= set(near))
+        point = work()
     except SpecError:
         return found
-    better = with_evidence(before, found.probe, point)
-    return better if better.fit.point.cost < found.fit.point.cost else found
+    if point is None or not point.cost < found.fit.point.cost - least:
+        return found
+    return with_evidence(before, found.probe, point)
 
 
 def restart(before: Fit, found: CandidateFit, goal: float = math.inf) -> CandidateFit:
@@ -203,30 +207,15 @@ def restart(before: Fit, found: CandidateFit, goal: float = math.inf) -> Candida
 
     The new fit is given up once a cost of `goal` is out of reach.
     """
-    if found.misfit < STRANGE and found.fit.point.strain < STRAINED:
+    if found.misfit < LARGER and found.fit.point.strain < FAR_OFF:
         return found
-    try:
-        point = _from_expected(before.point, found.probe, min(goal, found.fit.point.cost))
-    except SpecError:
-        return found
-    if point is None or not point.cost < found.fit.point.cost - BETTER:
-        return found
-    return with_evidence(before, found.probe, point)
+    reach = min(goal, found.fit.point.cost)
+    return _improved(before, found, lambda: _from_expected(before.point, found.probe, reach), BETTER)
 
 
 def diverged_from_prior(point: Point) -> bool:
     """Whether the tolerance parameters have unlikely values, and the record is unexplained all the same."""
-    return point.misfit >= STRANGE and point.strain >= STRAINED
-
-
-def finish(before: Fit, found: CandidateFit) -> CandidateFit:
-    """The fit, run to convergence, with all derivatives computed anew."""
-    try:
-        point = converge(found.fit.point, POLISHING)
-    except SpecError:
-        return found
-    better = with_evidence(before, found.probe, point)
-    return better if better.fit.point.cost < found.fit.point.cost else found
+    return point.misfit >= LARGER and point.strain >= FAR_OFF
 
 
 def improved_baseline(before: Fit, found: CandidateFit) -> Fit | None:
@@ -319,3 +308,119 @@ def price_of(observation: Observation, hypothesis: Hypothesis) -> float:
 
 def _indices(unknowns: Sequence[Unknown], names: Sequence[str]) -> list[int]:
     return [k for k, u in enumerate(unknowns) if u.name in names]
+
+
+WORTH_A_FIT = 0.7
+"""A set of joints is fitted where the evidence of its single fits adds up to this share of the best so far."""
+
+
+def fit_several_joints(
+    current: Fit,
+    singles: Sequence[CandidateFit],
+    probes: Sequence[Probe],
+    thresholds: Thresholds,
+    cancel: Cancel,
+) -> list[CandidateFit]:
+    """The effects that are significant on two joints or more, each fitted on its best two joints at once.
+
+    A search joint by joint would judge such an effect while it is still missing on the others: the tolerance parameters
+    make up for those, and what remains looks like other effects.
+
+    Parameters are each joint's own. The best such pairs are tried on further joints, one by one. A fit that brings no
+    more than the effect on one joint fewer is left out.
+
+    Args:
+        singles: fits on single joints. probes: start values on joints where there is no such fit.
+
+    Raises CancelledError.
+    """
+    found: list[tuple[CandidateFit, list[CandidateFit]]] = []
+    best = max((r.evidence for r in singles), default=0.0)
+    for alike in _alike(singles, thresholds):
+        if sum(r.evidence for r in alike) >= WORTH_A_FIT * best:
+            stop_if(cancel)
+            fit = _better(current, alike[:2], thresholds)
+            if fit is not None:
+                found.append((fit, alike[2:]))
+                best = max(best, fit.evidence)
+    every = [pair for pair, _ in found]
+    for pair, others in found:
+        if pair.evidence <= best - thresholds.close:
+            continue
+        widest = pair
+        further: list[CandidateFit | Probe] = [*others, *_only_probed(pair, others, probes)]
+        for place in further:
+            stop_if(cancel)
+            wider = _better(current, [widest], thresholds, place)
+            if wider is not None:
+                widest = wider
+                every.append(wider)
+    return every
+
+
+def _only_probed(found: CandidateFit, fitted: Sequence[CandidateFit], probes: Sequence[Probe]) -> list[Probe]:
+    """Probes of the same law on joints where there is no fit of it."""
+    known = {j for r in (found, *fitted) for j in r.hypothesis.joints}
+    law = _law(found.hypothesis)
+    return [p for p in probes if _law(p.hypothesis) == law and not set(p.hypothesis.joints) & known]
+
+
+def _better(
+    current: Fit, parts: Sequence[CandidateFit], thresholds: Thresholds, further: CandidateFit | Probe | None = None
+) -> CandidateFit | None:
+    """The parts fitted together, and on one further joint if given; None if that brings less than a further joint
+    must."""
+    most = max(r.evidence for r in parts)
+    begun = _begun(current, parts, further)
+    fit = refit(current, nearest(current.point, begun)) if begun else None
+    fit = None if fit is None else restart(current, fit)
+    return fit if fit is not None and fit.evidence - most > thresholds.needed(elsewhere=most, kin=True) else None
+
+
+def _begun(current: Fit, parts: Sequence[CandidateFit], further: CandidateFit | Probe | None) -> list[Probe]:
+    """Two starts of a fit of all of them; empty where the model refuses them.
+
+    In the first, every part is where its own fit has ended, and the other unknowns are moved by the sum of their moves
+    there. In the second, the best part is where its fit has ended and the others are absent, which is nearer where all
+    of them explain the same. Nothing is simulated: the gain is the sum of the parts', and there is no response.
+    """
+    point = current.point
+    fits = [*parts, further] if isinstance(further, CandidateFit) else list(parts)
+    values = {p.name: r.fit.point.value(p.name) for r in fits for p in r.hypothesis.free}
+    moves = {id(r): np.array([r.fit.point.value(u.name) for u in point.unknowns]) - point.values for r in fits}
+    alike, every = [r.hypothesis for r in fits], list(moves.values())
+    if isinstance(further, Probe):
+        values |= further.start
+        every.append(further.moved)
+        alike.append(further.hypothesis)
+    best = max(parts, key=lambda r: r.evidence)
+    own = {p.name for p in best.hypothesis.free}
+    absent = {p.name: p.null for c in alike for p in c.main if p.null is not None and p.name not in own}
+    found = []
+    for start, moved in ((values, np.sum(every, axis=0)), ({**values, **absent}, moves[id(best)])):
+        hypothesis = on_joints(point.model, alike, start)
+        if hypothesis is not None:
+            gain = sum(r.evidence for r in fits)
+            found.append(Probe(hypothesis, gain, start, moved, np.zeros_like(point.weighted)))
+    return found
+
+
+def _alike(singles: Sequence[CandidateFit], thresholds: Thresholds) -> list[list[CandidateFit]]:
+    """Sets of significant fits of one law on different joints, the best fit first; the set with the largest sum
+    first."""
+    suited = [
+        r
+        for r in singles
+        if r.evidence >= thresholds.significant and len(r.hypothesis.joints) == 1 and r.hypothesis.tone is None
+    ]
+    sets: list[list[CandidateFit]] = []
+    for _, group in groupby(sorted(suited, key=lambda r: _law(r.hypothesis)), key=lambda r: _law(r.hypothesis)):
+        best = {r.hypothesis.joints: r for r in sorted(group, key=lambda r: r.evidence)}
+        if len(best) > 1:
+            sets.append(sorted(best.values(), key=lambda r: -r.evidence))
+    return sorted(sets, key=lambda s: -sum(r.evidence for r in s))
+
+
+def _law(hypothesis: Hypothesis) -> tuple[str, str]:
+    """The effect's name, and its law, because a name may stand for two."""
+    return hypothesis.name, hypothesis.free[0].effect or ""

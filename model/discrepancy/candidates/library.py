@@ -10,6 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from model import layout as at
+from model.discrepancy.output_error.observation import Observation
 from model.effects.effect import JointScale, Tone
 from model.effects.library import BESIDE, effect, library
 from model.machine_model.effect_parameters import effect_parameters, suits_drive
@@ -283,3 +284,36 @@ def _full_bounds(
     free: Sequence[Parameter], bounds: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
     return {p.name: bounds[key] for p in free for key in bounds if key in (p.name, p.part)}
+
+
+SHARES = (0.85, 0.65, 0.45)
+"""Shares of the largest recorded drive at which a limit is tried, where the usual trials are all beyond it."""
+
+
+def with_recorded_trials(hypothesis: Hypothesis, observation: Observation) -> Hypothesis:
+    """The hypothesis; of a supply limit whose trials the record never reaches, with trials that it does reach; of a
+    spring on one side, with rests among the recorded positions: it shows only where the joint becomes taut."""
+    if hypothesis.name == "one_sided_spring":
+        return _taut_within(hypothesis, observation)
+    if hypothesis.name != "supply_limit" or not all(r.inputs.has_drive for r in observation.records):
+        return hypothesis
+    column = observation.machine.modelled_joints.index(hypothesis.joints[0])
+    largest = max(float(np.abs(r.inputs.drive[:, column]).max()) for r in observation.records)
+    (limit,) = hypothesis.main
+    if largest <= 0.0 or any(trial[limit.name] < largest for trial in hypothesis.trials):
+        return hypothesis
+    trials = tuple({limit.name: share * largest} for share in SHARES if share * largest > limit.low)
+    return replace(hypothesis, trials=(*hypothesis.trials, *trials))
+
+
+def _taut_within(hypothesis: Hypothesis, observation: Observation) -> Hypothesis:
+    """The hypothesis with its rest among the recorded positions of its joint, rad (m)."""
+    rests = [p.name for p in hypothesis.free if p.part == "rest"]
+    if not rests:
+        return hypothesis
+    column = observation.machine.modelled_joints.index(hypothesis.joints[0])
+    positions = np.concatenate([r.inputs.readings[:, column] for r in observation.records])
+    low, high = (float(x) for x in np.nanquantile(positions, TAUT_WITHIN))
+    tried = (float(x) for x in np.nanquantile(positions, TAUT_QUANTILES))
+    trials = tuple({**trial, **dict.fromkeys(rests, rest)} for rest in tried for trial in hypothesis.trials)
+    return replace(hypothesis, trials=trials, bounds={**hypothesis.bounds, **dict.fromkeys(rests, (low, high))})

@@ -17,6 +17,7 @@ from model.arrays import Floats
 from model.discrepancy.candidates.library import SMALL, Hypothesis
 from model.discrepancy.output_error.observation import side_by_side, step_of_derivatives
 from model.discrepancy.output_error.search import Point
+from model.machine_model.record_verdict import FAR_OFF
 
 LARGEST_STRETCH = 2.0
 """Largest factor by which a trial is scaled: beyond it, the response is no longer proportional."""
@@ -227,3 +228,49 @@ def _stretched(
             stretch = (value - absent) / size if size else stretch
             start[p.name] = value
     return start, stretch
+
+
+_NUMBERS = {
+    "link_mass": ("mass",),
+    "payload": ("mass",),
+    "input_delay": ("delay",),
+    "weakened_magnet": ("torque_constant", "back_emf_constant"),
+}
+"""By effect, the parts of a machine's numbers that it changes."""
+
+
+def as_effect(point: Point, hypothesis: Hypothesis) -> Probe | None:
+    """A start of a hypothesis that has all of the distance of a number far from its expectation, while that number is
+    as expected; None where the hypothesis changes no such number.
+
+    The gain is what the priors cost at the point.
+    """
+    parts = _NUMBERS.get(hypothesis.name)
+    main = hypothesis.main
+    if parts is None or len(main) != 1:
+        return None
+    own = [
+        k
+        for k, u in enumerate(point.unknowns)
+        if u.parameter.part in parts and u.parameter.effect is None and _is_of(u.joints, hypothesis)
+    ]
+    away = (point.values - point.expected) * np.sqrt(point.precision)
+    far = [k for k in own if abs(away[k]) >= FAR_OFF]
+    if not far:
+        return None
+    most = max(far, key=lambda k: abs(away[k]))
+    distance = float(point.values[most] - point.expected[most])
+    if hypothesis.name == "weakened_magnet":
+        distance /= -float(point.expected[most])
+    parameter = main[0]
+    size = float(np.clip((parameter.null or 0.0) + distance, parameter.low, parameter.high))
+    moved = np.zeros_like(point.values)
+    moved[own] = (point.expected - point.values)[own]
+    return Probe(
+        hypothesis, float(np.sum(away[own] ** 2)), {parameter.name: size}, moved, np.zeros_like(point.weighted)
+    )
+
+
+def _is_of(joints: tuple[int, ...], hypothesis: Hypothesis) -> bool:
+    """Whether a number is of the hypothesis's joints; a controller's delay is of every joint."""
+    return joints == hypothesis.joints or (hypothesis.name == "input_delay" and not joints)

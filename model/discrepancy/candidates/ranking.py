@@ -1,4 +1,4 @@
-"""Probes every hypothesis, fits the promising ones, and ranks all by evidence."""
+"""Probes every hypothesis, fits the promising ones, ranks all by evidence, and decides what that allows."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Literal
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.candidates.candidate_fit import (
-    STRANGE,
     CandidateFit,
     Fit,
+    cannot_be_told,
     diverged_from_prior,
     finish,
+    fit_several_joints,
     polish,
     price_of,
     refit,
@@ -21,18 +23,18 @@ from model.discrepancy.candidates.candidate_fit import (
     restart,
     same_answer,
 )
-from model.discrepancy.candidates.library import Hypothesis, hypotheses
-from model.discrepancy.candidates.multi_joint_fit import fit_several_joints
-from model.discrepancy.candidates.probing import Probe, keep_promising, probe
-from model.discrepancy.candidates.recorded_trials import with_recorded_trials
-from model.discrepancy.candidates.stated_numbers import as_effect
+from model.discrepancy.candidates.library import Hypothesis, hypotheses, with_recorded_trials
+from model.discrepancy.candidates.probing import Probe, as_effect, keep_promising, probe
 from model.discrepancy.candidates.tones import propose_tones
+from model.discrepancy.diagnosis import Step
 from model.discrepancy.output_error.case import Case
+from model.discrepancy.output_error.noise_model import LARGER
 from model.discrepancy.output_error.observation import AT_ONCE, side_by_side
-from model.discrepancy.output_error.search import STRAINED, Point
+from model.discrepancy.output_error.search import Point
 from model.discrepancy.thresholds import Thresholds
 from model.effects.library import effect
 from model.effects.names import effect_on
+from model.machine_model.record_verdict import FAR_OFF
 
 FLAGGED_SHARE = 0.1
 """A joint is flagged where its best probe promises this share of the best of all."""
@@ -64,7 +66,7 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     probes = _probe_all(case, current, cancel, earlier)
     chosen = [p for p in probes if _is_hopeful(current, p, case.thresholds)][: case.options.fitted]
     fits = _fit_all(current, chosen, case.thresholds.close, progress, cancel)
-    if current.point.strain >= STRAINED:
+    if current.point.strain >= FAR_OFF:
         fits += _fits_from_expected(current, probes, case.options.polished)
         fits += _fits_of_strained_numbers(current, case)
     progress(0.9, "fitting effects of several joints")
@@ -137,7 +139,7 @@ def _fit_all(
             break
         names = " and ".join(effect_on(one.hypothesis.name, one.hypothesis.joints) for one in now)
         progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
-        explaining = (f for f in fits if f.misfit < STRANGE)
+        explaining = (f for f in fits if f.misfit < LARGER)
         reach = min((f.fit.point.cost + price_of(observation, f.hypothesis) for f in explaining), default=None)
 
         def fit(probed: Probe, reach: float | None = reach) -> CandidateFit | None:
@@ -218,7 +220,7 @@ def _restart_unexplained(current: Fit, head: Sequence[CandidateFit], close: floa
     """The best fits; those that have not explained the record with likely values are restarted: all of them if none has
     explained it, otherwise those close to the best. Fits of several joints have been restarted already."""
     best = max(head, key=lambda r: r.evidence, default=None)
-    least = -math.inf if best is None or best.misfit >= STRANGE else best.evidence - close
+    least = -math.inf if best is None or best.misfit >= LARGER else best.evidence - close
     goal = math.inf if best is None else best.fit.point.cost + close
 
     def again(found: CandidateFit) -> CandidateFit:
@@ -248,3 +250,48 @@ def _one_law_per_name(fits: Sequence[CandidateFit]) -> tuple[CandidateFit, ...]:
             seen.add(key)
             kept.append(fit)
     return tuple(kept)
+
+
+Kind = Literal["nothing", "named", "group"]
+
+
+@dataclass(frozen=True)
+class Decision:
+    """best: the candidate with the answer. margin: its lead in evidence over the best that would be another answer.
+    group: candidates that the data cannot tell apart, the best first."""
+
+    kind: Kind
+    best: CandidateFit | None
+    margin: float
+    group: tuple[CandidateFit, ...]
+
+
+def decide(ranking: Ranking, thresholds: Thresholds, added: Sequence[Step] = ()) -> Decision:
+    """The answer, from the first candidate of the ranking that has the evidence it needs, and those after it.
+
+    Candidates below their threshold are skipped: those ranked higher are artefacts of an effect already in the model.
+    """
+    fits = ranking.fitted
+    place = next((k for k, f in enumerate(fits) if f.evidence >= _needed(f, thresholds, added)), None)
+    if place is None:
+        return Decision("nothing", fits[0] if fits else None, 0.0, ())
+    best = fits[place]
+    rivals = [f for f in fits[place + 1 :] if not same_answer(f, best)]
+    margin = best.evidence - max([0.0, *(r.evidence for r in rivals)])
+    group = (best, *(r for r in rivals if _is_member(r, best, thresholds, added)))
+    return Decision("group" if len(group) > 1 else "named", best, margin, group if len(group) > 1 else ())
+
+
+def _is_member(rival: CandidateFit, best: CandidateFit, thresholds: Thresholds, added: Sequence[Step]) -> bool:
+    """Whether a rival belongs to the group of the best. One that costs more has to be significant by itself."""
+    if best.evidence - rival.evidence < thresholds.margin:
+        return True
+    return cannot_be_told(rival, best, thresholds.margin) and rival.evidence >= _needed(rival, thresholds, added)
+
+
+def _needed(found: CandidateFit, thresholds: Thresholds, added: Sequence[Step]) -> float:
+    joints = set(found.hypothesis.joints)
+    near = [not joints or not a.joints or bool(joints & set(a.joints)) for a in added]
+    here = sum(a.evidence for a, on in zip(added, near, strict=True) if on)
+    elsewhere = sum(a.evidence for a, on in zip(added, near, strict=True) if not on)
+    return thresholds.needed(here, elsewhere, kin=any(a.effect == found.hypothesis.name for a in added))

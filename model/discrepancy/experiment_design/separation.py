@@ -8,17 +8,168 @@ there is already. Either may be the wrong one; the smaller of the two d′ count
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
-from daq.contracts.errors import SpecError
-from daq.contracts.experiment import OfferedExperiment
+from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
+from model import layout as at
 from model.arrays import Floats
+from model.design.information import Planner, falls_behind, imagined_trace
 from model.discrepancy.candidates.candidate_fit import CandidateFit
-from model.discrepancy.experiment_design.prediction import Imagined, Prediction
+from model.discrepancy.output_error.calibration import Calibration
+from model.discrepancy.output_error.observation import Observation, Signals, observe
+from model.discrepancy.output_error.search import Point
+from model.drives.sensor import sensed_angle
+from model.fitting.unknowns import Unknown
+from model.machine_model.model import Model
+
+NOISE_SEED = 2
+"""Seed of the readings' noise in an imagined run: without noise, friction would hold where the real arm creeps."""
+LOOSE = 1e-9
+"""Relative precision that stands for none, so that matrices can be inverted."""
+ROUNDS = 20
+"""Rounds in which the angle to a reading is found; each leaves the share by which the potentiometer's scale is off."""
+
+
+@dataclass(frozen=True)
+class Imagined:
+    """An imagined experiment, prepared as a diagnosis prepares a trace.
+
+    starts: the unknowns of its initial posture, known within a reading or so. noise: of the readings, counts.
+    """
+
+    observation: Observation
+    starts: tuple[Unknown, ...]
+    noise: Signals
+
+    @property
+    def duration(self) -> float:
+        """s"""
+        inputs = self.observation.records[0].inputs
+        return len(inputs) * inputs.period
+
+
+def imagine(model: Model, spec: ExperimentSpec, plan: Planner, noise_seed: int = NOISE_SEED) -> Imagined | None:
+    """The experiment on the grid of control periods; None where the planner refuses it, or nothing would move."""
+    try:
+        observation, given = observe(model, [imagined_trace(model, spec, plan)])
+    except DaqError:
+        return None
+    counts = observation.deviations / observation.unit
+    drawn = np.random.default_rng(noise_seed).standard_normal(observation.prepared[0].noise.shape)
+    observation = observation.with_drive_as_input(False)  # nothing has been recorded yet
+    return Imagined(observation, tuple(u for u in given.unknowns if u.trace is not None), (drawn * counts,))
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a point's model would show on an imagined experiment, by its shared unknowns and the experiment's starts."""
+
+    there: Imagined
+    point: Point
+
+    @cached_property
+    def begun(self) -> Calibration:
+        """The point with those of its unknowns that belong to no trace, because they keep their values on the next one,
+        and with the starts, at rest."""
+        shared = self.point.only([k for k, u in enumerate(self.point.unknowns) if u.trace is None])
+        starts = self.there.starts
+        values = np.concatenate([shared.values, starts_at_rest(self.there.observation, shared, starts)])
+        return Calibration(shared.model, (*shared.unknowns, *starts), values)
+
+    def named(self, derivatives: Floats) -> dict[str, Floats]:
+        """Rows of derivatives by the unknowns' names."""
+        return dict(zip((u.name for u in self.begun.unknowns), derivatives, strict=True))
+
+    def bounded(self, values: Floats) -> Floats:
+        """The values within their unknowns' bounds."""
+        unknowns = self.begun.unknowns
+        return np.clip(values, [u.low for u in unknowns], [u.high for u in unknowns])
+
+    def recorded(self) -> Prediction:
+        """The same on the record that an arm like the point's model would leave. Not finite where its simulation is
+        not."""
+        own = self.there.observation.imagined(self.begun, self.there.noise)
+        observation = own.with_drive_as_input(self.point.observation.drive_is_input)
+        return replace(self, there=replace(self.there, observation=observation))
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether set points would not pause on an arm that has made the record: a margin is kept."""
+        record = self.there.observation.records[0]
+        set_points = record.inputs.set_points
+        return falls_behind(self.point.model.machine, set_points, set_points - record.measured) is None
+
+    def shown(self, values: Floats | None = None) -> Floats:
+        """The simulation that is given the record, (N,) in deviations of a reading; at other values (p,) than the
+        point's, if given. Not finite where the simulation is not."""
+        own = self.begun if values is None else self.begun.at(values)
+        return self.there.observation.weighted(self.there.observation.shown(own))
+
+    def tangents(self, known: Mapping[str, Floats], values: Floats | None = None) -> Floats:
+        """Derivatives (p, N) of that by the unknowns, at other values than the point's, if given. known: rows that are
+        taken over by name, because those by the tolerance parameters change little.
+
+        Raises SpecError when the simulation does not stay finite.
+        """
+        rows, unknowns = dict(known), self.begun.unknowns
+        missing = [k for k, u in enumerate(unknowns) if u.name not in rows]
+        if missing:
+            own = self.begun if values is None else self.begun.at(values)
+            new = self.there.observation.tangents(own, missing)
+            rows |= {unknowns[k].name: row for k, row in zip(missing, new, strict=True)}
+        return np.stack([rows[u.name] for u in unknowns])
+
+    def known_so_far(self) -> Floats:
+        """Information (p, p) about the shared unknowns from traces and priors, those of single traces marginalised;
+        about the new starts, their priors."""
+        mine = np.array([u.trace is None for u in self.point.unknowns])
+        information = self.point.information.copy()
+        information[np.diag_indices_from(information)] *= 1 + LOOSE
+        inner, cross = information[np.ix_(~mine, ~mine)], information[np.ix_(~mine, mine)]
+        left = information[np.ix_(mine, mine)]
+        if len(inner):
+            left = left - cross.T @ np.linalg.solve(inner, cross)
+        starts = np.array([0.0 if u.deviation is None else u.deviation**-2 for u in self.there.starts])
+        size = len(left) + len(starts)
+        whole = np.zeros((size, size))
+        whole[: len(left), : len(left)] = 0.5 * (left + left.T)
+        whole[np.arange(len(left), size), np.arange(len(left), size)] = starts
+        diagonal = np.diag(whole)
+        whole[np.diag_indices(size)] += LOOSE * np.where(diagonal > 0, diagonal, 1.0)
+        return whole
+
+
+def starts_at_rest(observation: Observation, shared: Calibration, starts: Sequence[Unknown]) -> Floats:
+    """Values of the starts of an observation's last record with which the arm's readings begin where the record does:
+    there its controller holds it.
+
+    An arm that began at the angles that are read would first make up for the error of its potentiometers, a motion that
+    no record holds; and a fit that begins there ends in another minimum.
+    """
+    vector, _ = observation.state(shared)
+    read = observation.records[-1].inputs.initial[:, 0]
+    found = []
+    for start in starts:
+        (joint,) = start.joints
+        first = at.slot(joint, 0)
+        angle = _angle_read_as(read[joint - 1], vector[first : first + at.PER_JOINT])
+        found.append(float(np.clip(angle - read[joint - 1], start.low, start.high)))
+    return np.array(found)
+
+
+def _angle_read_as(wanted: float, joint: Floats) -> float:
+    """The angle (rad) at which a potentiometer reads the angle `wanted`. joint: its numbers in the model's vector."""
+    angle = wanted
+    for _ in range(ROUNDS):
+        angle += wanted - sensed_angle(angle, joint)
+    return float(angle)
+
 
 Pair = tuple[int, int]
 """Two rivals, by their places in a list, the first place first."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from daq.contracts.errors import SpecError
 from model.discrepancy.diagnosis import (
     CLEAR_SHAPE,
     FEWEST_BINS,
@@ -42,15 +41,13 @@ from model.discrepancy.explanation.step_words import (
     step_with_sentences,
     where_with_summary,
 )
+from model.discrepancy.thresholds import WITHIN_NOISE
 from model.effects.names import effect_on, joints_in_words, placed
 from model.record_check.finding import doubts_headline, doubts_in, lines_of
 from model.units import shown_unit, with_unit
 
 SHOWN = 3
 """Members of a group that a headline names."""
-WITHIN_NOISE = 3.0
-"""Error of a joint, in deviations of its readings' noise, up to which a model is said to explain it within that: sound
-rigs of other worlds leave up to 2.6, where friction turns."""
 
 
 def headline(found: Diagnosis) -> str:
@@ -132,8 +129,6 @@ def _undecided(step: Step, found: Diagnosis) -> str:
     """Why several effects are named: they explain the same, within what their evidence can tell apart, or on every
     motion."""
     group = step.group
-    if len(group) < 2:
-        raise SpecError(f"{len(group)} candidates cannot be undecided between; at least 2 are needed")
     named = ", ".join(f"{called(c.effect, c.joints)} ({c.evidence:.0f})" for c in group)
     apart = max(c.evidence for c in group) - min(c.evidence for c in group)
     text = f"{step.where.summary} These explain it, with evidence that differs by no more than {apart:.0f}: {named}."

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from daq.contracts.machine import Machine
-from model.discrepancy.diagnosis import Diagnosis, FoundValue, GapNumber
+from model.discrepancy.diagnosis import Diagnosis, FoundValue
+from model.discrepancy.verdict import MOST_NUMBERS
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Parameter
 
-MOST = 5
-"""Numbers that are listed."""
 MOVED = 1.0
 """Distance from the file, in stated deviations, that at least one of them must exceed: within it, a fit has found what
 the file says."""
@@ -47,7 +45,7 @@ def most_moved(found: Diagnosis) -> tuple[FittedNumber, ...]:
         if p.deviation and p.name in after and after[p.name].value != p.value
     ]
     numbers.sort(key=lambda n: n.distance, reverse=True)
-    return tuple(numbers[:MOST]) if numbers and numbers[0].distance > MOVED else ()
+    return tuple(numbers[:MOST_NUMBERS]) if numbers and numbers[0].distance > MOVED else ()
 
 
 def stated_numbers(found: Diagnosis) -> Mapping[str, Parameter]:
@@ -73,18 +71,3 @@ def with_deviation(value: float, deviation: float | None, unit: str) -> str:
     """A stated number: `5.5 ± 0.5 kg`."""
     spread = "" if not deviation else f" ± {deviation:.2g}"
     return f"{value:.4g}{spread}{'' if unit == '1' else f' {unit}'}"
-
-
-def gap_numbers(machine: Machine, without: Mapping[str, float], fitted: Mapping[str, float]) -> tuple[GapNumber, ...]:
-    """Numbers that would have had to move by more than a stated deviation, the furthest first.
-
-    Args:
-        without, fitted: values by name, fitted without and with the effects.
-    """
-    found = [
-        GapNumber(name=p.name, unit=p.unit, stated=p.value, deviation=p.deviation, without=value, fitted=fitted[p.name])
-        for p in base_model(machine).parameters
-        if p.deviation and p.name in fitted and (value := without.get(p.name)) is not None
-    ]
-    moved = [n for n in found if abs(n.without - n.stated) > n.deviation]
-    return tuple(sorted(moved, key=lambda n: abs(n.without - n.stated) / n.deviation, reverse=True)[:MOST])

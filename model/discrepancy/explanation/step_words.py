@@ -7,8 +7,8 @@ import math
 from daq.contracts.joint_text import slides
 from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import UNWRITTEN, FoundValue, Step, Where
-from model.discrepancy.explanation.effect_words import PHASES, REFUSALS, called, from_to, plain, shape_of
-from model.discrepancy.grounds import ControllerEffect, NamedEffect, Refusal
+from model.discrepancy.explanation.effect_words import PHASES, REFUSALS, from_to, plain, shape_of
+from model.discrepancy.grounds import ControllerEffect, Refusal
 from model.effects.names import capitalised, joints_in_words
 from model.units import shown_unit, with_unit
 
@@ -17,8 +17,6 @@ NOISE_UNKNOWN = 1e6
 made of a URDF does, and what rounding leaves is no measure."""
 NOTICEABLE = 0.98
 """Ratio of the errors with and without an effect, above which the effect hardly changes the error."""
-ALL = 0.95
-"""Share of the evidence; with a margin above it, the next best candidate has next to no evidence."""
 LEAST_SHOWN = 5e-4
 """Least share of a mean square that is not shown as 0.0 %."""
 
@@ -46,15 +44,20 @@ def _place(where: Where) -> str:
             f"no joint is off by more than noise; the largest residual is that of joint {worst.joint}, "
             f"{worst.ratio:.2f} times its noise {phase}"
         )
-    if not worst.whole_record and worst.floor is not None:
-        return f"joint {worst.joint}, {phase}: {worst.rms:.2g} {worst.unit} rms against a floor of {worst.floor:.2g}"
     times = f"{plain(worst.ratio)} times its noise"
     if worst.ratio >= NOISE_UNKNOWN:
         times = "and the machine file states no noise of the sensors to compare it with"
-    seen = f"joint {worst.joint}, mostly {phase}: {plain(worst.rms, 3)} {worst.unit} rms, {times}"
+    seen = (
+        f"joint {worst.joint}, {'mostly ' if worst.whole_record else ''}{phase}: {_rms(worst.rms, worst.unit)}, {times}"
+    )
     if largest is None or largest.rms is None:
         return seen
-    return f"{seen}; more is left of joint {largest.joint}, {plain(largest.rms, 3)} {largest.unit} rms"
+    return f"{seen}; more is left of joint {largest.joint}, {_rms(largest.rms, largest.unit)}"
+
+
+def _rms(value: float, unit: str) -> str:
+    factor, shown = shown_unit(unit)
+    return f"{with_unit(plain(value * factor, 3), shown)} rms"
 
 
 def step_with_sentences(step: Step, machine: Machine) -> Step:
@@ -67,7 +70,7 @@ def step_with_sentences(step: Step, machine: Machine) -> Step:
 
 
 def reason_text(step: Step, machine: Machine) -> str:
-    """What speaks for the effect of a step, in one or two sentences, with the numbers of the step as it is now."""
+    """What speaks for the effect of a step, in a sentence, with the numbers of the step as it is now."""
     reason = step.reason_data
     if step.proof is not None:
         return sentence(f"{_proof(step)}; this needs no model of the arm")
@@ -78,10 +81,7 @@ def reason_text(step: Step, machine: Machine) -> str:
     sizes = (_size(v, several=len(step.joints) > 1, sliding=sliding) for v in step.parameters.values())
     seen = f"{place}{shape_of(step.effect or '', sliding=sliding)} ({', '.join(sizes)})"
     taken = _taken_off(step) if reason.removed is None else _removed(reason.removed)
-    sentences = [sentence(f"{seen}{taken}")]
-    if reason.rival is not None:
-        sentences.append(sentence(_beaten(reason.rival, step)))
-    return " ".join(sentences)
+    return sentence(f"{seen}{taken}")
 
 
 def _proof(step: Step) -> str:
@@ -120,19 +120,6 @@ def _taken_off(step: Step) -> str:
     if most.after > NOTICEABLE * most.before:
         return f"{named} hardly changes: it stays near {with_unit(after, unit)}"
     return f"{named} falls from {with_unit(before, unit)} to {with_unit(after, unit)}"
-
-
-def _beaten(rival: NamedEffect, step: Step) -> str:
-    """How far the next best candidate is behind."""
-    if step.margin >= ALL * step.evidence:
-        return f"no other fitted candidate has a twentieth of its evidence of {step.evidence:.0f}"
-    name = called(rival.effect, rival.joints)
-    if rival.evidence > step.evidence:  # it was ranked first, but came to less when its fit was taken to its end
-        return (
-            f"its completed fit has evidence of {step.evidence:.0f}, less than the {rival.evidence:.0f} of {name}: "
-            "these traces do not tell which of the two it is"
-        )
-    return f"the next best, {name}, has evidence of {rival.evidence:.0f}, and this has {step.evidence:.0f}"
 
 
 def refusal_words(refusal: Refusal) -> str:

@@ -10,8 +10,7 @@ from daq.contracts.trace import Trace
 from model.comparison.compare import TraceSignals
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.estimates import torque_unit
-from model.discrepancy.inverse_dynamics.fitting import Data, fit
-from model.discrepancy.inverse_dynamics.likelihood import stretches_of
+from model.discrepancy.inverse_dynamics.fitting import Data, fit, stretches_of
 from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.inverse_dynamics.torque_balance import TorqueBalance

@@ -8,14 +8,11 @@ import numpy as np
 
 from model.arrays import Floats
 from model.discrepancy.diagnosis import FoundValue, SignalError
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit
-from model.discrepancy.inverse_dynamics.likelihood import LONGEST_MEMORY
+from model.discrepancy.inverse_dynamics.fitting import LONGEST_MEMORY, BalanceFit
 from model.fitting.covariance import sandwich
+from model.fitting.fit import INTERVAL
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-
-NORMAL_95 = 1.959964
-"""Half width of a 95 % interval of the normal distribution, in standard deviations."""
 
 
 def found_values(now: BalanceFit, parameters: Sequence[Parameter]) -> dict[str, FoundValue]:
@@ -27,7 +24,7 @@ def found_values(now: BalanceFit, parameters: Sequence[Parameter]) -> dict[str, 
         if deviation is None or not np.isfinite(deviation):
             result[p.name] = FoundValue.of(p, value)
             continue
-        low, high = value - NORMAL_95 * deviation, value + NORMAL_95 * deviation
+        low, high = value - INTERVAL * deviation, value + INTERVAL * deviation
         result[p.name] = FoundValue.of(p, value, max(low, p.low), min(high, p.high))
     return result
 

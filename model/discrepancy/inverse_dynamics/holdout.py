@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.arrays import Floats
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Data, fit
-from model.discrepancy.inverse_dynamics.likelihood import (
+from model.discrepancy.inverse_dynamics.fitting import (
+    BalanceFit,
+    Data,
     Stretches,
+    fit,
     minus_twice_log_likelihood,
     noise_model,
     stretches_of,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,23 +17,28 @@ from model.discrepancy.diagnosis import (
     Where,
     WorstPlace,
 )
-from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import torque_unit
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit
-from model.discrepancy.localisation.dependence import AGAINST, Quantities, dependence
-from model.discrepancy.localisation.statistics import Bins, correlation_of, significance_of_chi_square
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, TorqueCase
+from model.discrepancy.localisation.statistics import (
+    LEAST,
+    Quantities,
+    correlation_of,
+    dependence,
+    dependences,
+    optional,
+    significance_of_chi_square,
+    table_of,
+    units_of,
+)
+from model.discrepancy.localisation.structure import LINE
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 
 WINDOW = 0.5
 """Duration of one cell of the map, s."""
-LEAST = 0.3
-"""Least deviation of a residual from which its correlation is taken, in deviations of noise."""
 FAST = 0.5
 """Acceleration above which a joint starts to move or turns back, as a share of its larger ones (95 % quantile)."""
 SLOW = 0.15
 """Speed below which a joint creeps, as a share of its larger ones (95 % quantile)."""
-SHAPE_SIGNIFICANCE = 6.0
-"""Least significance of a shape of the remaining torque, in standard deviations."""
 SHAPE_SHARE = 0.15
 """Least share of the remaining torque's variance that a shape must explain."""
 ANOTHER_LAW = 0.4
@@ -61,7 +65,7 @@ def phases(record: RecordedMotion, joint: int) -> list[Phase]:
 
 def locate(now: BalanceFit, case: TorqueCase) -> Where:
     """Map of the residual, in units of its noise, and the quantities that it depends on."""
-    model, records, residual, floor = now.balance.model, now.balance.records, now.residual, case.noise
+    model, records, residual, noise = now.balance.model, now.balance.records, now.residual, case.noise
     cells: list[PhaseCell] = []
     dependences: list[Dependence] = []
     places: list[WorstPlace] = []
@@ -70,7 +74,7 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
         pieces = case.stretches.of_joint(residual, j)
         if not pieces or not np.isfinite(sizes[j]):
             continue
-        correlation = correlation_of([p / floor[j] for p in pieces], LEAST)
+        correlation = correlation_of([p / noise[j] for p in pieces], LEAST)
         squares: dict[Phase, float] = {}
         for i, rows in case.stretches.by_joint[j]:
             record = records[i]
@@ -78,7 +82,7 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
             size = max(1, round(WINDOW / (record.period * record.every)))
             for begin in range(rows.start, rows.stop, size):
                 window = slice(begin, min(begin + size, rows.stop))
-                square = float(np.mean((residual[i][window, j] / floor[j]) ** 2))
+                square = float(np.mean((residual[i][window, j] / noise[j]) ** 2))
                 count = window.stop - window.start
                 phase = max(dict.fromkeys(named[window]), key=named[window].count)
                 squares[phase] = squares.get(phase, 0.0) + square * count
@@ -94,10 +98,11 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
                         trace=i,
                     )
                 )
-        dependences += [_dependence(joint, a, b, u) for a, b, u in _Signals(now, case, j).bins()]
+        signal, floor = _signal(now, case, j)
+        dependences += table_of(signal, j, joint, _quantities(now, case, j), floor)
         phase = max(squares, key=lambda p: squares[p])
-        relative = float(sizes[j]) / floor[j]
-        rms, unit = relative * floor[j], torque_unit(model, joint)
+        relative = float(sizes[j]) / noise[j]
+        rms, unit = relative * noise[j], torque_unit(model, joint)
         places.append(WorstPlace(joint=joint, phase=phase, ratio=relative, rms=rms, unit=unit, whole_record=True))
     if not places:
         return Where(joint=None, phase=None, summary=UNWRITTEN, cells=(), dependences=())
@@ -121,22 +126,24 @@ def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape,
     for j, joint in enumerate(model.machine.modelled_joints):
         if sizes[j] < BEYOND_NOISE * case.noise[j]:
             continue
-        signals = _Signals(now, case, j)
-        every = [(b, a, u, False) for a, b, u in signals.bins()]
-        if (rubs := signals.friction_by_place()) is not None:
-            every.append((rubs, "position", signals.quantities["position"][1], True))
-        shown = [e for e in every if e[0].significance > SHAPE_SIGNIFICANCE and e[0].explained > SHAPE_SHARE]
+        signal, floor = _signal(now, case, j)
+        known = _quantities(now, case, j)
+        every = [(bins, against, False) for against, bins in dependences(signal, j, known, floor)]
+        # friction of a tight spot changes its sign with the motion: its mean over both directions shows nothing
+        rubs = dependence(-signal * known.values["direction"][:, j], j, "position", known, floor)
+        every += [] if rubs is None else [(rubs, "position", True)]
+        shown = [e for e in every if e[0].significance > LINE and e[0].explained > SHAPE_SHARE]
         if shown:
-            bins, against, unit, against_motion = max(shown, key=lambda e: e[0].explained)
+            bins, against, against_motion = max(shown, key=lambda e: e[0].explained)
             found.append(
                 RemainingShape(
                     joint=joint,
                     against=against,
-                    unit=unit,
+                    unit=known.units[against][j],
                     torque_unit=torque_unit(model, joint),
                     centres=tuple(map(float, bins.centres)),
-                    torque=_optional(bins.mean),
-                    deviation=_optional(bins.deviation),
+                    torque=optional(bins.mean),
+                    deviation=optional(bins.deviation),
                     explained=bins.explained,
                     against_motion=against_motion,
                 )
@@ -146,77 +153,37 @@ def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape,
 
 def is_function_of(torque: Sequence[Floats], now: BalanceFit, case: TorqueCase, j: int) -> bool:
     """Whether much of what is left on a joint (index) is a function of a torque (m, n) of every record."""
-    bins = _Signals(now, case, j).against(np.concatenate(list(torque)))
-    return bins is not None and bins.significance > SHAPE_SIGNIFICANCE and bins.explained >= ANOTHER_LAW
+    signal, floor = _signal(now, case, j)
+    known = Quantities({"drive": np.concatenate(list(torque))}, {}, _stretches(now, case, j))
+    bins = dependence(signal, j, "drive", known, floor)
+    return bins is not None and bins.significance > LINE and bins.explained >= ANOTHER_LAW
 
 
 def _time(record: RecordedMotion, row: int) -> float:
     return round(float(record.time[record.edge] + row * record.every * record.period - record.time[0]), 4)
 
 
-class _Signals:
-    """The residual of a joint (index), and what it may depend on, all records in a row."""
-
-    def __init__(self, now: BalanceFit, case: TorqueCase, j: int) -> None:
-        records, residual = now.balance.records, now.residual
-        number = now.balance.model.machine.modelled_joints[j]
-        joint = now.balance.model.machine.joint(number)
-        angle = "rad" if joint.kind == "revolute" else "m"
-        drive = {"dc_motor": "V", "current": "A"}.get(joint.drive.kind, torque_unit(now.balance.model, number))
-        begins = np.cumsum([0, *(len(r) for r in residual)])
-        count = residual[0].shape[1]
-        times = [np.repeat((r.time[r.rows] - r.time[0])[:, None], count, axis=1) for r in records]
-        speed = np.concatenate([r.speed[r.rows] for r in records])
-        self.joint = j
-        self.stretches = tuple(
-            slice(int(begins[i]) + s.start, int(begins[i]) + s.stop) for i, s in case.stretches.by_joint[j]
-        )
-        self.signal = np.concatenate(list(residual))[:, j]
-        self.floor = LEAST * float(case.noise[j])
-        self.quantities: dict[AgainstWhat, tuple[Floats, str]] = {
-            "time": (np.concatenate(times), "s"),
-            "position": (np.concatenate([r.position[r.rows] for r in records]), angle),
-            "speed": (speed, f"{angle}/s"),
-            "direction": (np.sign(speed), "1"),
-            "drive": (np.concatenate([r.drive[r.rows] for r in records]), drive),
-        }
-
-    def bins(self) -> list[tuple[AgainstWhat, Bins, str]]:
-        """Dependences of the residual: quantity, bins, unit of the quantity."""
-        found = [(a, self._dependence(self.signal, a), self.quantities[a][1]) for a in AGAINST]
-        return [(against, bins, unit) for against, bins, unit in found if bins is not None]
-
-    def friction_by_place(self) -> Bins | None:
-        """The residual against the motion in bins of position, positive where it opposes that: friction of a tight spot
-        changes its sign with the motion, so that its mean over both directions shows nothing."""
-        return self._dependence(-self.signal * self.quantities["direction"][0][:, self.joint], "position")
-
-    def against(self, torque: Floats) -> Bins | None:
-        """The residual in bins of another torque (m, n)."""
-        known = Quantities({"drive": torque}, {}, self.stretches)
-        return dependence(self.signal, self.joint, "drive", known, self.floor)
-
-    def _dependence(self, signal: Floats, against: AgainstWhat) -> Bins | None:
-        count = self.quantities["time"][0].shape[1]
-        known = Quantities(
-            {name: values for name, (values, _) in self.quantities.items()},
-            {name: (unit,) * count for name, (_, unit) in self.quantities.items()},
-            self.stretches,
-        )
-        return dependence(signal, self.joint, against, known, self.floor)
+def _signal(now: BalanceFit, case: TorqueCase, j: int) -> tuple[Floats, float]:
+    """The residual (m,) of a joint (index), all records in a row, and the least deviation that it can have."""
+    return np.concatenate(list(now.residual))[:, j], LEAST * float(case.noise[j])
 
 
-def _dependence(joint: int, against: AgainstWhat, bins: Bins, unit: str) -> Dependence:
-    return Dependence(
-        joint=joint,
-        against=against,
-        unit=unit,
-        centres=tuple(map(float, bins.centres)),
-        residual=_optional(bins.mean),
-        deviation=_optional(bins.deviation),
-        significance=bins.significance,
-    )
+def _stretches(now: BalanceFit, case: TorqueCase, j: int) -> tuple[slice, ...]:
+    """Where a joint (index) moves, all records in a row."""
+    begins = np.cumsum([0, *(len(r) for r in now.residual)])
+    return tuple(slice(int(begins[i]) + s.start, int(begins[i]) + s.stop) for i, s in case.stretches.by_joint[j])
 
 
-def _optional(values: Floats) -> tuple[float | None, ...]:
-    return tuple(None if math.isnan(v) else float(v) for v in values)
+def _quantities(now: BalanceFit, case: TorqueCase, j: int) -> Quantities:
+    """What the residual of a joint (index) may depend on, where it moves."""
+    records = now.balance.records
+    times = [np.repeat((r.time[r.rows] - r.time[0])[:, None], r.speed.shape[1], axis=1) for r in records]
+    speed = np.concatenate([r.speed[r.rows] for r in records])
+    values: dict[AgainstWhat, Floats] = {
+        "time": np.concatenate(times),
+        "position": np.concatenate([r.position[r.rows] for r in records]),
+        "speed": speed,
+        "direction": np.sign(speed),
+        "drive": np.concatenate([r.drive[r.rows] for r in records]),
+    }
+    return Quantities(values, units_of(now.balance.model.machine), _stretches(now, case, j))

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from model.arrays import Floats
+from model.discrepancy.candidates.probing import LARGEST_STRETCH
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, stacked
-from model.discrepancy.inverse_dynamics.priors import prior_distance, prior_rows
-from model.discrepancy.inverse_dynamics.trial import Start, Trial
+from model.discrepancy.inverse_dynamics.starts import Start, Trial
+from model.discrepancy.inverse_dynamics.tolerances import prior_distance, prior_rows
 from model.inverse_dynamics.torque_balance import TorqueBalance
 
 NONLINEAR = frozenset(
@@ -34,8 +35,6 @@ SMALL = 1e-6
 tolerances took over of an effect would be there twice at its full size, and friction would hold a different part of it
 where a joint turns. A ten-thousandth was too much for that: on a rig whose payload was fitted as a mass, a payload's
 column was fifty times longer than what mass and payload differ by, and promised nothing."""
-NONLINEAR_LIMIT = 2.0
-"""Largest size of such an effect that a probe may find, in the size at which it was probed."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +102,7 @@ class Prober:
         while kept.any():
             found = np.linalg.lstsq(columns[:, kept], -left, rcond=1e-8)[0]
             shares[:] = 0.0
-            shares[kept] = np.clip(found, 0.0, NONLINEAR_LIMIT) if trial.effect in NONLINEAR else found
+            shares[kept] = np.clip(found, 0.0, LARGEST_STRETCH) if trial.effect in NONLINEAR else found
             wrong = kept & np.array(
                 [self._outside(trial, n, a, start, null) for n, a in zip(trial.amplitudes, shares, strict=True)]
             )

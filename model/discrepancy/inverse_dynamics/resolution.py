@@ -10,11 +10,9 @@ import numpy as np
 from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.excitation import own_frequencies
-from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.estimates import found_values
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, TorqueCase, minus_twice_log_likelihood, noise_model
 from model.discrepancy.inverse_dynamics.holdout import mean_squares
-from model.discrepancy.inverse_dynamics.likelihood import minus_twice_log_likelihood, noise_model
 from model.discrepancy.inverse_dynamics.search import Fitted, cost_of
 from model.inverse_dynamics.drive_timing import DELAY, MOST
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
@@ -28,8 +26,6 @@ OF_CHANGES = frozenset({"joint_compliance", "backlash", "input_delay", "motor_in
 accelerations, or a gear that rattles, is fast."""
 LIMIT = "supply_limit"
 """The effect of a drive that gives no more than a limit."""
-WARMING = "resistance_rise"
-"""The effect of a winding that warms with time, whatever its current."""
 REPEATING = "periodic_disturbance"
 """The effect of a torque that repeats in time."""
 BENT = "potentiometer_nonlinearity"
@@ -53,7 +49,14 @@ LIMITED = 0.01
 exceeded in 1.6 % of the samples or more. On sound arms, spikes in 0.3 % of the samples were told as a limit 4 % below
 their highest (decision 0053)."""
 AT_BOUND = 1.01
-"""Ratio to its lower bound below which a speed is the bound's."""
+"""Ratio to a bound within which a shape is at it."""
+UNRESOLVED_ENDS = {("stribeck_friction", "speed"): "low"}
+"""Ends of a shape that may lie beyond what records resolve: where friction fades below the lowest speed that is looked
+at, a smoothed speed does not tell whether the joint stands."""
+IMPOSSIBLE_ENDS = {("stribeck_friction", "speed"): "high", ("resistance_rise", "time_constant"): "low"}
+"""Ends of a shape that are another effect: no record shows that friction fades at the highest speed, and Coulomb
+friction is the simpler law; no copper is as warm as it gets at once, and what is more at once than before is friction
+or a lost part of the drive."""
 AT_END = 1e-6
 """Share of a bound within which a size is at it."""
 
@@ -67,8 +70,7 @@ def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
     if _is_of_no_machine(found) or _repeats_with_motion(found, case):
         return False
     plain = _takes_half_of_what_is_no_noise(found, before, case)
-    values = found.fit.values
-    if not plain and any(_fades_unresolved(p, values[p.name]) for p in found.parameters):
+    if not plain and _ends(found, UNRESOLVED_ENDS):
         return False
     if sizes_at_bounds(found) or not is_far_everywhere(found.stated, found.fit.values):
         return False
@@ -81,9 +83,16 @@ def _is_of_no_machine(found: Fitted) -> bool:
     """Whether an effect as it was fitted is how drives are formed, or what no machine does in the recorded motion."""
     if found.effect == DELAY and _may_be_timing(found):
         return True
-    values = found.fit.values
-    ends = (_warms_at_once(p, values[p.name]) or _fades_beyond(p, values[p.name]) for p in found.parameters)
-    return any(ends) or _is_uneven(found) or _is_hardly_reached(found)
+    return _ends(found, IMPOSSIBLE_ENDS) or _is_uneven(found) or _is_hardly_reached(found)
+
+
+def _ends(found: Fitted, ends: Mapping[tuple[str, str], str]) -> bool:
+    """Whether a shape of an effect ended at one of these ends of its range."""
+    for p in found.parameters:
+        end, value = ends.get((p.effect or "", p.part)), found.fit.values[p.name]
+        if (end == "low" and value <= AT_BOUND * p.low) or (end == "high" and AT_BOUND * value >= p.high):
+            return True
+    return False
 
 
 def _takes_half_of_what_is_no_noise(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
@@ -111,7 +120,10 @@ def _slower_residual(fit: BalanceFit, records: Sequence[RecordedMotion]) -> list
 
 def _is_uneven(found: Fitted) -> bool:
     """Whether a bent sensor's reading would be more uneven than any sensor's is, somewhere in its range."""
-    return found.effect == BENT and any(steepest_bend(_as_fitted(found), joint) > MOST_UNEVEN for joint in found.joints)
+    if found.effect != BENT:
+        return False
+    model = found.model.with_values(found.fit.model_values)
+    return any(steepest_bend(model, joint) > MOST_UNEVEN for joint in found.joints)
 
 
 def _is_hardly_reached(found: Fitted) -> bool:
@@ -123,11 +135,6 @@ def _is_hardly_reached(found: Fitted) -> bool:
         if np.mean(drives > found.fit.values[p.name]) < LIMITED:
             return True
     return False
-
-
-def _as_fitted(found: Fitted) -> Model:
-    """The model with an effect, with the numbers of its fit."""
-    return found.model.with_values(found.fit.model_values)
 
 
 def steepest_bend(model: Model, joint: int) -> float:
@@ -151,18 +158,6 @@ def _may_be_timing(found: Fitted) -> bool:
     return any(e.low is None or e.low <= most for e in estimates)
 
 
-def _fades_unresolved(p: Parameter, value: float) -> bool:
-    """Whether friction fades at the lowest speed that is looked at: then it fades below, where a smoothed speed does
-    not tell whether the joint stands."""
-    return p.effect == "stribeck_friction" and p.null is None and value <= AT_BOUND * p.low
-
-
-def _fades_beyond(p: Parameter, value: float) -> bool:
-    """Whether friction fades at the highest speed that is looked at: no record shows that it does, and Coulomb friction
-    is the simpler law."""
-    return p.effect == "stribeck_friction" and p.null is None and AT_BOUND * value >= p.high
-
-
 def _repeats_with_motion(found: Fitted, case: TorqueCase) -> bool:
     """Whether a disturbance repeats as often as the motion itself: then it goes with the motion, as every torque that
     is a little wrong does."""
@@ -171,12 +166,6 @@ def _repeats_with_motion(found: Fitted, case: TorqueCase) -> bool:
     rates = [found.fit.values[p.name] for p in found.parameters if p.part == "frequency"]
     speeds = [record.speed for record in case.records]
     return bool(own_frequencies(np.array(rates), speeds, case.records[0].period).any())
-
-
-def _warms_at_once(p: Parameter, value: float) -> bool:
-    """Whether a winding is as warm as it gets within the shortest time that is looked at: no copper is, and what is
-    more at once than before is friction or a lost part of the drive."""
-    return p.effect == WARMING and p.part == "time_constant" and value <= AT_BOUND * p.low
 
 
 def sizes_at_bounds(found: Fitted) -> list[Parameter]:

@@ -9,14 +9,11 @@ import numpy as np
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.arrays import Floats
-from model.discrepancy.inverse_dynamics.candidates import list_trials
-from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, fit
-from model.discrepancy.inverse_dynamics.likelihood import noise_model
+from model.discrepancy.inverse_dynamics.candidates import list_trials, take_back
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, TorqueCase, fit, noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
-from model.discrepancy.inverse_dynamics.stated_numbers import take_back
+from model.discrepancy.inverse_dynamics.starts import Start
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
-from model.discrepancy.inverse_dynamics.trial import Start
 from model.effects.library import find_named_effect
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import effect_on
@@ -304,7 +301,7 @@ def prefer_fewer_joints(found: Sequence[Fitted]) -> list[Fitted]:
         return is_part and bool(other.joints) and best.log_odds - other.log_odds < more * JOINT_GAIN
 
     fewer = sorted((f for f in found if does_as_much(f)), key=lambda f: len(f.joints))
-    return [*fewer[:1], *(f for f in found if not any(f is one for one in fewer[:1]))]
+    return _led_by(fewer[:1], found)
 
 
 def prefer_shorter_laws(found: Sequence[Fitted], before: BalanceFit, lead: float) -> list[Fitted]:
@@ -318,7 +315,11 @@ def prefer_shorter_laws(found: Sequence[Fitted], before: BalanceFit, lead: float
         for f in found[1:]
         if f.joints == best.joints and best.imitates(f, before) and best.log_odds - f.log_odds < lead
     ]
-    return [*shorter[:1], *(f for f in found if not any(f is one for one in shorter[:1]))]
+    return _led_by(shorter[:1], found)
+
+
+def _led_by(first: Sequence[Fitted], found: Sequence[Fitted]) -> list[Fitted]:
+    return [*first, *(f for f in found if not any(f is one for one in first))]
 
 
 def evidence(before: BalanceFit, after: BalanceFit, memory: Floats, parameters: int, places: int) -> float:

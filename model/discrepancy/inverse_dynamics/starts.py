@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,11 +13,137 @@ from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.candidates.library import TAUT_QUANTILES, TAUT_WITHIN
 from model.discrepancy.excitation import own_frequencies
-from model.discrepancy.inverse_dynamics.place import LEAST_OF_WAVE, Place
-from model.discrepancy.inverse_dynamics.trial import Start
 from model.inverse_dynamics.drive_timing import MOST
-from model.inverse_dynamics.recorded_motion import RESOLVED
+from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
+from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
+
+Start = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An effect on joints, with its own parameters and the starting values from which it is tried.
+
+    amplitudes: its parameters (full names) that measure its size; the others only shape it.
+    stated: those of its parameters that the file states, as it states them: the trial lifts their priors. Its starts
+        are then measured from where the tolerances' fit has them, `origin`, and not from nothing.
+    """
+
+    effect: str
+    joints: tuple[int, ...]
+    model: Model
+    parameters: tuple[Parameter, ...]
+    amplitudes: tuple[str, ...]
+    starts: tuple[Start, ...]
+    stated: tuple[Parameter, ...] = ()
+    origin: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def size(self) -> int:
+        """Parameters that the effect adds."""
+        return len(self.parameters)
+
+
+LEAST_OF_WAVE = 0.8
+"""Least share of a ripple's wave within the travel of a joint: a slower one is a spring."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where starting values are looked for: a joint's column, the model with the effect, records and their residual."""
+
+    model: Model
+    column: int
+    records: Sequence[RecordedMotion]
+    residual: Sequence[Floats]
+
+    @property
+    def numbers(self) -> Floats:
+        """The joint's columns of the model's vector."""
+        return self.model.vector[at.slot(self.column + 1, 0) : at.slot(self.column + 2, 0)]
+
+    @property
+    def gain(self) -> float:
+        """Torque of the drive a volt (a unit of drive), N·m/V."""
+        joint = self.numbers
+        return float(joint[at.GEAR] * joint[at.TORQUE_CONSTANT] / joint[at.RESISTANCE])
+
+    @property
+    def speeds(self) -> Floats:
+        """Magnitudes of the joint's speed where it moves."""
+        return self._magnitudes(lambda r: r.speed)
+
+    @property
+    def drives(self) -> Floats:
+        """Magnitudes of the joint's drive where it moves."""
+        return self._magnitudes(lambda r: r.drive)
+
+    @property
+    def positions(self) -> Floats:
+        """The joint's positions in all records, rad (m)."""
+        return np.concatenate([r.position[r.rows, self.column] for r in self.records])
+
+    @property
+    def middle(self) -> float:
+        """The mean of these positions, rad (m)."""
+        return float(np.mean(self.positions))
+
+    @property
+    def travel(self) -> float:
+        """How far these positions reach, rad (m)."""
+        return float(np.ptp(self.positions))
+
+    @property
+    def longest_travel(self) -> float:
+        """How far the joint moves in one record, rad (m)."""
+        return max(float(np.ptp(r.position[:, self.column])) for r in self.records)
+
+    @property
+    def largest_drive(self) -> float:
+        """The largest magnitude of the drive where the joint moves."""
+        return float(self.drives.max())
+
+    @property
+    def largest_supplied(self) -> float:
+        """The same, or the supply where that is less."""
+        return min(self.largest_drive, float(self.numbers[at.SUPPLY]))
+
+    @property
+    def passed_drive(self) -> float:
+        """The magnitude above which the drive is in a share `PASSED` of the record."""
+        return float(np.quantile(self.drives, 1 - PASSED))
+
+    @property
+    def slowest_ripple(self) -> float:
+        """Slowest rate, in rad of phase per rad (m), of a ripple: most of a wave (`LEAST_OF_WAVE`) lies within the
+        positions at which the joint moves."""
+        every = np.concatenate([r.position[r.rows, self.column][r.moving[:, self.column]] for r in self.records])
+        return LEAST_OF_WAVE * 2 * np.pi / max(float(np.ptp(every)) if every.size else 0.0, 1e-9)
+
+    @property
+    def current(self) -> float:
+        """Root mean square of the motor's settled current where the joint moves, A."""
+        joint = self.numbers
+        per_speed = joint[at.GEAR] * joint[at.BACK_EMF]
+        currents = self._magnitudes(lambda r: (r.drive - per_speed * r.speed) / joint[at.RESISTANCE])
+        return float(np.sqrt(np.mean(currents**2)))
+
+    @property
+    def duration(self) -> float:
+        """Of the longest record, s."""
+        return max(float(np.ptp(r.time)) for r in self.records)
+
+    @property
+    def torque(self) -> float:
+        """A tenth of the drive's torque, N·m or N: a size to probe with."""
+        return max(0.1 * abs(self.gain) * float(np.sqrt(np.mean(self.drives**2))), 1e-9)
+
+    def _magnitudes(self, signal: Callable[[RecordedMotion], Floats]) -> Floats:
+        pieces = [np.abs(signal(r)[r.rows, self.column])[r.moving[:, self.column]] for r in self.records]
+        every = np.concatenate(pieces)
+        return every if every.size else np.zeros(1)
+
 
 DAMPED = 0.1
 """Damping ratio of a rotor on its gear's spring from which damping is tried."""
@@ -92,14 +218,14 @@ def narrowed(p: Parameter, place: Place) -> Parameter:  # noqa: PLR0911 (one lin
         fastest = max(slowest, float(np.quantile(place.speeds, NEARLY_FASTEST)))
         return replace(p, low=min(p.high, max(p.low, slowest)), high=min(p.high, fastest))
     if p.effect == "one_sided_spring" and p.null is None:
-        stretch = LEAST_STRETCH * float(np.ptp(place.positions))
+        stretch = LEAST_STRETCH * place.travel
         within = (place.positions.min() + stretch, place.positions.max() - stretch)
         low, high = np.clip(np.quantile(place.positions, TAUT_WITHIN), *within)
         return replace(p, low=float(low), high=float(high))
     if p.effect == "resistance_drift" and p.null is not None:
         return replace(p, high=min(p.high, LARGEST_HEATING / max(place.current**2, 1e-12)))
     if p.effect == "amplifier_threshold":
-        return replace(p, high=max(p.low, min(p.high, float(np.quantile(place.drives, 1 - PASSED)))))
+        return replace(p, high=max(p.low, min(p.high, place.passed_drive)))
     if p.effect == "torque_ripple" and p.null is None:
         return replace(p, low=min(p.high, max(p.low, place.slowest_ripple)))
     if p.effect != "supply_limit":
@@ -116,31 +242,6 @@ def _inside(p: Parameter, value: float) -> float:
     return float(np.clip(value, p.low, p.high))
 
 
-def _stribeck(place: Place) -> Iterator[Start]:
-    for speed in np.quantile(place.speeds, SPEED_QUANTILES):
-        yield {"torque": place.torque, "speed": max(float(speed), 1e-3)}
-
-
-def _dead_zone(place: Place) -> Iterator[Start]:
-    drive = place.drives
-    for width in (0.05 * float(drive.max()), *np.quantile(drive, DRIVE_QUANTILES)):
-        yield {"width": float(width)}
-
-
-def _threshold(place: Place) -> Iterator[Start]:
-    largest, highest = float(place.drives.max()), float(np.quantile(place.drives, 1 - PASSED))
-    for width in (share * largest for share in THRESHOLD_SHARES):
-        if width <= highest:
-            yield {"width": width}
-
-
-def _limit(place: Place) -> Iterator[Start]:
-    largest, supply = float(place.drives.max()), float(place.numbers[at.SUPPLY])
-    for share in LIMIT_SHARES:
-        if share * min(largest, supply) > 0:
-            yield {"voltage": share * min(largest, supply)}
-
-
 def _delay(place: Place) -> Iterator[Start]:
     controller = place.model.machine.controller
     if isinstance(controller, NoController):
@@ -151,21 +252,6 @@ def _delay(place: Place) -> Iterator[Start]:
     for time in DELAYS:
         if time <= 13 * controller.period.value:
             yield {"time": time}
-
-
-def _inductance(place: Place) -> Iterator[Start]:
-    for time in DELAYS:
-        yield {"inductance": float(place.numbers[at.RESISTANCE]) * time}
-
-
-def _warming(place: Place) -> Iterator[Start]:
-    for time in WARMING_TIMES:
-        yield {"heating": RISE / max(place.current**2 * min(time, place.duration), 1e-12), "time_constant": time}
-
-
-def _timed_warming(place: Place) -> Iterator[Start]:
-    for time, side in itertools.product(WARMING_TIMES, (1.0, -1.0)):
-        yield {"rise": side * RISE / (1.0 - float(np.exp(-place.duration / time))), "time_constant": time}
 
 
 def _ripple(place: Place) -> Iterator[Start]:
@@ -192,18 +278,6 @@ def _disturbance(place: Place) -> Iterator[Start]:
         yield {"sine": place.torque, "cosine": place.torque, "frequency": rate / (2 * np.pi)}
 
 
-def _spring(place: Place) -> Iterator[Start]:
-    middle, span = float(np.mean(place.positions)), float(np.ptp(place.positions))
-    for rest in (middle, middle - 2 * span, middle + 2 * span):
-        yield {"stiffness": place.torque / max(span, 1e-9), "rest": rest}
-
-
-def _cable(place: Place) -> Iterator[Start]:
-    stiffness = place.torque / max(float(np.ptp(place.positions)), 1e-9)
-    for rest, side in itertools.product(np.quantile(place.positions, TAUT_QUANTILES), (1.0, -1.0)):
-        yield {"stiffness": side * stiffness, "rest": float(rest)}
-
-
 def _compliance(place: Place) -> Iterator[Start]:
     """Compliances with which the motion of the rotor relative to the link takes a share of the torque."""
     joint = place.numbers
@@ -215,16 +289,6 @@ def _compliance(place: Place) -> Iterator[Start]:
     for share in WINDING_SHARES:
         compliance = share * whole
         yield {"compliance": compliance, "damping": 2 * DAMPED * float(np.sqrt(inertia / max(compliance, 1e-300)))}
-
-
-def _play(place: Place) -> Iterator[Start]:
-    travel = max(float(np.ptp(r.position[:, place.column])) for r in place.records)
-    for share in PLAY_SHARES:
-        yield {"gap": share * travel}
-
-
-def _tilt(_place: Place) -> Iterator[Start]:
-    yield {"about_x": 0.05, "about_y": 0.05}
 
 
 def _scanned(low: float, high: float, step: float) -> Floats:
@@ -252,21 +316,45 @@ def _peaks(rates: Floats, along: Sequence[Floats], place: Place) -> list[float]:
     return found
 
 
-_SEARCHED: dict[str, Callable[[Place], Iterator[Start]]] = {
-    "stribeck_friction": _stribeck,
-    "dead_zone": _dead_zone,
-    "amplifier_threshold": _threshold,
-    "supply_limit": _limit,
+_SEARCHED: dict[str, Callable[[Place], Iterable[Start]]] = {
+    "stribeck_friction": lambda place: [
+        {"torque": place.torque, "speed": max(float(speed), 1e-3)}
+        for speed in np.quantile(place.speeds, SPEED_QUANTILES)
+    ],
+    "dead_zone": lambda place: [
+        {"width": float(width)}
+        for width in (0.05 * float(place.drives.max()), *np.quantile(place.drives, DRIVE_QUANTILES))
+    ],
+    "amplifier_threshold": lambda place: [
+        {"width": share * place.largest_drive}
+        for share in THRESHOLD_SHARES
+        if share * place.largest_drive <= place.passed_drive
+    ],
+    "supply_limit": lambda place: [
+        {"voltage": share * place.largest_supplied} for share in LIMIT_SHARES if share * place.largest_supplied > 0
+    ],
     "input_delay": _delay,
-    "motor_inductance": _inductance,
-    "resistance_drift": _warming,
-    "resistance_rise": _timed_warming,
+    "motor_inductance": lambda place: [{"inductance": float(place.numbers[at.RESISTANCE]) * t} for t in DELAYS],
+    "resistance_drift": lambda place: [
+        {"heating": RISE / max(place.current**2 * min(time, place.duration), 1e-12), "time_constant": time}
+        for time in WARMING_TIMES
+    ],
+    "resistance_rise": lambda place: [
+        {"rise": side * RISE / (1.0 - float(np.exp(-place.duration / time))), "time_constant": time}
+        for time, side in itertools.product(WARMING_TIMES, (1.0, -1.0))
+    ],
     "torque_ripple": _ripple,
     "periodic_disturbance": _disturbance,
-    "spring_torque": _spring,
-    "one_sided_spring": _cable,
-    "base_tilt": _tilt,
+    "spring_torque": lambda place: [
+        {"stiffness": place.torque / max(place.travel, 1e-9), "rest": place.middle + k * place.travel}
+        for k in (0, -2, 2)
+    ],
+    "one_sided_spring": lambda place: [
+        {"stiffness": side * (place.torque / max(place.travel, 1e-9)), "rest": float(rest)}
+        for rest, side in itertools.product(np.quantile(place.positions, TAUT_QUANTILES), (1.0, -1.0))
+    ],
+    "base_tilt": lambda _: [{"about_x": 0.05, "about_y": 0.05}],
     "joint_compliance": _compliance,
-    "backlash": _play,
+    "backlash": lambda place: [{"gap": share * place.longest_travel} for share in PLAY_SHARES],
 }
-"""Effects whose starting values depend on the record, and the functions that find them."""
+"""Effects whose starting values depend on the record, and how they are found."""

@@ -10,19 +10,19 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step
 from model.discrepancy.grounds import Reason
 from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.comparison import compare
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
+from model.discrepancy.inverse_dynamics.fitting import TorqueCase
 from model.discrepancy.inverse_dynamics.judging import (
     SUSPECTED,
-    Judgement,
+    Comparison,
+    compare,
     needed_evidence,
 )
 from model.discrepancy.inverse_dynamics.localisation import locate
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.resolution import OF_CHANGES
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, order_by_odds
 from model.discrepancy.inverse_dynamics.standing import Standing
+from model.discrepancy.options import TorqueOptions
 
 SHOWN = 12
 """Most candidates that a step lists."""
@@ -31,14 +31,14 @@ ABOVE_NOISE = 1.2
 removed."""
 
 
-def record_step(standing: Standing, found: Findings, judgement: Judgement, refused: Sequence[Fitted]) -> Step:
+def record_step(standing: Standing, found: Findings, compared: Comparison, refused: Sequence[Fitted]) -> Step:
     """The step that a judged candidate is.
 
     Args:
         standing: before the step. found: what the step's search found.
         refused: candidates of this step that were not taken, or passed over, before; they are no rivals.
     """
-    model, case, chosen, compared = standing.model, standing.case, judgement.chosen, judgement.comparison
+    model, case, chosen = standing.model, standing.case, compared.chosen
     rivals = _rivals(standing, found, chosen, refused)
     return Step(
         effect=chosen.effect,
@@ -59,8 +59,8 @@ def record_step(standing: Standing, found: Findings, judgement: Judgement, refus
         where=locate(compared.reference, case),
         reason=UNWRITTEN,
         reason_data=Reason(removed=compared.removed),
-        adopted=judgement.refusal is None,
-        refusal=judgement.refusal,
+        adopted=compared.refusal is None,
+        refusal=compared.refusal,
     )
 
 

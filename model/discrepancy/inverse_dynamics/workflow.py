@@ -6,15 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from daq.contracts.progress import Cancel, Progress, stop_if
-from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Suspicion
-from model.discrepancy.grounds import Note, Refusal, RefusalKind
+from model.discrepancy.diagnosis import Candidate, Suspicion
+from model.discrepancy.grounds import Note, Refusal
 from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.answer import Outcome, answer_of
-from model.discrepancy.inverse_dynamics.case import TorqueCase
-from model.discrepancy.inverse_dynamics.found import Found, Refitter
-from model.discrepancy.inverse_dynamics.judged_controller import JudgedController
-from model.discrepancy.inverse_dynamics.judging import CHANCES, judge
-from model.discrepancy.inverse_dynamics.left_over import has_another_form
+from model.discrepancy.inverse_dynamics.fitting import TorqueCase
+from model.discrepancy.inverse_dynamics.judging import has_another_form, judge, suspect
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.search import (
     Findings,
@@ -25,15 +21,13 @@ from model.discrepancy.inverse_dynamics.search import (
     prefer_shorter_laws,
     search,
 )
+from model.discrepancy.inverse_dynamics.standing import Standing, begin
 from model.discrepancy.inverse_dynamics.step_record import list_tried, record_step
-from model.discrepancy.inverse_dynamics.suspicion import suspect
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
+from model.discrepancy.thresholds import CHANCES
 from model.discrepancy.verdict import withdrawn
 from model.effects.names import effect_on
 from model.machine_model.model import Model
-
-SUPERFLUOUS: RefusalKind = "superfluous"
-"""Kind of refusal of an effect that nothing needs any more."""
 
 
 @dataclass
@@ -42,7 +36,6 @@ class TorqueWorkflow:
 
     model: Model
     case: TorqueCase
-    controller: JudgedController
     progress: Progress
     cancel: Cancel
     tried: tuple[Candidate, ...] = ()
@@ -50,10 +43,9 @@ class TorqueWorkflow:
     suspicion: Suspicion | None = None
 
     def __post_init__(self) -> None:
-        self.refitter = Refitter(self.model, self.case)
-        self.found = self.refitter.begin()
+        self.found = begin(self.model, self.case)
         self.first = self.found.now
-        fitted = len(self.refitter.known_before)
+        fitted = len(self.found.known)
         source = {"source": tolerances(self.model)[1], "share": FITTED_SHARE, "fitted": fitted}
         self.notes.append(Note(kind="tolerance-source", values=source))
 
@@ -64,39 +56,21 @@ class TorqueWorkflow:
         self.notes += [
             Note(kind="taken-out-again", values={"effect": step.effect, "step": number})
             for number, step in enumerate(self.found.steps, start=1)
-            if step.refusal is not None and step.refusal.kind == SUPERFLUOUS
+            if step.refusal is not None and step.refusal.kind == "superfluous"
         ]
 
-    def answer(self, traces: Sequence[str], held_out: Sequence[str], cutoff: float) -> Diagnosis:
-        """The whole answer, except for its sentences and the times that it took.
-
-        Args:
-            traces, held_out: identities of the traces that were fitted to, and that were not.
-            cutoff: of the torques, Hz.
-        """
-        outcome = Outcome(
-            standing=self.refitter.standing(self.found),
-            controller=self.controller,
-            first=self.first,
-            added=self.found.added,
-            stated=self.found.stated,
-            tried=self.tried,
-            suspicion=self.suspicion,
-            notes=tuple(self.notes),
-        )
-        return answer_of(outcome, traces, held_out, cutoff)
-
     def _take_steps(self) -> None:
-        for _ in range(2 * self.case.options.most_steps):  # two effects may make each other superfluous in turn
-            if len(self.found.adopted) >= self.case.options.most_steps:
+        most = self.case.options.most_steps
+        for _ in range(2 * most):  # two effects may make each other superfluous in turn
+            if len(self.found.adopted) >= most:
                 break
             before = self.found
             self._report(0.1, "what is missing")
             findings = self._search(before)
             self.found = self._adopt(before, findings)
-            if not _has_more(self.found, before):
-                self.tried = list_tried(self.refitter.standing(self.found), findings)
-                self.suspicion = suspect(self.refitter.standing(self.found), findings)
+            if len(self.found.adopted) == len(before.adopted):
+                self.tried = list_tried(self.found, findings)
+                self.suspicion = suspect(self.found, findings)
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(len(before.steps))
@@ -108,7 +82,7 @@ class TorqueWorkflow:
         so_far = f"found so far: {named}; " if named else ""
         self.progress(min(0.99, (done + fraction) / (whole + 1)), f"{so_far}step {done + 1}: {text}")
 
-    def _search(self, found: Found) -> Findings:
+    def _search(self, found: Standing) -> Findings:
         """What a step finds, without what the records do not resolve, the most probable by all records first."""
         findings = search(found.model, found.now, self.case, self._report, self.cancel)
         fitted = prefer_fewer_joints(sorted(self._with_held_out(found, findings.fitted), key=order_by_odds))
@@ -120,7 +94,7 @@ class TorqueWorkflow:
             unresolved=tuple(f for f, is_one in zip(fitted, resolved, strict=True) if not is_one),
         )
 
-    def _with_held_out(self, found: Found, candidates: Sequence[Fitted]) -> list[Fitted]:
+    def _with_held_out(self, found: Standing, candidates: Sequence[Fitted]) -> list[Fitted]:
         """Candidates with what held-out records say for them; those for which fitted records do not speak are left."""
         held = self.case.held_out
         asked = [c for c in candidates if held and c.evidence > 0]
@@ -131,22 +105,21 @@ class TorqueWorkflow:
             *others,
         ]
 
-    def _adopt(self, found: Found, findings: Findings) -> Found:
+    def _adopt(self, found: Standing, findings: Findings) -> Standing:
         """Adds the best candidate that holds, if there is one, and the steps that were refused before it."""
         refused: list[Fitted] = []
         passed_over: list[Fitted] = []  # they lack evidence, or explain noise
-        standing, steps = self.refitter.standing(found), list(found.steps)
+        steps = list(found.steps)
         for chosen in findings.fitted:
             if len(refused) == CHANCES:
                 break
-            judgement = judge(standing, chosen, refused)
-            if judgement is None:
+            compared = judge(found, chosen, refused)
+            if compared is None:
                 passed_over.append(chosen)
                 continue
-            rivals = [*refused, *passed_over]
-            steps.append(record_step(standing, findings, judgement, rivals))
-            if judgement.refusal is None:
-                return replace(self.refitter.take(found, chosen), steps=tuple(steps))
+            steps.append(record_step(found, findings, compared, [*refused, *passed_over]))
+            if compared.refusal is None:
+                return replace(found.take(chosen), steps=tuple(steps))
             refused.append(chosen)
         return replace(found, steps=tuple(steps))
 
@@ -155,29 +128,20 @@ class TorqueWorkflow:
         for step in self.found.steps[:latest]:
             if not step.adopted or step.effect is None:
                 continue
-            now, without = self.found.now, self.refitter.remove(self.found, step)
-            less = evidence(without.now, now, now.noise.memory, len(step.parameters), 1)
-            if less < 0:
-                self.found = self._refuse(without, self.found, step, SUPERFLUOUS)
+            now, without = self.found.now, self.found.remove(step)
+            if evidence(without.now, now, now.noise.memory, len(step.parameters), 1) < 0:
+                gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
+                self.found = replace(without, steps=tuple(gone if s is step else s for s in self.found.steps))
 
     def _withdraw_wrong_laws(self) -> None:
         """Take back the first effect whose law is of another form than what is there, and all effects after it."""
-        standing, steps = self.refitter.standing(self.found), self.found.steps
-        forms = ((k, has_another_form(standing, step)) for k, step in enumerate(steps) if step.adopted)
+        steps = self.found.steps
+        forms = ((k, has_another_form(self.found, step)) for k, step in enumerate(steps) if step.adopted)
         first, wrong = next((found for found in forms if found[1]), (len(steps), ()))
         if not wrong:
             return
         for step in steps[first:]:
             if step.adopted:
                 now = tuple(withdrawn(s, wrong) if s is step else s for s in self.found.steps)
-                self.found = replace(self.refitter.remove(self.found, step), steps=now)
+                self.found = replace(self.found.remove(step), steps=now)
         self.suspicion, self.tried = None, ()  # they were of the model with these effects
-
-    def _refuse(self, without: Found, found: Found, step: Step, kind: RefusalKind) -> Found:
-        """Takes an effect out and tells why its step does not hold."""
-        gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind=kind)})
-        return replace(without, steps=tuple(gone if s is step else s for s in found.steps))
-
-
-def _has_more(after: Found, before: Found) -> bool:
-    return len(after.adopted) > len(before.adopted)

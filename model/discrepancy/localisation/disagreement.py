@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from daq.contracts.machine import Machine
 from model.arrays import Floats, Integers
 from model.discrepancy.diagnosis import UNWRITTEN, Dependence, PhaseCell, Where, WorstPlace
-from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
-from model.discrepancy.localisation.phases import HOLD, PHASES
-from model.discrepancy.localisation.residuals import Residuals
+from model.discrepancy.localisation.phases import HOLD, PHASES, Residuals
 from model.discrepancy.localisation.statistics import (
+    LEAST,
     Correlation,
     chance_significance,
     correlation_of,
+    quantities,
     significance_of_chi_square,
     significance_of_squares,
+    table_of,
 )
-from model.fitting.records import resolution
+from model.units import joint_unit
 
 WINDOW = 0.3
 """Duration of one cell of the map, s."""
@@ -32,8 +32,6 @@ MEDIAN_OF_NOISE = 0.9
 """Median of a window's mean square where there is noise alone: a little below its mean."""
 MOST_NOISE = 1.5
 """Largest variance that counts as noise, relative to the stated one."""
-LEAST = 0.3
-"""Lower bound of a residual's deviation, relative to that of noise, when its correlation is estimated."""
 
 
 @dataclass(frozen=True)
@@ -161,15 +159,16 @@ class _Map:
                 for run in record.runs
             ]
         )
-        scale, unit = spoken_unit(residuals.model.machine, self.joints[j])
         rms, floor = float(np.sqrt(np.mean(own_residual**2))), float(residuals.deviations[j])
+        sensor = residuals.model.machine.joint(self.joints[j]).sensor
+        unit = joint_unit(residuals.model.machine, self.joints[j])
         return WorstPlace(
             joint=self.joints[j],
             phase=PHASES[phase],
             ratio=rms / floor,
-            rms=rms * scale,
-            floor=floor * scale,
-            unit=unit,
+            rms=rms,
+            floor=floor,
+            unit=f"{unit}/s" if sensor is not None and sensor.measures == "velocity" else unit,
         )
 
     def _shares(self, j: int) -> list[_Share]:
@@ -227,41 +226,8 @@ def _windows(run: slice, period: float) -> list[slice]:
     return [slice(a, b) for a, b in zip(begins, [*begins[1:], run.stop], strict=True)]
 
 
-def _dependences(residuals: Residuals) -> list[Dependence]:
+def _dependences(residuals: Residuals) -> Iterator[Dependence]:
     """The residual of every joint against every quantity that varies."""
-    known = quantities(residuals.motions)
-    every = np.concatenate(list(residuals.signals))
-    found = []
+    known, every = quantities(residuals.motions), np.concatenate(list(residuals.signals))
     for j, joint in enumerate(residuals.model.machine.modelled_joints):
-        for against in AGAINST:
-            bins = dependence(every[:, j], j, against, known, LEAST * float(residuals.deviations[j]))
-            if bins is None:
-                continue
-            found.append(
-                Dependence(
-                    joint=joint,
-                    against=against,
-                    unit=known.units[against][j],
-                    centres=tuple(map(float, bins.centres)),
-                    residual=optional(bins.mean),
-                    deviation=optional(bins.deviation),
-                    significance=bins.significance,
-                )
-            )
-    return found
-
-
-def optional(values: Floats) -> tuple[float | None, ...]:
-    """Numbers, None for NaN."""
-    return tuple(None if math.isnan(v) else float(v) for v in values)
-
-
-def spoken_unit(machine: Machine, joint: int) -> tuple[float, str]:
-    """Factor and name of the unit in which people speak of a joint's residual: counts of its sensor, degrees, mm."""
-    sensor = machine.joint(joint).sensor
-    if sensor is not None and sensor.measures == "position":
-        return 1.0 / resolution(sensor), "ADC counts"
-    speed = "/s" if sensor is not None and sensor.measures == "velocity" else ""
-    if machine.joint(joint).kind == "revolute":
-        return math.degrees(1.0), f"°{speed}"
-    return 1e3, f"mm{speed}"
+        yield from table_of(every[:, j], j, joint, known, LEAST * float(residuals.deviations[j]))

@@ -1,7 +1,8 @@
-"""Phases of a motion, a joint and sample each, from what was asked of the joint."""
+"""What the joints were asked to do, in which phase of a motion a sample is, and what a model leaves of it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import get_args
@@ -12,6 +13,7 @@ from daq.contracts.machine import Machine, NoController, Sensor
 from model.arrays import Floats, Integers
 from model.discrepancy.diagnosis import Phase
 from model.fitting.records import Record, resolution
+from model.machine_model.model import Model
 
 PHASES: tuple[Phase, ...] = get_args(Phase)
 """Phases in the order of their numbers: ramp start, steady ramp, reversal, creep, hold."""
@@ -121,3 +123,24 @@ def _phases(speed: Floats, period: float) -> Integers:
             found[k : k + turning] = np.where(speed[k : k + turning] == 0.0, HOLD, REVERSAL)
         last_direction, rested = direction, 0.0
     return np.asarray(found, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Residuals of a model's simulation, record by record.
+
+    Args:
+        signals: (m, n) measured − simulated per record, in the unit of the measurement.
+        deviations: (n,) standard deviation of such a residual when nothing is wrong.
+
+    """
+
+    model: Model
+    records: Sequence[Record]
+    signals: Sequence[Floats]
+    deviations: Floats
+
+    @cached_property
+    def motions(self) -> tuple[AskedMotion, ...]:
+        """What the joints were asked to do in each record."""
+        return tuple(AskedMotion(self.model.machine, record) for record in self.records)

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from model.arrays import Floats
-from model.discrepancy.localisation.dependence import AGAINST, dependence, quantities
-from model.discrepancy.localisation.residuals import Residuals
+from model.discrepancy.localisation.phases import Residuals
+from model.discrepancy.localisation.statistics import LEAST, LONGEST_MEMORY, dependences, quantities
 from model.fitting.whitening import fitted_whitener
 
 LINE = 6.0
@@ -25,10 +25,6 @@ CLIP = 5.0
 """Robust standard deviations at which samples are clipped."""
 GAUSSIAN = 1.4826
 """Standard deviation of Gaussian noise over its median distance from zero."""
-LONGEST_MEMORY = 12
-"""Largest order, in samples, of the autoregression that tells how much of a residual its past predicts."""
-LEAST = 0.3
-"""Lower bound of a residual's deviation, relative to that of noise, when its correlation is estimated."""
 
 
 def clipped(signal: Floats) -> Floats:
@@ -57,8 +53,7 @@ def joints_with_structure(residuals: Residuals | None) -> tuple[int, ...]:
             continue
         mean_square = max(float(np.mean(signal**2)), LEAST**2)
         for tried in (signal, signal**2 / mean_square):
-            bins = (dependence(tried, column, against, known, LEAST) for against in AGAINST)
-            if any(b is not None and b.significance > LINE for b in bins):
+            if any(bins.significance > LINE for _, bins in dependences(tried, column, known, LEAST)):
                 found.append(joint)
                 break
     return tuple(found)

@@ -9,20 +9,20 @@ import numpy as np
 
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.diagnosis import SignalError, Where
+from model.discrepancy.diagnosis import Gap, GapNumber, SignalError, Step, Where
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.localisation.disagreement import locate
-from model.discrepancy.localisation.residuals import Residuals
+from model.discrepancy.localisation.phases import Residuals
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.holdout import HeldOut
-from model.discrepancy.output_error.noise_floor import noise_floor
+from model.discrepancy.output_error.holdout import HeldOut, noise_floor
+from model.discrepancy.output_error.noise_model import residuals_of
 from model.discrepancy.output_error.observation import Observation, Signals
-from model.discrepancy.output_error.search import STRAINED, Point
-from model.discrepancy.output_error.shown_noise import residuals_of
+from model.discrepancy.output_error.search import FEW_STEPS, Point, descend, point_at
 from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS, THRESHOLDS, Thresholds
-from model.discrepancy.verdict import excess_removed, rises_too_much
+from model.discrepancy.verdict import Errors, excess_removed, gap_numbers, gap_of, rises_too_much
 from model.machine_model.model import Model
+from model.machine_model.record_verdict import FAR_OFF
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Case:
         added since has made likely again: then that number was the effect. So all numbers are as they were given. The
         effects that the point before has already stay as they are: what they explain is no merit of the new one.
         """
-        if not before.strain >= STRAINED > after.strain:
+        if not before.strain >= FAR_OFF > after.strain:
             return before
         given = {u.name for u in self.given.unknowns if u.deviation is not None}
         as_given = np.array([u.name in given for u in before.unknowns])
@@ -172,3 +172,46 @@ def errors_of_fit(point: Point) -> tuple[SignalError, ...]:
     """Errors of every joint on the fitted traces as the fit itself sees them, with its own feedback share."""
     floor = noise_floor(point.observation, point)
     return point.observation.errors(point.residuals, point.residuals, floor)
+
+
+def closed_loop_gap(case: Case, first: Point, taken: Sequence[tuple[Step, Point]], end: Point) -> Gap:
+    """The gap of a diagnosis by output error.
+
+    The search itself lets the simulation follow a share of the record, so that a simulation with a wrong effect stays
+    near enough to be compared; there the gap is smaller than what anybody sees on the arm.
+
+    Args:
+        first: the point before any effect was added. taken: the steps in the resulting model, each with the point after
+            it. end: the point of the resulting model.
+    """
+    alone = _alone(case.scoring)
+    held = None if case.held is None else replace(case.held, observation=_alone(case.held.observation))
+
+    def errors(point: Point) -> Errors:
+        theirs = () if held is None else _errors(held.observation, held.residuals(point))
+        return {"fitted": _errors(alone, alone.residuals(point)), "held_out": theirs}
+
+    joints = zip(case.scoring.machine.modelled_joints, case.scoring.units, map(float, case.scoring.sizes), strict=True)
+    within = [(step, _within_file(point)) for step, point in taken]
+    return gap_of("closed-loop", tuple(joints), errors, case.given, first, within, end, _numbers(first, end))
+
+
+def _numbers(first: Point, end: Point) -> tuple[GapNumber, ...]:
+    return gap_numbers(end.model.machine, first.by_name, end.by_name)
+
+
+def _within_file(point: Point) -> Point:
+    """The point fitted again with its numbers within one deviation of what the machine file states."""
+    unknowns = tuple(u.within_stated for u in point.unknowns)
+    values = np.clip(point.values, [u.low for u in unknowns], [u.high for u in unknowns])
+    begun = point_at(point.observation, Calibration(point.model, unknowns, values), point.tangents)
+    return descend(begun, FEW_STEPS) if begun.is_finite else begun
+
+
+def _alone(observation: Observation) -> Observation:
+    return observation.with_drive_as_input(False).with_feedback_share(0.0)
+
+
+def _errors(observation: Observation, residuals: Signals) -> tuple[float | None, ...]:
+    """Root mean square of every joint; None where it is not finite."""
+    return tuple(rms if np.isfinite(rms) else None for rms in observation.rms(residuals))

@@ -20,8 +20,14 @@ from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, SignalError, Step, Where
 from model.discrepancy.grounds import ControllerEffect, ControllerProof
-from model.discrepancy.output_error.sampled_controller import controller_numbers
+from model.discrepancy.output_error.sampled_controller import (
+    LEAST_SAMPLES,
+    LEAST_STEPS,
+    controller_numbers,
+    with_errors,
+)
 from model.drives.controller import POWER_MAX
+from model.fitting.fit import INTERVAL
 from model.machine_model.model import Model
 from model.machine_model.nominal import gain_error
 from model.machine_model.record_verdict import FAR_OFF
@@ -32,10 +38,6 @@ LEAST_SHARE = 1e-3
 """Share of wrong samples below which they may be due to the start of the record."""
 LEAST_GAIN_DEVIATION = 0.01
 """Least relative deviation of a gain that is reported: rounding may explain a smaller one."""
-LEAST_POWER = 4.0
-"""Least power of a sample that is used for a gain, DAC counts: rounding dominates below it."""
-LEAST_SAMPLES = 20
-"""Samples that the estimate of a gain needs."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,31 @@ class ControllerFinding:
     high: float
     samples: int
     of: int
+
+
+@dataclass(frozen=True)
+class JudgedController:
+    """Violations of the controller's law, and the effects that its numbers prove or exclude."""
+
+    findings: tuple[ControllerFinding, ...]
+    settled: tuple[str, ...]
+
+    def steps(self, errors: tuple[SignalError, ...]) -> tuple[Step, ...]:
+        """A step for every violation. errors: of zero, since nothing is fitted for it."""
+        return tuple(proved_step(finding, errors) for finding in self.findings)
+
+    def with_findings(self, model: Model) -> Model:
+        """The model with the gains that the records prove."""
+        return with_findings(model, self.findings)
+
+
+def judge_controller(model: Model, traces: Sequence[Trace]) -> JudgedController:
+    """Holds the recorded drive against what the controller makes of set points and positions.
+
+    Nothing is found where the machine file describes no controller, or where the traces do not hold what it needs.
+    """
+    told = with_errors(traces, model.machine)
+    return JudgedController(check_controller(told, model.machine, model), settled_by_records(told, model.machine))
 
 
 def check_controller(
@@ -213,7 +240,7 @@ class _JointRecords:
         unit = sensor.direction * sensor.range.value / 2**sensor.bits
         wanted = gains[0] * controller.dac_counts_per_adc_count.value * trace.error[:, column] / unit
         power = trace.power_raw[:, column].astype(np.float64)
-        free = (np.abs(power) < POWER_MAX - 1) & (np.abs(wanted) > LEAST_POWER)
+        free = (np.abs(power) < POWER_MAX - 1) & (np.abs(wanted) > LEAST_STEPS)
         return wanted[free], power[free]
 
 
@@ -280,7 +307,7 @@ def _wrong_gain(own: _JointRecords, stated: float) -> ControllerFinding | None:
 
 def _share_interval(count: int, of: int) -> tuple[float, float]:
     """95 % interval of a share (Wilson)."""
-    z, share = 1.959964, count / of
+    z, share = INTERVAL, count / of
     middle = (share + z**2 / (2 * of)) / (1 + z**2 / of)
     half = z * np.sqrt(share * (1 - share) / of + z**2 / (4 * of**2)) / (1 + z**2 / of)
     return float(max(0.0, middle - half)), float(min(1.0, middle + half))

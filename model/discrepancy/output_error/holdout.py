@@ -1,9 +1,14 @@
-"""Held-out traces: what a fit leaves of them, with initial postures and phases of their own, and how far that rises."""
+"""Held-out traces: what a fit leaves of them, with initial postures and phases of their own, and how far that rises.
+
+The floor is the error that noise and rounding alone would leave, if a model were the truth. It is more than the noise
+of one reading: the part of that noise which the simulated controller is not given goes round the real loop and moves
+the arm a little near standstill.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,21 +17,55 @@ from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.noise_floor import noise_floor
-from model.discrepancy.output_error.observation import Observation, Signals, observe
-from model.discrepancy.output_error.search import Point, descend, point_at
+from model.discrepancy.output_error.observation import Observation, Signals, observe, side_by_side
+from model.discrepancy.output_error.search import STEPS, Point, descend, point_at
 from model.discrepancy.thresholds import FEEDBACK_SHARE, FEEDBACK_SHARE_FOR_ERRORS
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind
 
+REPLICAS, SEED = 6, 1991
+
+
+def noise_floor(
+    observation: Observation, truth: Calibration, left: Callable[[Observation], Signals] | None = None
+) -> Floats:
+    """Root mean square of each joint's residual, (n,) rad, over simulated records of an arm that is this model.
+
+    Where its simulations in closed loop do not stay finite: the noise of a reading.
+
+    Args:
+        left: residuals of an observation, computed as those of the real records are; None for those of that very model.
+    """
+    left = left or (lambda made: made.residuals(truth))
+    rng = np.random.default_rng(SEED)
+    replicas = [_replica(observation, truth, rng) for _ in range(REPLICAS)]
+    if not all(np.isfinite(r.measured).all() for replica in replicas for r in replica.records):
+        return observation.deviations.copy()
+    squares = [
+        np.square(replica.rms(residuals))
+        for replica, residuals in zip(replicas, side_by_side(left, replicas), strict=True)
+    ]
+    return np.asarray(np.sqrt(np.mean(squares, axis=0)))
+
+
+def _replica(observation: Observation, truth: Calibration, rng: np.random.Generator) -> Observation:
+    """The same experiments on an arm that is this model, with random noise of the stated size, or as the records show
+    it."""
+    scale = observation.deviations / observation.unit
+    noise = [rng.normal(size=p.noise.shape) for p in observation.prepared]
+    if observation.noise is not None:
+        whiteners = observation.noise.whiteners
+        noise = [
+            np.stack([w.coloured(own) for w, own in zip(whiteners, each.T, strict=True)], axis=1) for each in noise
+        ]
+    return observation.imagined(truth, [scale * each for each in noise])
+
+
 BLOCK = 0.2
 """Time over which errors may be correlated, s."""
 NEARER = (FEEDBACK_SHARE, 0.95)
 """Feedback shares that are tried in turn where the simulation of a held-out trace does not stay finite."""
-START_STEPS = 8
-"""Steps of the search for the initial posture of a held-out trace: with play in a gear, that is not a smooth
-problem."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +153,7 @@ def _fitted_here(observation: Observation, point: Calibration, own: tuple[Unknow
     if not own or not begun.is_finite:
         return begun
     try:
-        return descend(begun, START_STEPS, range(count - len(own), count))
+        return descend(begun, STEPS, range(count - len(own), count))
     except SpecError:
         return begun  # on the verge of instability, as where a delay is missing: no derivative exists
 

@@ -367,9 +367,7 @@ def observe(
         for r in problem.records
     )
     given = {p.name: p.value for p in model.parameters if p.effect is not None}
-    unknowns = tuple(
-        _sudden_friction(_loose_start(_even_bend(_as_given(u, given), problem.model))) for u in problem.unknowns
-    )
+    unknowns = tuple(_as_diagnosed(u, given, problem.model) for u in problem.unknowns)
     scales = _recorded_scales(model, problem.records)
     observation = Observation(model.machine, problem.records, problem.floor, unit, prepared, scales)
     return observation, Calibration(problem.model, unknowns, np.array([u.start for u in unknowns]))
@@ -409,11 +407,6 @@ def forms_rounded_drive(machine: Machine, gains: Floats) -> bool:
     return bool(np.any(gains[:, pid.I]) or np.any(np.abs(of_counts - np.round(of_counts)) > WHOLE))
 
 
-def _as_given(unknown: Unknown, given: Mapping[str, float]) -> Unknown:
-    """The unknown; the prior mean of an effect's parameter is the value that it has in the given model."""
-    return replace(unknown, expected=given[unknown.name]) if unknown.name in given else unknown
-
-
 def longest_step_of(model: Model) -> float:
     """Longest step of integration, s, with which a model can be simulated."""
     return CONTACT_STEP if any(use.name == "backlash" for use in model.effects) else COARSE_STEP
@@ -449,30 +442,25 @@ def _difference(tried: Calibration, index: int, seconds: float) -> float:
     return -size if value + size > unknown.high else size
 
 
-def _loose_start(unknown: Unknown) -> Unknown:
-    """The unknown; an initial posture gets a prior so wide that the trace decides it."""
-    if unknown.kind is not Kind.INITIAL_POSITION or unknown.deviation is None:
-        return unknown
-    limit = 2 * LOOSE_START * unknown.deviation
-    return replace(unknown, deviation=LOOSE_START * unknown.deviation, low=-limit, high=limit)
+def _as_diagnosed(unknown: Unknown, given: Mapping[str, float], model: Model) -> Unknown:
+    """The unknown as a diagnosis searches it.
 
-
-def _sudden_friction(unknown: Unknown) -> Unknown:
-    """The unknown; friction may also be there at once."""
-    if unknown.kind is not Kind.PRESLIDING:
-        return unknown
-    return replace(unknown, low=SHORTEST_PRESLIDING * unknown.expected)
-
-
-def _even_bend(unknown: Unknown, model: Model) -> Unknown:
-    """The unknown; all bends of a sound potentiometer get the same prior, because nothing says that its curve is
-    smooth."""
-    if not (unknown.nuisance and unknown.parameter.effect == "potentiometer_nonlinearity"):
-        return unknown
-    sensor = model.machine.joint(unknown.joints[0]).sensor
-    if sensor is None or sensor.linearity is None:
-        return unknown
-    return replace(unknown, deviation=BEND_SHARE * sensor.linearity.value * sensor.range.value)
+    The prior mean of an effect's parameter is the value that it has in the given model. An initial posture gets a prior
+    so wide that the trace decides it. Friction may also be there at once. All bends of a sound potentiometer get the
+    same prior, because nothing says that its curve is smooth.
+    """
+    if unknown.name in given:
+        unknown = replace(unknown, expected=given[unknown.name])
+    if unknown.kind is Kind.PRESLIDING:
+        return replace(unknown, low=SHORTEST_PRESLIDING * unknown.expected)
+    if unknown.kind is Kind.INITIAL_POSITION and unknown.deviation is not None:
+        limit = 2 * LOOSE_START * unknown.deviation
+        return replace(unknown, deviation=LOOSE_START * unknown.deviation, low=-limit, high=limit)
+    if unknown.nuisance and unknown.parameter.effect == "potentiometer_nonlinearity":
+        sensor = model.machine.joint(unknown.joints[0]).sensor
+        if sensor is not None and sensor.linearity is not None:
+            return replace(unknown, deviation=BEND_SHARE * sensor.linearity.value * sensor.range.value)
+    return unknown
 
 
 def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:

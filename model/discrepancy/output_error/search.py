@@ -25,13 +25,17 @@ ATTEMPTS = ((1.0, 0.0), (1.0, 0.0), (0.4, 0.0), (1.0, 0.3), (0.12, 0.0), (1.0, 3
 """Steps that are tried, as a share of the whole one and a damping in shares of the information's diagonal (Marquardt
 1963), each from derivatives that the attempts before have corrected. A short step helps where the cost is strongly
 curved, a damped one where the record says little."""
-STRAINED = 4.0
-"""Deviation from a prior's mean, in its standard deviations, from which a number is no likely one."""
 CONVERGED = 1.0
 """Fall of the cost below which a search ends: one unit is one standard deviation of one parameter."""
 FORETOLD = 0.1
 """Share of the readings' change that derivatives may have missed and still hold where a search ends: what they miss of
 a further step is a tenth of it."""
+STEPS = 8
+"""Steps of a search that has to find its way: with play in a gear, that is not a smooth problem."""
+FEW_STEPS = 6
+"""Steps of a search that begins near its end, or is followed by another."""
+LAST_STEPS = 4
+"""Steps of each search that takes a fit to its end."""
 MOST_SEARCHES = 8
 """Searches with new derivatives: two are enough, except from a start that is far away."""
 

@@ -12,10 +12,8 @@ from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, Progress
 from daq.contracts.trace import Trace
 from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, improved_baseline, judge
-from model.discrepancy.candidates.decision import Added, decide
-from model.discrepancy.candidates.estimates import listed, only_probed
 from model.discrepancy.candidates.probing import Probe
-from model.discrepancy.candidates.ranking import Ranking, rank
+from model.discrepancy.candidates.ranking import Ranking, decide, rank
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, SignalError, Step, Where
 from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
 from model.discrepancy.explanation.answer_words import with_sentences
@@ -25,39 +23,28 @@ from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.localisation.structure import joints_with_structure
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.case import Case, build_case, errors_of_fit
-from model.discrepancy.output_error.controller_evidence import (
-    check_controller,
-    proved_step,
-    settled_by_records,
-    with_findings,
-    with_used_set_points,
-)
-from model.discrepancy.output_error.gap import closed_loop_gap, within_file
+from model.discrepancy.output_error.case import Case, build_case, closed_loop_gap, errors_of_fit
+from model.discrepancy.output_error.controller_evidence import judge_controller, with_used_set_points
 from model.discrepancy.output_error.holdout import hold_out
+from model.discrepancy.output_error.noise_model import note_on_noise, shown_noise
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.sampled_controller import with_errors
-from model.discrepancy.output_error.search import STRAINED, Point, converge, descend, point_at
-from model.discrepancy.output_error.shown_noise import note_on_noise, shown_noise
-from model.discrepancy.selection.last_fit import update_to_last_fit
-from model.discrepancy.selection.step import LAST_STEPS, make_step
-from model.discrepancy.thresholds import FEEDBACK_SHARE_FOR_ERRORS
+from model.discrepancy.output_error.search import FEW_STEPS, LAST_STEPS, Point, converge, descend, point_at
+from model.discrepancy.selection.step import listed, make_step, only_probed, update_to_last_fit
+from model.discrepancy.thresholds import CHANCES, FEEDBACK_SHARE_FOR_ERRORS
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
 from model.effects.names import effect_on
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Lineage, Model
 from model.machine_model.parameter import Kind
+from model.machine_model.record_verdict import FAR_OFF
 
 NOISE_ROUNDS = 2
 """Fits with the noise that the one before has left."""
-MOST_REFUSALS = 3
-"""Candidates of one ranking that held-out traces may refuse before the search ends."""
 FIRST_FEEDBACK_SHARES = (0.0, 0.5)
 """Feedback shares of the fits that come before the first one with the full share."""
 SHORT_DISTANCE = 0.3
 """Share of the expected distance over which friction builds up, below which a fit is tried with sudden friction too."""
-FIRST_STEPS = 6
-"""Steps of a search in these fits, before derivatives are computed anew."""
 
 
 def diagnose_by_simulation(
@@ -73,13 +60,13 @@ def diagnose_by_simulation(
     begun = time.perf_counter()
     progress(0.0, "checking the controller's own numbers")
     traces, holdout = (with_errors(some, model.machine) for some in (traces, holdout))
-    findings = check_controller(traces, model.machine, model)
-    excluded = settled_by_records(traces, model.machine)
-    if any(f.effect is ControllerEffect.LOST_SET_POINTS for f in findings):
+    controller = judge_controller(model, traces)
+    excluded = controller.settled
+    if any(f.effect is ControllerEffect.LOST_SET_POINTS for f in controller.findings):
         # The set points that were used are known to the count.
         traces, holdout = (tuple(map(with_used_set_points, some)) for some in (traces, holdout))
     progress(0.02, "fitting the tolerance parameters")
-    known = with_findings(model, findings)
+    known = controller.with_findings(model)
     given = _given_point(*observe(known, traces, held_out=[t.record.trace_id for t in holdout]))
     if given.observation.drive_is_input:
         # The plant gets the drive that was recorded, whatever the controller has done.
@@ -89,7 +76,7 @@ def diagnose_by_simulation(
     first = judge(fitted)
     search = _add_effects(case, _Search(first=first, current=first), progress, cancel)
     progress(0.95, "writing the answer")
-    proved = tuple(proved_step(f, _no_errors(given.observation)) for f in findings)
+    proved = controller.steps(_no_errors(given.observation))
     answer = _answer(case, search, proved, chooser, cancel)
     progress(1.0, "done")
     return answer.model_copy(update={"seconds": time.perf_counter() - begun})
@@ -120,9 +107,9 @@ class _Search:
     ended: bool = False
 
     @property
-    def added(self) -> list[Added]:
-        """The effects in the current fit."""
-        return [Added(s.effect, s.joints, s.evidence) for s in self.steps if s.adopted]
+    def added(self) -> list[Step]:
+        """The steps of the effects in the current fit."""
+        return [s for s in self.steps if s.adopted]
 
     @property
     def taken(self) -> list[tuple[Step, Point]]:
@@ -179,7 +166,7 @@ def _fit_with_feedback(point: Point, observation: Observation) -> Point | None:
     finite."""
     try:
         begun = point.on(observation)
-        return descend(begun, FIRST_STEPS) if begun.is_finite else None
+        return descend(begun, FEW_STEPS) if begun.is_finite else None
     except SpecError:
         return None
 
@@ -198,7 +185,7 @@ def _weighed_with_shown_noise(fitted: Point) -> Point:
         observation = replace(fitted.observation, noise=noise)
         try:
             fitted = converge(fitted.on(observation), LAST_STEPS)
-            if fitted.strain >= STRAINED:
+            if fitted.strain >= FAR_OFF:
                 again = _fit_tolerances(fitted.at_expected())
                 fitted = again if again.cost < fitted.cost else fitted
         except SpecError:
@@ -229,7 +216,7 @@ def _add_effect(case: Case, search: _Search, progress: Progress, cancel: Cancel)
     search = replace(search, current=current, probes=(*search.probes, *ranking.probed), tried=ranking)
     if not search.added:
         search = replace(search, first=current)
-    for _ in range(MOST_REFUSALS):
+    for _ in range(CHANCES):
         decision = decide(ranking, case.thresholds, search.added)
         step, following = make_step(case, current, ranking, decision)
         if step is None:
@@ -296,7 +283,7 @@ def _answer(
         holdout=tuple(t.record.trace_id for t in case.held_traces),
         rmse_fit=case.fitted_errors(case.given, end),
         rmse_holdout=held,
-        gap=closed_loop_gap(case, found.first.point, [(s, within_file(p)) for s, p in found.taken], end),
+        gap=closed_loop_gap(case, found.first.point, found.taken, end),
         significant=case.thresholds.significant,
         seconds=0.0,
         robot_seconds=float(sum(t.time[-1] - t.time[0] for t in case.traces)),

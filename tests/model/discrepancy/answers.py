@@ -18,9 +18,9 @@ from model.discrepancy.diagnosis import (
     SignalError,
 )
 from model.discrepancy.explanation.answer_words import with_sentences
-from model.discrepancy.grounds import NamedEffect, Reason
+from model.discrepancy.grounds import Reason
 from model.discrepancy.localisation.disagreement import locate
-from model.discrepancy.localisation.residuals import Residuals
+from model.discrepancy.localisation.phases import Residuals
 from model.fitting.records import noise_floor, records_of
 from model.machine_model.model import Model
 from model.simulation.prepared import Options
@@ -56,7 +56,6 @@ def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
         Candidate(effect="base_tilt", joints=(), evidence=-6.0),
         Candidate(effect="viscous_friction", joints=(1,), evidence=-11.0),
     )
-    rival = NamedEffect(effect="stiction", joints=(2,), evidence=1890.0)
     comparison = compare([("before", before), ("after", after)], [fit, held], [held.record.trace_id])
     taken = step(
         EFFECT,
@@ -69,7 +68,7 @@ def an_answer(seconds: float = 20.0) -> tuple[Diagnosis, Comparison]:
         rmse_holdout=_errors(comparison, "held_out"),
         excess_removed_holdout=0.982,
         where=locate(left),
-        reason_data=Reason(rival=rival),
+        reason_data=Reason(),
     )
     asked = NextExperiment(
         name="slow reversals on joint 2",

@@ -8,9 +8,8 @@ import pytest
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.trace import Trace
-from model.discrepancy.method_choice import choose_method
 from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.workflow import diagnose
+from model.discrepancy.workflow import choose_method, diagnose
 from model.machine_model.model import Model, base_model
 from tests.model.discrepancy import outside_arm
 from tests.model.discrepancy.inverse_dynamics import rigs

@@ -11,8 +11,7 @@ from daq.trajectories.planner import plan, start_angles
 from daq.trajectories.presets import PRESETS
 from model.discrepancy.carried_load import with_load
 from model.discrepancy.excitation import own_frequencies
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
-from model.discrepancy.options import DiagnosisOptions, check_options
+from model.discrepancy.options import DiagnosisOptions, TorqueOptions, check_options
 from model.discrepancy.workflow import diagnose
 from model.effects.library import add_own, remove_own
 from model.machine_model.model import base_model

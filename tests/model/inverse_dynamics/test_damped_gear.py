@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from model.discrepancy.inverse_dynamics.stated_numbers import _has_effect
+from model.discrepancy.inverse_dynamics.candidates import _has_effect
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import base_model

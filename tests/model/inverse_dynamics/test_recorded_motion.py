@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq.contracts.machine import Machine
 from model.arrays import Floats
-from model.discrepancy.inverse_dynamics.likelihood import stretches_of
+from model.discrepancy.inverse_dynamics.fitting import stretches_of
 from model.inverse_dynamics.recorded_motion import RecordedMotion, derivative, low_pass, turns_round
 from tests.model.discrepancy.inverse_dynamics.rigs import bench_machine, slide_machine
 from tests.model.inverse_dynamics.driven_slide import CUTOFF, PERIOD, TIME, controlled, motion_of

@@ -7,7 +7,7 @@ import pytest
 
 from daq.contracts.trace import Trace
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.shaking import Shaking, find_shaking
 from model.machine_model.model import base_model

@@ -5,7 +5,7 @@ import pytest
 from daq.contracts.errors import SpecError
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.options import TorqueOptions
 from model.fitting.options import FitOptions
 from model.inverse_dynamics.fit import fit_torques
 from model.machine_model.model import Lineage, Model, base_model

@@ -19,8 +19,7 @@ from daq_cli.models.service_jobs import _given
 from extras.lab.batches.folder import BatchFolder, BatchInUseError, asked_of, opened
 from extras.lab.batches.run import Chosen, Standing, chosen_traces, run_batch
 from extras.lab.batches.study import Answer, Common, SimulateStudy
-from model.discrepancy.inverse_dynamics.options import torque_options
-from model.discrepancy.options import DiagnosisOptions
+from model.discrepancy.options import DiagnosisOptions, torque_options
 from model.fitting.options import FitOptions
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options

@@ -15,6 +15,7 @@ from model.discrepancy.candidates.candidate_fit import (
     CandidateFit,
     Fit,
     diverged_from_prior,
+    fit_several_joints,
     judge,
     nearest,
     polish,
@@ -23,7 +24,6 @@ from model.discrepancy.candidates.candidate_fit import (
     with_evidence,
 )
 from model.discrepancy.candidates.library import Hypothesis, hypotheses
-from model.discrepancy.candidates.multi_joint_fit import fit_several_joints
 from model.discrepancy.candidates.probing import Probe, probe
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, observe

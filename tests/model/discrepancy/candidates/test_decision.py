@@ -2,10 +2,10 @@
 
 import pytest
 
-from model.discrepancy.candidates.decision import Added, decide
-from model.discrepancy.candidates.ranking import Ranking
+from model.discrepancy.candidates.ranking import Ranking, decide
 from model.discrepancy.thresholds import Thresholds
 from tests.model.discrepancy.candidate_fits import candidate_fit
+from tests.model.discrepancy.steps import step
 
 LINES = Thresholds(significant=12.0, margin=4.0, echo=0.05, distant_echo=0.01)
 
@@ -40,21 +40,21 @@ def test_the_margin_of_the_only_candidate_is_its_evidence() -> None:
 def test_a_small_remainder_of_an_added_effect_on_the_same_joint_is_no_effect() -> None:
     small = ranking(("dead_zone", 3, 30.0))
     assert decide(small, LINES).kind == "named"
-    assert decide(small, LINES, [Added("backlash", (3,), 1000.0)]).kind == "nothing"
-    assert decide(small, LINES, [Added("base_tilt", (), 1000.0)]).kind == "nothing"
+    assert decide(small, LINES, [step("backlash", (3,), evidence=1000.0)]).kind == "nothing"
+    assert decide(small, LINES, [step("base_tilt", (), evidence=1000.0)]).kind == "nothing"
 
 
 def test_an_effect_on_another_joint_raises_the_threshold_less() -> None:
     small = ranking(("dead_zone", 3, 30.0))
-    assert decide(small, LINES, [Added("backlash", (2,), 1000.0)]).kind == "named"
-    assert decide(small, LINES, [Added("backlash", (2,), 3000.0)]).kind == "nothing"
+    assert decide(small, LINES, [step("backlash", (2,), evidence=1000.0)]).kind == "named"
+    assert decide(small, LINES, [step("backlash", (2,), evidence=3000.0)]).kind == "nothing"
 
 
 def test_a_candidate_below_its_threshold_is_skipped_for_one_on_another_joint() -> None:
     said = decide(
         ranking(("dead_zone", 2, 100.0), ("backlash", 1, 60.0), ("stiction", 1, 20.0)),
         LINES,
-        [Added("coulomb_friction", (2,), 2000.0)],
+        [step("coulomb_friction", (2,), evidence=2000.0)],
     )
     assert said.best is not None
     assert (said.kind, said.best.hypothesis.name, said.margin) == ("named", "backlash", pytest.approx(40.0))
@@ -62,8 +62,8 @@ def test_a_candidate_below_its_threshold_is_skipped_for_one_on_another_joint() -
 
 def test_an_effect_found_on_one_joint_needs_less_evidence_on_another() -> None:
     small = ranking(("dead_zone", 3, 8.0))
-    assert decide(small, LINES, [Added("backlash", (2,), 40.0)]).kind == "nothing"
-    assert decide(small, LINES, [Added("dead_zone", (2,), 40.0)]).kind == "named"
+    assert decide(small, LINES, [step("backlash", (2,), evidence=40.0)]).kind == "nothing"
+    assert decide(small, LINES, [step("dead_zone", (2,), evidence=40.0)]).kind == "named"
 
 
 def test_the_same_effect_on_fewer_joints_is_no_rival() -> None:

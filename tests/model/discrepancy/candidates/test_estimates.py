@@ -6,11 +6,11 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from model.discrepancy.candidates.candidate_fit import Fit, judge
-from model.discrepancy.candidates.estimates import found_values, shift_by_noise, standard_deviations
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.noise_model import fit_noise_model
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.search import converge, point_at
+from model.discrepancy.selection.step import found_values, shift_by_noise, standard_deviations
 from model.fitting.fit import INTERVAL
 from model.fitting.unknowns import Unknown
 from model.machine_model.parameter import Parameter

@@ -7,10 +7,8 @@ import pytest
 
 from daq.contracts.errors import SpecError
 from model import layout as at
-from model.discrepancy.candidates.library import STICTION_SPEED, hypotheses, tone
-from model.discrepancy.candidates.probing import inverse_of
-from model.discrepancy.candidates.recorded_trials import SHARES, with_recorded_trials
-from model.discrepancy.candidates.stated_numbers import as_effect
+from model.discrepancy.candidates.library import SHARES, STICTION_SPEED, hypotheses, tone, with_recorded_trials
+from model.discrepancy.candidates.probing import as_effect, inverse_of
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.search import Point, point_at
 from model.effects.library import BESIDE, add_own, library, remove_own

@@ -6,7 +6,7 @@ import pytest
 
 from daq.contracts.effects import effect_names
 from model.discrepancy.diagnosis import PlacedEffect
-from model.discrepancy.experiment_design.inseparable import classes_of, notes_on, shared_law
+from model.discrepancy.experiment_design.next_experiment import classes_of, notes_on, shared_law
 from model.discrepancy.explanation.effect_words import LAWS, MEASUREMENTS, class_headline, class_words
 from model.discrepancy.explanation.notes import note_words
 from model.discrepancy.grounds import Measurement, Note, SharedLaw

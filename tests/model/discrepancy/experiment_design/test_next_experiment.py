@@ -13,10 +13,9 @@ from daq.contracts.trace import Trace
 from daq.safety.planned import planned
 from daq.trajectories.offered import offered_experiments
 from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, refit
-from model.discrepancy.candidates.decision import decide
 from model.discrepancy.candidates.library import Hypothesis
 from model.discrepancy.candidates.probing import Probe
-from model.discrepancy.candidates.ranking import Ranking, rank
+from model.discrepancy.candidates.ranking import Ranking, decide, rank
 from model.discrepancy.experiment_design.next_experiment import (
     ExperimentChooser,
     best_experiment,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from model.discrepancy.experiment_design.prediction import Prediction, imagine
+from model.discrepancy.experiment_design.separation import Prediction, imagine
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.search import point_at
 from tests.model.discrepancy.experiment_design.test_next_experiment import EXPERIMENTS, plan, record

@@ -18,7 +18,7 @@ from model.discrepancy.diagnosis import (
 )
 from model.discrepancy.explanation.answer_words import what_is_left, with_sentences
 from model.discrepancy.explanation.step_words import reason_text, step_with_sentences, where_with_summary
-from model.discrepancy.grounds import ControllerProof, NamedEffect, Reason, Refusal
+from model.discrepancy.grounds import ControllerProof, Reason, Refusal
 from model.discrepancy.verdict import worse_held_out
 from model.effects.library import effect
 from model.machine_model.model import Model
@@ -63,7 +63,6 @@ TORQUE = {
     )
     for j in (1, 2)
 }
-STICTION = NamedEffect(effect="stiction", joints=(2,), evidence=728.0)
 
 
 def error(joint: int, before: float, after: float) -> SignalError:
@@ -71,31 +70,19 @@ def error(joint: int, before: float, after: float) -> SignalError:
 
 
 def test_a_reason_says_what_the_effect_does_its_sizes_and_the_error_that_falls_most(arm: Model) -> None:
-    step = step_with("coulomb_friction", (1, 2), TORQUE, Reason(rival=STICTION)).model_copy(
+    step = step_with("coulomb_friction", (1, 2), TORQUE, Reason()).model_copy(
         update={"rmse_fit": (error(1, 0.02, 0.01), error(2, 0.04, 0.004), error(3, 0.04, 1e-4))}
     )
     assert reason_text(step, arm.machine) == (
         "Joints 1 and 2: a constant torque opposes motion and changes sign with its direction, at any speed (torque of "
-        "joint 1 4 N·m, torque of joint 2 4 N·m); the rms error of joint 2 falls from 2.3° to 0.23°. The next best, "
-        "stiction on joint 2, has evidence of 728, and this has 900."
+        "joint 1 4 N·m, torque of joint 2 4 N·m); the rms error of joint 2 falls from 2.3° to 0.23°."
     )
 
 
-def test_a_rival_that_has_come_to_more_is_said_as_such(arm: Model) -> None:
-    """The fit that was ranked first came to less when it was completed."""
-    step = step_with("coulomb_friction", (2,), TORQUE, Reason(rival=STICTION), evidence=539.0, margin=-189.0)
-    assert reason_text(step, arm.machine).endswith(
-        "Its completed fit has evidence of 539, less than the 728 of stiction on joint 2: these traces do not tell "
-        "which of the two it is."
-    )
-
-
-def test_a_rival_without_evidence_and_an_error_that_hardly_falls_are_said_as_such(arm: Model) -> None:
-    rival = STICTION.model_copy(update={"evidence": -3.0})
-    step = step_with("coulomb_friction", (2,), TORQUE, Reason(rival=rival), evidence=30.0, margin=33.0)
+def test_an_error_that_hardly_falls_is_said_as_such(arm: Model) -> None:
+    step = step_with("coulomb_friction", (2,), TORQUE, Reason())
     text = reason_text(step.model_copy(update={"rmse_fit": (error(2, 0.02, 0.0199),)}), arm.machine)
-    assert "; the rms error of joint 2 hardly changes: it stays near 1.14°. " in text
-    assert text.endswith("No other fitted candidate has a twentieth of its evidence of 30.")
+    assert text.endswith("; the rms error of joint 2 hardly changes: it stays near 1.14°.")
 
 
 @pytest.mark.parametrize(

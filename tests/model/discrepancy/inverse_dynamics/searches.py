@@ -7,11 +7,11 @@ from daq.contracts.machine import load_machine
 from daq.contracts.progress import Never, silent
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
-from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.inverse_dynamics.fitting import TorqueCase
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.discrepancy.options import TorqueOptions
+from model.discrepancy.output_error.controller_evidence import judge_controller
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model

@@ -10,7 +10,7 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.efforts import recorded_and_predicted
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.options import TorqueOptions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.inverse_dynamics.rigs import slide_machine, slide_trace

@@ -10,12 +10,10 @@ from daq.contracts.progress import Never, silent
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.explanation.answer_words import what_is_left
 from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.case import TorqueCase
+from model.discrepancy.inverse_dynamics.candidates import take_back
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit
-from model.discrepancy.inverse_dynamics.judged_controller import judge_controller
+from model.discrepancy.inverse_dynamics.fitting import BalanceFit, TorqueCase
 from model.discrepancy.inverse_dynamics.localisation import locate
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.search import (
     FILE_IS_RIGHT,
     Fitted,
@@ -23,8 +21,9 @@ from model.discrepancy.inverse_dynamics.search import (
     prefer_shorter_laws,
     search,
 )
-from model.discrepancy.inverse_dynamics.stated_numbers import take_back
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.discrepancy.options import TorqueOptions
+from model.discrepancy.output_error.controller_evidence import judge_controller
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model

@@ -7,7 +7,6 @@ import pytest
 from daq.contracts.progress import Never
 from model.discrepancy.inverse_dynamics.fitting import fit
 from model.discrepancy.inverse_dynamics.judging import BESIDE_REFUSED, judge
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.probing import Probe
 from model.discrepancy.inverse_dynamics.search import (
     OF_A_JOINT,
@@ -19,9 +18,10 @@ from model.discrepancy.inverse_dynamics.search import (
     _weighted_squares,
     search,
 )
+from model.discrepancy.inverse_dynamics.starts import Trial
 from model.discrepancy.inverse_dynamics.step_record import _cannot_be_told
-from model.discrepancy.inverse_dynamics.trial import Trial
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.discrepancy.options import TorqueOptions
 from tests.model.discrepancy.inverse_dynamics.searches import sliding
 
 FRICTION = TorqueOptions(effects=("coulomb_friction", "viscous_friction"))
@@ -72,11 +72,9 @@ def test_an_effect_with_less_than_half_the_evidence_of_a_refused_rival_is_not_na
 ) -> None:
     chosen = next(f for f in found if f.effect == "coulomb_friction")
     rival = replace(chosen, effect="viscous_friction", evidence=chosen.evidence / (share * BESIDE_REFUSED))
-    assert (judge(rubbing.refitter.standing(rubbing.found), chosen, [rival]) is not None) is taken
+    assert (judge(rubbing.found, chosen, [rival]) is not None) is taken
     elsewhere = replace(rival, joints=(2,))
-    assert judge(rubbing.refitter.standing(rubbing.found), chosen, [elsewhere]) is not None, (
-        "it explains another joint's torque"
-    )
+    assert judge(rubbing.found, chosen, [elsewhere]) is not None, "it explains another joint's torque"
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
+from model.discrepancy.options import TorqueOptions
 from model.effects.library import find_named_effect, library
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.machine_model.model import base_model

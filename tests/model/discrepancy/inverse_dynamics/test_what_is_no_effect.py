@@ -17,9 +17,9 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.options import TorqueOptions
 from model.discrepancy.inverse_dynamics.starts import narrowed
 from model.discrepancy.inverse_dynamics.step_record import excess_removed
+from model.discrepancy.options import TorqueOptions
 from model.fitting.options import FitOptions
 from model.inverse_dynamics import repeats
 from model.inverse_dynamics.fit import fit_torques

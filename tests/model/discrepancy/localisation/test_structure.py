@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from model.discrepancy.localisation.residuals import Residuals
+from model.discrepancy.localisation.phases import Residuals
 from model.discrepancy.localisation.structure import joints_with_structure
 from model.fitting.records import Record, noise_floor, records_of
 from model.machine_model.model import Model

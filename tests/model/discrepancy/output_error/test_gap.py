@@ -9,8 +9,7 @@ import pytest
 from daq.contracts.machine import Machine
 from model.arrays import Floats
 from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.output_error.case import Case
-from model.discrepancy.output_error.gap import closed_loop_gap, within_file
+from model.discrepancy.output_error.case import Case, _within_file, closed_loop_gap
 from model.discrepancy.output_error.observation import Signals, observe
 from model.discrepancy.output_error.search import Point, converge, point_at
 from tests.model.discrepancy.steps import step
@@ -111,7 +110,8 @@ def test_each_stage_has_the_root_mean_square_of_its_own_point(
     held: Held | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     taken = [(step("coulomb_friction", (2,)), cast(Point, "friction"))]
-    monkeypatch.setattr("model.discrepancy.output_error.gap._numbers", lambda *_points: ())
+    monkeypatch.setattr("model.discrepancy.output_error.case._numbers", lambda *_points: ())
+    monkeypatch.setattr("model.discrepancy.output_error.case._within_file", lambda point: point)
     gap = closed_loop_gap(case_of(held), cast(Point, "fitted"), taken, cast(Point, "end"))
     rms = [(12.5**0.5, 5.0, 2.0**0.5), (0.5**0.5, 0.0, 5.0), (0.125**0.5, 0.0, 5.0)]
     assert [(s.kind, s.effect, s.joints) for s in gap.stages] == [
@@ -133,7 +133,7 @@ def test_within_what_the_file_states_no_number_is_further_off_than_one_deviation
     heavy = imagined.arm().with_values({"link2.mass": 4.0 * imagined.arm().parameter("link2.mass").value})
     observation, given = observe(imagined.arm(), [imagined.trace(heavy, seconds=3.0)])
     free = converge(point_at(observation, given.at(np.array([u.start for u in given.unknowns]))), 4)
-    bounded = within_file(free)
+    bounded = _within_file(free)
     assert free.strain > 1.0
     assert bounded.strain <= 1.0 + 1e-9
     assert bounded.cost <= free.at_expected().cost

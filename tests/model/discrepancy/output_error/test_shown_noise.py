@@ -7,9 +7,9 @@ import pytest
 from scipy.signal import lfilter
 
 from model.arrays import Floats
+from model.discrepancy.output_error.noise_model import shown_noise
 from model.discrepancy.output_error.observation import observe
 from model.discrepancy.output_error.search import Point, point_at
-from model.discrepancy.output_error.shown_noise import shown_noise
 from tests.model.fitting import imagined
 
 

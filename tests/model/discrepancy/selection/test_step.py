@@ -10,8 +10,9 @@ from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit
 from model.discrepancy.candidates.ranking import Ranking
 from model.discrepancy.diagnosis import FoundValue
 from model.discrepancy.grounds import Refusal
-from model.discrepancy.selection import diagnose, last_fit
-from model.discrepancy.selection.last_fit import _is_nothing, update_to_last_fit
+from model.discrepancy.selection import diagnose
+from model.discrepancy.selection import step as last_fit
+from model.discrepancy.selection.step import _is_nothing, update_to_last_fit
 from model.discrepancy.thresholds import Thresholds
 from tests.model.discrepancy.candidate_fits import candidate_fit
 from tests.model.discrepancy.steps import step
@@ -69,7 +70,7 @@ def test_a_second_effect_is_looked_for_after_a_group(monkeypatch: pytest.MonkeyP
 
 def test_the_search_ends_after_three_refused_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
     found = after_ranking(monkeypatch, [candidate_fit(f"effect_{k}", (1,), 90.0 - 10 * k) for k in range(6)], None)
-    assert len(found.steps) == diagnose.MOST_REFUSALS
+    assert len(found.steps) == diagnose.CHANCES
     assert found.ended
 
 
