@@ -6193,6 +6193,13 @@ export interface components {
              */
             joint_names?: string[];
             /**
+             * Columns
+             * @default {}
+             */
+            columns?: {
+                [key: string]: string;
+            };
+            /**
              * Joints Chosen
              * @default false
              */
