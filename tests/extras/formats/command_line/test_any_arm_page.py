@@ -16,7 +16,7 @@ from tests.extras.formats.tables.test_tables import data_set
 ROOT = Path(__file__).parents[4]
 PAGE = (ROOT / "docs" / "any-arm.md").read_text("utf-8")
 SESSIONS = [block for block in re.findall(r"^```\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE) if "$ daq" in block]
-MACHINES = ROOT / "benchmarks" / "real_machines"
+SO101 = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper"]
 
 
 def rtde(path: Path) -> None:
@@ -45,12 +45,10 @@ def bench(path: Path) -> None:
 def files(daq: CommandLine) -> None:
     """What the page's commands read, in the folder in which they run."""
     del daq
-    data_set(Path("pick"), joints=["shoulder_pan", "shoulder_lift", "elbow_flex", "gripper"])
+    data_set(Path("pick"), joints=SO101)
     rtde(Path("robot_data.csv"))
     bag(Path("run"), "jazzy", with_states=True, effort=[1.0, 2.0])
     bench(Path("bench.mat"))
-    shutil.copy(MACHINES / "so101.toml", "so101.toml")
-    shutil.copy(MACHINES / "ur10e.toml", "ur10e.toml")
     shutil.copy(ROOT / "examples" / "motor_bench.toml", "motor_bench.toml")
 
 
