@@ -193,11 +193,9 @@ class _JointRecords:
             clear += int((wrong if numbers is None else wrong & numbers.lost).sum())
             if numbers is not None:
                 changed &= ~numbers.limited
-            moved, lost, total = (
-                moved + int(changed.sum()),
-                lost + int((wrong & changed).sum()),
-                total + int(wrong.sum()),
-            )
+            moved += int(changed.sum())
+            lost += int((wrong & changed).sum())
+            total += int(wrong.sum())
         return _Losses(moved, lost, total, sum(len(t) for t in self.traces), clear)
 
     @cached_property
@@ -209,12 +207,6 @@ class _JointRecords:
         if len(known) < len(pairs) or sum(len(wanted) for wanted, _ in known) < LEAST_SAMPLES:
             return None
         return np.concatenate([wanted for wanted, _ in known]), np.concatenate([power for _, power in known])
-
-    @property
-    def gain_deviation(self) -> float | None:
-        """Relative standard deviation of the gains, as far as the file states one."""
-        stated = gain_error(self.machine, self.joint)
-        return None if stated is None else stated.deviation
 
     @property
     def rounding(self) -> float:
@@ -296,7 +288,10 @@ def _wrong_gain(own: _JointRecords, stated: float) -> ControllerFinding | None:
     # Equal errors are rounded alike: only different ones are independent.
     values, counts = np.unique(wanted, return_counts=True)
     deviation = float(np.sqrt(max(spread, own.rounding**2 / 12) * np.sum((counts * values) ** 2)) / squares)
-    within = max(LEAST_GAIN_DEVIATION * (1 + stated), 5 * deviation, FAR_OFF * (own.gain_deviation or 0.0))
+    known = gain_error(own.machine, own.joint)
+    within = max(
+        LEAST_GAIN_DEVIATION * (1 + stated), 5 * deviation, FAR_OFF * ((known.deviation if known else 0.0) or 0.0)
+    )
     if abs(relative - stated) < within:
         return None
     half, used = 2 * deviation, len(wanted)
