@@ -18,7 +18,7 @@ from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, o
 from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, SignalError, Step, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
 from model.discrepancy.grounds import ControllerEffect, ControllerProof
 from model.discrepancy.output_error.sampled_controller import (
     LEAST_SAMPLES,
@@ -60,9 +60,10 @@ class JudgedController:
     findings: tuple[ControllerFinding, ...]
     settled: tuple[str, ...]
 
-    def steps(self, errors: tuple[SignalError, ...]) -> tuple[Step, ...]:
-        """A step for every violation. errors: of zero, since nothing is fitted for it."""
-        return tuple(proved_step(finding, errors) for finding in self.findings)
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """A step for every violation."""
+        return tuple(map(proved_step, self.findings))
 
     def with_findings(self, model: Model) -> Model:
         """The model with the gains that the records prove."""
@@ -236,8 +237,8 @@ class _JointRecords:
         return wanted[free], power[free]
 
 
-def proved_step(finding: ControllerFinding, errors: tuple[SignalError, ...]) -> Step:
-    """A step that a finding proves. Nothing is fitted: its evidence is the number of samples, its `errors` are zero."""
+def proved_step(finding: ControllerFinding) -> Step:
+    """A step that a finding proves. Nothing is fitted, so it has no errors; its evidence is the number of samples."""
     part, effect = finding.effect.part, finding.effect.value
     name = f"joint{finding.joint}.{effect}.{part}"
     value = FoundValue(
@@ -254,7 +255,7 @@ def proved_step(finding: ControllerFinding, errors: tuple[SignalError, ...]) -> 
         evidence=evidence,
         margin=evidence,
         candidates=(proof,),
-        rmse_fit=errors,
+        rmse_fit=(),
         where=Where(joint=finding.joint, phase=None, summary=UNWRITTEN, cells=(), dependences=()),
         reason=UNWRITTEN,
         proof=ControllerProof(samples=finding.samples, of=finding.of),
