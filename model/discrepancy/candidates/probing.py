@@ -60,9 +60,9 @@ class Projection:
         squares = np.einsum("kn,kn->k", responses, responses) - np.einsum("pk,pk->k", shared, explained)
         return responses @ self.residual[columns] - explained.T @ self.pull, np.maximum(squares, 0.0)
 
-    def moves(self, response: Floats, columns: slice | NDArray[np.int64] = slice(None)) -> Floats:
-        """How far the tolerance parameters move, (p,), when a response (N′,) is there."""
-        return np.asarray(self.inverse @ (self.pull - self.tangents[:, columns] @ response))
+    def moves(self, response: Floats) -> Floats:
+        """How far the tolerance parameters move, (p,), when a response (N,) is there."""
+        return np.asarray(self.inverse @ (self.pull - self.tangents @ response))
 
     def cross(self, one: Floats, other: Floats, columns: slice | NDArray[np.int64]) -> Floats:
         """Inner products, pair by pair, of responses (k, N′) after projection, (k,)."""
