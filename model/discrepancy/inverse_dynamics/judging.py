@@ -58,7 +58,11 @@ def compare(standing: Standing, chosen: Fitted) -> Comparison | None:
     fell, left = (standing.case.stretches.mean_squares(f.residual) for f in (reference, chosen.fit))
     if not _is_beyond_noise(standing, chosen, fell, left):
         return None
-    before, after = _predicted(standing, reference, chosen.fit)
+    held = standing.case.held_out  # else blocks of the records fitted to
+    before, after = (
+        holdout.held_out_squares(f.balance.model, f.values, held) if held else holdout.block_squares(f)
+        for f in (reference, chosen.fit)
+    )
     return Comparison(chosen, reference, fell, left, before, after, standing.case.options.least_share)
 
 
@@ -93,16 +97,6 @@ def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Flo
         elsewhere = np.array([j not in chosen.joints for j in standing.model.machine.modelled_joints])
         fell = np.where(elsewhere, np.nan, fell)
     return holdout.is_beyond_noise(fell, left, standing.case.noise)
-
-
-def _predicted(standing: Standing, before: BalanceFit, after: BalanceFit) -> tuple[Floats, Floats]:
-    """Mean squares (n,) of both on records not fitted to: held-out ones, else blocks of the fitted ones."""
-    held = standing.case.held_out
-    if held:
-        squares = [holdout.held_out_squares(f.balance.model, f.values, held) for f in (before, after)]
-    else:
-        squares = [holdout.block_squares(f) for f in (before, after)]
-    return squares[0], squares[1]
 
 
 BESIDE_REFUSED = 0.5
