@@ -101,9 +101,7 @@ def answer_of(
         suspected=work.suspicion is not None,
         partly=shares["after"] > 1.0 or is_left_beside(standing),
     )
-    fitted, checked = (
-        tuple(dict.fromkeys(t.record.trace_id for t in some)) for some in (traces, held_out)
-    )
+    fitted, checked = (tuple(dict.fromkeys(t.record.trace_id for t in some)) for some in (traces, held_out))
     return Diagnosis(
         verdict=found,
         suspicion=None if named else work.suspicion,

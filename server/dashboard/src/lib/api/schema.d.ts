@@ -4281,18 +4281,6 @@ export interface components {
             seed?: number;
         };
         /**
-         * NamedEffect
-         * @description An effect, its joints (none: of the whole machine), and its evidence.
-         */
-        NamedEffect: {
-            /** Effect */
-            effect: string;
-            /** Joints */
-            joints: number[];
-            /** Evidence */
-            evidence: number;
-        };
-        /**
          * NextExperiment
          * @description The experiment that best separates what is left, within the arm's limits.
          */
@@ -5003,13 +4991,11 @@ export interface components {
          * Reason
          * @description What speaks for the effect of a step, beside what the step itself holds: its parameters, evidence and errors.
          *
-         *     `removed`: by balancing torques, the share of the mean square that is gone on records not fitted to. `rival`: the
-         *     next best that would be another answer.
+         *     `removed`: by balancing torques, the share of the mean square that is gone on records not fitted to.
          */
         Reason: {
             /** Removed */
             removed?: number | null;
-            rival?: components["schemas"]["NamedEffect"] | null;
         };
         /**
          * RecordEventMessage
@@ -6192,6 +6178,13 @@ export interface components {
              * @default []
              */
             joint_names?: string[];
+            /**
+             * Columns
+             * @default {}
+             */
+            columns?: {
+                [key: string]: string;
+            };
             /**
              * Joints Chosen
              * @default false
