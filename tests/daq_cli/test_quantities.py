@@ -1,6 +1,5 @@
 """Lengths and angles as people type them: neither is taken for the other."""
 
-import json
 import math
 from pathlib import Path
 
@@ -54,23 +53,3 @@ def test_a_dry_run_of_a_sliding_joint(tmp_path: Path, daq: CommandLine) -> None:
     assert shown.code == 0, shown.err
     assert "joint 1: 100.00 mm → 130.00 mm" in shown.out
     assert "at most 15.0 mm/s" in shown.out
-
-
-def test_a_program_for_a_sliding_joint_is_edited_in_its_unit(tmp_path: Path, daq: CommandLine) -> None:
-    (tmp_path / "daq.toml").write_text(f'[robot]\nmachine = "{SLIDE_AND_TURN}"\n')
-    file = tmp_path / "push.json"
-    instruction = {"kind": "absolute", "angles": {"1": 0.1}, "speed": 0.03}
-    file.write_text(json.dumps({"name": "push", "machine": "slide_and_turn", "instructions": [instruction]}))
-    before = file.read_text()
-    edit = ("--config", tmp_path / "daq.toml", "teach", "edit")
-    for words in (
-        ("insert", file, "1", "--to", "1=5"),
-        ("insert", file, "1", "--to", "1=50mm", "--speed", "2"),
-        ("change", file, "1", "--angles", "1=5"),
-        ("change", file, "1", "--speed", "2"),
-    ):
-        daq(*edit, *words).complains(2, "joint 1 slides: write a length with its unit")
-        assert file.read_text() == before
-    assert daq(*edit, "change", file, "1", "--angles", "1=50mm", "--speed", "20mm/s").code == 0
-    changed = json.loads(file.read_text())["instructions"][0]
-    assert (changed["angles"], changed["speed"]) == ({"1": 0.05}, 0.02)

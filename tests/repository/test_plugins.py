@@ -25,7 +25,7 @@ PAGE = "server/dashboard/dist"
 EXAMPLE = ROOT / "examples" / "plugin"
 ROUTES = "import json; from server.app import bare_app; print(json.dumps(bare_app(None).openapi()))"
 LOADED = "import sys; sys.argv = ['daq', '--help']; from daq_cli import main\ntry: main()\nexcept SystemExit: pass\n"
-LOADED += "print(*(name for name in sys.modules if name.startswith('extras')), file=sys.stderr)"
+LOADED += "print(*(name for name in sys.modules if name.startswith(('extras', 'trials'))), file=sys.stderr)"
 
 
 def installed(folder: Path, name: str, entry: str) -> None:
