@@ -22,6 +22,7 @@ WITHOUT = {"serve", "mock", "demo", "docs"} | {
         "token": "add revoke sign-out",
         "teach": "jog step program lead",
         "teach programs": "keep fetch delete",
+        "machine": "tidy",
     }.items()
     for command in commands.split()
 }

@@ -15,7 +15,8 @@ from tests.extras.formats.tables.test_tables import data_set
 
 ROOT = Path(__file__).parents[4]
 PAGE = (ROOT / "docs" / "any-arm.md").read_text("utf-8")
-SESSIONS = [block for block in re.findall(r"^```\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE) if "$ daq" in block]
+BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
+SESSIONS = [block for language, block in BLOCKS if not language and "$ daq" in block]
 SO101 = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper"]
 
 
