@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from daq.contracts.progress import Cancel
-from daq.contracts.trace import Trace
+from daq.contracts.trace import Traces, several
 from ma2000.progress import Shown, told
 from model.base_parameters import base_parameters as base
 from model.base_parameters.result import BaseParameters
@@ -21,7 +19,7 @@ from model.machine_model.model import Model
 
 def fit(
     model: Model,
-    traces: Sequence[Trace],
+    traces: Traces,
     options: FitOptions | None = None,
     progress: Shown = True,
     cancel: Cancel | None = None,
@@ -33,13 +31,13 @@ def fit(
     Raises TraceError, SpecError for input that cannot give a result; CancelledError when asked to end.
     """
     with told(progress, "fitting") as tell:
-        return motion.fit(model, traces, options, tell, cancel)
+        return motion.fit(model, several(traces), options, tell, cancel)
 
 
 def fit_torques(
     model: Model,
-    traces: Sequence[Trace],
-    holdout: Sequence[Trace] = (),
+    traces: Traces,
+    holdout: Traces = (),
     options: FitOptions | None = None,
     *,
     progress: Shown = True,
@@ -51,10 +49,10 @@ def fit_torques(
     `result.held_out` is the share of torque that is left on `holdout`. Raises as `fit`.
     """
     with told(progress, "fitting torques") as tell:
-        return torques.fit_torques(model, traces, holdout, options, progress=tell, cancel=cancel)
+        return torques.fit_torques(model, several(traces), several(holdout), options, progress=tell, cancel=cancel)
 
 
-def base_parameters(model: Model, traces: Sequence[Trace] = (), *, seed: int = 0) -> BaseParameters:
+def base_parameters(model: Model, traces: Traces = (), *, seed: int = 0) -> BaseParameters:
     """The base parameters of a model's machine: the fewest combinations of inertial and friction parameters that its
     joint torques depend on, by QR with column pivoting of the regressor at random admissible postures (Gautier 1991).
 
@@ -64,12 +62,12 @@ def base_parameters(model: Model, traces: Sequence[Trace] = (), *, seed: int = 0
     Args:
         seed: of the drawn postures.
     """
-    return base.base_parameters(model, traces, seed=seed)
+    return base.base_parameters(model, several(traces), seed=seed)
 
 
 def profile(
     fitted: FitResult,
-    traces: Sequence[Trace],
+    traces: Traces,
     name: str,
     *,
     progress: Shown = True,
@@ -84,4 +82,4 @@ def profile(
     Raises SpecError for a parameter that was not fitted, or other traces; CancelledError when asked to end.
     """
     with told(progress, name) as tell:
-        return profiles.profile(fitted, traces, name, tell, cancel)
+        return profiles.profile(fitted, several(traces), name, tell, cancel)

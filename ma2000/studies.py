@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from daq.contracts.progress import Cancel
-from daq.contracts.trace import Trace
+from daq.contracts.trace import Traces, several
 from daq.safety.planned import planned
 from ma2000.progress import Shown, told
 from model.design import search
@@ -27,7 +27,7 @@ from server.jobs.next_experiment import experiment_chooser
 
 def validate(
     model: Model,
-    traces: Sequence[Trace],
+    traces: Traces,
     parameters: Sequence[str] | None = None,
     *,
     progress: Shown = True,
@@ -43,13 +43,13 @@ def validate(
     names = names_to_validate(model, parameters)
     options = Options(quantise=False)
     with told(progress, "validating") as tell:
-        return validate_by_distortion(model, traces, names, options=options, progress=tell, cancel=cancel)
+        return validate_by_distortion(model, several(traces), names, options=options, progress=tell, cancel=cancel)
 
 
 def diagnose(
     model: Model,
-    traces: Sequence[Trace],
-    holdout: Sequence[Trace] = (),
+    traces: Traces,
+    holdout: Traces = (),
     options: DiagnosisOptions | None = None,
     *,
     design: bool = False,
@@ -68,7 +68,7 @@ def diagnose(
     """
     chooser = experiment_chooser(model.machine, design=design)
     with told(progress, "diagnosing") as tell:
-        return workflow.diagnose(model, traces, holdout, options, tell, cancel, chooser)
+        return workflow.diagnose(model, several(traces), several(holdout), options, tell, cancel, chooser)
 
 
 def design(

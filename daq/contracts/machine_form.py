@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-from daq.contracts.drive_library import library_drive
+from daq.contracts.drive_library import LibraryDrive, library_drive
 from daq.contracts.errors import SpecError
 from daq.contracts.quantity import Quantity
 from daq.contracts.toml_places import Path, Places
@@ -113,12 +113,12 @@ class SpelledOut:
                 self.problems.append((path, str(error)))
                 joint["drive"] = None
                 return None
+            servo = self._at_supply(known, drive.get("supply_limit"), (*path, "supply_limit"))
             drive = {**known.drive, **drive}
             own = joint.get("friction", {})
             joint["friction"] = {**known.friction, **own} if isinstance(own, dict) else own
             if known.sensor:
                 joint.setdefault("sensor", dict(known.sensor))
-            servo = dict(known.servo)
         joint["drive"] = drive
         if "kind" not in drive:
             for field, kind in (("gain", "gain"), ("resistance", "dc_motor"), ("torque_constant", "current")):
@@ -129,6 +129,24 @@ class SpelledOut:
         if drive.get("kind") == "dc_motor":
             self._fill_motor(drive, path)
         return servo
+
+    def _at_supply(self, known: LibraryDrive, supply: Any, path: Path) -> dict[str, Any]:
+        """What the library says of a servo's own controller, whose volts are shares of the supply."""
+        servo = dict(known.servo)
+        if supply is None or not servo:
+            return servo
+        own, usual = self._number(supply, ("V",), path), self._number(known.drive["supply_limit"], ("V",), path)
+        if isinstance(own, dict) and isinstance(usual, dict):
+            ratio = own["value"] / usual["value"]
+            servo["per_gain"] = [ratio * gain for gain in servo["per_gain"]]
+            for name in ("output_limit", "drive_resolution"):
+                if name in servo:
+                    servo[name] = self._scaled(servo[name], ratio, f"of a supply of {own['value']:g} V")
+        return servo
+
+    def _scaled(self, number: Any, factor: float, source: str) -> Any:
+        whole = self._number(number, ("V",), ("controller",))
+        return number if not isinstance(whole, dict) else {**whole, "value": factor * whole["value"], "source": source}
 
     def _fill_motor(self, motor: dict[str, Any], path: Path) -> None:
         """What follows from a motor's stated numbers, and defaults."""
@@ -178,11 +196,8 @@ class SpelledOut:
     def _share(self, limit: Any, stated: Any) -> Any:
         if isinstance(limit, list):
             return [self._share(one, stated) for one in limit]
-        path: Path = ("controller", "pwm_limit")
-        whole, share = self._number(limit, ("V",), path), self._number(stated, ("1",), path)
-        if not isinstance(whole, dict) or not isinstance(share, dict):
-            return limit
-        return {**whole, "value": whole["value"] * share["value"], "source": f"PWM limit of {stated}"}
+        share = self._number(stated, ("1",), ("controller", "pwm_limit"))
+        return self._scaled(limit, share["value"], f"PWM limit of {stated}") if isinstance(share, dict) else limit
 
     def _numbers(self, value: Any, notes: list[Any], path: Path, *, slides: bool) -> Any:
         """The value with every number in it in full. notes: its type, and the marks of that."""

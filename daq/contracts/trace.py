@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -277,3 +278,12 @@ class Trace(WithArrays):
         if joint not in self.joints:
             raise TraceError(f"{self.called}: joint {joint} is not in it; it has {self.joints}")
         return self.joints.index(joint)
+
+
+Traces = Trace | Sequence[Trace]
+"""One trace, or several."""
+
+
+def several(traces: Traces) -> Sequence[Trace]:
+    """The traces, where one stands for a list of one."""
+    return (traces,) if isinstance(traces, Trace) else traces

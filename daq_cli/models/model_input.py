@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from daq.contracts.errors import SpecError
-from daq.contracts.joint_matching import matched
 from daq.contracts.machine import Machine, load_machine, shipped_machines
 from daq_cli.app import completion
 from daq_cli.app.context import console, printable
@@ -201,6 +200,8 @@ def machine_of(traces: Sequence[Trace], robot: RobotAccess, names: Sequence[str]
 
     Raises SpecError when the machines differ otherwise, and for a trace that names none and lacks a joint of it.
     """
+    from daq.contracts.joint_matching import matched  # here: numpy takes a while to load, and completion needs none
+
     machines = [t.record.machine for t in traces if t.record.machine is not None]
     called = list(dict.fromkeys(machine.name for machine in machines))
     if len(called) > 1:
@@ -231,6 +232,8 @@ def machine_of(traces: Sequence[Trace], robot: RobotAccess, names: Sequence[str]
 
 def check_made_for(machine: Machine, traces: Sequence[Trace], names: Sequence[str]) -> None:
     """Raises SpecError, with the file as the command line calls it, for a trace that cannot be of this machine."""
+    from daq.contracts.joint_matching import matched
+
     speeds = [j for j in machine.modelled_joints if (s := machine.joint(j).sensor) and s.measures == "velocity"]
     for name, read in zip(_names(traces, names), traces, strict=True):
         own = read.record.machine

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 DOCS = Path(__file__).parents[1]
 BLOCK = re.compile(r"^[ ]*```(python|console)\n(.*?)^[ ]*```$", re.DOTALL | re.MULTILINE)
 RUN: Mapping[tuple[str, str], str] = {
+    ("any-arm.md", "python"): "tests/extras/formats/command_line/test_any_arm_page.py",
     ("audit.md", "console"): "tests/extras/lab/audit/test_page.py",
     ("batches.md", "console"): "tests/extras/lab/batches/test_batches_page.py",
     ("batches.md", "python"): "tests/extras/lab/batches/test_batches_page.py",

@@ -259,7 +259,7 @@ class Step(FrozenRecord):
     rejected_because: str | None = None
     reason_data: Reason | None = None
     proof: ControllerProof | None = None
-    """Where the controller's own recorded numbers prove the effect: nothing was fitted for it."""
+    """Where the controller's own recorded numbers prove the effect: nothing was fitted for it, and it has no errors."""
     refusal: Refusal | None = None
 
 

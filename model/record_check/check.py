@@ -49,7 +49,12 @@ MOST_KEPT = 100
 """Times that a finding holds: a page need not have more."""
 WILD_SHARE = 0.5
 """Distance between set point and position, as a share of the largest travel of any joint, that no controller leaves for
-half of a record. A joint that is held may sag by more than its own travel."""
+half of a record, but one whose joint is on its way. A joint that is held may sag by more than its own travel."""
+ON_ITS_WAY = 0.5
+"""Share of its motion, weighed by the distance that is left, that a joint moves towards its set point rather than away,
+if it follows: set points of another zero or sign lie as often behind its motion as ahead of it."""
+OUT_OF_REACH = 3.0
+"""Distance, in its own travels, from which even a joint on its way is not going there: set points of another unit."""
 
 
 def check_records(model: Model, traces: Sequence[Trace]) -> tuple[RecordFinding, ...]:
@@ -353,8 +358,12 @@ def _on_units(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
         if measures_speed(machine, joint):
             continue
         column = trace.column(joint)
-        apart = float(np.median(np.abs(trace.set_point[:, column] - trace.position[:, column])))
+        way = trace.set_point[:, column] - trace.position[:, column]
+        apart = float(np.median(np.abs(way)))
+        position = trace.position[:, column]
         most = WILD_SHARE * max(travels[j] for j in kinds if kinds[j] == kind)
+        if _approach(position, way) >= ON_ITS_WAY:
+            most = OUT_OF_REACH * float(np.ptp(position))
         if apart > most:
             larger = float(np.abs(trace.set_point[:, column]).max()), float(np.abs(trace.position[:, column]).max())
             unit = machine.joint(joint).units.position
@@ -369,3 +378,10 @@ def _on_units(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
                 says=f"set points (to {larger[0]:.4g}) and positions (to {larger[1]:.4g}) are {apart:.3g} {unit} apart "
                 f"throughout; both must be in {unit} from the same zero.",
             )
+
+
+def _approach(position: Floats, way: Floats) -> float:
+    """How much of a motion is towards the set point rather than away from it, from −1 to 1. way: (k,) what is left."""
+    work = way[:-1] * np.diff(position)
+    whole = float(np.abs(work).sum())
+    return float(work.sum()) / whole if whole > 0.0 else 0.0

@@ -87,7 +87,7 @@ def test_all_is_everything() -> None:
 
 def test_a_client_needs_little() -> None:
     asked = {Requirement(line).name for line in PROJECT["dependencies"]}
-    assert asked == {"httpx", "lz4", "mcap", "numpy", "pydantic", "zstandard"}
+    assert asked == {"httpx", "lz4", "mcap", "numpy", "pint", "pydantic", "zstandard"}
     assert EXTRAS["client"] == []
 
 

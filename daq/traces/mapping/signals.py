@@ -94,16 +94,8 @@ def signals_of(table: Table, entries: Mapping[str, Said], beside: Path) -> Signa
         else:
             lacking = next((token for token in tokens if token not in items), tokens[0])
             raise TraceError(f"{table.origin}: {signal}: has no column of joint {shown(lacking)}, which others have")
-        values, units = [], []
-        for token, entry in items.items():
-            unit = _unit(table, signal, entry)
-            units.append(unit)
-            values.append(table.value(entry.expression) * _factor(signal, unit, token, beside))
-        if signal == "drive":
-            bases = {DRIVES[unit][0] for unit in units}
-            if len(bases) > 1:
-                raise TraceError(f"{table.origin}: drive: units {' and '.join(sorted(bases))} differ; one is needed")
-            drive_unit = bases.pop()
+        values, unit = _of_joints(table, signal, items, beside)
+        drive_unit = unit if signal == "drive" else drive_unit
         if "#" in time.expression:  # it counts the rows of the longest column that there is
             columns["time"] = columns["time"][: len(values[0])]
         lengths = {len(each) for each in (columns["time"], *values)}
@@ -114,6 +106,18 @@ def signals_of(table: Table, entries: Mapping[str, Said], beside: Path) -> Signa
     if not {"position", "velocity"} & set(columns):
         raise TraceError(f"{table.origin}: nothing says which columns are positions; it has {table.listed()}")
     return Signals(tokens, columns, drive_unit, used)
+
+
+def _of_joints(table: Table, signal: str, items: Mapping[str, Said], beside: Path) -> tuple[list[Floats], str]:
+    """The values (n,) of each joint in the unit of a trace, and that unit. Raises TraceError where units differ."""
+    units = {token: _unit(table, signal, entry) for token, entry in items.items()}
+    values = [
+        table.value(entry.expression) * _factor(signal, units[token], token, beside) for token, entry in items.items()
+    ]
+    bases = sorted({DRIVES[unit][0] if signal == "drive" else known_units(signal)[0] for unit in units.values()})
+    if len(bases) > 1:
+        raise TraceError(f"{table.origin}: drive: units {' and '.join(bases)} differ; one is needed")
+    return values, bases[0]
 
 
 def _of(signal: str, entries: Mapping[str, Said]) -> dict[str, Said]:

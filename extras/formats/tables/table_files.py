@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from daq.contracts.errors import TraceError
+from daq.contracts.errors import DaqError, TraceError
 from daq.contracts.extras import require_extra
 from daq.contracts.import_choice import Choice
 from daq.contracts.trace import Trace
@@ -17,6 +17,7 @@ from daq.traces.description import Description, read_file
 from daq.traces.mapping.expression import Columns, Table
 from daq.traces.mapping.mapped_trace import mapped_trace
 from extras.formats.tables.flat import columns_of
+from extras.formats.tables.mat_process import read_mat
 
 PARQUET_MAGIC = b"PAR1"
 SUFFIXES = (".parquet", ".mat", ".npz", ".json")
@@ -54,23 +55,14 @@ def _columns(path: Path, limits: TraceLimits) -> Columns:
             with np.load(path, allow_pickle=False) as found:
                 return columns_of({name: found[name] for name in found.files if found[name].dtype.kind in "fiub"})
         if path.suffix.lower() == ".mat":
-            return _mat(path)
+            require_extra("tables", f"{path}: MATLAB's files", "scipy")
+            return read_mat(path)
         info = [folder / INFO for folder in path.absolute().parents[:3] if (folder / INFO).is_file()]
         return _parquet([path], _features(info[0], limits) if info else {}, limits)
-    except (TraceError, MemoryError):
+    except (DaqError, MemoryError):
         raise
-    except (ValueError, OSError, KeyError, NotImplementedError, RecursionError) as error:
+    except Exception as error:  # a damaged file makes the libraries that read it raise anything
         raise TraceError(f"{path}: cannot be read: {' '.join(str(error).split())[:200]}") from error
-
-
-def _mat(path: Path) -> Columns:
-    require_extra("tables", f"{path}: MATLAB's files", "scipy")
-    from scipy.io import loadmat
-
-    try:
-        return columns_of(loadmat(str(path), squeeze_me=True, struct_as_record=False))
-    except NotImplementedError as error:
-        raise TraceError(f"{path}: is a file of MATLAB 7.3; save it again with save('{path.name}', '-v7')") from error
 
 
 def _data_set(path: Path, limits: TraceLimits) -> Columns:

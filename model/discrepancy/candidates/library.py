@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import TypeVar
 
 import numpy as np
 
@@ -42,13 +43,20 @@ SMALL = 0.002
 """The one trial size, in expected deviations, of all other effects: a proportional response gives the size by itself.
 It is small because an effect that acts like a tolerance parameter differs from it only by the cost of that parameter's
 prior, which a curved response would hide."""
+Value = TypeVar("Value")
 NO_SCALES: Mapping[int, JointScale] = MappingProxyType({})
 """Every joint's natural sizes are those of the machine file."""
 STICTION_SPEED = 0.045
 """Speed that separates stiction from Stribeck friction, rad/s: friction that falls below it counts as stiction. At 20
 ms and 12 bits the joint moves there by less than a count per sample, so that no reading shows the fall."""
-STICTION_SHAPE, STRIBECK_SHAPES = 0.025, (0.09, 0.25)
-"""Trial values of the speed over which friction falls, rad/s."""
+STICTION_SHAPE = 0.025
+"""Trial value of the speed over which friction falls that counts as stiction, rad/s."""
+SHAPES: Mapping[str, tuple[dict[str, float], ...]] = {
+    "stribeck_friction": ({"speed": 0.09}, {"speed": 0.25}),
+    "resistance_drift": ({"time_constant": 10.0}, {"time_constant": 30.0}),
+    "resistance_rise": ({"time_constant": 15.0}, {"time_constant": 60.0}),
+}
+"""Trial values of numbers that only shape an effect, by part: rad/s, s."""
 
 
 TAUT_QUANTILES, TAUT_WITHIN = (0.25, 0.5, 0.75), (0.05, 0.95)
@@ -208,23 +216,15 @@ class _Place:
 
 
 def _variants(place: _Place) -> list[Hypothesis]:
-    found: list[Hypothesis | None] = []
-    if place.name == "stribeck_friction":
-        shapes = tuple({"speed": s} for s in STRIBECK_SHAPES)
-        found.append(_sized(place, shapes, {"speed": (STICTION_SPEED, 10.0)}))
-    elif place.name == "stiction":
-        stribeck = replace(place, law="stribeck_friction")
-        found.append(_sized(stribeck, ({"speed": STICTION_SHAPE},), {"speed": (0.004, STICTION_SPEED)}))
-        found.append(_sized(place))
-    elif place.name == "resistance_drift":
-        found.append(_sized(place, ({"time_constant": 10.0}, {"time_constant": 30.0})))
-    elif place.name == "resistance_rise":
-        found.append(_sized(place, ({"time_constant": 15.0}, {"time_constant": 60.0})))
-    elif place.name in ("spring_torque", "one_sided_spring"):
+    shapes: Sequence[dict[str, float]] = SHAPES.get(place.name, ({},))
+    if place.name in ("spring_torque", "one_sided_spring"):
         rest = place.model.machine.rest_posture
-        found.append(_sized(place, ({"rest": 0.0 if rest is None else rest[place.joints[0] - 1]},)))
-    else:
-        found.append(_sized(place))
+        shapes = ({"rest": 0.0 if rest is None else rest[place.joints[0] - 1]},)
+    bounds = {"speed": (STICTION_SPEED, 10.0)} if place.name == "stribeck_friction" else {}
+    found = [_sized(place, shapes, bounds)]
+    if place.name == "stiction":
+        stribeck = replace(place, law="stribeck_friction")
+        found.insert(0, _sized(stribeck, ({"speed": STICTION_SHAPE},), {"speed": (0.004, STICTION_SPEED)}))
     return [c for c in found if c is not None]
 
 
@@ -272,18 +272,12 @@ def _hypothesis(
         free = tuple(p for p in free if p.part in FREED_BENDS)
     free = place.sized(free)
     full = tuple(_full(free, trial) for trial in trials)
-    return Hypothesis(place.name, place.joints, wider, free, full, proportional, _full_bounds(free, bounds))
+    return Hypothesis(place.name, place.joints, wider, free, full, proportional, _full(free, bounds))
 
 
-def _full(free: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, float]:
-    """Values by full name, from full names or parts."""
+def _full(free: Sequence[Parameter], values: Mapping[str, Value]) -> dict[str, Value]:
+    """Values (or bounds) by full name, from full names or parts."""
     return {p.name: values[key] for p in free for key in values if key in (p.name, p.part)}
-
-
-def _full_bounds(
-    free: Sequence[Parameter], bounds: Mapping[str, tuple[float, float]]
-) -> dict[str, tuple[float, float]]:
-    return {p.name: bounds[key] for p in free for key in bounds if key in (p.name, p.part)}
 
 
 SHARES = (0.85, 0.65, 0.45)

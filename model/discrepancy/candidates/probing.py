@@ -60,9 +60,9 @@ class Projection:
         squares = np.einsum("kn,kn->k", responses, responses) - np.einsum("pk,pk->k", shared, explained)
         return responses @ self.residual[columns] - explained.T @ self.pull, np.maximum(squares, 0.0)
 
-    def moves(self, response: Floats, columns: slice | NDArray[np.int64] = slice(None)) -> Floats:
-        """How far the tolerance parameters move, (p,), when a response (N′,) is there."""
-        return np.asarray(self.inverse @ (self.pull - self.tangents[:, columns] @ response))
+    def moves(self, response: Floats) -> Floats:
+        """How far the tolerance parameters move, (p,), when a response (N,) is there."""
+        return np.asarray(self.inverse @ (self.pull - self.tangents @ response))
 
     def cross(self, one: Floats, other: Floats, columns: slice | NDArray[np.int64]) -> Floats:
         """Inner products, pair by pair, of responses (k, N′) after projection, (k,)."""
@@ -252,7 +252,10 @@ def as_effect(point: Point, hypothesis: Hypothesis) -> Probe | None:
     own = [
         k
         for k, u in enumerate(point.unknowns)
-        if u.parameter.part in parts and u.parameter.effect is None and _is_of(u.joints, hypothesis)
+        if u.parameter.part in parts
+        and u.parameter.effect is None
+        # a controller's delay is of every joint
+        and (u.joints == hypothesis.joints or (hypothesis.name == "input_delay" and not u.joints))
     ]
     away = (point.values - point.expected) * np.sqrt(point.precision)
     far = [k for k in own if abs(away[k]) >= FAR_OFF]
@@ -269,8 +272,3 @@ def as_effect(point: Point, hypothesis: Hypothesis) -> Probe | None:
     return Probe(
         hypothesis, float(np.sum(away[own] ** 2)), {parameter.name: size}, moved, np.zeros_like(point.weighted)
     )
-
-
-def _is_of(joints: tuple[int, ...], hypothesis: Hypothesis) -> bool:
-    """Whether a number is of the hypothesis's joints; a controller's delay is of every joint."""
-    return joints == hypothesis.joints or (hypothesis.name == "input_delay" and not joints)

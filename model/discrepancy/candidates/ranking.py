@@ -160,11 +160,11 @@ def _fits_from_expected(current: Fit, probes: Sequence[Probe], most: int) -> lis
     begun = current.point.expected_in_closed_loop
     if begun is None:
         return []
-    found: list[Probe] = []
+    found: dict[tuple[str, tuple[int, ...]], Probe] = {}
     for one in probe(begun, tried):
-        if len(found) < most and not any(_same_place(one, other) for other in found):
-            found.append(one)
-    fits = side_by_side(partial(refit_from_expected, current), found)
+        if len(found) < most:
+            found.setdefault((one.hypothesis.name, one.hypothesis.joints), one)
+    fits = side_by_side(partial(refit_from_expected, current), list(found.values()))
     return [fit for fit in fits if fit is not None]
 
 
@@ -181,10 +181,6 @@ def _fits_of_strained_numbers(current: Fit, case: Case) -> list[CandidateFit]:
         return min(found, key=lambda f: f.fit.point.cost, default=None)
 
     return [f for f in side_by_side(fit, begun) if f is not None]
-
-
-def _same_place(one: Probe, other: Probe) -> bool:
-    return (one.hypothesis.name, one.hypothesis.joints) == (other.hypothesis.name, other.hypothesis.joints)
 
 
 def _different(fits: Sequence[CandidateFit]) -> list[CandidateFit]:
@@ -242,14 +238,10 @@ def _finish_close(current: Fit, head: Sequence[CandidateFit], thresholds: Thresh
 
 def _one_law_per_name(fits: Sequence[CandidateFit]) -> tuple[CandidateFit, ...]:
     """The better fit of an effect that was tried with two laws at one place."""
-    seen: set[tuple[str, tuple[int, ...]]] = set()
-    kept = []
+    kept: dict[tuple[str, tuple[int, ...]], CandidateFit] = {}
     for fit in fits:
-        key = fit.hypothesis.name, fit.hypothesis.joints
-        if key not in seen:
-            seen.add(key)
-            kept.append(fit)
-    return tuple(kept)
+        kept.setdefault((fit.hypothesis.name, fit.hypothesis.joints), fit)
+    return tuple(kept.values())
 
 
 Kind = Literal["nothing", "named", "group"]

@@ -86,11 +86,6 @@ class Prediction:
         """Rows of derivatives by the unknowns' names."""
         return dict(zip((u.name for u in self.begun.unknowns), derivatives, strict=True))
 
-    def bounded(self, values: Floats) -> Floats:
-        """The values within their unknowns' bounds."""
-        unknowns = self.begun.unknowns
-        return np.clip(values, [u.low for u in unknowns], [u.high for u in unknowns])
-
     def recorded(self) -> Prediction:
         """The same on the record that an arm like the point's model would leave. Not finite where its simulation is
         not."""
@@ -158,17 +153,11 @@ def starts_at_rest(observation: Observation, shared: Calibration, starts: Sequen
     for start in starts:
         (joint,) = start.joints
         first = at.slot(joint, 0)
-        angle = _angle_read_as(read[joint - 1], vector[first : first + at.PER_JOINT])
-        found.append(float(np.clip(angle - read[joint - 1], start.low, start.high)))
+        angle = wanted = read[joint - 1]
+        for _ in range(ROUNDS):
+            angle += wanted - sensed_angle(angle, vector[first : first + at.PER_JOINT])
+        found.append(float(np.clip(angle - wanted, start.low, start.high)))
     return np.array(found)
-
-
-def _angle_read_as(wanted: float, joint: Floats) -> float:
-    """The angle (rad) at which a potentiometer reads the angle `wanted`. joint: its numbers in the model's vector."""
-    angle = wanted
-    for _ in range(ROUNDS):
-        angle += wanted - sensed_angle(angle, joint)
-    return float(angle)
 
 
 Pair = tuple[int, int]
@@ -190,14 +179,10 @@ class Separations:
     sizes: dict[Pair, float]
     left: dict[Pair, Floats]
 
-    def least(self, pairs: Sequence[Pair]) -> float:
-        """The separation of that one of some pairs which is hardest to tell apart."""
-        return min(self.sizes[p] for p in pairs)
-
     def worth(self, pairs: Sequence[Pair]) -> tuple[bool, float]:
         """Its rank for some pairs: experiments that separate them come first, then the most separation (up to `ENOUGH`)
         per second."""
-        separation = self.least(pairs)
+        separation = min(self.sizes[p] for p in pairs)
         return separation >= LEAST, min(separation, ENOUGH) ** 2 / self.there.duration
 
 
@@ -244,7 +229,8 @@ def _unhidden(
     derivatives = predicted.tangents(known)
     delta = target - predicted.shown()
     moved = begun + np.linalg.solve(information + derivatives @ derivatives.T, derivatives @ delta)
-    moved = predicted.bounded(moved)
+    unknowns = predicted.begun.unknowns
+    moved = np.clip(moved, [u.low for u in unknowns], [u.high for u in unknowns])
     own = {p.name for p in wrong.hypothesis.free}
     kept = {name: row for name, row in predicted.named(derivatives).items() if name not in own}
     derivatives = predicted.tangents(kept, moved)

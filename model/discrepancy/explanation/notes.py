@@ -3,28 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Inseparable
 from model.discrepancy.explanation.effect_words import NOTES, class_words, plain, within
 from model.discrepancy.grounds import Note, NoteKind
 from model.effects.names import effect_name
+from model.fitting.unknowns import Unknown
 from model.machine_model.parameter import Parameter
 from model.machine_model.record_verdict import FAR_OFF
-
-
-class _Expected(Protocol):
-    """A number of a fit: `Unknown`, or a number that torques determine."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def unit(self) -> str: ...
-    @property
-    def expected(self) -> float: ...
-    @property
-    def deviation(self) -> float | None: ...
 
 
 def on_unfinished(traces: Sequence[Trace]) -> tuple[Note, ...]:
@@ -55,7 +43,7 @@ def on_drives_at_limit(shares: Sequence[tuple[int, float]], unknown_joints: Sequ
     return (Note(kind="drive-at-limit", values=values),) if shares else ()
 
 
-def on_stated_numbers(numbers: Iterable[_Expected], values: Mapping[str, float]) -> tuple[Note, ...]:
+def on_stated_numbers(numbers: Iterable[Unknown], values: Mapping[str, float]) -> tuple[Note, ...]:
     """One warning about all numbers of the machine file whose estimates are far from what it states, the furthest
     first; none where there are no such numbers.
 
@@ -85,7 +73,7 @@ def on_named_numbers(stated: Iterable[Parameter], values: Mapping[str, float]) -
     return (Note(kind="stated-numbers-moved", values={"limit": FAR_OFF, "numbers": numbers, "named": True}),)
 
 
-def _moved(number: _Expected | Parameter, value: float, expected: float, deviation: float) -> dict[str, Any]:
+def _moved(number: Unknown | Parameter, value: float, expected: float, deviation: float) -> dict[str, Any]:
     away = abs(value - expected) / deviation
     return {"name": number.name, "unit": number.unit, "value": value, "expected": expected, "deviations": away}
 

@@ -90,7 +90,7 @@ def answer_of(
     """
     standing, case = work.found, work.case
     shapes = remaining_shapes(standing.now, case)
-    steps = (*controller.steps(_no_errors(standing)), *_as_last_fitted(standing))
+    steps = (*controller.steps, *_as_last_fitted(standing))
     named = bool(standing.adopted)
     missing = bool(shapes) or bool(joints_left_over(standing))
     fit_errors, held_errors = (_errors(standing, records) for records in (case.records, case.held_out))
@@ -101,6 +101,7 @@ def answer_of(
         suspected=work.suspicion is not None,
         partly=shares["after"] > 1.0 or is_left_beside(standing),
     )
+    # each once: a trace may be in pieces
     fitted, checked = (tuple(dict.fromkeys(t.record.trace_id for t in some)) for some in (traces, held_out))
     return Diagnosis(
         verdict=found,
@@ -135,11 +136,6 @@ def answer_of(
             *_on_shaking(standing.given, traces, held_out),
         ),
     )
-
-
-def _no_errors(standing: Standing) -> tuple[SignalError, ...]:
-    quiet = np.zeros(len(standing.case.noise))
-    return signal_errors(standing.given, quiet, quiet, standing.case.noise)
 
 
 def _unseen(controller: JudgedController) -> dict[str, str]:

@@ -155,7 +155,7 @@ def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Tri
             [()] if effect.whole_machine else [(j,) for j in case.options.joints or model.machine.modelled_joints]
         )
         for joints in places:
-            if _present(model, name, joints):
+            if any(u.name == name and (not joints or set(u.joints) & set(joints)) for u in model.effects):
                 if (again := stated_trial(model, name, joints, now)) is not None:
                     yield again
                 continue
@@ -189,10 +189,6 @@ def _constant_load(model: Model, name: str, column: int, records: Sequence[Recor
     rubbing = model.with_effect(name, (column + 1,), {UNDER_LOAD[name]: 1.0})
     levels = np.concatenate([levels_along(rubbing, r)[r.rows, column] for r in records])
     return bool(np.ptp(levels) < CONSTANT_LOAD * np.abs(levels).max() + 1e-12)
-
-
-def _present(model: Model, name: str, joints: tuple[int, ...]) -> bool:
-    return any(u.name == name and (not joints or set(u.joints) & set(joints)) for u in model.effects)
 
 
 def _possible(model: Model, effect: Effect, joints: tuple[int, ...]) -> bool:

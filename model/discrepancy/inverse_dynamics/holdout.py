@@ -13,7 +13,6 @@ from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.fitting import (
     BalanceFit,
     Data,
-    Stretches,
     fit,
     minus_twice_log_likelihood,
     noise_model,
@@ -34,14 +33,9 @@ MORE_THAN_NOISE = 1.1
 """Least residual, in noise floors, of a joint on which something may be missing."""
 
 
-def mean_squares(stretches: Stretches, residual: Sequence[Floats]) -> Floats:
-    """Mean square (n,) of residual torques by joint where it moves; NaN for a joint that never does."""
-    return stretches.mean_squares(residual)
-
-
 def held_out_squares(model: Model, values: Mapping[str, float], records: tuple[RecordedMotion, ...]) -> Floats:
     """Mean squares (n,) of a fitted model on other records."""
-    return mean_squares(stretches_of(records), _residuals(model, values, records))
+    return stretches_of(records).mean_squares(_residuals(model, values, records))
 
 
 @dataclass(frozen=True)

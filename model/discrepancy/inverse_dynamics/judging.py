@@ -55,10 +55,14 @@ class Comparison:
 def compare(standing: Standing, chosen: Fitted) -> Comparison | None:
     """The candidate beside its reference; None where there was no more than noise to explain."""
     reference = _reference(standing, chosen)
-    fell, left = (holdout.mean_squares(standing.case.stretches, f.residual) for f in (reference, chosen.fit))
+    fell, left = (standing.case.stretches.mean_squares(f.residual) for f in (reference, chosen.fit))
     if not _is_beyond_noise(standing, chosen, fell, left):
         return None
-    before, after = _predicted(standing, reference, chosen.fit)
+    held = standing.case.held_out  # else blocks of the records fitted to
+    before, after = (
+        holdout.held_out_squares(f.balance.model, f.values, held) if held else holdout.block_squares(f)
+        for f in (reference, chosen.fit)
+    )
     return Comparison(chosen, reference, fell, left, before, after, standing.case.options.least_share)
 
 
@@ -95,16 +99,6 @@ def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Flo
     return holdout.is_beyond_noise(fell, left, standing.case.noise)
 
 
-def _predicted(standing: Standing, before: BalanceFit, after: BalanceFit) -> tuple[Floats, Floats]:
-    """Mean squares (n,) of both on records not fitted to: held-out ones, else blocks of the fitted ones."""
-    held = standing.case.held_out
-    if held:
-        squares = [holdout.held_out_squares(f.balance.model, f.values, held) for f in (before, after)]
-    else:
-        squares = [holdout.block_squares(f) for f in (before, after)]
-    return squares[0], squares[1]
-
-
 BESIDE_REFUSED = 0.5
 """Least evidence of an effect beside that of a rival which was refused before it: with less, it takes a small part of
 something else."""
@@ -133,15 +127,12 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Comp
 
 
 def needed_evidence(standing: Standing, chosen: Fitted) -> float:
-    """Evidence from which a candidate is named."""
-    options = standing.case.options
-    return options.least_evidence + options.echo * _collected(standing, chosen.joints)
-
-
-def _collected(standing: Standing, joints: tuple[int, ...]) -> float:
-    """Evidence of the steps adopted so far on these joints, or on any for an effect of the whole machine."""
-    near = (s for s in standing.steps if s.adopted and (not joints or not s.joints or set(s.joints) & set(joints)))
-    return sum(max(0.0, s.evidence + (s.evidence_held_out or 0.0)) for s in near)
+    """Evidence from which a candidate is named, beside what steps have brought on its joints (on any, for an effect of
+    the whole machine)."""
+    options, own = standing.case.options, set(chosen.joints)
+    near = (s for s in standing.adopted if not own or not s.joints or own & set(s.joints))
+    collected = sum(max(0.0, s.evidence + (s.evidence_held_out or 0.0)) for s in near)
+    return options.least_evidence + options.echo * collected
 
 
 SUSPECTED_SHARE = 0.05
@@ -231,7 +222,7 @@ def _noises_left(standing: Standing) -> Floats:
     """(n,) what fitted and held-out records leave at least, in noise floors: a record in which a joint rests says
     nothing of it."""
     case, now = standing.case, standing.now
-    left = [np.sqrt(holdout.mean_squares(case.stretches, now.residual))]
+    left = [np.sqrt(case.stretches.mean_squares(now.residual))]
     if case.held_out:
         left.append(np.sqrt(holdout.held_out_squares(standing.model, now.values, case.held_out)))
     return np.asarray(np.fmin.reduce(left) / case.noise)

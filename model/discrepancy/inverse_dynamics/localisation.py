@@ -52,15 +52,10 @@ def phases(record: RecordedMotion, joint: int) -> list[Phase]:
     speed, change = record.speed[record.rows, joint], record.acceleration[record.rows, joint]
     fast = FAST * float(np.quantile(np.abs(change), 0.95)) + 1e-12
     slow = SLOW * float(np.quantile(np.abs(speed), 0.95)) + 1e-12
-    found: list[Phase] = []
-    for v, a, moves in zip(speed, change, record.moving[:, joint], strict=True):
-        if not moves:
-            found.append("hold")
-        elif abs(v) < slow:
-            found.append("reversal" if abs(a) > fast else "creep")
-        else:
-            found.append("ramp_start" if abs(a) > fast else "steady_ramp")
-    return found
+    turns, creeps, moves = np.abs(change) > fast, np.abs(speed) < slow, record.moving[:, joint]
+    names: list[Phase] = ["hold", "reversal", "creep", "ramp_start", "steady_ramp"]
+    number = np.where(~moves, 0, np.where(creeps, np.where(turns, 1, 2), np.where(turns, 3, 4)))
+    return [names[k] for k in number]
 
 
 def locate(now: BalanceFit, case: TorqueCase) -> Where:

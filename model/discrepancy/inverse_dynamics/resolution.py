@@ -8,14 +8,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from model import layout as at
-from model.arrays import Floats
 from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics.estimates import found_values
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, TorqueCase, minus_twice_log_likelihood, noise_model
-from model.discrepancy.inverse_dynamics.holdout import mean_squares
 from model.discrepancy.inverse_dynamics.search import Fitted, cost_of
 from model.inverse_dynamics.drive_timing import DELAY, MOST
-from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
+from model.inverse_dynamics.recorded_motion import holds_drive_between_samples
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
@@ -99,7 +97,7 @@ def _takes_half_of_what_is_no_noise(found: Fitted, before: BalanceFit, case: Tor
     """Whether on every joint of an effect five times the noise is left without it, and half of that with it: no noise
     imitates that, however fast it is."""
     own = np.array([j in found.joints for j in found.model.machine.modelled_joints])
-    first, last = (mean_squares(case.stretches, fit.residual)[own] for fit in (before, found.fit))
+    first, last = (case.stretches.mean_squares(fit.residual)[own] for fit in (before, found.fit))
     return bool(own.any() and (first > (NO_NOISE * case.noise[own]) ** 2).all() and (last < HALF * first).all())
 
 
@@ -107,15 +105,11 @@ def slower_evidence(found: Fitted, before: BalanceFit, case: TorqueCase) -> floa
     """Evidence of an effect, as it was fitted, in torques low-passed at a share `SLOWER` of the cutoff."""
     data = found.fit.data
     floor = data.floor * SLOWER**2.5
-    first, last = (_slower_residual(fit, case.records) for fit in (before, found.fit))
+    slower = tuple(record.slower(SLOWER) for record in case.records)
+    first, last = (TorqueBalance(fit.balance.model, slower).residual(fit.values) for fit in (before, found.fit))
     memory = noise_model(data.stretches, last, floor).memory
     fell = [minus_twice_log_likelihood(data.stretches, r, memory, floor).sum() for r in (first, last)]
     return float(fell[0] - fell[1]) - cost_of(before, memory, len(found.parameters), 1)
-
-
-def _slower_residual(fit: BalanceFit, records: Sequence[RecordedMotion]) -> list[Floats]:
-    slower = tuple(record.slower(SLOWER) for record in records)
-    return TorqueBalance(fit.balance.model, slower).residual(fit.values)
 
 
 def _is_uneven(found: Fitted) -> bool:

@@ -90,7 +90,7 @@ def list_tried(standing: Standing, found: Findings) -> tuple[Candidate, ...]:
 
 
 def _candidate(case: TorqueCase, c: Fitted) -> Candidate:
-    squares = holdout.mean_squares(case.stretches, c.fit.residual)
+    squares = case.stretches.mean_squares(c.fit.residual)
     values = {p.name: FoundValue.of(p, c.fit.values[p.name]) for p in c.parameters}
     return Candidate(
         effect=c.effect,

@@ -146,7 +146,8 @@ def build_case(
 ) -> Case:
     """The case of traces that a point was fitted to, with the floors that this point gives them."""
     scoring = fitted.observation.with_feedback_share(FEEDBACK_SHARE_FOR_ERRORS)
-    held = _held_with_noise(held, fitted)
+    if held is not None:  # they are weighed with the noise that the fitted ones show
+        held = replace(held, observation=replace(held.observation, noise=fitted.observation.noise))
     return Case(
         model=model,
         given=given,
@@ -158,14 +159,6 @@ def build_case(
         options=options or DiagnosisOptions(),
         excluded=excluded,
     )
-
-
-def _held_with_noise(held: HeldOut | None, point: Point) -> HeldOut | None:
-    """Held-out traces with the noise that a point is weighed with."""
-    noise = point.observation.noise
-    if held is None or noise is None:
-        return held
-    return replace(held, observation=replace(held.observation, noise=noise))
 
 
 def errors_of_fit(point: Point) -> tuple[SignalError, ...]:

@@ -18,7 +18,7 @@ from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, o
 from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, SignalError, Step, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
 from model.discrepancy.grounds import ControllerEffect, ControllerProof
 from model.discrepancy.output_error.sampled_controller import (
     LEAST_SAMPLES,
@@ -60,9 +60,10 @@ class JudgedController:
     findings: tuple[ControllerFinding, ...]
     settled: tuple[str, ...]
 
-    def steps(self, errors: tuple[SignalError, ...]) -> tuple[Step, ...]:
-        """A step for every violation. errors: of zero, since nothing is fitted for it."""
-        return tuple(proved_step(finding, errors) for finding in self.findings)
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """A step for every violation."""
+        return tuple(map(proved_step, self.findings))
 
     def with_findings(self, model: Model) -> Model:
         """The model with the gains that the records prove."""
@@ -193,11 +194,9 @@ class _JointRecords:
             clear += int((wrong if numbers is None else wrong & numbers.lost).sum())
             if numbers is not None:
                 changed &= ~numbers.limited
-            moved, lost, total = (
-                moved + int(changed.sum()),
-                lost + int((wrong & changed).sum()),
-                total + int(wrong.sum()),
-            )
+            moved += int(changed.sum())
+            lost += int((wrong & changed).sum())
+            total += int(wrong.sum())
         return _Losses(moved, lost, total, sum(len(t) for t in self.traces), clear)
 
     @cached_property
@@ -209,12 +208,6 @@ class _JointRecords:
         if len(known) < len(pairs) or sum(len(wanted) for wanted, _ in known) < LEAST_SAMPLES:
             return None
         return np.concatenate([wanted for wanted, _ in known]), np.concatenate([power for _, power in known])
-
-    @property
-    def gain_deviation(self) -> float | None:
-        """Relative standard deviation of the gains, as far as the file states one."""
-        stated = gain_error(self.machine, self.joint)
-        return None if stated is None else stated.deviation
 
     @property
     def rounding(self) -> float:
@@ -244,8 +237,8 @@ class _JointRecords:
         return wanted[free], power[free]
 
 
-def proved_step(finding: ControllerFinding, errors: tuple[SignalError, ...]) -> Step:
-    """A step that a finding proves. Nothing is fitted: its evidence is the number of samples, its `errors` are zero."""
+def proved_step(finding: ControllerFinding) -> Step:
+    """A step that a finding proves. Nothing is fitted, so it has no errors; its evidence is the number of samples."""
     part, effect = finding.effect.part, finding.effect.value
     name = f"joint{finding.joint}.{effect}.{part}"
     value = FoundValue(
@@ -262,7 +255,7 @@ def proved_step(finding: ControllerFinding, errors: tuple[SignalError, ...]) -> 
         evidence=evidence,
         margin=evidence,
         candidates=(proof,),
-        rmse_fit=errors,
+        rmse_fit=(),
         where=Where(joint=finding.joint, phase=None, summary=UNWRITTEN, cells=(), dependences=()),
         reason=UNWRITTEN,
         proof=ControllerProof(samples=finding.samples, of=finding.of),
@@ -296,7 +289,10 @@ def _wrong_gain(own: _JointRecords, stated: float) -> ControllerFinding | None:
     # Equal errors are rounded alike: only different ones are independent.
     values, counts = np.unique(wanted, return_counts=True)
     deviation = float(np.sqrt(max(spread, own.rounding**2 / 12) * np.sum((counts * values) ** 2)) / squares)
-    within = max(LEAST_GAIN_DEVIATION * (1 + stated), 5 * deviation, FAR_OFF * (own.gain_deviation or 0.0))
+    known = gain_error(own.machine, own.joint)
+    within = max(
+        LEAST_GAIN_DEVIATION * (1 + stated), 5 * deviation, FAR_OFF * ((known.deviation if known else 0.0) or 0.0)
+    )
     if abs(relative - stated) < within:
         return None
     half, used = 2 * deviation, len(wanted)

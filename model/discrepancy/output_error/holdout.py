@@ -89,9 +89,13 @@ class HeldOut:
         """
         return tuple(
             _residuals(
-                _record(self.observation, t), point, tuple(replace(u, trace=0) for u in self.starts if u.trace == t)
+                replace(self.observation, records=(record,), prepared=(prepared,)),
+                point,
+                tuple(replace(u, trace=0) for u in self.starts if u.trace == t),
             )
-            for t in range(len(self.observation.records))
+            for t, (record, prepared) in enumerate(
+                zip(self.observation.records, self.observation.prepared, strict=True)
+            )
         )
 
     def rise(self, before: Signals, after: Signals) -> tuple[float, float]:
@@ -117,16 +121,6 @@ def hold_out(model: Model, traces: Sequence[Trace]) -> HeldOut | None:
         return None
     observation, given = observe(model, traces, FEEDBACK_SHARE_FOR_ERRORS)
     return HeldOut(tuple(traces), observation, tuple(u for u in given.unknowns if u.kind is Kind.INITIAL_POSITION))
-
-
-def _record(observation: Observation, number: int) -> Observation:
-    """One record of several."""
-    own = slice(number, number + 1)
-    return replace(
-        observation,
-        records=observation.records[own],
-        prepared=observation.prepared[own],
-    )
 
 
 def _residuals(observation: Observation, point: Calibration, starts: tuple[Unknown, ...]) -> Floats:

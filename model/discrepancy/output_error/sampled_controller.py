@@ -249,7 +249,7 @@ def _by_law(law: ControllerLaw, recorded: _Recorded) -> _Found:
         # A record that begins in motion does not hold the change up to its first sample: by a later one, then.
         later = [Scale(1.0, float(drive[k] - plain[k])) for k in LATER_STARTS if not limited[k]]
         found += [recorded.numbers_by(law, scale) for scale in later]
-    return _last_best(found)
+    return max(reversed(found), key=lambda one: one.share)
 
 
 def _scales(law: ControllerLaw, recorded: _Recorded, plain: Floats) -> list[Scale]:
@@ -264,11 +264,6 @@ def _scales(law: ControllerLaw, recorded: _Recorded, plain: Floats) -> list[Scal
     if int(free.sum()) >= LEAST_SAMPLES:
         scales.append(_line(drive[free], plain[free], recorded.resolution, offset=law.integrates))
     return [scale for scale in scales if scale.factor > 0.0]
-
-
-def _last_best(found: Sequence[_Found]) -> _Found:
-    """Those numbers whose drive agrees at most samples: of several, the last."""
-    return max(reversed(found), key=lambda one: one.share)
 
 
 def _largest_output(machine: Machine, joint: int, recorded: Floats) -> float:

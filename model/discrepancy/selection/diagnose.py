@@ -14,7 +14,7 @@ from daq.contracts.trace import Trace
 from model.discrepancy.candidates.candidate_fit import CandidateFit, Fit, improved_baseline, judge
 from model.discrepancy.candidates.probing import Probe
 from model.discrepancy.candidates.ranking import Ranking, decide, rank
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, SignalError, Step, Where
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Step, Where
 from model.discrepancy.experiment_design.next_experiment import Asked, ExperimentChooser, rivals_of
 from model.discrepancy.explanation.answer_words import with_sentences
 from model.discrepancy.explanation.notes import on_stated_numbers, on_unfinished
@@ -76,8 +76,7 @@ def diagnose_by_simulation(
     first = judge(fitted)
     search = _add_effects(case, _Search(first=first, current=first), progress, cancel)
     progress(0.95, "writing the answer")
-    proved = controller.steps(_no_errors(given.observation))
-    answer = _answer(case, search, proved, chooser, cancel)
+    answer = _answer(case, search, controller.steps, chooser, cancel)
     progress(1.0, "done")
     return answer.model_copy(update={"seconds": time.perf_counter() - begun})
 
@@ -117,12 +116,6 @@ class _Search:
         after = [*self.before[1:], self.current]
         adopted = [k for k, step in enumerate(self.steps) if step.adopted]
         return [(self.steps[k], (self.current if k == adopted[-1] else after[k]).point) for k in adopted]
-
-
-def _no_errors(observation: Observation) -> tuple[SignalError, ...]:
-    """Errors of zero, of a step that fits nothing."""
-    quiet = tuple(np.zeros_like(r.measured) for r in observation.records)
-    return observation.errors(quiet, quiet, observation.deviations)
 
 
 def _given_point(observation: Observation, given: Calibration) -> Point:

@@ -51,7 +51,7 @@ def test_a_servos_registers_become_the_pid_of_its_firmware() -> None:
     assert len(PAN_TILT.strip().splitlines()) <= 12
     controller = parse_machine(PAN_TILT).controller
     assert isinstance(controller, SampledPid)
-    assert controller.gains == ((pytest.approx(16 * 0.166 * 7.4), 0.0, 0.0),) * 2
+    assert [gain for row in controller.gains for gain in row] == pytest.approx([16 * 0.166 * 7.4, 0.0, 0.0] * 2)
     limit, band = controller.output_limit, controller.dead_band
     assert isinstance(limit, Quantity)
     assert limit.value == pytest.approx(0.97 * 7.4 / 2)
@@ -75,3 +75,12 @@ def test_a_number_of_the_file_comes_before_that_of_the_library() -> None:
     motor = parse_machine(text).joint(2).dc_motor
     assert (motor.resistance.value, motor.resistance.deviation) == (2.5, None)
     assert motor.torque_constant.source.startswith("BAM m1")
+
+
+def test_a_servo_at_another_supply_gives_other_volts() -> None:
+    text = PAN_TILT.replace('"feetech/sts3215-7.4V"', '{ model = "feetech/sts3215-7.4V", supply_limit = "6 V" }')
+    controller = parse_machine(text).controller
+    assert isinstance(controller, SampledPid)
+    assert controller.gains[0][0] == pytest.approx(16 * 0.166 * 6.0)
+    assert isinstance(controller.output_limit, Quantity)
+    assert controller.output_limit.value == pytest.approx(0.97 * 6.0 / 2)

@@ -57,6 +57,24 @@ def test_a_drive_of_another_unit_is_doubted(scale: float) -> None:
     assert kinds(rigs.slide_machine(), replace(SLIDE, drive=scale * SLIDE.drive)) == ["drive-scale"]
 
 
+@pytest.mark.parametrize(
+    ("factor", "offset", "doubted"), [(1.0, 0.0, False), (-1.0, 0.0, True), (1.0, 3.0, True), (57.3, 0.0, True)]
+)
+def test_set_points_far_away_are_doubted_where_the_joint_does_not_go_there(
+    factor: float, offset: float, doubted: bool
+) -> None:
+    """Steps that come before the joint has arrived, as a hobby servo is driven."""
+    time = np.arange(0.0, 20.0, 0.01)
+    steps = np.sign(np.sin(2.0 * np.pi * time / 1.1))
+    position = np.zeros_like(time)
+    for row in range(1, len(time)):
+        position[row] = position[row - 1] + 0.02 * (steps[row] - position[row - 1])
+    signals = {"position": position, "set_point": factor * steps + offset}
+    columns = {name: own[:, None] for name, own in signals.items()}
+    trace = Trace(record=SLIDE.record, joints=(1,), time=time, **columns)
+    assert ("units-differ" in kinds(rigs.slide_machine(), trace)) is doubted
+
+
 @pytest.mark.parametrize("hidden", [{}, {"coulomb": 30.0}, {"viscous": 120.0}])
 def test_friction_that_no_file_states_is_no_other_unit(hidden: dict[str, float]) -> None:
     assert kinds(rigs.slide_machine(), rigs.slide_trace(1, hidden, 8.0)) == []

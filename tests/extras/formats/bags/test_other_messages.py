@@ -2,6 +2,7 @@
 
 import json
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +72,7 @@ def controller_state(store: Any, release: str, number: int) -> Any:
     return types[CONTROLLER_STATE](header=header(store, moment), joint_names=NAMES, **points, **more)
 
 
-def bag(path: Path, release: str, *, with_states: bool = False) -> Path:
+def bag(path: Path, release: str, *, with_states: bool = False, effort: Sequence[float] = ()) -> Path:
     """Ten controller's states, and where it is wanted joint states between them."""
     store = store_of(release)
     with Writer2(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
@@ -84,7 +85,7 @@ def bag(path: Path, release: str, *, with_states: bool = False) -> Path:
             states = writer.add_connection("/joint_states", JOINT_STATE, typestore=store)
             for number in range(10):
                 moment = START + number * NS // 100 - NS // 200
-                message = state(store, number, stamp=moment, effort=[])
+                message = state(store, number, stamp=moment, effort=effort)
                 writer.write(states, moment, store.serialize_cdr(message, JOINT_STATE))
     return path
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from daq.contracts.machine import Body, Machine, PlainGain, load_machine
+from daq.contracts.machine import Body, Machine, PlainGain, SampledPid, load_machine
 from tests.daq_cli.hostile import FILES, hostile_file, refuses
 from tests.daq_cli.invoke import CommandLine
 
@@ -172,7 +173,7 @@ def weight_of(machine: Machine, angles: Floats) -> Floats:
     turn = angles + joint.geometry.theta.value
     east = np.cos(turn) * own[0] - np.sin(turn) * own[1]
     north = np.sin(turn) * own[0] + np.cos(turn) * own[1]
-    return -joint.link.mass.value * (east * machine.gravity[1] - north * machine.gravity[0])
+    return np.asarray(-joint.link.mass.value * (east * machine.gravity[1] - north * machine.gravity[0]))
 
 
 def test_a_file_is_tidied_where_it_lies_or_elsewhere(daq: CommandLine) -> None:
@@ -188,3 +189,15 @@ def test_drives_are_listed_and_one_is_shown_with_its_numbers(daq: CommandLine) -
     assert len(daq("machine", "drives").out.splitlines()) >= 25
     assert "drive.torque_constant = 0.115 N·m/A ± 15 %" in daq("machine", "drives", "ak80-9").out
     daq("machine", "drives", "nobody").complains(2, "no drive has 'nobody' in its name")
+
+
+def test_the_page_s_dynamixels_make_a_machine(daq: CommandLine) -> None:
+    section = (EXAMPLE.parents[1] / "docs" / "any-arm.md").read_text("utf-8").partition("## My Dynamixels")[2]
+    (command,) = re.findall(r"^daq (machine new .*)$", section.partition("## My Franka")[0], re.MULTILINE)
+    assert daq(*command.split()).code == 0
+    assert len([line for line in Path("head.toml").read_text("utf-8").splitlines() if line]) == 11
+    written = re.findall(r"```toml\n(.*?)```", section, re.DOTALL)[0]
+    Path("own.toml").write_text(f'name = "own"\n{written}link = {{ mass = "0.15 kg", radius = "40 mm" }}\n', "utf-8")
+    controller = load_machine("own.toml").controller
+    assert isinstance(controller, SampledPid)
+    assert controller.gains[0][0] == pytest.approx(55.2456 * 11.1 / 12.0, rel=1e-3)

@@ -18,12 +18,13 @@ from daq.traces.files import open_trace
 JOINTS = ["shoulder_pan", "elbow_flex", "gripper"]
 
 
-def data_set(folder: Path, version: str = "v3.0") -> Path:
+def data_set(folder: Path, version: str = "v3.0", joints: list[str] = JOINTS) -> Path:
     """A data set of lerobot with two episodes of ten rows: degrees, and a gripper of 0 to 100."""
-    state = [[row + episode, 2.0 * row, 50.0] for episode in range(2) for row in range(10)]
+    count = len(joints)
+    state = [[row + episode, *[2.0 * row] * (count - 2), 50.0] for episode in range(2) for row in range(10)]
     table = {
-        "observation.state": pa.array(state, pa.list_(pa.float32(), 3)),
-        "action": pa.array([[a + 1.0, b, c] for a, b, c in state], pa.list_(pa.float32(), 3)),
+        "observation.state": pa.array(state, pa.list_(pa.float32(), count)),
+        "action": pa.array([[first + 1.0, *others] for first, *others in state], pa.list_(pa.float32(), count)),
         "timestamp": np.tile(np.arange(10) / 30, 2).astype(np.float32),
         "episode_index": np.repeat([0, 1], 10),
         "task": ["pick"] * 20,
@@ -31,8 +32,10 @@ def data_set(folder: Path, version: str = "v3.0") -> Path:
     place = folder / "data" / "chunk-000"
     place.mkdir(parents=True)
     pyarrow.parquet.write_table(pa.table(table), place / "file-000.parquet")
-    names: Any = [f"{name}.pos" for name in JOINTS] if version == "v3.0" else {"motors": JOINTS}
-    features = {name: {"dtype": "float32", "shape": [3], "names": names} for name in ("observation.state", "action")}
+    names: Any = [f"{name}.pos" for name in joints] if version == "v3.0" else {"motors": joints}
+    features = {
+        name: {"dtype": "float32", "shape": [count], "names": names} for name in ("observation.state", "action")
+    }
     (folder / "meta").mkdir()
     (folder / "meta" / "info.json").write_text(json.dumps({"codebase_version": version, "features": features}))
     return folder

@@ -11,7 +11,6 @@ from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.fitting import TorqueCase
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.discrepancy.options import TorqueOptions
-from model.discrepancy.output_error.controller_evidence import judge_controller
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
@@ -26,7 +25,7 @@ def sliding(hidden: Mapping[str, float], options: TorqueOptions) -> TorqueWorkfl
     cutoff = choose_cutoff(traces, model.machine)
     fitted, held = (recorded_motions([t], model.machine, cutoff) for t in traces)
     case = TorqueCase(fitted, held, torque_noise(model, traces, cutoff), options)
-    return TorqueWorkflow(model, case, judge_controller(model, traces), silent, Never())
+    return TorqueWorkflow(model, case, silent, Never())
 
 
 def diagnosed_rig(folder: Path, kind: str, seed: int, case: str | None = None, effect: str | None = None) -> Diagnosis:

@@ -23,7 +23,6 @@ from model.discrepancy.inverse_dynamics.search import (
 )
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.discrepancy.options import TorqueOptions
-from model.discrepancy.output_error.controller_evidence import judge_controller
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
@@ -110,7 +109,7 @@ def test_a_weakened_magnet_takes_back_what_the_constants_had_taken() -> None:
     cutoff = choose_cutoff(traces, model.machine)
     fitted, held = (recorded_motions([t], model.machine, cutoff) for t in traces)
     case = TorqueCase(fitted, held, torque_noise(model, traces, cutoff), TorqueOptions())
-    flow = TorqueWorkflow(model, case, judge_controller(model, traces), silent, Never())
+    flow = TorqueWorkflow(model, case, silent, Never())
     wider = model.with_effect("weakened_magnet", (1,))
     own = [p for p in wider.parameters if p.effect == "weakened_magnet"]
     begun = take_back("weakened_magnet", own, flow.first)
@@ -189,7 +188,7 @@ def test_the_joint_of_the_largest_torque_is_told_beside_the_one_farthest_above_i
     traces = [rigs.six_trace(1, {}, duration=6.0)]
     records = recorded_motions(traces, model.machine, 3.0)
     case = TorqueCase(records, (), np.array([0.1, 0.1, 0.1, 0.1, 0.1, 1e-3]), TorqueOptions())
-    flow = TorqueWorkflow(model, case, judge_controller(model, traces), silent, Never())
+    flow = TorqueWorkflow(model, case, silent, Never())
     residual = [np.tile([0.1, 9.0, 0.1, 0.1, 0.1, 0.3], (len(r), 1)) for r in flow.found.now.residual]
     where = locate(replace(flow.found.now, residual=residual), case)
     assert where.worst is not None

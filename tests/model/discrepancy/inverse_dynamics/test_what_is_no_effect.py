@@ -73,10 +73,10 @@ def test_a_spring_on_one_side_is_taut_for_a_part_of_the_travel() -> None:
     model = base_model(rigs.bench_machine()).with_effect("one_sided_spring", (1,))
     rest = model.parameter("joint1.one_sided_spring.rest")
     dwelling = np.concatenate([np.linspace(0.0, 1.0, 100), np.full(100, 1.0)])
-    place: Any = SimpleNamespace(positions=dwelling)
+    place: Any = SimpleNamespace(positions=dwelling, travel=1.0)
     bounded = narrowed(rest, place)
     assert (bounded.low, bounded.high) == (pytest.approx(0.1, abs=0.01), pytest.approx(0.99))
-    hardly: Any = SimpleNamespace(positions=np.append(np.linspace(0.0, 1.0, 3), np.full(100, 1.0)))
+    hardly: Any = SimpleNamespace(positions=np.append(np.linspace(0.0, 1.0, 3), np.full(100, 1.0)), travel=1.0)
     assert narrowed(rest, hardly).low == narrowed(rest, hardly).high == pytest.approx(0.99)
 
 

@@ -204,5 +204,5 @@ def test_a_board_rounds_its_drive_unless_whole_errors_make_whole_counts_of_power
         }
     )
     assert forms_rounded_drive(coarse, gains_of(coarse, None))
-    integrates = gains_of(machine, None) + np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    integrates = gains_of(machine, None) + np.eye(9)[1]
     assert forms_rounded_drive(machine, integrates)
