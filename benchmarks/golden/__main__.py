@@ -22,6 +22,7 @@ from tempfile import TemporaryDirectory
 from benchmarks.golden.answers import Leaf, differences, of_help, of_json
 from benchmarks.golden.cases import EXAMPLES, arms, questions
 from benchmarks.golden.records import ask, record_all_rigs, record_arm
+from daq_cli.app.subcommands import subcommands
 
 PLACE = EXAMPLES.parent / ".golden"
 """Where the records are kept between runs; git ignores it."""
@@ -125,7 +126,10 @@ def _help() -> dict[str, Leaf]:
         text = "" if words == ("mock",) else ask((*words, "--help"))
         pages |= {f"{' '.join(words)}{path}": word for path, word in of_help(text).items()}
         _, found, below = text.partition("\nCommands:\n")
-        names = [line.split()[0] for line in below.splitlines() if found and line[:3].strip() and line.startswith("  ")]
+        lines = [line for line in below.splitlines() if found and line[:3].strip() and line.startswith("  ")]
+        names = (
+            [line.split()[0] for line in lines] if words else subcommands()
+        )  # the first page has headings of its own
         waiting += [(*words, name) for name in names]
     return pages
 
