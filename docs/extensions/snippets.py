@@ -23,7 +23,6 @@ RUN: Mapping[tuple[str, str], str] = {
     ("fleet.md", "python"): "tests/extras/lab/fleet/test_page.py",
     ("index.md", "python"): "tests/repository/test_snippets.py",
     ("notifications.md", "console"): "tests/extras/lab/notifications/test_service.py",
-    ("one-joint-rig.md", "python"): "tests/repository/test_snippets.py",
     ("own-effect.md", "python"): "tests/model/effects/test_own_effect.py",
     ("python.md", "python"): "tests/ma2000/test_public_interface.py",
     ("robots-from-urdf.md", "python"): "tests/extras/formats/command_line/test_robot_page.py",

@@ -83,9 +83,10 @@ def test_a_socket_whose_folder_is_removed_is_made_again(folder: Path) -> None:
 
 
 def test_where_its_folder_cannot_be_made_again_it_lies_among_the_temporary_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Such as that of a unit of systemd, in which only root makes folders."""
+    tmp_path = tmp_path_factory.mktemp("t")  # a socket's path has 107 bytes at most
     monkeypatch.setattr(stop_socket, "ANSWER_TIMEOUT", 0.01)
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     roots = tmp_path / "roots"
