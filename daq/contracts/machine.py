@@ -446,6 +446,10 @@ def joint_names(machine: Machine | None, joints: tuple[int, ...]) -> tuple[str, 
     return tuple(machine.joint(joint).name for joint in joints)
 
 
+LONGEST_MISTAKE = 400
+"""Most characters of what is said of one mistake in a file."""
+
+
 def parse_machine(text: str, origin: str = "machine file") -> Machine:
     """A machine from TOML text, in the short form or in full; `origin` names the file in errors.
 
@@ -465,9 +469,18 @@ def parse_machine(text: str, origin: str = "machine file") -> Machine:
         if not found:
             return machine
     lines = sorted(((places.line(path or _named_place(words)) or 0, words) for path, words in found), key=itemgetter(0))
-    said = [words if not line else f"line {line}: {words}" for line, words in lines]
+    said = [_within_a_line(words if not line else f"line {line}: {words}") for line, words in lines]
     raise SpecError(
         f"{origin}: {said[0]}" if len(said) == 1 else "\n  ".join([f"{origin}: {len(said)} mistakes", *said])
+    )
+
+
+def _within_a_line(words: str) -> str:
+    """The words without their middle, if what was found in the file made them very long."""
+    return (
+        words
+        if len(words) <= LONGEST_MISTAKE
+        else f"{words[: LONGEST_MISTAKE // 2]} … {words[-LONGEST_MISTAKE // 2 :]}"
     )
 
 

@@ -30,10 +30,10 @@ def stop_if_doubted(model: Model, traces: Sequence[Trace], *, despite_doubts: bo
     """
     from model.record_check.check import check_records, require_computable
 
-    if not as_json:
-        say_what_is_lacking(model, traces)
     found = check_records(model, traces)
     require_computable(found)
+    if not as_json:
+        say_what_is_lacking(model, traces)
     if despite_doubts or not doubts_in(found):
         return
     if as_json:

@@ -1,15 +1,10 @@
-"""Carries out a job in a worker process. Its input and output are files.
-
-The answer of a diagnosis with the data of its plots: overlays, changed parameters, significance by chance.
-"""
+"""Carries out a job in a worker process. Its input and output are files."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from daq.contracts.errors import DaqError
 from daq.contracts.extras import missing_extras_named
@@ -19,107 +14,19 @@ from daq.contracts.progress import CancelledError
 from daq.contracts.service.jobs import MACHINE, CompareRequest, DiagnoseRequest, FitRequest, JobRequest, ValidateRequest
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.reader import read_trace
-from model.comparison.difference import differences
-from model.discrepancy.explanation.answer_words import not_a_finding
-from model.discrepancy.explanation.step_words import where_with_summary
-from model.discrepancy.localisation.disagreement import locate
-from model.discrepancy.localisation.phases import Residuals
-from model.discrepancy.localisation.statistics import chance_significance
-from model.effects.machine_numbers import MACHINE_NUMBERS
-from model.effects.names import placed
-from model.fitting.records import noise_floor, records_of
-from model.machine_model.effect_parameters import effect_parameters
-from model.machine_model.parameter_words import words_by_name
-from model.record_check.check import as_used
-from model.simulation.prepared import Options
-from model.simulation.simulate import simulate
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
 from server.jobs.options import options_of, with_effects
-from server.jobs.overlays import overlays
-from server.jobs.results import (
-    DiagnosisData,
-    DiagnosisStep,
-    GivenWhere,
-    TriedEffect,
-    of_comparison,
-    of_fit,
-    of_validation,
-)
+from server.jobs.results import of_comparison, of_fit, of_validation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from daq.contracts.service.jobs import ParameterWords
     from daq.contracts.trace import Trace
     from model.blocks import Report
-    from model.comparison.compare import Comparison, TraceSignals
-    from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Where
+    from model.comparison.compare import Comparison
     from model.machine_model.model import Model
+    from model.simulation.prepared import Options
     from server.jobs.results import JobResult
-
-
-def diagnosis_data(
-    found: Diagnosis,
-    comparison: Comparison | None,
-    given: Where | None = None,
-    efforts: Sequence[TraceSignals] = (),
-) -> DiagnosisData:
-    """Returns the answer with the data of its plots. `comparison`: of the models before and after, if they can be
-    simulated. `given`: where the given model disagrees with the traces, likewise. `efforts`: recorded beside predicted
-    ones, of a diagnosis in torques."""
-    return DiagnosisData(
-        **{
-            **dict(found),
-            "steps": tuple(_step(found, step) for step in found.steps),
-            "candidates": tuple(map(_tried, found.candidates)),
-            "models": () if comparison is None else comparison.models,
-            "signals": () if comparison is None else overlays(comparison.signals),
-            "efforts": overlays(efforts),
-            "differences": differences((found.model_before, found.model_after)),
-            "given": None if given is None else GivenWhere(where=given, **_beside_map(found, given)),
-            "words": _words(found),
-        }
-    )
-
-
-def _words(found: Diagnosis) -> dict[str, ParameterWords]:
-    """Words for the parameters of both models, and of the effects that were tried and not added."""
-    machine = found.model_before.machine
-    rejected = [
-        parameter
-        for step in found.steps
-        if step.effect is not None and not step.adopted and step.effect not in MACHINE_NUMBERS  # the model has those
-        for parameter in effect_parameters(machine, step.effect, step.joints, shared=False)
-    ]
-    return words_by_name([*found.model_before.parameters, *found.model_after.parameters, *rejected])
-
-
-def where_given(model: Model, traces: Sequence[Trace]) -> Where | None:
-    """Returns where a model disagrees with traces before anything is fitted; None if its simulation does not stay
-    finite. Raises TraceError, SpecError for traces that cannot be simulated."""
-    records = records_of(as_used(traces, model.machine, "closed"), model.machine, "position")
-    runs = [simulate(model, record.inputs, Options(quantise=False)) for record in records]
-    left = [record.measured - run.at_samples(run.reading) for record, run in zip(records, runs, strict=True)]
-    if not all(np.isfinite(one).all() for one in left):
-        return None
-    floor = noise_floor(records, model.machine, "position")
-    return where_with_summary(locate(Residuals(model, records, left, floor)))
-
-
-def _step(found: Diagnosis, step: Step) -> DiagnosisStep:
-    tried = {"candidates": tuple(map(_tried, step.candidates)), "group": tuple(map(_tried, step.group))}
-    called = "nothing" if step.effect is None else placed(step.effect, step.joints)
-    return DiagnosisStep(**{**dict(step), **tried, "called": called, **_beside_map(found, step.where)})
-
-
-def _tried(one: Candidate) -> TriedEffect:
-    return TriedEffect(**dict(one), called=placed(one.effect, one.joints))
-
-
-def _beside_map(found: Diagnosis, where: Where) -> dict[str, Any]:
-    """What is told beside a map of disagreement."""
-    return {"chance": chance_significance(len(where.cells)), "not_a_finding": not_a_finding(found, where)}
-
 
 CURVE_POINTS = 21
 """Number of points of each curve of a validation."""
@@ -288,6 +195,7 @@ class _Worker:
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
         from model.reports.diagnosis_report import LABELS, diagnosis_report
+        from server.jobs.diagnosis_data import diagnosis_data, where_given
         from server.jobs.next_experiment import experiment_chooser
         from server.jobs.results import DiagnosisJobResult
 

@@ -6,6 +6,7 @@ of what the file has, or its notes say what is missing. The files of traces them
 
 import itertools
 import random
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -154,9 +155,10 @@ class Campaign:
         try:
             found = kind.read(kind.opened)
         except DaqError as error:
-            line = str(error)
-            if "\n" in line or len(line) > LONGEST_LINE:
-                self.tally.fault("errors of several or endless lines", f"{kind.name}, {way}", line)
+            first, *others = str(error).split("\n")
+            counted = re.search(r": (\d+) mistakes$", first)  # a machine file's, all at once, a line each
+            if len(others) != (int(counted[1]) if counted else 0) or max(map(len, (first, *others))) > LONGEST_LINE:
+                self.tally.fault("errors of several or endless lines", f"{kind.name}, {way}", str(error))
             self.tally.ends["refused"] += 1
         except Exception as error:  # noqa: BLE001  # that is what is counted
             self.tally.fault("other exceptions", f"{kind.name}, {way}", repr(error))

@@ -13,9 +13,9 @@ from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.thresholds import THRESHOLDS
 from model.effects.library import library
 from server.jobs import results
+from server.jobs.diagnosis_data import diagnosis_data
 from server.jobs.overlays import LEAST_POINTS, overlay, overlays
 from server.jobs.results import DiagnosisData, JobResult
-from server.jobs.work import diagnosis_data
 from tests.model.discrepancy.answers import an_answer
 from tests.server.service import Service
 
