@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from hashlib import sha256
 from typing import Any
 
-TIMES = frozenset({"seconds", "created", "duration_s", "age", "time_s", "software", "elapsed", "utc"})
+TIMES = frozenset({"seconds", "created", "duration_s", "age", "time_s", "software", "elapsed", "utc", "host_time"})
 PROSE = frozenset(
     {"description", "summary", "title", "reason", "note", "notes", "text", "rejected_because", "why", "words"}
 )
