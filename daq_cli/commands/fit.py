@@ -148,7 +148,7 @@ def fit(
         _print_result(done, done.models, out, as_json=json)
         end_if_doubted(done.record)
         return
-    stop_if_doubted(begin, [*fitted_to, *held], despite_doubts=despite_doubts, as_json=json)
+    stop_if_doubted(begin, [*fitted_to, *held], despite_doubts=despite_doubts, as_json=json, torques=torques)
     if torques:
         from daq_cli.models.fit_torques import fit_recorded_torques
 

@@ -23,14 +23,16 @@ DespiteDoubtsOption = Annotated[
 ]
 
 
-def stop_if_doubted(model: Model, traces: Sequence[Trace], *, despite_doubts: bool, as_json: bool) -> None:
+def stop_if_doubted(
+    model: Model, traces: Sequence[Trace], *, despite_doubts: bool, as_json: bool, torques: bool = False
+) -> None:
     """Checks records before anything is computed from them, and ends the command where one is doubted.
 
     Raises TraceError where nothing can be computed at all.
     """
     from model.record_check.check import check_records, require_computable
 
-    found = check_records(model, traces)
+    found = check_records(model, traces, torques=torques)
     require_computable(found)
     if not as_json:
         say_what_is_lacking(model, traces)

@@ -90,7 +90,7 @@ def compare(
                 f"{label} moves joints {list(model.machine.modelled_joints)}, {models[0][0]} moves "
                 f"{list(machine.modelled_joints)}: they cannot be compared"
             )
-    require_computable(check_records(models[0][1], traces))
+    require_computable(check_records(models[0][1], traces, torques=False))
     loop: Loop = "closed" if options is None else options.loop
     traces = as_used(traces, machine, loop)
     records = records_of(traces, machine, signal)

@@ -70,7 +70,7 @@ def fit(
         CancelledError: when asked to end.
     """
     options, cancel, begun = options or FitOptions(), cancel or Never(), time.perf_counter()
-    record = check_records(model, traces)
+    record = check_records(model, traces, torques=False)
     require_computable(record)
     problem = fit_problem(model, traces, options)
     coordinates = coordinates_of(problem.model, problem.unknowns, options)

@@ -135,7 +135,7 @@ def fit_torques(
     """
     options, cancel = options or FitOptions(), cancel or Never()
     _check_effects(model)
-    record = check_records(model, (*traces, *held_out))
+    record = check_records(model, (*traces, *held_out), torques=True)
     require_computable(record)
     records_of([*traces, *held_out], model.machine, "position")
     traces, held_out = (in_pieces(as_used(some, model.machine)) for some in (traces, held_out))

@@ -22,7 +22,7 @@ from model.machine_model.model import Model
 from model.record_check.columns import column_findings
 from model.record_check.drives import drive_findings
 from model.record_check.finding import FindingKind, RecordFinding, doubts_in
-from model.record_check.pieces import in_pieces
+from model.record_check.pieces import SHORTEST, in_pieces
 from model.record_check.readings import (
     FalseReadings,
     Jump,
@@ -57,12 +57,14 @@ OUT_OF_REACH = 3.0
 """Distance, in its own travels, from which even a joint on its way is not going there: set points of another unit."""
 
 
-def check_records(model: Model, traces: Sequence[Trace]) -> tuple[RecordFinding, ...]:
+def check_records(model: Model, traces: Sequence[Trace], *, torques: bool | None = None) -> tuple[RecordFinding, ...]:
     """What is wrong with records, or with the machine file beside them, or should be known; empty where all is well.
 
     Args:
-        model: of the machine that made them. traces: as they were read.
+        model: of the machine that made them. traces: as they were read. torques: whether torques are to be balanced, so
+            that a record may be cut at its gaps; None: as for a diagnosis, where the machine has no controller.
     """
+    cut = isinstance(model.machine.controller, NoController) if torques is None else torques
     traces = [matched(trace, model.machine) for trace in traces]
     found = list(_on_machine(model.machine, traces))
     for trace in traces:
@@ -71,6 +73,7 @@ def check_records(model: Model, traces: Sequence[Trace]) -> tuple[RecordFinding,
         elif all(j in trace.joints for j in model.machine.modelled_joints):
             bursts = list(_on_bursts(trace))
             found += bursts or [
+                *_on_gaps(trace, cut=cut),
                 *_on_readings(trace, model.machine),
                 *_on_columns(max(in_pieces([repaired(trace, model.machine)]), key=len), model),
             ]
@@ -186,7 +189,6 @@ def _on_machine(machine: Machine, traces: Sequence[Trace]) -> Iterator[RecordFin
 
 
 def _on_readings(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
-    yield from _on_gaps(trace, machine)
     for joint in machine.modelled_joints:
         yield from _on_jumps(trace, machine, joint)
         yield from _on_bounds(trace, machine, joint)
@@ -223,8 +225,8 @@ def _on_bursts(trace: Trace) -> Iterator[RecordFinding]:
         )
 
 
-def _on_gaps(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
-    """A loop is simulated through its whole record. A balance of torques is of pieces (`in_pieces`)."""
+def _on_gaps(trace: Trace, *, cut: bool) -> Iterator[RecordFinding]:
+    """cut: for a balance of torques (`in_pieces`). What is simulated runs through the whole record."""
     gaps = find_gaps(trace.time)
     if not gaps:
         return
@@ -232,8 +234,7 @@ def _on_gaps(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
     long = [gap for gap in gaps if not is_bridged(gap[1], usual)]
     shown = long or gaps
     longest = max(length for _, length in shown)
-    cut = isinstance(machine.controller, NoController)
-    advice = "It is cut there" if cut else "Use a piece without any"
+    advice = f"For torques it is cut there, without pieces under {SHORTEST:g} s" if cut else "Use a piece without any"
     starts = [float(trace.time[row]) for row, _ in shown]
     yield RecordFinding(
         kind="gap",

@@ -11,6 +11,8 @@ from daq.contracts.trace import Trace
 from model.discrepancy.workflow import diagnose
 from model.inverse_dynamics.fit import torque_curves
 from model.machine_model.model import base_model
+from model.record_check.check import check_records
+from model.record_check.finding import doubts_in
 from model.record_check.pieces import SHORTEST, in_pieces
 from tests.model.discrepancy.inverse_dynamics.rigs import bench_machine, bench_trace
 
@@ -45,6 +47,7 @@ def test_an_effect_is_named_and_a_torque_drawn_across_a_gap() -> None:
     assert [(step.effect, step.joints) for step in found.steps if step.adopted] == [("coulomb_friction", (1,))]
     assert found.traces == (trace.record.trace_id,)
     assert [one.kind for one in found.record if one.kind == "gap"] == ["gap", "gap"]
+    assert doubts_in(check_records(model, [trace], torques=False))
     curves = torque_curves(model, trace, 5.0)
     assert not ((curves.time > 12.0) & (curves.time < 14.0)).any()
     assert curves.time.max() > 25.0
