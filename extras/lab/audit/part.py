@@ -103,6 +103,10 @@ class AuditPart(Part, Collector):
         """Writes what happened otherwise than by a request."""
         (self.writer.count if again else self.writer.note)(cleaned(note))
 
+    def checks(self) -> dict[str, str]:
+        """Returns why rows cannot be written."""
+        return {"audit": self.writer.trouble}
+
     def close(self, seconds: float) -> None:
         """Writes the last rows."""
         self.writer.close(seconds * (1 - KEEPING))

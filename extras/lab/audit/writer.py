@@ -107,6 +107,8 @@ class AuditWriter:
         """Number of notes that are not in the database yet, without those that are counted."""
         self.written = 0
         """Number of rows written since the service started."""
+        self.trouble = ""
+        """Why rows could not be written at the last attempt; empty if they were."""
         self._audit = audit
         self._kept = kept
         self._clock = clock
@@ -115,7 +117,6 @@ class AuditWriter:
         self._notes: deque[tuple[AuditNote, Future[None] | None]] = deque()
         self._repeats = Repeats()
         self._left_out = 0
-        self._trouble = ""
         self._closing = self._closed = False
         self._take_in()
         self._thread: threading.Thread | None = None
@@ -203,12 +204,12 @@ class AuditWriter:
         try:
             self._append(many)
         except Exception as error:
-            if (line := one_line(error)) != self._trouble:
+            if (line := one_line(error)) != self.trouble:
                 log.exception("audit: %s rows are not written yet", len(notes))
-            self._trouble = line
+            self.trouble = line
             return False
         self._left_out -= left_out
-        self._trouble = ""
+        self.trouble = ""
         return True
 
     def _append(self, notes: Sequence[AuditNote]) -> None:

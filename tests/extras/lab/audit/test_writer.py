@@ -52,6 +52,7 @@ def test_while_the_database_is_away_nobody_waits_and_the_rows_come_later(sqlite_
             assert writer.waiting == 3
         for one in noted:
             one.result(WITHIN)
+        assert not writer.trouble
         assert [row.subject for row in rows(sqlite_store)] == [f"{n:012x}" for n in range(3)]
     assert AuditLog(sqlite_store).first_misfit()[1] is None
 
@@ -62,6 +63,7 @@ def test_what_could_not_be_written_before_the_end_is_written_after_the_next_star
     with away(sqlite_store):
         with writing(sqlite_store, tmp_path) as writer:
             writer.note(made_note(1))
+        assert writer.trouble
         late = made_note(2, action="stop_robot")
         writer.note(late)  # of the stop listener, which ends last
     with (tmp_path / "waiting.jsonl").open("a", encoding="utf-8") as stream:

@@ -9,12 +9,12 @@ export const EVENTS = 30;
 /** Rows of the audit log that are shown. */
 const AUDIT = 8;
 
-/** The newest rows of the audit log; null for whoever may not read it, and where that plug-in is not installed. */
+/** The newest rows of the audit log; null for a caller who may not read it. */
 async function newestAudit(): Promise<readonly AuditEntry[] | null> {
   try {
     return (await ask(api.GET('/api/v1/audit', { params: { query: { limit: AUDIT } } }))).items;
   } catch (error) {
-    if (error instanceof Problem && (error.status === 403 || error.status === 404)) return null;
+    if (error instanceof Problem && error.status === 403) return null;
     throw error;
   }
 }
@@ -23,12 +23,12 @@ export async function lookAtService(): Promise<Seen> {
   const path = here();
   const ofJobs = { path, query: { state: ['queued', 'running'] as ('queued' | 'running')[], limit: 50 } };
   const health = await readiness();
-  const notifies = 'notifications' in health.checks; // where that plug-in is installed
+  const [notifies, audits] = ['notifications', 'audit'].map((plugIn) => plugIn in health.checks);
   const [system, jobs, events, audit, notifications] = await Promise.all([
     ask(api.GET('/api/v1/system')),
     ask(api.GET('/api/v1/robots/{robot}/jobs', { params: ofJobs })),
     ask(api.GET('/api/v1/robots/{robot}/events', { params: { path, query: { limit: EVENTS } } })),
-    newestAudit(),
+    audits ? newestAudit() : null,
     notifies ? ask(api.GET('/api/v1/notifications')) : null,
   ]);
   return {
