@@ -13,11 +13,12 @@ description of its own commands. docs/plugins.md shows a whole plug-in.
 from __future__ import annotations
 
 import logging
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Any, Literal
 
 from daq.contracts.extras import Extra
@@ -105,7 +106,7 @@ class Plugin:
 def plugins() -> tuple[Plugin, ...]:
     """Returns the plug-ins that are installed, by their names. One that cannot be loaded is left out with a warning: a
     robot must be stopped all the same."""
-    found = (_loaded(entry) for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name))
+    found = (_loaded(name, reference) for name, reference in sorted(_entry_points().items()))
     return tuple(plugin for plugin in found if plugin is not None)
 
 
@@ -115,16 +116,30 @@ def named(reference: str) -> Any:
     return getattr(import_module(module), name)
 
 
-def _loaded(entry: EntryPoint) -> Plugin | None:
+def _entry_points() -> dict[str, str]:
+    """The references of the group by name, from the same files as `importlib.metadata` reads: to import that takes a
+    third of the time of `daq --help`."""
+    found: dict[str, str] = {}
+    for folder in sys.path:
+        for file in sorted(Path(folder).glob("*.dist-info/entry_points.txt")):
+            _, _, group = f"\n{file.read_text('utf-8', 'replace')}".partition(f"\n[{GROUP}]\n")
+            for line in group.partition("\n[")[0].splitlines():
+                name, is_entry, reference = line.partition("=")
+                if is_entry and not line.startswith(("#", ";")):
+                    found.setdefault(name.strip(), reference.strip())
+    return found
+
+
+def _loaded(name: str, reference: str) -> Plugin | None:
     try:
-        plugin = entry.load()
+        plugin = named(reference)
     except ModuleNotFoundError as error:
-        if error.name is not None and f"{entry.module}.".startswith(f"{error.name}."):
+        if error.name is not None and f"{reference.partition(':')[0]}.".startswith(f"{error.name}."):
             return None  # its own package was taken away, as `extras/` may be
         plugin = error
     except Exception as error:  # noqa: BLE001 - somebody else's module may raise anything
         plugin = error
     if isinstance(plugin, Plugin):
         return plugin
-    log.warning("plug-in %s (%s) is left out: %s", entry.name, entry.value, plugin)
+    log.warning("plug-in %s (%s) is left out: %s", name, reference, plugin)
     return None

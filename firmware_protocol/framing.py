@@ -118,13 +118,17 @@ class FrameDecoder:
         frames: list[Frame] = []
         *ended, begun = data.split(DELIMITER)
         for piece in ended:
-            if not (piece or self._partial or self._overrun):
+            if self._partial or self._overrun:
+                self._take(piece)
+                frame = self._finish()
+            elif piece:
+                frame = self._decoded(piece)
+            else:
                 continue  # nothing lies between two delimiters
-            self._take(piece)
-            frame = self._finish()
             if frame is not None:
                 frames.append(frame)
-        self._take(begun)
+        if begun:
+            self._take(begun)
         return frames
 
     @property
@@ -145,12 +149,18 @@ class FrameDecoder:
             self._partial += piece
 
     def _finish(self) -> Frame | None:
-        if self._overrun:
-            self.oversized += 1
-            self._overrun = False
-            return None
         encoded = bytes(self._partial)
         self._partial.clear()
+        if not self._overrun:
+            return self._decoded(encoded)
+        self._overrun = False
+        self.oversized += 1
+        return None
+
+    def _decoded(self, encoded: bytes) -> Frame | None:
+        if len(encoded) > MAX_ENCODED:
+            self.oversized += 1
+            return None
         try:
             return decode_body(encoded)
         except ProtocolError:

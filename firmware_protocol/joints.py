@@ -6,7 +6,7 @@ import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
+from itertools import pairwise, starmap
 from operator import lt
 from typing import ClassVar
 
@@ -88,6 +88,8 @@ class JointReading:
         check_range("power", self.power, -0x80, 0x7F)
 
 
+_READING = struct.Struct("<" + JointReading.LAYOUT)
+
 COMPACT_ERROR_MAX = 2047
 """Largest error that twelve bits hold; one further out is told as this, or as -2048."""
 
@@ -146,5 +148,6 @@ def pack_readings(readings: JointReadings) -> bytes:
 def parse_readings(what: str, payload: bytes) -> JointReadings:
     """Readings from mask and values. Raises ProtocolError for a wrong mask, length or value."""
     joints, rest = split_mask(what, payload)
-    values = unpack("<" + JointReading.LAYOUT * len(joints), rest, what)
-    return tuple((joint, JointReading(*values[4 * i : 4 * i + 4])) for i, joint in enumerate(joints))
+    if len(rest) != _READING.size * len(joints):
+        unpack("<" + JointReading.LAYOUT * len(joints), rest, what)  # says what is wrong
+    return tuple(zip(joints, starmap(JointReading, _READING.iter_unpack(rest)), strict=True))

@@ -14,7 +14,6 @@ packages is internal and may change with any version.
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from ma2000.own_packages import require_own_packages
@@ -152,8 +151,6 @@ _NEEDED: dict[Extra, tuple[str, ...]] = {
 }
 """Packages that tell whether an extra is installed."""
 
-__version__ = version("ma2000-daq")
-
 require_own_packages()
 
 
@@ -161,6 +158,10 @@ def __getattr__(name: str) -> Any:
     """Imports a public name on its first use. Raises MissingExtraError for one whose extra is not installed."""
     if name == "__all__":
         return [*_homes(), "__version__"]
+    if name == "__version__":
+        from importlib.metadata import version  # takes longer than all else here
+
+        return version("ma2000-daq")
     home = _HOME.get(name) or (None if name.startswith("_") else _homes().get(name))
     if home is None:
         raise AttributeError(f"module 'ma2000' has no attribute {name!r}; it has {', '.join(sorted(_homes()))}")

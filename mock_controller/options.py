@@ -50,8 +50,9 @@ class Options(BaseModel):
     fault: tuple[str, ...] = ()
 
 
-def read_options(arguments: list[str]) -> Options:
-    """Options from command-line arguments and the file that `--config` names; arguments win, lists are joined.
+def read_options(arguments: list[str], *, listens: bool = True) -> Options:
+    """Options from command-line arguments and the file that `--config` names; arguments win, lists are joined. One that
+    `listens` needs an address.
 
     Raises OptionsError; `--help` prints and leaves (SystemExit).
     """
@@ -82,7 +83,7 @@ def read_options(arguments: list[str]) -> Options:
         raise OptionsError(f"{where}: {first.message.lower()}, is {_shown(first.value)}") from None
     if options.pty and options.tcp:
         raise OptionsError("pty and tcp: give one of them")
-    if not (options.pty or options.tcp):
+    if listens and not (options.pty or options.tcp):
         raise OptionsError("nowhere to be reached: give --pty or --tcp HOST:PORT")
     if options.secret is not None and options.modify:
         raise OptionsError("secret and modify: give one of them")

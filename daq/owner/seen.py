@@ -6,7 +6,7 @@ from daq.contracts.service.robot import LinkStatus, RobotIdentity, Sample
 from daq.owner.messages import ArmReport, LiveSample
 from daq.runner.line_status import with_rates
 from daq.transport import parse_port_url
-from daq.transport.endpoint import BITS_PER_BYTE
+from daq.transport.url import BITS_PER_BYTE
 from firmware_protocol.commands import StatusFlag
 
 

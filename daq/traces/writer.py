@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import queue
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -28,6 +27,9 @@ QUEUE_LENGTH = 16384
 """Samples and events that may wait for the disk: five minutes at 50 Hz."""
 ROWS_A_CHUNK = 2000
 """Rows after which a chunk ends even before the next sync (faster than real time many rows come between two)."""
+WORTH_WAKING = 256
+"""Samples and events that wait before the thread is woken ahead of the next sync: a change of threads for each would
+cost as much as writing it."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,12 @@ class TraceWriter:
         self._last: SampleRow | None = None
         self._failure: TraceError | None = None
         self._closed = False
-        self._queue: queue.Queue[SampleRow | TraceEvent | _Close] = queue.Queue(queue_length)
+        self._changed = threading.Condition()
+        """Guards what waits and the close; whoever waits for room, and the thread, wait for it to be notified."""
+        self._waiting: list[SampleRow | TraceEvent] = []
+        self._longest = queue_length
+        self._wake_at = min(WORTH_WAKING, queue_length)
+        self._close_with: _Close | None = None
         if path.exists():
             raise TraceError(f"{path}: exists already; a trace is never written over")
         try:
@@ -113,12 +120,10 @@ class TraceWriter:
         if self._closed:
             raise TraceError(f"{self.path}: is closed already")
         self._closed = True
-        while self._thread.is_alive():
-            try:
-                self._queue.put(_Close(outcome, counters or {}), timeout=self._sync_interval)
-            except queue.Full:
-                continue
-            self._thread.join()
+        with self._changed:
+            self._close_with = _Close(outcome, counters or {})
+            self._changed.notify_all()
+        self._thread.join()
         self._release()
         if self._failure is not None:
             raise self._failure
@@ -153,10 +158,14 @@ class TraceWriter:
             raise self._failure
         if self._closed:
             raise TraceError(f"{self.path}: is closed already")
-        try:
-            self._queue.put(item, timeout=self._patience)
-        except queue.Full:
-            raise self._fail(f"the disk is {self._queue.maxsize} samples and events behind") from None
+        with self._changed:
+            if len(self._waiting) >= self._longest:
+                self._changed.wait_for(lambda: len(self._waiting) < self._longest, self._patience)
+            if len(self._waiting) >= self._longest:
+                raise self._fail(f"the disk is {self._longest} samples and events behind")
+            self._waiting.append(item)
+            if len(self._waiting) == self._wake_at:
+                self._changed.notify_all()
 
     def _fail(self, what: str) -> TraceError:
         """Keeps the first failure; later calls raise it."""
@@ -176,35 +185,46 @@ class TraceWriter:
             raise
 
     def _refuse_what_waits(self) -> None:
-        """Empties the queue, so that an acquisition that waits for room in it gets the error at its next call."""
-        while not self._queue.empty():
-            self._queue.get_nowait()
+        """Lets go of what waits, so that an acquisition that waits for room gets the error at its next call."""
+        with self._changed:
+            self._waiting = []
+            self._changed.notify_all()
 
     def _write_until_closed(self) -> None:
         next_sync = time.monotonic() + self._sync_interval
         unsynced = rows = 0
         while True:
-            try:
-                item = self._queue.get(timeout=max(0.0, next_sync - time.monotonic()))
-            except queue.Empty:
-                item = None
-            match item:
-                case SampleRow():
+            items, close = self._next(next_sync)
+            for item in items:
+                if isinstance(item, SampleRow):
                     self._recording.row(item)
                     unsynced, rows = unsynced + 1, rows + 1
-                case TraceEvent():
+                elif item is not None:
                     self._recording.event(item)
                     unsynced += 1
-                case _Close():
-                    return self._finish(item)
-            if time.monotonic() >= next_sync:
-                next_sync = time.monotonic() + self._sync_interval
-                if unsynced:
-                    self._sync()
-                unsynced = rows = 0
-            elif rows >= ROWS_A_CHUNK:
-                self._recording.flush()
-                rows = 0
+                if time.monotonic() >= next_sync:
+                    next_sync = time.monotonic() + self._sync_interval
+                    if unsynced:
+                        self._sync()
+                    unsynced = rows = 0
+                elif rows >= ROWS_A_CHUNK:
+                    self._recording.flush()
+                    rows = 0
+            if close is not None:
+                return self._finish(close)
+
+    def _next(self, until: float) -> tuple[Sequence[SampleRow | TraceEvent | None], _Close | None]:
+        """What waits, once it is worth it, at the time `until` (s, monotonic), or at the close; None where nothing
+        does."""
+        with self._changed:
+            self._changed.wait_for(
+                lambda: len(self._waiting) >= self._wake_at or self._close_with is not None,
+                max(0.0, until - time.monotonic()),
+            )
+            items, self._waiting = self._waiting, []
+            if len(items) >= self._longest:
+                self._changed.notify_all()
+            return items or (None,), self._close_with
 
     def _sync(self) -> None:
         self._recording.flush()

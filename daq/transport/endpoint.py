@@ -9,14 +9,22 @@ from typing import Protocol
 import serial
 
 from daq.transport.channel import ByteChannel, DescriptorChannel
+from daq.transport.embedded_mock import EmbeddedEndpoint
 from daq.transport.holders import FINDERS, other_holders
 from daq.transport.mock_process import MockProcess, start_mock
 from daq.transport.pseudo_terminal import Terminal, require_same, terminal_at
-from daq.transport.url import MockPort, PortBusyError, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
+from daq.transport.url import (
+    BITS_PER_BYTE,
+    MockPort,
+    PortBusyError,
+    PortUrl,
+    SerialPort,
+    TcpPort,
+    TransportError,
+    parse_port_url,
+)
 
 CONNECT_TIMEOUT_S = 3.0
-BITS_PER_BYTE = 10
-"""Bits that a byte takes on the line: start bit, eight data bits, stop bit."""
 
 
 class Endpoint(Protocol):
@@ -56,9 +64,12 @@ class Endpoint(Protocol):
 
 
 def open_endpoint(url: str) -> Endpoint:
-    """The endpoint of a URL; a mock is started. Nothing is sent. Raises TransportError."""
+    """The endpoint of a URL; a mock is started, in this process where it is one in lock-step without a terminal.
+    Nothing is sent. Raises TransportError."""
     port = parse_port_url(url)
     if isinstance(port, MockPort):
+        if port.lock_step and not port.through_pty:
+            return EmbeddedEndpoint(url, port)
         return MockEndpoint(url, port, start_mock(port, waits=not port.lock_step))
     return PortEndpoint(url, port)
 

@@ -23,6 +23,8 @@ BAUD_RATES = (
     *(250000, 460800, 500000, 921600, 1000000),  # of these, a clock of 16 MHz gives 250000, 500000, 1000000 exactly
     *(2000000, 3000000, 4000000),
 )
+BITS_PER_BYTE = 10
+"""Bits that a byte takes on the line: start bit, eight data bits, stop bit."""
 FRAMED = "framed"
 """The dialect of PROTOCOL.md, where the URL names none."""
 SERVOS = "dynamixel"

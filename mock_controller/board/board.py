@@ -384,8 +384,7 @@ class Board:
         if self._stored == total:
             return
         due = min((self._time_us - self._publishing_since_us) // self._timing.publish_byte, total)
-        for address, value in self._published[self._stored : due]:
-            self.memory.put(address, value)
+        self.memory.put_all(self._published[self._stored : due])
         self._stored = due
 
     def _advance_plant(self, time_us: int) -> None:

@@ -65,6 +65,12 @@ class SharedMemory:
         """Stores one byte."""
         self._bytes[address - self._base] = value
 
+    def put_all(self, pairs: Iterable[tuple[int, int]]) -> None:
+        """Stores the bytes of (address, byte) pairs, in their order."""
+        data, base = self._bytes, self._base
+        for address, value in pairs:
+            data[address - base] = value
+
     def clear(self) -> None:
         """All zero, as after a loss of power."""
         self._bytes[:] = bytes(len(self._bytes))
@@ -82,8 +88,7 @@ class SharedMemory:
 
     def store(self, name: str, values: Sequence[int]) -> None:
         """Stores all values of a register at once."""
-        for address, value in self.encoded(name, enumerate(values)):
-            self.put(address, value)
+        self.put_all(self.encoded(name, enumerate(values)))
 
     def encoded(self, name: str, values: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
         """(address, byte) pairs for (index, value) pairs, low byte before high: the order in which they are stored.

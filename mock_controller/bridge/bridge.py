@@ -342,9 +342,9 @@ class Bridge:
         return []
 
     def _snapshot(self, found: PeriodSnapshot, waiting: _WaitingSample) -> Reply:
-        registers = (found.set_points, found.positions, found.errors, found.powers)
+        readings = tuple(zip(found.set_points, found.positions, found.errors, found.powers, strict=True))
         flags = self._flags(found.frozen, found.set_point_missed)
-        joints = tuple((joint, JointReading(*(v[joint - 1] for v in registers))) for joint in waiting.joints)
+        joints = tuple((joint, JointReading(*readings[joint - 1])) for joint in waiting.joints)
         if waiting.taken is None:
             return Snapshot(found.tick, flags, joints)
         compact = tuple((joint, CompactReading.of(reading)) for joint, reading in joints)

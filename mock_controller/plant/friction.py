@@ -24,22 +24,23 @@ class CoulombLevel:
         body = parameters.rigid_body
         g = hypot(*body.gravity)
         arms = [parameters.friction.effective_arm + extra for extra in parameters.friction.extra_arms]
-        self._link2 = [arm * body.m2 * g for arm in arms]
-        self._link3 = [arm * (body.m3 + body.m_load) * g for arm in arms]
-        constant = [joint.constant_friction for joint in parameters.joints]
-        self._c1, self._c2, self._c3 = constant[:3]
-        self._wrist = constant[3:]
+        self.link2 = [arm * body.m2 * g for arm in arms]
+        """Torques (N·m) of joints 1 to 3 for link 2; `link3` for link 3 with its load."""
+        self.link3 = [arm * (body.m3 + body.m_load) * g for arm in arms]
+        self.constant = [joint.constant_friction for joint in parameters.joints]
+        """What comes on top (N·m), of all six joints."""
 
     def at(self, q: list[float]) -> list[float]:
         """Levels (N·m, ≥ 0) of the six joints at angles `q` (rad)."""
         s2 = sin(q[1])
         s23 = sin(q[1] + q[2])
-        link2, link3 = self._link2, self._link3
+        link2, link3 = self.link2, self.link3
+        c1, c2, c3, *wrist = self.constant
         return [
-            self._c1 + abs(link2[0] * s2 * cos(q[1]) + link3[0] * s23 * cos(q[1] + q[2])),
-            self._c2 + abs(link2[1] * s2 + link3[1] * s23 * cos(q[2])),
-            self._c3 + abs(link3[2] * s23),
-            *self._wrist,
+            c1 + abs(link2[0] * s2 * cos(q[1]) + link3[0] * s23 * cos(q[1] + q[2])),
+            c2 + abs(link2[1] * s2 + link3[1] * s23 * cos(q[2])),
+            c3 + abs(link3[2] * s23),
+            *wrist,
         ]
 
 

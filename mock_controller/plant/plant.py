@@ -32,6 +32,7 @@ from mock_controller.plant.extension_points import (
 from mock_controller.plant.friction import CoulombLevel, deflect
 from mock_controller.plant.parameters import JOINTS, PlantParameters
 from mock_controller.plant.rigid_body import build_model
+from mock_controller.plant.rigid_steps import RigidSteps
 from mock_controller.plant.transmission import FreeRotor
 
 STEP_US = 1000
@@ -106,6 +107,7 @@ class Plant:
             )
         )
         self._model.dof_damping[:] = self._half_damping
+        self._rigid = RigidSteps(self._model, self._data, self._half_damping, self._coulomb, self._presliding_rate)
         self._stalled: set[int] = set()
         self.reset(parameters.start if angles is None else angles)
         self._check_stiffness()
@@ -193,9 +195,8 @@ class Plant:
             for _ in range(steps * (self.step_us // self._inner_us)):
                 self._step_modified(volts)
             return
-        pushed = self._pushed_by(volts)
-        for _ in range(steps):
-            self._step(pushed)
+        self._bristle = self._rigid.run(self._pushed_by(volts), self._bristle, steps)
+        self._steps += steps
 
     def place(self, angles: Sequence[float], duration_us: int) -> None:
         """Puts the arm at rest at six angles (rad) after `duration_us`, in which something else held and moved it."""
@@ -222,18 +223,6 @@ class Plant:
             volts[index] = effect.drive_voltage(volts[index], self.time_us * 1e-6)
         limit = amplifier.supply_limit
         return [min(max(value, -limit), limit) for value in volts]
-
-    def _step(self, pushed: list[float]) -> None:
-        """One step of a plant with rigid gears, no inductance and nothing added."""
-        v = self._v.tolist()
-        bristle = self._deflect(v)
-        level = self._coulomb.at(self._q.tolist())
-        self._applied[:] = [
-            push - half * rate - most * deflection
-            for push, half, rate, most, deflection in zip(pushed, self._half_damping, v, level, bristle, strict=True)
-        ]
-        mujoco.mj_step(self._model, self._data)
-        self._steps += 1
 
     def _step_modified(self, asked: list[float]) -> None:
         """One step with everything that a modification or an inductance may add; `asked` are the amplifiers' volts."""
