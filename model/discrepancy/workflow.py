@@ -13,6 +13,7 @@ from model.discrepancy.experiment_design.next_experiment import ExperimentChoose
 from model.discrepancy.explanation.answer_words import with_sentences
 from model.discrepancy.grounds import Method
 from model.discrepancy.options import DiagnosisOptions, check_options
+from model.discrepancy.output_error.case import Watch
 from model.discrepancy.selection.diagnose import diagnose_by_simulation
 from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.recorded_motion import recorded_motions
@@ -73,12 +74,14 @@ def diagnose(
     progress: Progress = silent,
     cancel: Cancel | None = None,
     chooser: ExperimentChooser | None = None,
+    watch: Watch | None = None,
 ) -> Diagnosis:
     """Where a model and traces disagree, which effects are missing, and what adding them brings.
 
     Either the closed loop is simulated from the recorded set points, or the recorded drive is balanced against the
     motion in torques: `choose_method` says when. `chooser` knows the experiments that may be run next on a machine with
-    a controller; without it, or in torques, nothing is proposed.
+    a controller; without it, or in torques, nothing is proposed. `watch` is called with the leading candidates while
+    the loop is simulated with them.
 
     The records are checked first. Where units, signs, columns, times or readings are doubted, the verdict is
     `check-the-record`, and nothing is computed unless the options say so.
@@ -95,7 +98,7 @@ def diagnose(
     if doubts_in(found) and not options.despite_doubts:
         return _doubted(model, traces, holdout, found)
     require_computable(found)
-    answer = _computed(model, traces, holdout, options, progress, cancel, chooser)
+    answer = _computed(model, traces, holdout, options, progress, cancel, chooser, watch)
     doubted = {"verdict": "check-the-record"} if doubts_in(found) else {}
     return with_sentences(answer.model_copy(update={"record": found, **doubted})) if found else answer
 
@@ -108,6 +111,7 @@ def _computed(
     progress: Progress,
     cancel: Cancel,
     chooser: ExperimentChooser | None,
+    watch: Watch | None,
 ) -> Diagnosis:
     """The answer of the method that suits, whatever is doubted."""
     designs = chooser is not None and chooser.search is not None
@@ -117,7 +121,7 @@ def _computed(
         whole, held = (in_pieces(as_used(some, model.machine)) for some in (traces, holdout))
         return diagnose_torques(model, whole, held, options, progress, cancel)
     traces, holdout = (as_used(some, model.machine, "closed") for some in (traces, holdout))
-    return diagnose_by_simulation(model, traces, holdout, options, progress, cancel, chooser)
+    return diagnose_by_simulation(model, traces, holdout, options, progress, cancel, chooser, watch)
 
 
 def _doubted(

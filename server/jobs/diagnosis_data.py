@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from daq.contracts.service.jobs import LeadingEffect
 from model.comparison.difference import differences
 from model.discrepancy.explanation.answer_words import not_a_finding
 from model.discrepancy.explanation.step_words import where_with_summary
@@ -13,7 +14,7 @@ from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.phases import Residuals
 from model.discrepancy.localisation.statistics import chance_significance
 from model.effects.machine_numbers import MACHINE_NUMBERS
-from model.effects.names import placed
+from model.effects.names import effect_on, placed
 from model.fitting.records import noise_floor, records_of
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.parameter_words import words_by_name
@@ -31,6 +32,21 @@ if TYPE_CHECKING:
     from model.comparison.compare import Comparison, TraceSignals
     from model.discrepancy.diagnosis import Candidate, Diagnosis, Step, Where
     from model.machine_model.model import Model
+
+
+def leading(candidates: Sequence[Candidate]) -> tuple[LeadingEffect, ...]:
+    """Returns candidates of a diagnosis that runs as its job shows them."""
+    return tuple(
+        LeadingEffect(
+            effect=one.effect,
+            joints=one.joints,
+            called=effect_on(one.effect, one.joints),
+            evidence=one.evidence,
+            fitted=one.refitted,
+        )
+        for one in candidates
+        if np.isfinite(one.evidence)
+    )
 
 
 def diagnosis_data(

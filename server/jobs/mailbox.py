@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from daq.contracts.service.jobs import LeadingEffect
 from daq.contracts.whole_file import replacing
 
 TELL_EVERY = 0.2
@@ -29,6 +30,7 @@ class Reported:
 
     fraction: float
     text: str
+    leading: tuple[LeadingEffect, ...] = ()
 
 
 class Mailbox:
@@ -39,6 +41,7 @@ class Mailbox:
         self._told = 0.0
         self._looked = 0.0
         self._cancelled = False
+        self._now = Reported(0.0, "")
 
     def write(self, name: str, data: Any) -> None:
         """Writes a JSON file."""
@@ -63,7 +66,10 @@ class Mailbox:
     def reported(self) -> Reported | None:
         """Returns the progress of the job; None before it has begun."""
         data = self.read(PROGRESS)
-        return None if data is None else Reported(data["fraction"], data["text"])
+        if data is None:
+            return None
+        leading = tuple(LeadingEffect.model_validate(one) for one in data.get("leading", ()))
+        return Reported(data["fraction"], data["text"], leading)
 
     # ---- the worker's side
 
@@ -71,11 +77,19 @@ class Mailbox:
         """Reports progress, as `daq.contracts.progress.Progress`. A report too soon after the one before is left out,
         unless it is `at_once`, as for the beginning of something long."""
         now = time.monotonic()
+        self._now = replace(self._now, fraction=fraction, text=text)
         if now - self._told < TELL_EVERY and not at_once:
             return
         self._told = now
+        leading = [one.model_dump() for one in self._now.leading]
+        data = {"fraction": fraction, "text": text, "leading": leading}
         with replacing(self.folder / PROGRESS, synced=False) as part:
-            part.write_text(json.dumps({"fraction": fraction, "text": text}), "utf-8")
+            part.write_text(json.dumps(data), "utf-8")
+
+    def tell_leading(self, leading: tuple[LeadingEffect, ...]) -> None:
+        """Reports the candidates that lead, at once."""
+        self._now = replace(self._now, leading=leading)
+        self.tell(self._now.fraction, self._now.text, at_once=True)
 
     def is_set(self) -> bool:
         """Whether the job must end, as `daq.contracts.progress.Cancel`."""

@@ -171,8 +171,9 @@ class JobService:
         if job.state != "running":
             return job
         reported = self._reported(job.id)
-        fraction, text = (0.0, "starting") if reported is None else (reported.fraction, reported.text)
-        return job.model_copy(update={"progress": fraction, "progress_text": text})
+        reported = reported or Reported(0.0, "starting")
+        told = {"progress": reported.fraction, "progress_text": reported.text, "leading": reported.leading}
+        return job.model_copy(update=told)
 
     def close(self, patience: float) -> None:
         """Interrupts running jobs; waiting jobs stay queued."""

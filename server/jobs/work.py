@@ -195,7 +195,7 @@ class _Worker:
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
         from model.reports.diagnosis_report import LABELS, diagnosis_report
-        from server.jobs.diagnosis_data import diagnosis_data, where_given
+        from server.jobs.diagnosis_data import diagnosis_data, leading, where_given
         from server.jobs.next_experiment import experiment_chooser
         from server.jobs.results import DiagnosisJobResult
 
@@ -209,6 +209,7 @@ class _Worker:
             lambda f, text: self._tell(0, DIAGNOSIS_SHARE, f, text),
             self.mailbox,
             chooser=experiment_chooser(begin.machine, design=request.design),
+            watch=lambda candidates: self.mailbox.tell_leading(leading(candidates)),
         )
         comparison, given = None, None
         controlled = found.computed and not isinstance(begin.machine.controller, NoController)

@@ -148,6 +148,17 @@ class WaitsBehind(Wire):
     """Number of further jobs before this one."""
 
 
+class LeadingEffect(Wire):
+    """A candidate of a diagnosis that runs. `fitted`: `evidence` is that of a fit, not only promised by a probe."""
+
+    effect: str
+    joints: tuple[int, ...]
+    called: str
+    """The effect and its joints as people write them."""
+    evidence: FiniteFloat
+    fitted: bool
+
+
 class Job(Wire):
     """One computation with its state and result. `progress` is a fraction from 0 to 1."""
 
@@ -161,6 +172,8 @@ class Job(Wire):
     ended: AwareDatetime | None = None
     progress: float | None = None
     progress_text: str = ""
+    leading: tuple[LeadingEffect, ...] = ()
+    """The candidates that lead while a diagnosis runs, the best first; no answer."""
     reason: str = ""
     """Why it is not done, in one line."""
     failure: JobFailure | None = None

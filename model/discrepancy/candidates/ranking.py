@@ -26,7 +26,7 @@ from model.discrepancy.candidates.candidate_fit import (
 from model.discrepancy.candidates.library import Hypothesis, hypotheses, with_recorded_trials
 from model.discrepancy.candidates.probing import Probe, as_effect, keep_promising, probe
 from model.discrepancy.candidates.tones import propose_tones
-from model.discrepancy.diagnosis import Step
+from model.discrepancy.diagnosis import Candidate, Step
 from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.noise_model import LARGER
 from model.discrepancy.output_error.observation import AT_ONCE, side_by_side
@@ -44,6 +44,8 @@ PROMISING = 0.6
 """Least gain of a probe that is fitted, as a share of the fall of the cost that would make its effect significant."""
 WORTH_POLISHING = 0.5
 """Least evidence of a fit that is polished, as a share of the best: a fit with less cannot catch up."""
+LEADING = 8
+"""Candidates that whoever watches is told of."""
 REMEMBERED = 0.3
 """A hypothesis is probed again where its earlier response promises this share of an interesting gain."""
 
@@ -65,7 +67,8 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     progress(0.0, "probing the known effects")
     probes = _probe_all(case, current, cancel, earlier)
     chosen = [p for p in probes if _is_hopeful(current, p, case.thresholds)][: case.options.fitted]
-    fits = _fit_all(current, chosen, case.thresholds.close, progress, cancel)
+    _tell_leading(case, current, probes, ())
+    fits = _fit_all(case, current, chosen, progress, cancel)
     if current.point.strain >= FAR_OFF:
         fits += _fits_from_expected(current, probes, case.options.polished)
         fits += _fits_of_strained_numbers(current, case)
@@ -79,6 +82,7 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     head = _polish_best(current, answers)
     head = _restart_unexplained(current, head, case.thresholds.close)
     head = _finish_close(current, head, case.thresholds)
+    _tell_leading(case, current, probes, head)
     rest = [r for r in fits if not any(r is a for a in answers)]
     return Ranking(_one_law_per_name(sorted([*head, *rest], key=lambda f: -f.evidence)), tuple(probes))
 
@@ -125,11 +129,25 @@ def _is_hopeful(current: Fit, probed: Probe, thresholds: Thresholds) -> bool:
     return probed.gain >= max(thresholds.interesting, PROMISING * needed)
 
 
+def _tell_leading(case: Case, current: Fit, probes: Sequence[Probe], fits: Sequence[CandidateFit]) -> None:
+    """Tells who watches: of each effect at a place its fit, or what its probe promises, as evidence."""
+    if case.watch is None:
+        return
+    leading: dict[tuple[str, tuple[int, ...]], Candidate] = {}
+    for hypothesis, evidence, refitted in (
+        *((f.hypothesis, f.evidence, True) for f in fits),
+        *((p.hypothesis, p.gain - price_of(current.point.observation, p.hypothesis), False) for p in probes),
+    ):
+        told = Candidate(effect=hypothesis.name, joints=hypothesis.joints, evidence=evidence, refitted=refitted)
+        leading.setdefault((told.effect, told.joints), told)
+    case.watch(tuple(sorted(leading.values(), key=lambda one: -one.evidence)[:LEADING]))
+
+
 def _fit_all(
-    current: Fit, chosen: Sequence[Probe], close: float, progress: Progress, cancel: Cancel
+    case: Case, current: Fit, chosen: Sequence[Probe], progress: Progress, cancel: Cancel
 ) -> list[CandidateFit]:
     """Fits of the probed candidates, the most promising first, until those left are hopeless."""
-    observation = current.point.observation
+    observation, close = current.point.observation, case.thresholds.close
     fits: list[CandidateFit] = []
     for begin in range(0, len(chosen), AT_ONCE):
         stop_if(cancel)
@@ -147,6 +165,7 @@ def _fit_all(
             return refit(current, probed, goal)
 
         fits += [f for f in side_by_side(fit, now) if f is not None]
+        _tell_leading(case, current, chosen, fits)
     return fits
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.diagnosis import Gap, GapNumber, SignalError, Step, Where
+from model.discrepancy.diagnosis import Candidate, Gap, GapNumber, SignalError, Step, Where
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.phases import Residuals
@@ -24,6 +24,9 @@ from model.discrepancy.verdict import Errors, excess_removed, gap_numbers, gap_o
 from model.machine_model.model import Model
 from model.machine_model.record_verdict import FAR_OFF
 
+Watch = Callable[[tuple[Candidate, ...]], None]
+"""Called with the leading candidates of a step, the best first, whenever one of them has been computed."""
+
 
 @dataclass(frozen=True)
 class Case:
@@ -34,7 +37,7 @@ class Case:
         traces: the fitted ones. scoring: these traces as errors are reported, with less feedback of the record than
             fits get. floor: (n,) rad, the error that noise alone leaves on them.
         held: the held-out traces, if any. floor_held: the same on those; empty without any.
-        excluded: effects that need not be tried.
+        excluded: effects that need not be tried. watch: is called with the leading candidates while they are computed.
     """
 
     model: Model
@@ -47,6 +50,7 @@ class Case:
     options: DiagnosisOptions
     thresholds: Thresholds = THRESHOLDS
     excluded: tuple[str, ...] = ()
+    watch: Watch | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -143,6 +147,7 @@ def build_case(
     held: HeldOut | None = None,
     options: DiagnosisOptions | None = None,
     excluded: tuple[str, ...] = (),
+    watch: Watch | None = None,
 ) -> Case:
     """The case of traces that a point was fitted to, with the floors that this point gives them."""
     scoring = fitted.observation.with_feedback_share(FEEDBACK_SHARE_FOR_ERRORS)
@@ -158,6 +163,7 @@ def build_case(
         floor_held=np.zeros(0) if held is None else held.floor(fitted),
         options=options or DiagnosisOptions(),
         excluded=excluded,
+        watch=watch,
     )
 
 

@@ -23,7 +23,7 @@ from model.discrepancy.localisation.statistics import chance_significance
 from model.discrepancy.localisation.structure import joints_with_structure
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.case import Case, build_case, closed_loop_gap, errors_of_fit
+from model.discrepancy.output_error.case import Case, Watch, build_case, closed_loop_gap, errors_of_fit
 from model.discrepancy.output_error.controller_evidence import judge_controller, with_used_set_points
 from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.noise_model import note_on_noise, shown_noise
@@ -55,6 +55,7 @@ def diagnose_by_simulation(
     progress: Progress,
     cancel: Cancel,
     chooser: ExperimentChooser | None,
+    watch: Watch | None = None,
 ) -> Diagnosis:
     """The answer to traces with set points from a machine with a controller, as `workflow.diagnose` describes."""
     begun = time.perf_counter()
@@ -72,7 +73,7 @@ def diagnose_by_simulation(
         # The plant gets the drive that was recorded, whatever the controller has done.
         excluded = tuple(effect.value for effect in ControllerEffect)
     fitted = _weighed_with_shown_noise(_fit_tolerances(given))
-    case = build_case(model, given, fitted, traces, hold_out(known, holdout), options, excluded)
+    case = build_case(model, given, fitted, traces, hold_out(known, holdout), options, excluded, watch)
     first = judge(fitted)
     search = _add_effects(case, _Search(first=first, current=first), progress, cancel)
     progress(0.95, "writing the answer")

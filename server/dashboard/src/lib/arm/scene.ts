@@ -1,6 +1,7 @@
 /** The arm in 3-D. Draws when something has changed and not otherwise; loaded only where a page shows it. */
 
 import {
+  Color,
   DirectionalLight,
   GridHelper,
   Group,
@@ -56,6 +57,8 @@ export interface ArmPicture {
   readonly trail?: boolean;
   readonly stale?: boolean;
   readonly closed?: boolean;
+  /** By joint, 0 to 1: how much of its motion nothing explains. The joints then have no colours of their own. */
+  readonly heat?: readonly number[] | null;
 }
 
 /** Raises an Error where the browser has no WebGL. */
@@ -136,7 +139,10 @@ export class ArmScene {
     if (picture.closed !== before.closed) this.arm.grip(picture.closed ?? false);
     if (picture.trail !== before.trail && !picture.trail) this.trail.clear();
     if (picture.way !== before.way || picture.marks !== before.marks) this.showWay();
-    if (picture.stale !== before.stale || picture.ghostIsViolation !== before.ghostIsViolation) this.paint();
+    const isRepainted = (['stale', 'ghostIsViolation', 'heat'] as const).some(
+      (part) => picture[part] !== before[part],
+    );
+    if (isRepainted) this.paint();
     if (this.isVisibleChange(before)) this.invalidate();
   }
 
@@ -231,8 +237,10 @@ export class ArmScene {
 
   private paint(): void {
     const { colours, shown } = this;
+    const hot = new Color(colours.outside);
     this.materials.links.forEach((material, index) => {
-      material.color.set(shown.stale ? colours.stale : (colours.joints[index] ?? colours.body));
+      const own = shown.heat ? colours.body : (colours.joints[index] ?? colours.body);
+      material.color.set(shown.stale ? colours.stale : own).lerp(hot, shown.heat?.[index] ?? 0);
     });
     this.materials.body.color.set(shown.stale ? colours.stale : colours.body);
     this.ghostMaterial.color.set(shown.ghostIsViolation ? colours.outside : colours.ghost);
@@ -284,7 +292,7 @@ export class ArmScene {
   /** Whether the picture differs from the one on the screen by more than a part of a pixel. */
   private isVisibleChange(before: ArmPicture): boolean {
     const { shown, drawn, camera, renderer } = this;
-    const others = ['stale', 'closed', 'way', 'marks', 'ghostIsViolation', 'trail'] as const;
+    const others = ['stale', 'closed', 'way', 'marks', 'ghostIsViolation', 'trail', 'heat'] as const;
     if (others.some((part) => shown[part] !== before[part])) return true;
     const distance = camera.position.distanceTo(this.controls.target);
     const pixel = metresOfPixel(distance, (camera.fov * Math.PI) / 180, renderer.domElement.height);

@@ -1,4 +1,4 @@
-/** The moment of a previewed motion that is shown: chosen by hand, or running at the motion's own speed. */
+/** The moment of a motion that is shown: chosen by hand, or running, at the motion's own speed or another one. */
 
 export class Playing {
   moment = $state(0);
@@ -6,6 +6,12 @@ export class Playing {
   /** Whether somebody has chosen a moment: until then none is marked. */
   isUsed = $state(false);
   private frame = 0;
+
+  /** `speed`: seconds of the motion in a second. `again`: whether it begins anew at its end. */
+  constructor(
+    private readonly speed = 1,
+    private readonly again = false,
+  ) {}
 
   goTo(moment: number): void {
     this.hold();
@@ -23,8 +29,9 @@ export class Playing {
     const begun = performance.now();
     this.isPlaying = this.isUsed = true;
     const next = (now: number): void => {
-      this.moment = Math.min(duration, from + Math.max(0, now - begun) / 1000);
-      if (this.moment < duration) this.frame = requestAnimationFrame(next);
+      const at = from + (this.speed * Math.max(0, now - begun)) / 1000;
+      this.moment = this.again ? at % duration : Math.min(duration, at);
+      if (this.again || this.moment < duration) this.frame = requestAnimationFrame(next);
       else this.isPlaying = false;
     };
     this.frame = requestAnimationFrame(next);

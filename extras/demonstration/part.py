@@ -1,0 +1,169 @@
+"""Demonstrations of a service: one at a time, each on a thread, on a mock of its own beside the robot's."""
+
+from __future__ import annotations
+
+import logging
+import secrets
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from daq.contracts.errors import DaqError
+from daq.contracts.service.hidden import Hidden, HideRequest, HidingPlace
+from daq.contracts.service.jobs import MACHINE, CompareRequest, DiagnoseRequest, Job
+from daq.owner.client import OwnerOnDemand
+from daq.trajectories.set_points import control_period
+from daq.transport import parse_port_url
+from daq.transport.url import MockPort
+from extras.demonstration.hidden import EXPERIMENTS, HidingError, Sealed, choices, draw, opened, record
+from server.catalogue.room import require_room
+from server.jobs.mailbox import RESULT
+from server.parts import Part
+from server.problems import ProblemError, conflict
+from server.robot_services import RobotServices
+from server.services import Services
+
+if TYPE_CHECKING:
+    from model.discrepancy.diagnosis import Diagnosis
+
+LOOK_EVERY = 0.2
+"""Time (s) between two looks at whether the diagnosis has ended."""
+REAL_ARM = "a demonstration needs the mock: this robot is a real arm, or another machine"
+ENDED = ("done", "failed", "cancelled", "interrupted")
+log = logging.getLogger("server.demonstration")
+
+
+class Demonstrations(Part):
+    """Hides effects and lets the service's own jobs look for them. Safe to use from any thread."""
+
+    def __init__(self, services: Services) -> None:
+        self._jobs, self._clock = services.jobs, services.clock
+        self._lock = threading.Lock()
+        self._latest: dict[str, Hidden] = {}
+        self._counts: dict[str, tuple[int, int]] = {}
+        self._owner: OwnerOnDemand | None = None
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def place(self, rig: RobotServices) -> HidingPlace:
+        """Returns what a robot's mock can hide, and the latest demonstration."""
+        problem = _problem(rig)
+        with self._lock:
+            number, named = self._counts.get(rig.robot.name, (0, 0))
+            latest = self._latest.get(rig.robot.name)
+        offered = () if problem else choices()
+        return HidingPlace(problem=problem, choices=offered, latest=latest, opened=number, named=named)
+
+    def begin(self, rig: RobotServices, request: HideRequest, by: str) -> Hidden:
+        """Hides an effect and begins to look for it. Raises a 409 on a real arm and while another one goes on, and
+        SpecError for an effect that cannot be hidden."""
+        if problem := _problem(rig):
+            raise conflict("not-a-mock", problem, "start a service without a configured port: it has a mock")
+        require_room(rig.catalogue.folder)
+        sealed = draw(request)
+        with self._lock:
+            if self._thread is not None and self._thread.is_alive():
+                raise conflict("demonstration-runs", "another demonstration goes on", "wait until its secret is opened")
+            hidden = Hidden(
+                id=secrets.token_hex(6),
+                state="recording",
+                began=self._clock.utc(),
+                seal=sealed.seal,
+                picked=request,
+            )
+            self._latest[rig.robot.name] = hidden
+            self._thread = threading.Thread(
+                target=self._run, args=(rig, sealed, hidden, by), name="demonstration", daemon=True
+            )
+            self._thread.start()
+        return hidden
+
+    def close(self, seconds: float) -> None:
+        """Halts a recording that runs; its job ends with the others."""
+        self._closing.set()
+        owner, thread = self._owner, self._thread
+        if owner is not None:
+            owner.halt()
+        if thread is not None:
+            thread.join(seconds)
+
+    def _run(self, rig: RobotServices, sealed: Sealed, hidden: Hidden, by: str) -> None:
+        begun = time.monotonic()
+        try:
+            hidden = self._recorded(rig, sealed, hidden, by)
+            hidden = self._asked(rig, hidden, by)
+            answer = self._answered(rig, hidden)
+            secret = opened(sealed, answer, rig.robot.machine)
+            with self._lock:
+                number, named = self._counts.get(rig.robot.name, (0, 0))
+                self._counts[rig.robot.name] = number + 1, named + (secret.outcome == "named")
+            self._keep(rig, hidden, state="opened", secret=secret, seconds=time.monotonic() - begun)
+        except (DaqError, ProblemError) as error:
+            self._keep(rig, self._latest[rig.robot.name], state="failed", problem=str(error))
+        except Exception as error:
+            log.exception("demonstration")
+            self._keep(rig, self._latest[rig.robot.name], state="failed", problem=f"program fault: {error}")
+
+    def _recorded(self, rig: RobotServices, sealed: Sealed, hidden: Hidden, by: str) -> Hidden:
+        """Records both experiments, takes their traces into the catalogue, and has the first compared with the machine
+        file while the second is recorded."""
+        fitted, held_out = EXPERIMENTS
+        trace, motion = self._trace(rig, sealed, fitted)
+        compare = CompareRequest(traces=(trace,), models=(MACHINE,))
+        comparison, _ = rig.jobs.submit(compare, by, None)
+        hidden = self._keep(rig, hidden, trace=trace, motion=motion, comparison=comparison.id)
+        held, _ = self._trace(rig, sealed, held_out)
+        return self._keep(rig, hidden, held_out=held)
+
+    def _trace(self, rig: RobotServices, sealed: Sealed, name: str) -> tuple[str, float]:
+        """Returns the number of a new trace, and the duration of its motion."""
+        finished = record(sealed, name, rig.robot.machine, rig.catalogue.folder, self._hold)
+        self._owner = None
+        number = rig.catalogue.add(Path(finished.trace))
+        if number is None:
+            raise HidingError("the recorded trace could not be taken in; the service's log says why")
+        return number, finished.samples * control_period(rig.robot.machine)
+
+    def _hold(self, owner: OwnerOnDemand) -> None:
+        self._owner = owner
+        if self._closing.is_set():
+            owner.halt()
+
+    def _asked(self, rig: RobotServices, hidden: Hidden, by: str) -> Hidden:
+        """Hands the traces to a job of the service."""
+        assert hidden.trace is not None
+        assert hidden.held_out is not None
+        request = DiagnoseRequest(
+            traces=(hidden.trace,), held_out=(hidden.held_out,), most_steps=1, name=f"hidden {hidden.id}"
+        )
+        diagnosis, _ = rig.jobs.submit(request, by, None)
+        return self._keep(rig, hidden, state="diagnosing", diagnosis=diagnosis.id)
+
+    def _answered(self, rig: RobotServices, hidden: Hidden) -> Diagnosis:
+        """Waits for the answer. Raises HidingError where there is none."""
+        from server.jobs.results import DiagnosisJobResult  # what it needs takes long to load
+
+        while (job := self._job(rig, hidden)).state not in ENDED:
+            if self._closing.wait(LOOK_EVERY):
+                raise HidingError("the service ended")
+        if job.state != "done":
+            raise HidingError(f"the diagnosis has no answer: {job.reason}")
+        result = DiagnosisJobResult.model_validate_json(rig.jobs.result_file(job.id, RESULT).read_bytes())
+        return result.data
+
+    def _job(self, rig: RobotServices, hidden: Hidden) -> Job:
+        assert hidden.diagnosis is not None
+        return self._jobs.get(rig.robot.name, hidden.diagnosis)
+
+    def _keep(self, rig: RobotServices, hidden: Hidden, **changes: object) -> Hidden:
+        changed = hidden.model_copy(update=changes)
+        with self._lock:
+            self._latest[rig.robot.name] = changed
+        return changed
+
+
+def _problem(rig: RobotServices) -> str:
+    """Why a robot can hide nothing; empty where it can."""
+    is_mock = isinstance(parse_port_url(rig.robot.place.url), MockPort)
+    return "" if is_mock and rig.robot.machine.name == "ma2000" else REAL_ARM

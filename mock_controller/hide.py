@@ -1,0 +1,74 @@
+"""`python -m mock_controller.hide`: a seed for `mock://?secret=SEED` whose arm hides one effect of a clear size; with
+`--effect` and `--joint`, that one. With `--list`, the effects that can be hidden and their joints.
+
+It prints one line of JSON: the seed, which says nothing by itself, and its seal. The seal is the SHA-256 of the line
+that `python -m mock_controller.reveal SEED` prints: nobody can change afterwards what was hidden. Exit code 2 for an
+effect that there is not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable
+from hashlib import sha256
+from random import Random, SystemRandom
+
+from mock_controller.hidden.arm import HiddenArm, Kind, Load, SecretError, compose_seed, draw_arm
+from mock_controller.hidden.sizes import LATER_SIZES, SHARED_SIZES, SizeRange
+
+CLEAR = 0.5
+"""Least strength: the upper half of the sizes that blind trials draw, on their logarithmic scale."""
+_NUMBERS = 2**48
+"""Seeds are drawn from so many that nobody finds one by its seal."""
+
+
+def seed_that_hides(random: Random, effect: str | None = None, joint: int | None = None) -> int:
+    """A drawn seed whose arm hides this effect on this joint alone, clearly. Raises SecretError where no arm does."""
+    fitting = [size for size in (*SHARED_SIZES, *LATER_SIZES) if effect in (None, size.effect)]
+    if not any(joint is None or joint in _joints(size) for size in fitting):
+        on = "" if joint is None else f" on joint {joint}"
+        raise SecretError(f"effect {effect or 'any'}{on}: cannot be hidden; --list says what can")
+    later = effect in {size.effect for size in LATER_SIZES}
+    kind = Kind.LATER_SINGLE if later else Kind.SINGLE
+    while True:
+        arm = draw_arm(compose_seed(random.randrange(_NUMBERS), kind, Load.NOMINAL))
+        if _fits(arm, effect, joint):
+            return arm.seed
+
+
+def _fits(arm: HiddenArm, effect: str | None, joint: int | None) -> bool:
+    (hidden,) = arm.effects
+    return hidden.strength >= CLEAR and effect in (None, hidden.name) and (joint is None or joint in hidden.joints)
+
+
+def _joints(size: SizeRange) -> tuple[int, ...]:
+    return size.joints if size.acts_on_joints else ()
+
+
+def _choices(sizes: Iterable[SizeRange]) -> list[dict[str, object]]:
+    return [{"effect": size.effect, "joints": list(_joints(size))} for size in sizes]
+
+
+def main(arguments: list[str]) -> int:
+    """Prints a seed and its seal; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m mock_controller.hide", description=__doc__)
+    parser.add_argument("--effect", help="the effect to hide")
+    parser.add_argument("--joint", type=int, help="the joint to hide it on")
+    parser.add_argument("--list", action="store_true", help="the effects that can be hidden")
+    given = parser.parse_args(arguments)
+    if given.list:
+        print(json.dumps(_choices((*SHARED_SIZES, *LATER_SIZES))))
+        return 0
+    try:
+        seed = seed_that_hides(SystemRandom(), given.effect, given.joint)
+    except SecretError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    print(json.dumps({"seed": seed, "seal": sha256(f"{json.dumps(draw_arm(seed).truth())}\n".encode()).hexdigest()}))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))

@@ -1,0 +1,56 @@
+/** What the demonstration says. Pure. */
+
+import type { Hidden, HiddenNumber } from '../api/types';
+import type { Tone } from '../jobs/jobs';
+import { significant } from '../format';
+
+type Outcome = NonNullable<Hidden['secret']>['outcome'];
+
+export const OUTCOMES: Record<Outcome, { tone: Tone; title: string; text: string }> = {
+  named: {
+    tone: 'good',
+    title: 'Found',
+    text: 'The diagnosis named the hidden effect, alone and on its joint.',
+  },
+  among: {
+    tone: 'warn',
+    title: 'Among several',
+    text: 'The hidden effect is in the group that the records leave open; the diagnosis does not pretend to know more.',
+  },
+  joint: { tone: 'warn', title: 'Right joint, wrong effect', text: 'It found where, and not what.' },
+  missed: {
+    tone: 'bad',
+    title: 'Missed',
+    text: 'The diagnosis found nothing significant. The effect may be too small for these records to show.',
+  },
+  wrong: {
+    tone: 'bad',
+    title: 'Wrong',
+    text: 'The diagnosis named something else. It happens, and here it is.',
+  },
+};
+
+/** The two numbers of a row, in the unit in which people read them. */
+export function bothNumbers(one: HiddenNumber): { hidden: string; found: string; range: string } {
+  const [factor, unit] = one.unit === 'rad' ? [180 / Math.PI, '°'] : [1, one.unit];
+  const written = (value: number | null): string =>
+    value === null ? '' : `${significant(value * factor)}${unit && unit !== '1' ? ` ${unit}` : ''}`;
+  const isBounded = one.low !== null && one.high !== null;
+  return {
+    hidden: written(one.hidden),
+    found: written(one.found) || 'not given',
+    range: isBounded ? `95 %: ${significant(one.low! * factor)} to ${written(one.high)}` : '',
+  };
+}
+
+/** What goes on now, in one line. */
+export function stageWords(hidden: Hidden | null, hasDrift: boolean): string {
+  if (hidden === null) return '';
+  if (hidden.state === 'failed') return hidden.problem;
+  if (hidden.state === 'opened') return 'The secret is open.';
+  if (hidden.trace === null) return 'The mock moves: 55 s of motion, recorded in lock-step in a few seconds.';
+  if (hidden.state === 'recording') return 'A second motion is recorded, which the search will not see.';
+  return hasDrift
+    ? 'Which effect makes the arm differ from its model? Candidates are tried and fitted.'
+    : 'The model simulates the same motion.';
+}
