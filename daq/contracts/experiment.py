@@ -12,12 +12,12 @@ from pydantic import BaseModel, Field, FiniteFloat, StrictBool, ValidationError,
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
-from daq.contracts.frozen import FrozenRecord, SpokenRecord
+from daq.contracts.frozen import FrozenRecord, UserRecord
 from daq.contracts.in_unit import InUnit
 from firmware_protocol.invalid import first_invalid, invalid_of
 
 JOINTS = 6
-GAIN_PLACE = 3
+GAIN_LOCATION_LENGTH = 3
 """Length of the error location of one gain: the field, the joint, which of P, I, D."""
 DEFAULT_AMPLITUDE = math.radians(21.6)
 """Amplitude of the default ramp: 21.6°, that is 80 posture units (section 6.5 of the source)."""
@@ -47,7 +47,7 @@ Amplitude = Angle | dict[JointNumber, Angle]
 """One value for all joints of the experiment, or one per joint."""
 
 
-class _Spoken(SpokenRecord):
+class _UserRecord(UserRecord):
     """A part of an experiment, which people make in their programs as well."""
 
     @classmethod
@@ -56,7 +56,7 @@ class _Spoken(SpokenRecord):
         return _one_line(error)
 
 
-class Ramp(_Spoken):
+class Ramp(_UserRecord):
     """Constant speed through `amplitude` in `duration`; all joints arrive together."""
 
     kind: Literal["ramp"] = "ramp"
@@ -64,14 +64,14 @@ class Ramp(_Spoken):
     duration: Duration = DEFAULT_RAMP_TIME
 
 
-class Step(_Spoken):
+class Step(_UserRecord):
     """The whole `amplitude` at once, in one set point."""
 
     kind: Literal["step"] = "step"
     amplitude: Amplitude = math.radians(5.4)
 
 
-class Staircase(_Spoken):
+class Staircase(_UserRecord):
     """`steps` equal steps up through `amplitude` and, if `back`, down again, `dwell` s on each."""
 
     kind: Literal["staircase"] = "staircase"
@@ -81,7 +81,7 @@ class Staircase(_Spoken):
     back: StrictBool = True
 
 
-class SlowRamp(_Spoken):
+class SlowRamp(_UserRecord):
     """Constant low speed out to `amplitude` and back, with `reversals` changes of direction. Shows friction."""
 
     kind: Literal["slow_ramp"] = "slow_ramp"
@@ -90,7 +90,7 @@ class SlowRamp(_Spoken):
     reversals: Annotated[int, Field(ge=0, le=200)] = 3
 
 
-class Sine(_Spoken):
+class Sine(_UserRecord):
     """`cycles` of a sine about the start posture. Each joint lags `phase` rad behind the one before it."""
 
     kind: Literal["sine"] = "sine"
@@ -100,7 +100,7 @@ class Sine(_Spoken):
     phase: Angle = 0.0
 
 
-class Multisine(_Spoken):
+class Multisine(_UserRecord):
     """Sum of `tones` sines between two frequencies with seeded phases, scaled to the amplitude, faded in and out."""
 
     kind: Literal["multisine"] = "multisine"
@@ -118,7 +118,7 @@ class Multisine(_Spoken):
         return self
 
 
-class Cubic(_Spoken):
+class Cubic(_UserRecord):
     """Cubic in time through `amplitude` in `duration`, at rest at both ends."""
 
     kind: Literal["cubic"] = "cubic"
@@ -126,7 +126,7 @@ class Cubic(_Spoken):
     duration: Duration = 1.0
 
 
-class Via(_Spoken):
+class Via(_UserRecord):
     """Cubic segments through via points to the last one, at rest at both ends (section 3.7.1).
 
     `points` are angles (rad) from the start, one for all joints or one per joint; `times` (s) count from there, and the
@@ -146,7 +146,7 @@ class Via(_Spoken):
         return self
 
 
-class PickAndPlace(_Spoken):
+class PickAndPlace(_UserRecord):
     """Straight up by `lift` m, over to `amplitude` from the start, straight down: a 4-3-4 trajectory (section 3.7.2).
 
     The lift-off and set-down points are `lift` above the ends; in between joints move by polynomials of orders 4, 3 and
@@ -161,7 +161,7 @@ class PickAndPlace(_Spoken):
     place: Duration = 1.0
 
 
-class Path(_Spoken):
+class Path(_UserRecord):
     """A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear between.
 
     The first point is the start: the arm is brought there by a slow move.
@@ -181,7 +181,7 @@ class Path(_Spoken):
         return self
 
 
-class Pause(_Spoken):
+class Pause(_UserRecord):
     """No motion for `duration`: a piece of a sequence."""
 
     kind: Literal["pause"] = "pause"
@@ -193,14 +193,14 @@ Simple = Annotated[
 ]
 
 
-class Segment(_Spoken):
+class Segment(_UserRecord):
     """One piece of a sequence, on its own joints (all of the experiment's when None)."""
 
     move: Simple
     joints: tuple[JointNumber, ...] | None = None
 
 
-class Sequence(_Spoken):
+class Sequence(_UserRecord):
     """Pieces one after the other, each from where the one before ended."""
 
     kind: Literal["sequence"] = "sequence"
@@ -213,7 +213,7 @@ Trajectory = Annotated[
 ]
 
 
-class PlainExperiment(_Spoken):
+class PlainExperiment(_UserRecord):
     """An experiment whose set points are those of its motion; its fields are described at ExperimentSpec."""
 
     trajectory: Trajectory = Ramp()
@@ -291,12 +291,12 @@ class ExperimentSpec(PlainExperiment):
         return self
 
     @property
-    def plain(self) -> ExperimentSpec:
+    def wanted_motion(self) -> ExperimentSpec:
         """The experiment whose motion is wanted: this one, or the one that its set points were computed for."""
         return self if self.feedforward is None else ExperimentSpec(**dict(self.feedforward.asked))
 
     @property
-    def as_asked(self) -> PlainExperiment:
+    def without_feedforward(self) -> PlainExperiment:
         """This experiment without word of computed set points."""
         return PlainExperiment(**{name: getattr(self, name) for name in PlainExperiment.model_fields})
 
@@ -321,9 +321,9 @@ def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
 
 def _one_line(error: ValidationError) -> str:
     """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
-    # What is given joint by joint is not told that it is no single number.
-    told = [one for one in error.errors() if one["type"] != "float_type" or not isinstance(one["input"], dict)]
-    first = invalid_of(told[0]) if told else first_invalid(error)
+    # What is given joint by joint is not relevant that it is no single number.
+    relevant = [one for one in error.errors() if one["type"] != "float_type" or not isinstance(one["input"], dict)]
+    first = invalid_of(relevant[0]) if relevant else first_invalid(error)
     where, value, message = [str(part) for part in first.place], first.value, first.message
     # Pydantic's names for the branches of a union mean nothing to a user.
     where = [
@@ -331,7 +331,7 @@ def _one_line(error: ValidationError) -> str:
         for i, part in enumerate(where)
         if not part.startswith(("constrained-", "function-", "dict[")) and (i != 1 or where[0] != "trajectory")
     ]
-    if "gains" in where[:1] and len(where) == GAIN_PLACE:
+    if "gains" in where[:1] and len(where) == GAIN_LOCATION_LENGTH:
         where = [f"gains of joint {where[1]}", "PID"[int(where[2])]]
     bound = next((first.bounds[key] for key in ("le", "ge") if key in first.bounds), None)
     if bound is not None and math.isclose(abs(bound), 2 * math.pi) and _fits_a_float(value):

@@ -41,11 +41,11 @@ class _OneLine(_OfPydantic):
         try:
             return super().__call__(*given, **named)
         except ValidationError as error:
-            words = cast("type[SpokenRecord]", cls).words_of(error)
+            words = cast("type[UserRecord]", cls).words_of(error)
             raise SpecError(f"{cls.__name__}: {words}") from None
 
 
-class SpokenRecord(FrozenRecord, metaclass=_OneLine):
+class UserRecord(FrozenRecord, metaclass=_OneLine):
     """A record that people make in their programs. Raises SpecError, in one line, for values that are refused."""
 
     @classmethod

@@ -25,7 +25,7 @@ def limp_line(gains: Mapping[int, tuple[int, int, int]]) -> str:
     return f"JOINTS {', '.join(map(str, limp))} ARE LIMP (gain P is 0): nothing holds them" if limp else ""
 
 
-def doubts_line(gains: Mapping[int, tuple[int, int, int]]) -> str:
+def limp_warning(gains: Mapping[int, tuple[int, int, int]]) -> str:
     """Why the arm may not hold its posture: its limp joints, or that no gains can be read; empty where it does."""
     return limp_line(gains) if gains else GAINS_UNKNOWN
 

@@ -284,6 +284,6 @@ Traces = Trace | Sequence[Trace]
 """One trace, or several."""
 
 
-def several(traces: Traces) -> Sequence[Trace]:
+def as_sequence(traces: Traces) -> Sequence[Trace]:
     """The traces, where one stands for a list of one."""
     return (traces,) if isinstance(traces, Trace) else traces

@@ -198,7 +198,7 @@ class Controller:
         except RequestRefusedError as error:
             return StopConfirmation(sent=True, acknowledged=False, problem=str(error))
 
-    def stop_here(self, stop: int) -> int:
+    def restart_stop_at_measured_posture(self, stop: int) -> int:
         """Ends the stop of number `stop` by another one, whose number it returns: the set points are then the posture
         measured now. A second stop alone would change nothing: the board measures the posture when a stop begins.
 

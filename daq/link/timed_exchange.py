@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from daq.link.connection import Connection
 from daq.link.errors import LinkError, LinkTimeoutError
 from daq.link.pending import Transaction
-from daq.transport.holders import sharing_words
+from daq.transport.holders import shared_port_advice
 from firmware_protocol.commands import Request, Stop
 
 
@@ -83,5 +83,5 @@ def no_reply(connection: Connection, transaction: Transaction) -> str:
     name = type(transaction.request).__name__
     why = connection.complaint or "is the controller on, and are port and baud rate the right ones?"
     if not isinstance(transaction.request, Stop):  # looking for other programs takes a moment, which no stop has
-        why += sharing_words(connection.description)
+        why += shared_port_advice(connection.description)
     return f"{connection.description}: no reply to {name}, asked {transaction.written} times: {why}"

@@ -41,7 +41,7 @@ class EndCause(Enum):
     CANCELLED = "by the service: what ran was cancelled, or nobody had the control any more"
     SIGNAL = "by a signal"
     ORPHANED = "the process that started this run is gone"
-    DEAF = "this run could no longer be stopped from outside"
+    LISTENER_FAILED = "this run could no longer be stopped from outside"
 
 
 class Guardian:
@@ -64,7 +64,7 @@ class Guardian:
         self._wakeup_before = -1
         self._closing = False
         self._cause: EndCause | None = None
-        self._answered = -math.inf
+        self._last_stop_done = -math.inf
         """When the newest request to end was carried out (monotonic clock, s); infinite while one is under way."""
         self._under_way = 0
         self._lock = threading.Lock()
@@ -74,11 +74,11 @@ class Guardian:
     def cause(self) -> EndCause | None:
         """Why the run is to end; None while nobody wants it to."""
         if self._cause is None and not self._closing and not self._thread.is_alive():
-            return EndCause.DEAF
+            return EndCause.LISTENER_FAILED
         return self._cause
 
     @property
-    def unheard(self) -> str:
+    def socket_problem(self) -> str:
         """Why no other process of this user can stop this run; empty where one can."""
         return self._listener.problem
 
@@ -86,19 +86,19 @@ class Guardian:
         """A stop that came neither by the socket nor by a signal; for any thread."""
         return self._end(EndCause.STOP)
 
-    def forget(self, asked: float) -> bool:
+    def clear_cause(self, asked: float) -> bool:
         """For an explicit reset, asked for at this moment (monotonic clock, s): what ended the work before ends nothing
         any more. False, and nothing is forgotten, for a request that is `outdated`."""
         with self._lock:
-            if self.outdated(asked):
+            if self.is_older_than_stop(asked):
                 return False
             self._cause = None
             return True
 
-    def outdated(self, asked: float) -> bool:
+    def is_older_than_stop(self, asked: float) -> bool:
         """Whether what was asked for at this moment (monotonic clock, s) was asked before the newest request to end had
         been carried out: whoever asked did not know of that."""
-        return self._answered >= asked
+        return self._last_stop_done >= asked
 
     def __enter__(self) -> Self:
         self._wake_read, self._wake_write = os.pipe()
@@ -130,12 +130,12 @@ class Guardian:
             self._listen()
         except BaseException:
             # Nobody can stop this run any more: it does not go on.
-            self._end(EndCause.DEAF)
+            self._end(EndCause.LISTENER_FAILED)
             raise
 
     def _end(self, cause: EndCause) -> StopAnswer:
         with self._lock:
-            self._answered = math.inf
+            self._last_stop_done = math.inf
             self._under_way += 1
             self._cause = self._cause or cause
         try:
@@ -144,7 +144,7 @@ class Guardian:
             with self._lock:
                 self._under_way -= 1
                 if not self._under_way:
-                    self._answered = time.monotonic()
+                    self._last_stop_done = time.monotonic()
 
     def _listen(self) -> None:
         watched = select.poll()
@@ -158,9 +158,9 @@ class Guardian:
                 self._answer_client()
             if self._parent in ready and self._parent is not None and not self._parent_speaks():
                 watched.unregister(self._parent)
-            self._keep_heard(watched)
+            self._renew_socket(watched)
 
-    def _keep_heard(self, watched: select.poll) -> None:
+    def _renew_socket(self, watched: select.poll) -> None:
         """Listens at another socket if the file of this one is gone."""
         before = self._listener.renew()
         if before is None:

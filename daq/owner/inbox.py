@@ -24,10 +24,10 @@ from daq.owner.messages import (
     JogBegin,
     JogDrive,
     LeadBegin,
-    Long,
+    LongOrder,
     Open,
     Order,
-    Quick,
+    QuickOrder,
     RunExperiment,
     RunProgram,
 )
@@ -54,7 +54,7 @@ class Inbox:
         self.freeze: Callable[[Freeze], None] = lambda _order: None
         self.guardian_end, self._to_guardian = os.pipe()
         self._input = os.fdopen(descriptor, "rb", closefd=False)
-        self._waiting: queue.Queue[Long | Quick | None] = queue.Queue()
+        self._waiting: queue.Queue[LongOrder | QuickOrder | None] = queue.Queue()
         self._lock = threading.Lock()
         self._drive: JogDrive | None = None
         self._said = -math.inf
@@ -75,7 +75,7 @@ class Inbox:
         """Reads orders from now on. The thread ends with the input, or with the process."""
         self._thread.start()
 
-    def take(self, patience: float = 0.0) -> Long | Quick | None:
+    def take(self, patience: float = 0.0) -> LongOrder | QuickOrder | None:
         """Returns the next order; None if none comes within `patience` s, or the client ends."""
         try:
             return self._waiting.get(timeout=patience) if patience else self._waiting.get_nowait()

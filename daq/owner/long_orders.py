@@ -19,7 +19,7 @@ from daq.owner.messages import (
     JogBegin,
     JogDrive,
     LeadBegin,
-    Quick,
+    QuickOrder,
     RunExperiment,
     RunProgram,
 )
@@ -86,7 +86,7 @@ def jog_until_finished(robot: OwnedRobot, order: JogBegin) -> Answer:
         nonlocal newest
         _between_samples(robot)
         said = robot.inbox.drive()
-        if said is not None and not robot.guardian.outdated(said.said) and _allowed(robot, said):
+        if said is not None and not robot.guardian.is_older_than_stop(said.said) and _allowed(robot, said):
             on_its_way = time.monotonic() - said.said
             newest = JogCommand(said.velocities, robot.controller.clock.now() - on_its_way)
         return newest
@@ -128,7 +128,7 @@ def lead(robot: OwnedRobot, order: LeadBegin) -> Answer:
     return Answer(number=order.number, data=kept, problem=problem, exit_code=exit_code)
 
 
-def answered_quickly(robot: OwnedRobot, order: Quick) -> Answer:
+def answered_quickly(robot: OwnedRobot, order: QuickOrder) -> Answer:
     """Returns the answer to a quick order; a refusal is an answer, too."""
     try:
         return Answer(number=order.number, data=carry_out(robot, order))
@@ -153,7 +153,7 @@ def _between_samples(robot: OwnedRobot) -> None:
     order = robot.inbox.take()
     if order is None:
         return
-    if isinstance(order, Quick):
+    if isinstance(order, QuickOrder):
         robot.speaker.ended(answered_quickly(robot, order))
     else:
         robot.inbox.done()

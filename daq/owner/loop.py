@@ -15,7 +15,7 @@ from daq.driver import ControllerRestartedError, HardwareFaultError, NoSampleErr
 from daq.link import LinkError, LinkState
 from daq.owner import long_orders
 from daq.owner.guardian import EndCause
-from daq.owner.messages import BEGINS_WITHIN, Answer, JogBegin, LeadBegin, Long, Quick, RunExperiment
+from daq.owner.messages import BEGINS_WITHIN, Answer, JogBegin, LeadBegin, LongOrder, QuickOrder, RunExperiment
 from daq.owner.owned_robot import OwnedRobot
 from daq.owner.quick_orders import require_current
 from daq.owner.watched_controller import is_frozen
@@ -25,7 +25,7 @@ from firmware_protocol.errors import ProtocolError
 
 LOOK_EVERY = 0.1
 """Time (s) between two looks whether somebody ends this process, if nothing else is to be done."""
-LEAVING = (EndCause.SIGNAL, EndCause.ORPHANED, EndCause.DEAF)
+LEAVING = (EndCause.SIGNAL, EndCause.ORPHANED, EndCause.LISTENER_FAILED)
 """Causes that end not only the work but this process."""
 
 
@@ -93,8 +93,8 @@ def _watch(robot: OwnedRobot, last: int | None) -> int:
     return snapshot.tick
 
 
-def _carry_out(robot: OwnedRobot, order: Long | Quick) -> None:
-    if isinstance(order, Quick):
+def _carry_out(robot: OwnedRobot, order: LongOrder | QuickOrder) -> None:
+    if isinstance(order, QuickOrder):
         answer = long_orders.answered_quickly(robot, order)
         # Before the answer, since a client that knows of a reset may resume the queue at once. Even if the state equals
         # that of the last report: the service may have noted a stop since, which this process has never reported.
@@ -120,7 +120,7 @@ def _carry_out(robot: OwnedRobot, order: Long | Quick) -> None:
         robot.read_gains()
 
 
-def _moved(robot: OwnedRobot, order: Long) -> Answer:
+def _moved(robot: OwnedRobot, order: LongOrder) -> Answer:
     if isinstance(order, RunExperiment):
         return long_orders.run(robot, order)
     if isinstance(order, JogBegin):
@@ -179,8 +179,8 @@ def _notice_a_stop_before_us(robot: OwnedRobot) -> None:
         robot.control.stop("before this connection")
 
 
-def _refuse(robot: OwnedRobot, order: Long | Quick, line: str, exit_code: int) -> None:
-    if not isinstance(order, Quick):
+def _refuse(robot: OwnedRobot, order: LongOrder | QuickOrder, line: str, exit_code: int) -> None:
+    if not isinstance(order, QuickOrder):
         robot.inbox.done()
     robot.speaker.ended(Answer(number=order.number, problem=line, exit_code=exit_code))
 

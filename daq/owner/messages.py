@@ -132,7 +132,7 @@ class Freeze(_Request):
 
 
 class ReadState(_QuickRequest):
-    """Reads status, sample and gains: the answer's data are those of a `Seen`."""
+    """Reads status, sample and gains: the answer's data are those of a `StateAnswer`."""
 
     kind: Literal["read_state"] = "read_state"
 
@@ -210,8 +210,8 @@ Order = Annotated[
 ]
 ORDER: TypeAdapter[Order] = TypeAdapter(Order, config=WHEN_USED)
 
-Long = RunExperiment | JogBegin | RunProgram | LeadBegin
-Quick = ReadState | ReadGains | WriteGains | ReadProcess | WriteOutput | MoveGripper | Reset
+LongOrder = RunExperiment | JogBegin | RunProgram | LeadBegin
+QuickOrder = ReadState | ReadGains | WriteGains | ReadProcess | WriteOutput | MoveGripper | Reset
 
 
 # ---- from the owner
@@ -249,7 +249,7 @@ class ArmReport(FrozenRecord):
     """Why `daq stop` and the stop listener do not reach this process; empty where they do."""
 
 
-class Seen(FrozenRecord):
+class StateAnswer(FrozenRecord):
     """What one look at the robot has shown."""
 
     arm: ArmReport

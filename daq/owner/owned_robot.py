@@ -81,7 +81,7 @@ class OwnedRobot:
     def newest_stop(self) -> int | None:
         """The number of the board's newest stop; None while it must be read anew, since there has been another."""
         number, freezes, read = self._stop
-        return None if freezes != self.control.freezes or self.guardian.outdated(read) else number
+        return None if freezes != self.control.freezes or self.guardian.is_older_than_stop(read) else number
 
     def number_stop(self) -> None:
         """Reads the number of the newest stop where it is not known; of an arm that is not idle once a second, since
@@ -124,7 +124,7 @@ class OwnedRobot:
             link=self.controller.link.state.value,
             counters=counters,
             stop=self.newest_stop,
-            unheard=self.guardian.unheard,
+            unheard=self.guardian.socket_problem,
         )
 
     def _due(self) -> bool:

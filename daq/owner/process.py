@@ -17,7 +17,7 @@ from daq.owner.owned_robot import OwnedRobot
 from daq.owner.session import port_session
 from daq.owner.speaker import Speaker
 from daq.owner.watched_controller import WatchedController
-from daq.runner.preparation import require_fitting
+from daq.runner.preparation import require_matching_machine
 from daq.transport import PortBusyError
 from firmware_protocol.commands import Capability
 from firmware_protocol.errors import ProtocolError
@@ -74,7 +74,7 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker, loaded: Callable[[], None
             # It came while there was nothing to freeze. Now there is.
             control.stop(cause)
         if opening.watched:
-            require_fitting(controller, opening.machine)
+            require_matching_machine(controller, opening.machine)
             robot.read_gains()
         loaded()
         speaker.ended(Opened(identity=_identity(controller.identity)))

@@ -5,24 +5,24 @@ from __future__ import annotations
 import time
 
 from daq.contracts.errors import ReachError, SafetyError
-from daq.contracts.limp import doubts_line, require_no_jump
+from daq.contracts.limp import limp_warning, require_no_jump
 from daq.link import RequestRefusedError, StopCameFirstError
 from daq.owner.messages import (
     WAITS_AT_MOST,
-    Long,
+    LongOrder,
     MoveGripper,
-    Quick,
+    QuickOrder,
     ReadGains,
     ReadProcess,
     ReadState,
     Reset,
-    Seen,
+    StateAnswer,
     WriteGains,
     WriteOutput,
 )
 from daq.owner.owned_robot import OwnedRobot
 from daq.runner.arm_control import StoppedError
-from daq.runner.preparation import require_fitting
+from daq.runner.preparation import require_matching_machine
 from daq.safety import Event, State
 from firmware_protocol.commands import Refusal, StatusFlag
 
@@ -32,19 +32,19 @@ _READS = (ReadState, ReadProcess, ReadGains)
 _WHILE_TEACHING = (*_READS, WriteOutput, MoveGripper)
 
 
-def require_current(robot: OwnedRobot, order: Long | Quick, within: float) -> None:
+def require_current(robot: OwnedRobot, order: LongOrder | QuickOrder, within: float) -> None:
     """Raises ReachError for an order that nobody expects any more `within` s after its arrival, and SafetyError for one
     that changes something and arrived before the newest stop: whoever sent it did not know of that."""
-    name = order.kind if isinstance(order, Quick) else order.activity
+    name = order.kind if isinstance(order, QuickOrder) else order.activity
     waited = time.monotonic() - order.asked
     if waited > within:
         line = f"{name}: the robot's process came to it {waited:.1f} s after its arrival, {within:g} s are allowed"
         raise ReachError(f"{line}; nothing was done")
-    if robot.guardian.outdated(order.asked) and not isinstance(order, _READS):
+    if robot.guardian.is_older_than_stop(order.asked) and not isinstance(order, _READS):
         raise _overtaken(name, robot.end_cause())
 
 
-def carry_out(robot: OwnedRobot, order: Quick) -> dict[str, object]:
+def carry_out(robot: OwnedRobot, order: QuickOrder) -> dict[str, object]:
     """Carries out an order, and returns the answer's data. Raises DaqError; nothing has changed then, unless the error
     says so."""
     stops = robot.controller.link.stops  # before the look at stops: one that is written after it comes first
@@ -57,7 +57,7 @@ def carry_out(robot: OwnedRobot, order: Quick) -> dict[str, object]:
         raise _overtaken(order.kind, robot.end_cause()) from error
 
 
-def _carried_out(robot: OwnedRobot, order: Quick, stops: int) -> dict[str, object]:
+def _carried_out(robot: OwnedRobot, order: QuickOrder, stops: int) -> dict[str, object]:
     """The answer's data. Raises StopCameFirstError for what would change something behind a stop that was written since
     there were so many `stops`."""
     match order:
@@ -80,15 +80,15 @@ def _carried_out(robot: OwnedRobot, order: Quick, stops: int) -> dict[str, objec
             return {"text": _reset(robot, order)}
 
 
-def _state(robot: OwnedRobot) -> Seen:
+def _state(robot: OwnedRobot) -> StateAnswer:
     """Raises SafetyError for another machine's file: its angles would be wrong."""
-    require_fitting(robot.controller, robot.machine)
+    require_matching_machine(robot.controller, robot.machine)
     status, gains = robot.read_status(), robot.read_gains()
     sample = robot.samples.sample(robot.controller.next_snapshot(), time.monotonic())
     arm = robot.report()
     if StatusFlag.FROZEN in status.flags and arm.arm == "idle":
         arm = arm.model_copy(update={"arm": "stopped"})
-    return Seen(arm=arm, sample=sample, gains=gains, missed=status.missed)
+    return StateAnswer(arm=arm, sample=sample, gains=gains, missed=status.missed)
 
 
 def _write_gains(robot: OwnedRobot, order: WriteGains, stops: int) -> dict[str, object]:
@@ -126,8 +126,8 @@ def _release(robot: OwnedRobot, order: Reset, stop: int) -> None:
     """Releases the arm from the stop of this number. Raises RequestRefusedError or SafetyError if there is a
     newer one: of one from this computer the guardian knows first, of one from elsewhere the board alone."""
     controller, control = robot.controller, robot.control
-    number = controller.stop_here(stop) if order.here else stop
-    if not robot.guardian.forget(order.asked):
+    number = controller.restart_stop_at_measured_posture(stop) if order.here else stop
+    if not robot.guardian.clear_cause(order.asked):
         raise _overtaken(order.kind, robot.end_cause())
     if control.arm.state in (State.STOPPED, State.FAULT):
         control.handle(Event.RESET, stop=number)
@@ -161,7 +161,7 @@ def _reset(robot: OwnedRobot, order: Reset) -> str:
     if (cause := robot.end_cause()) is not None:
         control.stop(cause)
         raise SafetyError(f"the arm has been stopped again: {cause}")
-    limp = doubts_line(robot.read_gains())
+    limp = limp_warning(robot.read_gains())
     holds = "the arm takes set points again" if limp else "the arm holds its posture and takes set points again"
     return (
         f"released: {holds}"

@@ -69,7 +69,7 @@ def prepare(
     """Looks at the arm, plans, and checks. Raises SafetyError, SpecError, TraceError (no room), LinkError,
     NoSampleError, ControllerRestartedError; nothing has changed on the board then."""
     consent.require(controller)
-    require_fitting(controller, machine)
+    require_matching_machine(controller, machine)
     _require_period(controller, machine)
     require_not_stopped(controller)
     _require_driven(controller, spec, machine)
@@ -106,7 +106,7 @@ def require_not_stopped(controller: Controller) -> None:
         raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
 
 
-def require_fitting(controller: Controller, machine: Machine) -> None:
+def require_matching_machine(controller: Controller, machine: Machine) -> None:
     """Raises SafetyError where the machine file is of another machine than the one behind the line: set points in
     other steps would be set points for other postures, and positions in other counts would be other angles."""
     scale, joints = controller.link.scale, len(machine.joints)

@@ -7,14 +7,14 @@ from typing import Annotated, Generic, TypeVar
 
 from pydantic import AfterValidator, AwareDatetime, Field
 
-from daq.contracts.frozen import FrozenRecord, SpokenRecord
+from daq.contracts.frozen import FrozenRecord, UserRecord
 
 
 class Wire(FrozenRecord):
     """A message of the service. Unknown fields are refused, never ignored."""
 
 
-class SpokenWire(Wire, SpokenRecord):
+class UserWire(Wire, UserRecord):
     """A message that people make in their programs."""
 
 

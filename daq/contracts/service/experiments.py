@@ -9,7 +9,7 @@ from pydantic import AwareDatetime, Field, StrictBool, model_validator
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.in_unit import InUnit
 from daq.contracts.labels import Outcome
-from daq.contracts.service.base import Moment, SpokenWire, Wire
+from daq.contracts.service.base import Moment, UserWire, Wire
 from daq.contracts.trace import EventKind
 
 ExperimentState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
@@ -35,7 +35,7 @@ Submission = TypeVar("Submission", "ExperimentRequest", "ScheduleRequest")
 PresetName = Annotated[str, Field(min_length=1, max_length=64)]
 
 
-class ExperimentRequest(SpokenWire):
+class ExperimentRequest(UserWire):
     """An experiment to run, not before the time `at` (with its time zone); None for as soon as possible."""
 
     spec: ExperimentSpec = ExperimentSpec()
@@ -120,7 +120,7 @@ class Experiment(Wire):
     """The number of its trace, once there is one."""
 
 
-class ScheduleRequest(SpokenWire):
+class ScheduleRequest(UserWire):
     """An experiment to run again and again, for studies of wear and drift: at even intervals (`every`), or by the wall
     clock (`cron`)."""
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AwareDatetime, Field, FiniteFloat, StrictBool
 
 from daq.contracts.experiment import JointNumber
-from daq.contracts.service.base import SpokenWire, Wire
+from daq.contracts.service.base import UserWire, Wire
 
 JobKind = Literal["fit", "validate", "compare", "diagnose"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
@@ -34,7 +34,7 @@ class EffectChoice(Wire):
     joints: tuple[JointNumber, ...] = ()
 
 
-class FitStudy(SpokenWire):
+class FitStudy(UserWire):
     """How parameters are estimated with which a model best reproduces traces. The fields are the options of
     `daq fit`."""
 
@@ -54,7 +54,7 @@ class FitStudy(SpokenWire):
     """Find only bodies that can exist."""
 
 
-class ValidateStudy(SpokenWire):
+class ValidateStudy(UserWire):
     """How a model is validated against traces. The fields are the options of `daq validate`."""
 
     kind: Literal["validate"] = "validate"
@@ -63,7 +63,7 @@ class ValidateStudy(SpokenWire):
     damping_ratio: Annotated[float, Field(gt=0, le=10)] = 0.5
 
 
-class DiagnoseStudy(SpokenWire):
+class DiagnoseStudy(UserWire):
     """How a missing effect is looked for. The fields are the options of `daq diagnose`."""
 
     kind: Literal["diagnose"] = "diagnose"
@@ -97,7 +97,7 @@ class ValidateRequest(ValidateStudy):
     model: ModelNumber
 
 
-class CompareRequest(SpokenWire):
+class CompareRequest(UserWire):
     """Compares one model or several with the same traces, by simulation."""
 
     kind: Literal["compare"] = "compare"

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from daq.contracts.experiment import JointNumber
-from daq.contracts.service.base import SpokenWire, Wire
+from daq.contracts.service.base import UserWire, Wire
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.queue import Control, QueueStatus
@@ -171,7 +171,7 @@ class JogCommand(Wire):
     velocities: dict[JointNumber, Velocity]
 
 
-class LiveRequest(SpokenWire):
+class LiveRequest(UserWire):
     """A client's message over the WebSocket. Its fields may be given alone or together.
 
     The last `history` s of samples are sent at once, in about `points` points; `rate` is in samples per second.
