@@ -49,9 +49,8 @@ def fit_torques(
     `result.held_out` is the share of torque that is left on `holdout`. Raises as `fit`.
     """
     with told(progress, "fitting torques") as tell:
-        return torques.fit_torques(
-            model, as_sequence(traces), as_sequence(holdout), options, progress=tell, cancel=cancel
-        )
+        fitted, held_out = as_sequence(traces), as_sequence(holdout)
+        return torques.fit_torques(model, fitted, held_out, options, progress=tell, cancel=cancel)
 
 
 def base_parameters(model: Model, traces: Traces = (), *, seed: int = 0) -> BaseParameters:

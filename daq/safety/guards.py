@@ -40,7 +40,7 @@ class FollowingError:
             if was_held is None:
                 return NOTHING
             waited = (row.tick - was_held) * self.watched.period
-            return Verdict(findings=(Finding("resume", f"set points go on after {waited:.2f} s"),))
+            return Verdict(findings=(Finding("resume", f"set points continue after {waited:.2f} s"),))
         findings: tuple[Finding, ...] = ()
         if self.held_since is None:
             self.held_since = row.tick
@@ -109,7 +109,7 @@ class Freshness:
         line = f"{lost} control periods between ticks {last} and {row.tick} have no sample"
         if self.every > 1:
             line = (
-                f"ticks {last} and {row.tick} are {row.tick - last} control periods apart, {self.every} were asked for"
+                f"ticks {last} and {row.tick} are {row.tick - last} control periods apart, {self.every} were requested"
             )
         gap = (row.tick - last) * self.watched.period
         longest = max(LONGEST_SILENCE, SILENT_SAMPLES * self.every * self.watched.period)
