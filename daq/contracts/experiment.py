@@ -1,4 +1,4 @@
-"""What to run: a trajectory on some joints from a start posture, with gains, holds and repeats. Angles in rad."""
+"""Experiments: a trajectory on some joints from a start posture, with gains, holds and repeats. Angles in rad."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from firmware_protocol.invalid import first_invalid, invalid_of
 
 JOINTS = 6
 GAIN_LOCATION_LENGTH = 3
-"""Length of the error location of one gain: the field, the joint, which of P, I, D."""
+"""Length of pydantic's error location of one gain: the field, the joint, which of P, I, D."""
 DEFAULT_AMPLITUDE = math.radians(21.6)
 """Amplitude of the default ramp: 21.6°, that is 80 posture units (section 6.5 of the source)."""
 DEFAULT_RAMP_TIME = 0.65
@@ -35,8 +35,8 @@ Hold = Annotated[FiniteFloat, Field(ge=0, le=3600), InUnit("s")]
 JointNumber = Annotated[int, Field(ge=1, le=JOINTS)]
 Angle = Annotated[FiniteFloat, Field(ge=-2 * math.pi, le=2 * math.pi), InUnit("rad")]
 Row = Annotated[tuple[Angle, ...], Field(fail_fast=True)]
-"""Angles of joints at one moment. Reading a long list ends at its first error (`fail_fast`): to collect a million of
-them takes minutes."""
+"""Angles of joints at one moment. Validation of a long list stops at its first error (`fail_fast`): collecting a
+million errors takes minutes."""
 Count = Annotated[int, Field(ge=0)]
 GainValue = Annotated[int, Field(ge=0, le=20)]
 Gain = tuple[GainValue, GainValue, GainValue]
@@ -48,11 +48,11 @@ Amplitude = Angle | dict[JointNumber, Angle]
 
 
 class _UserRecord(UserRecord):
-    """A part of an experiment, which people make in their programs as well."""
+    """A part of an experiment. Users also construct it in Python, so validation errors become one-line SpecErrors."""
 
     @classmethod
     def words_of(cls, error: ValidationError) -> str:
-        """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
+        """States the field, what is allowed and what was given; angles in degrees, as people type them."""
         return _one_line(error)
 
 
@@ -72,7 +72,7 @@ class Step(_UserRecord):
 
 
 class Staircase(_UserRecord):
-    """`steps` equal steps up through `amplitude` and, if `back`, down again, `dwell` s on each."""
+    """Moves through `amplitude` in `steps` equal steps and, if `back`, down again, `dwell` s on each step."""
 
     kind: Literal["staircase"] = "staircase"
     amplitude: Amplitude = DEFAULT_AMPLITUDE
@@ -82,7 +82,8 @@ class Staircase(_UserRecord):
 
 
 class SlowRamp(_UserRecord):
-    """Constant low speed out to `amplitude` and back, with `reversals` changes of direction. Shows friction."""
+    """Moves at constant low speed out to `amplitude` and back, with `reversals` changes of direction. Shows
+    friction."""
 
     kind: Literal["slow_ramp"] = "slow_ramp"
     amplitude: Amplitude = math.radians(10.8)
@@ -162,9 +163,9 @@ class PickAndPlace(_UserRecord):
 
 
 class Path(_UserRecord):
-    """A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear between.
+    """A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear in between.
 
-    The first point is the start: the arm is brought there by a slow move.
+    The first point is the start, to which the arm is brought by a slow move.
     """
 
     kind: Literal["path"] = "path"
@@ -182,7 +183,7 @@ class Path(_UserRecord):
 
 
 class Pause(_UserRecord):
-    """No motion for `duration`: a piece of a sequence."""
+    """No motion for `duration` s; a part of a sequence."""
 
     kind: Literal["pause"] = "pause"
     duration: Duration
@@ -194,14 +195,14 @@ Simple = Annotated[
 
 
 class Segment(_UserRecord):
-    """One piece of a sequence, on its own joints (all of the experiment's when None)."""
+    """One part of a sequence, on its own joints (None: on all joints of the experiment)."""
 
     move: Simple
     joints: tuple[JointNumber, ...] | None = None
 
 
 class Sequence(_UserRecord):
-    """Pieces one after the other, each from where the one before ended."""
+    """Parts in order, each beginning where the previous one ended."""
 
     kind: Literal["sequence"] = "sequence"
     segments: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=1000, fail_fast=True)]
@@ -214,7 +215,7 @@ Trajectory = Annotated[
 
 
 class PlainExperiment(_UserRecord):
-    """An experiment whose set points are those of its motion; its fields are described at ExperimentSpec."""
+    """An experiment without `feedforward`. ExperimentSpec describes its fields."""
 
     trajectory: Trajectory = Ramp()
     joints: Annotated[tuple[JointNumber, ...], Field(min_length=1, max_length=JOINTS)] = (1, 2, 3)
@@ -252,18 +253,18 @@ class PlainExperiment(_UserRecord):
 
 
 class TrackingError(FrozenRecord):
-    """Distance of a joint from the motion asked for: root mean square and largest, rad (m on a prismatic joint)."""
+    """Deviation of a joint from the wanted motion: root mean square and largest, rad (m on a prismatic joint)."""
 
     rms: Annotated[FiniteFloat, Field(ge=0)]
     largest: Annotated[FiniteFloat, Field(ge=0)]
 
 
 class Feedforward(FrozenRecord):
-    """Where a path's set points come from: they were computed so that the arm follows another experiment's motion.
+    """Origin of a path's set points: they were computed so that the arm follows another experiment's motion.
 
-    `asked` is that experiment. Set points were computed with the model of this identity, learned from the trace of this
-    number, or both. `expected` is the error that the arm should have; `before` that of plain set points in the model's
-    simulation, or that of the trace which was learned from.
+    `asked`: that experiment. `model`, `learned_from`: ID of the model used and of the trace learned from; at least one
+    is given. `expected`: predicted tracking error. `before`: tracking error without feedforward, either simulated or
+    measured in that trace.
     """
 
     asked: PlainExperiment
@@ -276,10 +277,9 @@ class Feedforward(FrozenRecord):
 class ExperimentSpec(PlainExperiment):
     """One experiment. The same model serves the command line, the service and the trace's metadata.
 
-    `start` gives angles (rad) of joints to be brought to before the record; joints not named go to the machine's rest
-    posture. `settle` s are held before the motion and `hold` s after it, both recorded. `record` names the joints to
-    record; None means every joint that the line has room for. `feedforward` says for which motion a path's set points
-    were computed.
+    `start`: angles (rad) of joints at the start of the record; joints not named go to the machine's rest posture.
+    `settle`, `hold`: times (s) at rest before and after the motion, both recorded. `record`: joints to record; None for
+    every joint that the line has capacity for. `feedforward`: the motion for which a path's set points were computed.
     """
 
     feedforward: Annotated[Feedforward | None, Field(exclude_if=lambda one: one is None)] = None
@@ -292,18 +292,18 @@ class ExperimentSpec(PlainExperiment):
 
     @property
     def wanted_motion(self) -> ExperimentSpec:
-        """The experiment whose motion is wanted: this one, or the one that its set points were computed for."""
+        """The experiment whose motion is wanted: this one or, for computed set points, the one that they follow."""
         return self if self.feedforward is None else ExperimentSpec(**dict(self.feedforward.asked))
 
     @property
     def without_feedforward(self) -> PlainExperiment:
-        """This experiment without word of computed set points."""
+        """This experiment without its `feedforward`."""
         return PlainExperiment(**{name: getattr(self, name) for name in PlainExperiment.model_fields})
 
 
 @dataclass(frozen=True)
 class OfferedExperiment:
-    """An experiment that a diagnosis may ask for. `general`: whether it suits effects of every kind."""
+    """An experiment that a diagnosis may propose. `general`: whether it suits effects of every kind."""
 
     name: str
     description: str
@@ -312,7 +312,7 @@ class OfferedExperiment:
 
 
 def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
-    """An experiment from plain data. Raises SpecError with one line that names the field and what is allowed."""
+    """Returns an experiment from plain data. Raises a one-line SpecError that names the field and what is allowed."""
     try:
         return ExperimentSpec.model_validate(data)
     except ValidationError as error:
@@ -320,12 +320,12 @@ def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
 
 
 def _one_line(error: ValidationError) -> str:
-    """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
-    # What is given joint by joint is not relevant that it is no single number.
+    """States the field, what is allowed and what was given; angles in degrees, as people type them."""
+    # For a dict of values per joint, drop pydantic's error that it is not a single float.
     relevant = [one for one in error.errors() if one["type"] != "float_type" or not isinstance(one["input"], dict)]
     first = invalid_of(relevant[0]) if relevant else first_invalid(error)
     where, value, message = [str(part) for part in first.place], first.value, first.message
-    # Pydantic's names for the branches of a union mean nothing to a user.
+    # Pydantic's names for the branches of a union mean nothing to users.
     where = [
         part
         for i, part in enumerate(where)
@@ -340,16 +340,17 @@ def _one_line(error: ValidationError) -> str:
     elif not isinstance(value, str) or len(value) > LONGEST_SHOWN:
         value = shown(value)
     given = "" if isinstance(first.value, dict | BaseModel) else f" (got {value})"
-    return f"{': '.join(['.'.join(where)] * bool(where) + [message])}{given}"
+    prefix = f"{'.'.join(where)}: " if where else ""
+    return f"{prefix}{message}{given}"
 
 
 def _fits_a_float(value: object) -> bool:
-    """Whether the value is a number that can be converted to degrees; whole numbers may be larger than any float."""
+    """Whether the value can be converted to degrees; an integer may be larger than any float."""
     return isinstance(value, int | float) and abs(value) <= sys.float_info.max
 
 
 def parse_joints(text: str) -> tuple[int, ...]:
-    """Joint numbers from `1-3`, `1,3` or `1-2,5`. Raises SpecError for anything else."""
+    """Returns the joint numbers in `1-3`, `1,3` or `1-2,5`. Raises SpecError for any other text."""
     joints: set[int] = set()
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d{1,4})\s*(?:-\s*(\d{1,4})\s*)?", part)

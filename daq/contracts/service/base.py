@@ -1,4 +1,4 @@
-"""Base of the service's models."""
+"""Base classes of the service's models."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from daq.contracts.frozen import FrozenRecord, UserRecord
 
 
 class Wire(FrozenRecord):
-    """A message of the service. Unknown fields are refused, never ignored."""
+    """A message of the service. Unknown fields are rejected, never ignored."""
 
 
 class UserWire(Wire, UserRecord):
-    """A message that people make in their programs."""
+    """A message that users also construct in Python."""
 
 
 def _has_utc(moment: datetime) -> datetime:
