@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from daq.contracts.progress import Cancel
-from daq.contracts.trace import Traces, several
+from daq.contracts.trace import Traces, as_sequence
 from ma2000.progress import Shown, told
 from model.base_parameters import base_parameters as base
 from model.base_parameters.result import BaseParameters
@@ -31,7 +31,7 @@ def fit(
     Raises TraceError, SpecError for input that cannot give a result; CancelledError when asked to end.
     """
     with told(progress, "fitting") as tell:
-        return motion.fit(model, several(traces), options, tell, cancel)
+        return motion.fit(model, as_sequence(traces), options, tell, cancel)
 
 
 def fit_torques(
@@ -49,7 +49,8 @@ def fit_torques(
     `result.held_out` is the share of torque that is left on `holdout`. Raises as `fit`.
     """
     with told(progress, "fitting torques") as tell:
-        return torques.fit_torques(model, several(traces), several(holdout), options, progress=tell, cancel=cancel)
+        fitted, held_out = as_sequence(traces), as_sequence(holdout)
+        return torques.fit_torques(model, fitted, held_out, options, progress=tell, cancel=cancel)
 
 
 def base_parameters(model: Model, traces: Traces = (), *, seed: int = 0) -> BaseParameters:
@@ -62,7 +63,7 @@ def base_parameters(model: Model, traces: Traces = (), *, seed: int = 0) -> Base
     Args:
         seed: of the drawn postures.
     """
-    return base.base_parameters(model, several(traces), seed=seed)
+    return base.base_parameters(model, as_sequence(traces), seed=seed)
 
 
 def profile(
@@ -82,4 +83,4 @@ def profile(
     Raises SpecError for a parameter that was not fitted, or other traces; CancelledError when asked to end.
     """
     with told(progress, name) as tell:
-        return profiles.profile(fitted, several(traces), name, tell, cancel)
+        return profiles.profile(fitted, as_sequence(traces), name, tell, cancel)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from daq.contracts.progress import Cancel
-from daq.contracts.trace import Traces, several
+from daq.contracts.trace import Traces, as_sequence
 from daq.safety.planned import planned
 from ma2000.progress import Shown, told
 from model.design import search
@@ -43,7 +43,7 @@ def validate(
     names = names_to_validate(model, parameters)
     options = Options(quantise=False)
     with told(progress, "validating") as tell:
-        return validate_by_distortion(model, several(traces), names, options=options, progress=tell, cancel=cancel)
+        return validate_by_distortion(model, as_sequence(traces), names, options=options, progress=tell, cancel=cancel)
 
 
 def diagnose(
@@ -68,7 +68,7 @@ def diagnose(
     """
     chooser = experiment_chooser(model.machine, design=design)
     with told(progress, "diagnosing") as tell:
-        return workflow.diagnose(model, several(traces), several(holdout), options, tell, cancel, chooser)
+        return workflow.diagnose(model, as_sequence(traces), as_sequence(holdout), options, tell, cancel, chooser)
 
 
 def design(

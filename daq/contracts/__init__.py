@@ -1,1 +1,1 @@
-"""The types that every part of the project shares: pure data, validated, no I/O beyond the files that ship with it."""
+"""Types that every part of the project shares: pure, validated data. The only I/O is reading files of this package."""

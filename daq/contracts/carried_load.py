@@ -1,4 +1,4 @@
-"""A machine with another load at its end than its file states."""
+"""Changes the load at the end of a machine."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from daq.contracts.machine import Machine
 from daq.contracts.quantity import Quantity
 
 LEAST_DEVIATION = 1e-3
-"""Least deviation (kg) of a load that a user states."""
+"""Least deviation (kg) of a load that a user gives."""
 
 
 def carrying(machine: Machine, kilograms: float, source: str) -> Machine:
-    """The machine with a load of `kilograms`. Its relative deviation is that of the file's own load; where the file
-    states an arm without load, the absolute deviation (kg) is the file's.
+    """Returns the machine with a load of `kilograms`. The relative deviation is that of the file's load; if the file's
+    load is 0, its absolute deviation (kg) is used.
 
     Args:
         source: where the value comes from.
 
-    Raises SpecError for a machine whose file has no load, and for a load outside the file's bounds.
+    Raises SpecError if the machine file has no load, or if the load is outside its bounds.
     """
     own = machine.load
     if own is None:

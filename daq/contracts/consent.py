@@ -8,11 +8,11 @@ from daq.contracts.errors import SpecError
 
 
 class Identity(Protocol):
-    """What a controller says about itself."""
+    """A controller's identity."""
 
     @property
     def simulated(self) -> bool:
-        """Whether no arm is behind it."""
+        """Whether the controller is simulated, without an arm."""
 
 
 def lacks_consent(identity: Identity | None, given: bool) -> bool:
@@ -21,8 +21,7 @@ def lacks_consent(identity: Identity | None, given: bool) -> bool:
 
 
 def require_word(moves_real_arm: object) -> bool:
-    """The consent, False where it is not given. Raises SpecError for any value other than True and False, even one that
-    is truthy."""
+    """Returns the consent. Raises SpecError for any value other than True and False, even a truthy one."""
     if not isinstance(moves_real_arm, bool):
-        raise SpecError(f"moves_real_arm = {moves_real_arm!r:.40}: True is the operator's consent, and False is none")
+        raise SpecError(f"moves_real_arm = {moves_real_arm!r:.40}: must be True (the operator consents) or False")
     return moves_real_arm

@@ -1,4 +1,4 @@
-"""Text files that people write, read with a bound on size and nesting: JSON and TOML as plain data, in one place."""
+"""Reads JSON and TOML files written by people as plain data, with limits on size and nesting."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from daq.contracts.errors import SpecError
 LARGEST = 64 << 20
 """Size (bytes) of the largest file that is read; a path recorded for an hour has about 20 MB."""
 DEEPEST = 64
-"""Most levels of nesting. No file here needs 10; parsers, validators and `repr` recurse once a level."""
+"""Most levels of nesting. No file here needs 10; parsers, validators and `repr` recurse once per level."""
 MOST_KEY_PARTS = 64
-"""Most parts of a dotted TOML key (`a.b.c`); reading one costs the square of their number."""
+"""Most parts of a dotted TOML key (`a.b.c`); the time to read a key grows with the square of their number."""
 
 MOST_BITS = 4096
-"""Most bits of a whole number; Python cannot write one of many thousands as text."""
+"""Most bits of an integer; Python cannot write much longer ones as text."""
 
 MARK = "\ufeff"
 """The byte-order mark, which some editors put before a text."""
 _LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:[\w\"'-]+[ \t]*\.[ \t]*){{{MOST_KEY_PARTS}}}", re.MULTILINE)
-"""Matches only where a key can begin, so that the search takes time in proportion to the text."""
+"""Matches only where a key can begin, so that the search time is proportional to the length of the text."""
 
 
 _ENCODING = re.compile(rb"""\s*<\?xml[^>]{0,100}?\sencoding\s*=\s*["']([A-Za-z0-9._-]{1,40})["']""")
@@ -32,11 +32,10 @@ _HALF = re.compile(r"\\u[dD][89a-fA-F]")
 
 
 class _Short(reprlib.Repr):
-    """As `reprlib.Repr`, except for whole numbers that Python does not write in decimal digits (those from TOML's
-    0x…)."""
+    """Like `reprlib.Repr`, but for integers too long for decimal digits (TOML's 0x…), which Python cannot print."""
 
     def repr_int(self, x: int, level: int) -> str:
-        """A whole number, in hexadecimal digits where it has many."""
+        """Formats an integer, a long one in hexadecimal digits."""
         del level
         if x.bit_length() <= _DECIMAL_BITS:
             return repr(x)
@@ -45,7 +44,7 @@ class _Short(reprlib.Repr):
 
 
 _DECIMAL_BITS = 190
-"""Bits of the largest whole number that is shown in decimal digits; it has 58 of them."""
+"""Bits of the largest integer that is printed in decimal digits; it has 58 of them."""
 
 _LONG_NUMBER = "a whole number has more than a thousand digits"
 
@@ -55,14 +54,14 @@ _short.maxlevel = 2
 
 
 def shown(value: object) -> str:
-    """A value for an error's line, cut short where it is long or deeply nested."""
+    """Formats a value for an error message, shortened if it is long or deeply nested."""
     return " ".join(_short.repr(value).split())
 
 
 def read_text(path: Path, what: str, *, xml: bool = False) -> str:
-    """The text of a file that `what` names in errors. xml: in the encoding that its first line declares.
+    """Returns the text of a file, which errors call `what`. xml: use the encoding that the first line declares.
 
-    Raises SpecError in one line when it cannot be read, has more than LARGEST bytes, or is in another encoding.
+    Raises a one-line SpecError if the file cannot be read, has more than LARGEST bytes, or is in another encoding.
     """
     try:
         with path.open("rb") as stream:
@@ -76,7 +75,7 @@ def read_text(path: Path, what: str, *, xml: bool = False) -> str:
     declared = _ENCODING.match(content) if xml else None
     encoding = "UTF-8" if declared is None else declared[1].decode("ascii")
     try:
-        # Decoding by some of Python's encodings takes time that grows with the square of the size.
+        # Some of Python's decoders take time that grows with the square of the size, so decode the declaration first.
         if declared is not None and declared[0].decode(encoding) != declared[0].decode("ascii"):
             raise SpecError(f"{what}: cannot be read: its first line is not in encoding {shown(encoding)}, as it says")
         return content.decode("utf-8-sig" if encoding.lower() == "utf-8" else encoding)
@@ -89,15 +88,15 @@ def read_text(path: Path, what: str, *, xml: bool = False) -> str:
 
 
 def parse_json(text: str, what: str) -> Any:
-    """Plain data from JSON. Raises SpecError in one line for text that is not JSON, is nested deeper than DEEPEST, or
-    holds a whole number of more than MOST_BITS."""
+    """Returns plain data from JSON. Raises a one-line SpecError for text that is not JSON, is nested deeper than
+    DEEPEST, or contains an integer of more than MOST_BITS."""
     try:
         data = json.loads(text.removeprefix(MARK))
     except RecursionError:
         raise _too_deep(what) from None
-    except ValueError as error:  # also a whole number of thousands of digits
+    except ValueError as error:  # also an integer with thousands of digits
         raise SpecError(f"{what}: not JSON: {_plain(error)}") from error
-    if _HALF.search(text):  # \ud83d\ude00 is one character, \ud83d alone is none, and can never be written again
+    if _HALF.search(text):  # an unpaired surrogate such as \ud83d is no character and cannot be encoded again
         try:
             json.dumps(data, ensure_ascii=False).encode()
         except (UnicodeEncodeError, RecursionError):
@@ -106,8 +105,8 @@ def parse_json(text: str, what: str) -> Any:
 
 
 def parse_toml(text: str, what: str) -> dict[str, Any]:
-    """Plain data from TOML. Raises SpecError in one line for text that is not TOML, is nested deeper than DEEPEST, or
-    holds a whole number of more than MOST_BITS."""
+    """Returns plain data from TOML. Raises a one-line SpecError for text that is not TOML, is nested deeper than
+    DEEPEST, or contains an integer of more than MOST_BITS."""
     text = text.removeprefix(MARK)
     if _LONG_KEY.search(text):
         raise SpecError(f"{what}: a key has more than {MOST_KEY_PARTS} parts; no key here needs them")
@@ -122,7 +121,7 @@ def parse_toml(text: str, what: str) -> dict[str, Any]:
 
 
 def read_document(path: Path, what: str) -> Any:
-    """Plain data of a .toml file, or of a JSON file of any other name. Raises SpecError in one line."""
+    """Returns plain data of a .toml file, or of a JSON file of any other name. Raises a one-line SpecError."""
     text = read_text(path, what)
     return parse_toml(text, what) if path.suffix == ".toml" else parse_json(text, what)
 
@@ -137,7 +136,8 @@ def _too_deep(what: str) -> SpecError:
 
 
 def _bounded(data: Any, what: str) -> Any:
-    """Returns the data unchanged if it is within bounds; works level by level, without recursion. Raises SpecError."""
+    """Returns the data unchanged if it is within the limits; works level by level, without recursion. Raises
+    SpecError."""
     level = [data]
     for _ in range(DEEPEST + 1):
         parts = [

@@ -1,4 +1,5 @@
-"""Servos and motors by name: numbers of data sheets and of others' measurements, in the words of a machine file."""
+"""Library of servos and motors: parameters from data sheets and published measurements, in the form of a machine
+file."""
 
 from __future__ import annotations
 
@@ -19,10 +20,10 @@ PARTS = ("drive", "friction", "sensor", "servo")
 
 @dataclass(frozen=True)
 class LibraryDrive:
-    """A servo or motor, its numbers as texts with their sources.
+    """A servo or motor. Its parameters are texts with their sources.
 
-    name: maker and model, with the voltage where it matters. title: for people.
-    drive, friction, sensor: parts of a joint. servo: of its own position control, in the units of its registers.
+    name: maker and model, and the voltage if it matters. title: for people.
+    drive, friction, sensor: parts of a joint. servo: its own position control, in the units of its registers.
     """
 
     name: str
@@ -34,12 +35,12 @@ class LibraryDrive:
 
     @property
     def parts(self) -> dict[str, Mapping[str, Any]]:
-        """The parts that have numbers, by name."""
+        """Returns the parts that have parameters, by name."""
         return {name: part for name in PARTS if (part := getattr(self, name))}
 
 
 def library_drive(name: str) -> LibraryDrive:
-    """The drive of a name. Raises SpecError with the nearest names."""
+    """Returns the drive of this name. Raises SpecError with the nearest names."""
     known = library_drives()
     if name not in known:
         near = get_close_matches(name, known, n=3) or [n for n in known if name.lower() in n][:3]
@@ -50,7 +51,7 @@ def library_drive(name: str) -> LibraryDrive:
 
 @cache
 def library_drives() -> dict[str, LibraryDrive]:
-    """All drives of the library, by name."""
+    """Returns all drives of the library by name."""
     folder = resources.files("daq.contracts") / "drives"
     found = {}
     for file in sorted(folder.iterdir(), key=lambda entry: entry.name):
@@ -70,7 +71,7 @@ def library_drives() -> dict[str, LibraryDrive]:
 
 
 def _sourced(value: Any, places: Places, path: Path) -> Any:
-    """The data with the comment behind each number as its source."""
+    """Returns the data with the comment after each number as its source."""
     if isinstance(value, dict):
         return {name: _sourced(inner, places, (*path, name)) for name, inner in value.items()}
     if isinstance(value, str) and is_number(value) and "," not in value:

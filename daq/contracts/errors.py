@@ -1,6 +1,6 @@
-"""Errors that a user meets: one clear line each, saying what is wrong, where, and what is allowed.
+"""Errors shown to users. Each is one line that states what is wrong, where, and what is allowed.
 
-`exit_code` is the exit code of the command line, one of `daq.contracts.exit_codes`.
+`exit_code` is the exit code of the command line, from `daq.contracts.exit_codes`.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ class DaqError(Exception):
 
 
 class SpecError(DaqError):
-    """An experiment, machine or configuration that cannot be carried out as written."""
+    """An experiment, machine or configuration is invalid."""
 
     exit_code = exit_codes.WRONG_INPUT
 
 
 class TraceError(DaqError):
-    """A trace that cannot be read, written or found, or whose content contradicts itself."""
+    """A trace cannot be read, written or found, or its content is inconsistent."""
 
     exit_code = exit_codes.WRONG_INPUT
 
@@ -35,13 +35,13 @@ class ReachError(DaqError):
 
 
 class SafetyError(DaqError):
-    """Something was refused because it is not safe now. Nothing moved."""
+    """An operation was refused because it is not safe now. Nothing moved."""
 
     exit_code = exit_codes.REFUSED
 
 
 class OrderFailedError(SafetyError):
-    """The process or the service that has the robot did not carry out an order; it has the exit code reported."""
+    """The process or service that owns the robot did not carry out an order. The exit code is the reported one."""
 
     def __init__(self, message: str, exit_code: int) -> None:
         super().__init__(message)

@@ -1,4 +1,4 @@
-"""Exit codes, the same for every program of this project (docs/command-line.md explains each)."""
+"""Exit codes of all programs of this project (docs/command-line.md explains each)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ NOT_REACHED: Final = 3
 REFUSED: Final = 4
 """Refused for safety; nothing moved."""
 FAULT: Final = 5
-"""The run ended in a fault, or data are not to be trusted."""
+"""The run ended in a fault, or data cannot be trusted."""
 STOPPED: Final = 6
 INTERRUPTED: Final = 130
-"""What shells report for a process that Ctrl-C has ended."""
+"""Exit code that shells report for a process ended by Ctrl-C."""
 
 OF_OUTCOME: Final[dict[str, int]] = {"complete": COMPLETE, "fault": FAULT, "interrupted": FAULT, "stopped": STOPPED}
 """Exit code for each outcome of a run that left a trace."""

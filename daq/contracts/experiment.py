@@ -1,4 +1,4 @@
-"""What to run: a trajectory on some joints from a start posture, with gains, holds and repeats. Angles in rad."""
+"""Experiments: a trajectory on some joints from a start posture, with gains, holds and repeats. Angles in rad."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from pydantic import BaseModel, Field, FiniteFloat, StrictBool, ValidationError,
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
-from daq.contracts.frozen import FrozenRecord, SpokenRecord
+from daq.contracts.frozen import FrozenRecord, UserRecord
 from daq.contracts.in_unit import InUnit
 from firmware_protocol.invalid import first_invalid, invalid_of
 
 JOINTS = 6
-GAIN_PLACE = 3
-"""Length of the error location of one gain: the field, the joint, which of P, I, D."""
+GAIN_LOCATION_LENGTH = 3
+"""Length of pydantic's error location of one gain: the field, the joint, which of P, I, D."""
 DEFAULT_AMPLITUDE = math.radians(21.6)
 """Amplitude of the default ramp: 21.6°, that is 80 posture units (section 6.5 of the source)."""
 DEFAULT_RAMP_TIME = 0.65
@@ -35,8 +35,8 @@ Hold = Annotated[FiniteFloat, Field(ge=0, le=3600), InUnit("s")]
 JointNumber = Annotated[int, Field(ge=1, le=JOINTS)]
 Angle = Annotated[FiniteFloat, Field(ge=-2 * math.pi, le=2 * math.pi), InUnit("rad")]
 Row = Annotated[tuple[Angle, ...], Field(fail_fast=True)]
-"""Angles of joints at one moment. Reading a long list ends at its first error (`fail_fast`): to collect a million of
-them takes minutes."""
+"""Angles of joints at one moment. Validation of a long list stops at its first error (`fail_fast`): collecting a
+million errors takes minutes."""
 Count = Annotated[int, Field(ge=0)]
 GainValue = Annotated[int, Field(ge=0, le=20)]
 Gain = tuple[GainValue, GainValue, GainValue]
@@ -47,16 +47,16 @@ Amplitude = Angle | dict[JointNumber, Angle]
 """One value for all joints of the experiment, or one per joint."""
 
 
-class _Spoken(SpokenRecord):
-    """A part of an experiment, which people make in their programs as well."""
+class _UserRecord(UserRecord):
+    """A part of an experiment. Users also construct it in Python, so validation errors become one-line SpecErrors."""
 
     @classmethod
     def words_of(cls, error: ValidationError) -> str:
-        """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
+        """States the field, what is allowed and what was given; angles in degrees, as people type them."""
         return _one_line(error)
 
 
-class Ramp(_Spoken):
+class Ramp(_UserRecord):
     """Constant speed through `amplitude` in `duration`; all joints arrive together."""
 
     kind: Literal["ramp"] = "ramp"
@@ -64,15 +64,15 @@ class Ramp(_Spoken):
     duration: Duration = DEFAULT_RAMP_TIME
 
 
-class Step(_Spoken):
+class Step(_UserRecord):
     """The whole `amplitude` at once, in one set point."""
 
     kind: Literal["step"] = "step"
     amplitude: Amplitude = math.radians(5.4)
 
 
-class Staircase(_Spoken):
-    """`steps` equal steps up through `amplitude` and, if `back`, down again, `dwell` s on each."""
+class Staircase(_UserRecord):
+    """Moves through `amplitude` in `steps` equal steps and, if `back`, down again, `dwell` s on each step."""
 
     kind: Literal["staircase"] = "staircase"
     amplitude: Amplitude = DEFAULT_AMPLITUDE
@@ -81,8 +81,9 @@ class Staircase(_Spoken):
     back: StrictBool = True
 
 
-class SlowRamp(_Spoken):
-    """Constant low speed out to `amplitude` and back, with `reversals` changes of direction. Shows friction."""
+class SlowRamp(_UserRecord):
+    """Moves at constant low speed out to `amplitude` and back, with `reversals` changes of direction. Shows
+    friction."""
 
     kind: Literal["slow_ramp"] = "slow_ramp"
     amplitude: Amplitude = math.radians(10.8)
@@ -90,7 +91,7 @@ class SlowRamp(_Spoken):
     reversals: Annotated[int, Field(ge=0, le=200)] = 3
 
 
-class Sine(_Spoken):
+class Sine(_UserRecord):
     """`cycles` of a sine about the start posture. Each joint lags `phase` rad behind the one before it."""
 
     kind: Literal["sine"] = "sine"
@@ -100,7 +101,7 @@ class Sine(_Spoken):
     phase: Angle = 0.0
 
 
-class Multisine(_Spoken):
+class Multisine(_UserRecord):
     """Sum of `tones` sines between two frequencies with seeded phases, scaled to the amplitude, faded in and out."""
 
     kind: Literal["multisine"] = "multisine"
@@ -118,7 +119,7 @@ class Multisine(_Spoken):
         return self
 
 
-class Cubic(_Spoken):
+class Cubic(_UserRecord):
     """Cubic in time through `amplitude` in `duration`, at rest at both ends."""
 
     kind: Literal["cubic"] = "cubic"
@@ -126,7 +127,7 @@ class Cubic(_Spoken):
     duration: Duration = 1.0
 
 
-class Via(_Spoken):
+class Via(_UserRecord):
     """Cubic segments through via points to the last one, at rest at both ends (section 3.7.1).
 
     `points` are angles (rad) from the start, one for all joints or one per joint; `times` (s) count from there, and the
@@ -146,7 +147,7 @@ class Via(_Spoken):
         return self
 
 
-class PickAndPlace(_Spoken):
+class PickAndPlace(_UserRecord):
     """Straight up by `lift` m, over to `amplitude` from the start, straight down: a 4-3-4 trajectory (section 3.7.2).
 
     The lift-off and set-down points are `lift` above the ends; in between joints move by polynomials of orders 4, 3 and
@@ -161,10 +162,10 @@ class PickAndPlace(_Spoken):
     place: Duration = 1.0
 
 
-class Path(_Spoken):
-    """A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear between.
+class Path(_UserRecord):
+    """A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear in between.
 
-    The first point is the start: the arm is brought there by a slow move.
+    The first point is the start, to which the arm is brought by a slow move.
     """
 
     kind: Literal["path"] = "path"
@@ -181,8 +182,8 @@ class Path(_Spoken):
         return self
 
 
-class Pause(_Spoken):
-    """No motion for `duration`: a piece of a sequence."""
+class Pause(_UserRecord):
+    """No motion for `duration` s; a part of a sequence."""
 
     kind: Literal["pause"] = "pause"
     duration: Duration
@@ -193,15 +194,15 @@ Simple = Annotated[
 ]
 
 
-class Segment(_Spoken):
-    """One piece of a sequence, on its own joints (all of the experiment's when None)."""
+class Segment(_UserRecord):
+    """One part of a sequence, on its own joints (None: on all joints of the experiment)."""
 
     move: Simple
     joints: tuple[JointNumber, ...] | None = None
 
 
-class Sequence(_Spoken):
-    """Pieces one after the other, each from where the one before ended."""
+class Sequence(_UserRecord):
+    """Parts in order, each beginning where the previous one ended."""
 
     kind: Literal["sequence"] = "sequence"
     segments: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=1000, fail_fast=True)]
@@ -213,8 +214,8 @@ Trajectory = Annotated[
 ]
 
 
-class PlainExperiment(_Spoken):
-    """An experiment whose set points are those of its motion; its fields are described at ExperimentSpec."""
+class PlainExperiment(_UserRecord):
+    """An experiment without `feedforward`. ExperimentSpec describes its fields."""
 
     trajectory: Trajectory = Ramp()
     joints: Annotated[tuple[JointNumber, ...], Field(min_length=1, max_length=JOINTS)] = (1, 2, 3)
@@ -252,18 +253,18 @@ class PlainExperiment(_Spoken):
 
 
 class TrackingError(FrozenRecord):
-    """Distance of a joint from the motion asked for: root mean square and largest, rad (m on a prismatic joint)."""
+    """Deviation of a joint from the wanted motion: root mean square and largest, rad (m on a prismatic joint)."""
 
     rms: Annotated[FiniteFloat, Field(ge=0)]
     largest: Annotated[FiniteFloat, Field(ge=0)]
 
 
 class Feedforward(FrozenRecord):
-    """Where a path's set points come from: they were computed so that the arm follows another experiment's motion.
+    """Origin of a path's set points: they were computed so that the arm follows another experiment's motion.
 
-    `asked` is that experiment. Set points were computed with the model of this identity, learned from the trace of this
-    number, or both. `expected` is the error that the arm should have; `before` that of plain set points in the model's
-    simulation, or that of the trace which was learned from.
+    `asked`: that experiment. `model`, `learned_from`: ID of the model used and of the trace learned from; at least one
+    is given. `expected`: predicted tracking error. `before`: tracking error without feedforward, either simulated or
+    measured in that trace.
     """
 
     asked: PlainExperiment
@@ -276,10 +277,9 @@ class Feedforward(FrozenRecord):
 class ExperimentSpec(PlainExperiment):
     """One experiment. The same model serves the command line, the service and the trace's metadata.
 
-    `start` gives angles (rad) of joints to be brought to before the record; joints not named go to the machine's rest
-    posture. `settle` s are held before the motion and `hold` s after it, both recorded. `record` names the joints to
-    record; None means every joint that the line has room for. `feedforward` says for which motion a path's set points
-    were computed.
+    `start`: angles (rad) of joints at the start of the record; joints not named go to the machine's rest posture.
+    `settle`, `hold`: times (s) at rest before and after the motion, both recorded. `record`: joints to record; None for
+    every joint that the line has capacity for. `feedforward`: the motion for which a path's set points were computed.
     """
 
     feedforward: Annotated[Feedforward | None, Field(exclude_if=lambda one: one is None)] = None
@@ -291,19 +291,19 @@ class ExperimentSpec(PlainExperiment):
         return self
 
     @property
-    def plain(self) -> ExperimentSpec:
-        """The experiment whose motion is wanted: this one, or the one that its set points were computed for."""
+    def wanted_motion(self) -> ExperimentSpec:
+        """The experiment whose motion is wanted: this one or, for computed set points, the one that they follow."""
         return self if self.feedforward is None else ExperimentSpec(**dict(self.feedforward.asked))
 
     @property
-    def as_asked(self) -> PlainExperiment:
-        """This experiment without word of computed set points."""
+    def without_feedforward(self) -> PlainExperiment:
+        """This experiment without its `feedforward`."""
         return PlainExperiment(**{name: getattr(self, name) for name in PlainExperiment.model_fields})
 
 
 @dataclass(frozen=True)
 class OfferedExperiment:
-    """An experiment that a diagnosis may ask for. `general`: whether it suits effects of every kind."""
+    """An experiment that a diagnosis may propose. `general`: whether it suits effects of every kind."""
 
     name: str
     description: str
@@ -312,7 +312,7 @@ class OfferedExperiment:
 
 
 def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
-    """An experiment from plain data. Raises SpecError with one line that names the field and what is allowed."""
+    """Returns an experiment from plain data. Raises a one-line SpecError that names the field and what is allowed."""
     try:
         return ExperimentSpec.model_validate(data)
     except ValidationError as error:
@@ -320,18 +320,18 @@ def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
 
 
 def _one_line(error: ValidationError) -> str:
-    """Where it is wrong, what is allowed, what was given; angles in degrees, as people type them."""
-    # What is given joint by joint is not told that it is no single number.
-    told = [one for one in error.errors() if one["type"] != "float_type" or not isinstance(one["input"], dict)]
-    first = invalid_of(told[0]) if told else first_invalid(error)
+    """States the field, what is allowed and what was given; angles in degrees, as people type them."""
+    # For a dict of values per joint, drop pydantic's error that it is not a single float.
+    relevant = [one for one in error.errors() if one["type"] != "float_type" or not isinstance(one["input"], dict)]
+    first = invalid_of(relevant[0]) if relevant else first_invalid(error)
     where, value, message = [str(part) for part in first.place], first.value, first.message
-    # Pydantic's names for the branches of a union mean nothing to a user.
+    # Pydantic's names for the branches of a union mean nothing to users.
     where = [
         part
         for i, part in enumerate(where)
         if not part.startswith(("constrained-", "function-", "dict[")) and (i != 1 or where[0] != "trajectory")
     ]
-    if "gains" in where[:1] and len(where) == GAIN_PLACE:
+    if "gains" in where[:1] and len(where) == GAIN_LOCATION_LENGTH:
         where = [f"gains of joint {where[1]}", "PID"[int(where[2])]]
     bound = next((first.bounds[key] for key in ("le", "ge") if key in first.bounds), None)
     if bound is not None and math.isclose(abs(bound), 2 * math.pi) and _fits_a_float(value):
@@ -340,16 +340,17 @@ def _one_line(error: ValidationError) -> str:
     elif not isinstance(value, str) or len(value) > LONGEST_SHOWN:
         value = shown(value)
     given = "" if isinstance(first.value, dict | BaseModel) else f" (got {value})"
-    return f"{': '.join(['.'.join(where)] * bool(where) + [message])}{given}"
+    prefix = f"{'.'.join(where)}: " if where else ""
+    return f"{prefix}{message}{given}"
 
 
 def _fits_a_float(value: object) -> bool:
-    """Whether the value is a number that can be converted to degrees; whole numbers may be larger than any float."""
+    """Whether the value can be converted to degrees; an integer may be larger than any float."""
     return isinstance(value, int | float) and abs(value) <= sys.float_info.max
 
 
 def parse_joints(text: str) -> tuple[int, ...]:
-    """Joint numbers from `1-3`, `1,3` or `1-2,5`. Raises SpecError for anything else."""
+    """Returns the joint numbers in `1-3`, `1,3` or `1-2,5`. Raises SpecError for any other text."""
     joints: set[int] = set()
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d{1,4})\s*(?:-\s*(\d{1,4})\s*)?", part)

@@ -1,6 +1,6 @@
-"""Packages that only some users need, and the line that says how to install one that is missing.
+"""Optional packages, and the error message with the command that installs a missing one.
 
-pyproject.toml says what each extra installs; docs/installing.md, which extra is for whom.
+pyproject.toml lists the packages of each extra; docs/installing.md explains who needs which.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from daq.contracts.exit_codes import WRONG_INPUT
 Extra = Literal["live", "robot", "model", "server", "tables", "ros", "cluster", "postgresql", "archive", "oidc"]
 
 CONTAINS: dict[Extra, tuple[Extra, ...]] = {"robot": ("live",), "model": ("robot", "live"), "server": ("robot", "live")}
-"""Extras whose packages an extra installs, too."""
+"""Extras that an extra includes."""
 EXTRA_OF: dict[str, Extra] = {
     "websockets": "live",
     "jinja2": "robot",
@@ -50,20 +50,20 @@ EXTRA_OF: dict[str, Extra] = {
     "obstore": "archive",
     "authlib": "oidc",
 }
-"""The smallest extra that installs a module."""
+"""The smallest extra that installs each module."""
 
 
 class MissingExtraError(DaqError):
-    """A package that is not installed, and that what was asked for needs."""
+    """A package that this operation needs is not installed."""
 
     exit_code = WRONG_INPUT
 
 
 def require_extra(extra: Extra, what: str, *packages: str) -> None:
-    """Raises MissingExtraError, with the command that installs it, where one of the packages of an extra is missing.
+    """Raises MissingExtraError, with the command to install it, if a package of an extra is missing.
 
     Args:
-        what: names what needs the packages; the error begins with it.
+        what: the feature that needs the packages; the error begins with it.
     """
     for package in packages:
         if not is_installed(package):
@@ -72,11 +72,11 @@ def require_extra(extra: Extra, what: str, *packages: str) -> None:
 
 @contextmanager
 def missing_extras_named(what: str, extra: Extra | None = None) -> Iterator[None]:
-    """Turns the failed import of a package of an extra into MissingExtraError. Any other failed import stays as it is.
+    """Turns the failed import of an extra's package into MissingExtraError. Other failed imports are raised unchanged.
 
     Args:
-        what: names what is done meanwhile; the error begins with it.
-        extra: what all of it needs. It is named in place of a smaller one, which would not suffice.
+        what: the feature in use; the error begins with it.
+        extra: the extra that the whole feature needs. It is named instead of a smaller one, which would not suffice.
     """
     try:
         yield
@@ -90,7 +90,7 @@ def missing_extras_named(what: str, extra: Extra | None = None) -> Iterator[None
 
 
 def is_installed(package: str) -> bool:
-    """Whether a package can be imported. Imports nothing."""
+    """Whether a package can be imported. It is not imported."""
     return find_spec(package) is not None
 
 

@@ -1,6 +1,6 @@
-"""The figure of a trace: position and set point, error, drive.
+"""Plots a trace: position and set point, error, drive.
 
-matplotlib is imported when a figure is made, so that nothing else waits for it.
+matplotlib is imported only when a figure is made.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ SET_POINT = "#555555"
 ALARM = "#B00020"
 GAP = "#f3d9a4"
 JOINTS_ABREAST = 3
-"""Joints side by side; further ones go into another band of panels, so that the figure fits a page."""
+"""Joints side by side. Further joints get another band of panels, so that the figure fits a page."""
 
 _ALARMS: frozenset[str] = frozenset({"limit", "restart", "link_lost", "stop", "fault"})
 _UNMARKED: frozenset[str] = frozenset({"start", "end", "note", "gains", "retry", "missing", "missed_set_point"})
-"""Kinds of event that are not marked: there may be hundreds, or they repeat what the axes show."""
+"""Kinds of event that are not marked: there may be hundreds of them, or the axes already show them."""
 _MOTIONS: frozenset[str] = frozenset({"ramp_start", "ramp_end"})
-"""The ends of a motion, whose messages say which motion it is: "sine ends"."""
+"""The ends of a motion, whose messages name the motion: "sine ends"."""
 
 STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -50,12 +50,12 @@ STYLE: dict[Any, Any] = {
     "ytick.major.width": 0.7,
     "svg.hashsalt": "ma2000-daq",
 }
-"""How it looks in print."""
+"""Style for print."""
 
 
 @dataclass(frozen=True)
 class _Row:
-    """One row of panels: what it shows and in which unit."""
+    """One row of panels: its signal and unit."""
 
     title: str
     unit: str
@@ -64,7 +64,7 @@ class _Row:
 
 
 def figure_of(trace: Recorded, joints: tuple[int, ...] | None = None) -> Figure:
-    """The figure: one row per signal, one column per joint, marks at events."""
+    """Returns the figure: one row per signal, one column per joint, marks at events."""
     import matplotlib as mpl
 
     from daq.contracts.notebook_figure import AS_WRITTEN
@@ -98,14 +98,15 @@ def _figure(trace: Recorded, joints: tuple[int, ...] | None) -> Figure:
         empty.set_visible(False)
     _legend(axes[0][0], trace)
     figure.align_ylabels()
-    shown = "".join(s if s.isprintable() else "\N{REPLACEMENT CHARACTER}" for s in title_of(trace))  # XML has no others
+    # XML allows no other characters
+    shown = "".join(s if s.isprintable() else "\N{REPLACEMENT CHARACTER}" for s in title_of(trace))
     figure.suptitle(shown, x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
     figure.supxlabel(_foot(trace, recorded), x=0.01, ha="left", fontsize=7.5, color=QUIET)
     return figure
 
 
 def _only(trace: Recorded, joints: tuple[int, ...] | None) -> Recorded:
-    """The trace with the joints to draw."""
+    """Returns the trace with only the joints to draw."""
     if joints is None:
         moved = trace.record.spec.joints if trace.record.spec else trace.joints
         joints = tuple(joint for joint in trace.joints if joint in moved) or trace.joints
@@ -130,7 +131,7 @@ def _rows(trace: Recorded) -> list[_Row]:
 
 
 def _prismatic(trace: Recorded) -> bool:
-    """Whether all joints of the trace slide; where both kinds are mixed, the unit is left to the machine."""
+    """Whether all joints of the trace are prismatic; for mixed kinds, the machine gives the unit."""
     machine = trace.record.machine
     if machine is None or max(trace.joints) > len(machine.joints):
         return False
@@ -158,8 +159,8 @@ def _draw(axes: Axes, trace: Recorded, row: _Row, column: int) -> None:
 
 
 def _limits(row: _Row, column: int) -> tuple[float, float]:
-    """Axis limits with the same span for every joint, so that joints can be compared; positions about their own
-    middle."""
+    """Axis limits with the same span for every joint, so that joints can be compared; positions are centred per
+    joint."""
     both = [row.measured] if row.wanted is None else [row.measured, row.wanted]
     low, high = np.min([s.min(axis=0) for s in both], axis=0), np.max([s.max(axis=0) for s in both], axis=0)
     if row.title != "position":
@@ -209,7 +210,7 @@ def _mark(event: RecordedEvent) -> str:
 
 
 def _labelled(trace: Recorded, column: int) -> list[RecordedEvent]:
-    """Marked events whose labels do not overlap those before; alarms take precedence."""
+    """Marked events whose labels do not overlap earlier ones; alarms take precedence."""
     apart = (trace.time[-1] - trace.time[0]) * 0.19
     marked = [e for e in trace.events if e.kind not in _UNMARKED and e.joint in (None, trace.joints[column])]
     labelled: list[RecordedEvent] = []
@@ -224,13 +225,13 @@ def _gaps(trace: Recorded) -> list[tuple[float, float]]:
 
 
 def _broken_at_gaps(trace: Recorded, signal: Floats) -> tuple[Floats, Floats]:
-    """Time and signal with a NaN in every gap, so that no line is drawn where nothing was measured."""
+    """Time and signal with a NaN in every gap, so that no line is drawn through missing samples."""
     after = np.array([row + 1 for row, _ in trace.gaps], dtype=np.intp)
     return np.insert(trace.time, after, trace.time[after - 1]), np.insert(signal, after, math.nan)
 
 
 def title_of(trace: Recorded) -> str:
-    """What was run, where, on what, and how it ended if not as it should."""
+    """Returns kind of motion, robot, source and, if it was not complete, the outcome."""
     record = trace.record
     what = (record.spec.name or record.spec.trajectory.kind) if record.spec else "trace"
     source = {"mock": "mock controller", "real": "real arm", "imported": "imported"}[record.source]

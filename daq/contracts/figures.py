@@ -9,8 +9,8 @@ class JointFigureSet(FrozenRecord):
     """Figures of one joint: angles in degrees (`unit` °), lengths in mm on a prismatic joint; times in s, drive in the
     trace's unit.
 
-    `overshoot` is how far beyond the last set point the joint went, in the direction of the motion; `rise_time` that
-    of the position between 10 and 90 % of the way; None where there is no set point, or no way.
+    `overshoot`: how far the joint went beyond the last set point, in the direction of the motion. `rise_time`: time of
+    the position from 10 to 90 % of the motion. Both are None without set points or motion.
     """
 
     joint: int

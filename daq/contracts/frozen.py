@@ -1,4 +1,4 @@
-"""Data that files and messages are made of."""
+"""Base classes of the data in files and messages."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from daq.contracts.errors import SpecError
 from firmware_protocol.invalid import first_invalid
 
 WHEN_USED = ConfigDict(defer_build=True)
-"""For a `TypeAdapter`: pydantic builds what checks it when that is used first, as it does for `FrozenRecord`s."""
+"""For a `TypeAdapter`: pydantic builds its validator on first use, as it does for `FrozenRecord`."""
 
 
 class FrozenRecord(BaseModel):
-    """Named values that do not change once made. Unknown ones are refused, never ignored."""
+    """Immutable named values. Unknown fields are rejected, never ignored."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
     shown: ClassVar[tuple[str, ...]] = ()
-    """Fields and properties that `repr` shows, for records that would fill a page; empty for all fields."""
+    """Fields and properties shown by `repr`, for records that would fill a page; empty for all fields."""
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
         if self.shown:
@@ -34,31 +34,31 @@ else:
 
 
 class _OneLine(_OfPydantic):
-    """Turns what pydantic refuses of a direct call into one line. Data that are read or sent are checked as before, by
-    whoever reads them."""
+    """Turns a ValidationError of a direct call into a one-line SpecError. Data that are read or sent are still
+    validated by their readers."""
 
     def __call__(cls, *given: Any, **named: Any) -> Any:  # noqa: N805 - of a metaclass
         try:
             return super().__call__(*given, **named)
         except ValidationError as error:
-            words = cast("type[SpokenRecord]", cls).words_of(error)
+            words = cast("type[UserRecord]", cls).words_of(error)
             raise SpecError(f"{cls.__name__}: {words}") from None
 
 
-class SpokenRecord(FrozenRecord, metaclass=_OneLine):
-    """A record that people make in their programs. Raises SpecError, in one line, for values that are refused."""
+class UserRecord(FrozenRecord, metaclass=_OneLine):
+    """A record that users construct in Python. Raises a one-line SpecError for invalid values."""
 
     @classmethod
     def words_of(cls, error: ValidationError) -> str:
-        """What is wrong, where, and what is allowed."""
+        """States what is wrong, where, and what is allowed."""
         first = first_invalid(error)
         return f"{first.where('arguments')}: {first.message} (got {first.value!r:.80})"
 
 
 def build_records() -> None:
-    """Builds what checks each record that is loaded. A process that keeps time, or stops the arm, does so before it
-    begins: to build one takes some ms, which it would otherwise take when it is used first."""
+    """Builds the validators of all loaded records, which takes some ms each. A time-critical process calls this at its
+    start, so that no validator is built on first use."""
     kinds: list[type[FrozenRecord]] = [FrozenRecord]
-    for kind in kinds:  # in the order in which they were made: what a record consists of is built before it
+    for kind in kinds:  # in order of definition: the parts of a record are built before it
         kinds += kind.__subclasses__()
         kind.model_rebuild()

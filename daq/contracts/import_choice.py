@@ -1,4 +1,4 @@
-"""What is taken from a file of another program."""
+"""Selects what to import from a file of another program."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Choice:
-    """What is taken from a recording of many things; it goes before the TOML beside it.
+    """Selects what to import from a recording; takes precedence over the TOML file beside the recording.
 
-    topic:      of a bag, the topic with the joints; needed where several have some
-    set_points: of a bag, the topic whose set points are taken beside those of `topic`
-    joints:     names of the joints to take, in the order of the trace's joints; samples without them are left out
-    received:   whether the times are those at which messages were received, in place of their own
-    drive_unit: of the drive; `none` leaves the drive out
-    map:        of a table, by signal: the columns and their unit (`daq.traces.mapping.expression`)
-    where:      of a table, the rows to take: COLUMN=VALUE or COLUMN=LOW..HIGH
-    as_guessed: whether columns are taken as their names let guess
+    topic:      in a bag, the topic with the joints; needed if several topics have some
+    set_points: in a bag, the topic of the set points, if it is not `topic`
+    joints:     names of the joints to import, in the order of the trace; samples without them are left out
+    received:   whether to use the times at which messages were received instead of their own times
+    drive_unit: unit of the drive; `none` leaves the drive out
+    map:        in a table, the columns and their unit by signal (`daq.traces.mapping.expression`)
+    where:      in a table, the rows to import: COLUMN=VALUE or COLUMN=LOW..HIGH
+    as_guessed: whether to accept the columns that were guessed from their names
     numbering:  names of a machine's joints 1, 2 …, for a recording that names no machine
     """
 

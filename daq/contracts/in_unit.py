@@ -1,4 +1,4 @@
-"""Numbers whose bounds are told with their unit."""
+"""Adds the unit to error messages about a number's bounds."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from pydantic import GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 BOUNDS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
-"""Pydantic's names of the errors of a number that is out of its bounds."""
+"""Pydantic's names of the errors for a number outside its bounds."""
 
 
 @dataclass(frozen=True)
 class InUnit:
-    """Mark of a field, behind its bounds: `Annotated[float, Field(gt=0), InUnit("s")]`."""
+    """Marks a field, after its bounds: `Annotated[float, Field(gt=0), InUnit("s")]`."""
 
     unit: str
 

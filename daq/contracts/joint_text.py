@@ -1,4 +1,4 @@
-"""Positions and speeds of joints as people read them: degrees of a joint that turns, millimetres of one that slides."""
+"""Formats positions and speeds of joints for people: degrees for revolute joints, millimetres for prismatic ones."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ def slides(machine: Machine, joint: int) -> bool:
 
 
 def position_text(machine: Machine, joint: int, value: float, digits: int = 2) -> str:
-    """A position, or a difference of two (rad; m on a prismatic joint), such as `21.60°` or `30.00 mm`."""
+    """Formats a position or position difference (rad; m on a prismatic joint), such as `21.60°` or `30.00 mm`."""
     return f"{value * MM:.{digits}f} mm" if slides(machine, joint) else f"{math.degrees(value):.{digits}f}°"
 
 
 def speed_text(machine: Machine, joint: int, value: float) -> str:
-    """A speed (rad/s; m/s on a prismatic joint), such as `33.2 °/s` or `50.0 mm/s`."""
+    """Formats a speed (rad/s; m/s on a prismatic joint), such as `33.2 °/s` or `50.0 mm/s`."""
     return f"{value * MM:.1f} mm/s" if slides(machine, joint) else f"{math.degrees(value):.1f} °/s"
 
 
 def speed_unit(machine: Machine, joint: int) -> str:
-    """Unit of a joint's speed in the files and at the service: `rad/s`, or `m/s` on a prismatic joint."""
+    """Unit of a joint's speed in files and in the service: `rad/s`, or `m/s` on a prismatic joint."""
     return "m/s" if slides(machine, joint) else "rad/s"

@@ -1,4 +1,4 @@
-"""Joints without drive: their gains are 0, nothing holds them, whatever their set points are."""
+"""Limp joints: their proportional gain is 0, so nothing holds them, whatever their set points are."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from daq.contracts.errors import SafetyError
 
 JUMP_WITHIN = 16
-"""Largest positional error (ADC counts) at which gains are written: an assumption. A limp joint that becomes stiff
-jumps by its whole error, here by 1° at most on joints 1 to 3. The static error of a held joint is smaller."""
+"""Largest positional error (ADC counts) at which gains may be written (an assumption). A limp joint that becomes stiff
+jumps by its whole error: here by at most 1° on joints 1 to 3. The static error of a held joint is smaller."""
 
-GAINS_UNKNOWN = "gains unknown (the memory map leaves them out): a limp joint cannot be seen"
-"""What is told in place of limp joints where no gains can be read."""
+GAINS_UNKNOWN = "gains unknown (the memory map lacks them): limp joints cannot be detected"
+"""Printed in place of limp joints if no gains can be read."""
 
 
 def limp_joints(gains: Mapping[int, tuple[int, int, int]]) -> list[int]:
@@ -20,26 +20,26 @@ def limp_joints(gains: Mapping[int, tuple[int, int, int]]) -> list[int]:
 
 
 def limp_line(gains: Mapping[int, tuple[int, int, int]]) -> str:
-    """One line that names the limp joints; empty when there are none."""
+    """Returns a line that names the limp joints; empty if there are none."""
     limp = limp_joints(gains)
     return f"JOINTS {', '.join(map(str, limp))} ARE LIMP (gain P is 0): nothing holds them" if limp else ""
 
 
-def doubts_line(gains: Mapping[int, tuple[int, int, int]]) -> str:
-    """Why the arm may not hold its posture: its limp joints, or that no gains can be read; empty where it does."""
+def limp_warning(gains: Mapping[int, tuple[int, int, int]]) -> str:
+    """Returns why the arm may not hold its posture: limp joints, or unknown gains; empty if it holds."""
     return limp_line(gains) if gains else GAINS_UNKNOWN
 
 
 def require_drive(gains: Mapping[int, tuple[int, int, int]]) -> None:
-    """Raises SafetyError when a joint is seen to be limp: neither keys nor programs may move such an arm. Without gains
-    none is seen."""
+    """Raises SafetyError if a joint is known to be limp: neither keys nor programs may move such an arm. Does not raise
+    if no gains are known."""
     line = limp_line(gains)
     if line:
         raise SafetyError(f"{line}; hold the arm, `daq reset --here`, then `daq gains set` them; nothing moved")
 
 
 def require_no_jump(errors: Mapping[int, int], wanted: Mapping[int, tuple[int, int, int]]) -> None:
-    """Raises SafetyError when a limp joint to be driven again is too far off its set point; `errors` in ADC counts."""
+    """Raises SafetyError if a limp joint that gets gains is too far from its set point; `errors` in ADC counts."""
     far = [
         f"joint {joint} is {errors[joint]} ADC counts"
         for joint, gain in sorted(wanted.items())

@@ -1,7 +1,7 @@
 """A machine as data: a serial chain of joints with drives, sensors, a controller and limits.
 
-Every number carries its unit and its source, and says where it is an assumption. The file that ships is
-`machines/ma2000.toml`; another rig is another file.
+Every number has its unit and its source, and is marked if it is an assumption. The packaged file is
+`machines/ma2000.toml`; other machines have other files.
 """
 
 from __future__ import annotations
@@ -65,29 +65,29 @@ def _not_zero(quantity: Quantity) -> Quantity:
 
 
 Ratio = Annotated[Plain, AfterValidator(_not_zero)]
-"""Of a gear; below 0 where motor and joint turn opposite ways."""
+"""Gear ratio; negative if motor and joint turn in opposite directions."""
 Product = Annotated[Quantity, in_unit("kg·m²")]
-"""Of inertia, of either sign."""
+"""A product of inertia, of either sign."""
 Size = Annotated[Quantity, AfterValidator(_positive)]
 Sizes = Size | tuple[Size, ...]
-"""A number for all joints, or one a joint."""
+"""One number for all joints, or one per joint."""
 
 
 class Geometry(FrozenRecord):
     """Standard Denavit–Hartenberg parameters (section 3.2 of the source): a, α, d, and the offset of θ (or d)."""
 
     a: Metre
-    """Length along the link's x axis, the common normal."""
+    """Link length a along the link's x axis, the common normal."""
     alpha: Radian
-    """Twist about x, from this joint's axis to the next one."""
+    """Twist α about x, from this joint's axis to the next one."""
     d: Metre
-    """Offset along the joint's axis; added to the position of a prismatic joint."""
+    """Offset d along the joint's axis; added to the position of a prismatic joint."""
     theta: Radian
-    """Angle about the joint's axis; added to the position of a revolute joint."""
+    """Offset θ about the joint's axis; added to the position of a revolute joint."""
 
 
 class Cylinder(FrozenRecord):
-    """A link turning about its own axis: I = ½ m r² about the joint (appendix B)."""
+    """A link that rotates about its own axis: I = ½ m r² about the joint (appendix B)."""
 
     shape: Literal["cylinder"]
     mass: Kilogram
@@ -105,7 +105,7 @@ class Rod(FrozenRecord):
 
 
 class Body(FrozenRecord):
-    """A rigid body: centre of mass in the link's own frame (m), inertia about it: xx, yy, zz, xy, xz, yz."""
+    """A rigid body: mass, centre of mass (m, in the link's frame), and inertia about it: xx, yy, zz, xy, xz, yz."""
 
     shape: Literal["body"]
     mass: Kilogram
@@ -113,34 +113,34 @@ class Body(FrozenRecord):
     centre: tuple[Metre, Metre, Metre]
     """Centre of mass in the link's own frame: x, y, z."""
     inertia: tuple[Inertia, Inertia, Inertia, Product, Product, Product]
-    """About the centre of mass: xx, yy, zz, xy, xz, yz."""
+    """Inertia about the centre of mass: xx, yy, zz, xy, xz, yz."""
 
 
 class DcMotor(FrozenRecord):
-    """Permanent-magnet DC motor behind a linear amplifier and a gear (section 7.1 of the source).
+    """Permanent-magnet DC motor with a linear amplifier and a gear (section 7.1 of the source).
 
-    `gear_ratio` is motor turns per joint turn. `dac_full_scale` is the controller's output at 127 counts.
+    `gear_ratio`: motor turns per joint turn. `dac_full_scale`: the controller's output at 127 counts.
     """
 
     kind: Literal["dc_motor"]
     resistance: Annotated[Quantity, in_unit("Ω", above=0.0)]
-    """Of the winding."""
+    """Resistance of the winding."""
     inductance: Annotated[Quantity, in_unit("H", at_least=0.0)]
-    """Of the winding; used by the effect `motor_inductance` alone."""
+    """Inductance of the winding; only the effect `motor_inductance` uses it."""
     torque_constant: Annotated[Quantity, in_unit("N·m/A", above=0.0)]
-    """Torque of the motor for a current."""
+    """Motor torque per current."""
     back_emf_constant: Annotated[Quantity, in_unit("V·s/rad", at_least=0.0)]
-    """Voltage for a speed of the motor."""
+    """Voltage per motor speed."""
     rotor_inertia: Inertia
-    """On the motor's side."""
+    """Rotor inertia, on the motor side of the gear."""
     gear_ratio: Ratio
     """Motor turns per joint turn."""
     amplifier_gain: Plain
-    """Volts at the motor for a volt of the board's output."""
+    """Motor volts per volt of the board's output."""
     dac_full_scale: Volt
-    """The board's output at 127 counts; of other controllers, with the gain, the largest voltage."""
+    """The board's output at 127 counts. With other controllers, this times `amplifier_gain` is the largest voltage."""
     supply_limit: Volt | None = None
-    """Largest voltage at the motor, behind the amplifier; none: no limit."""
+    """Largest voltage at the motor, after the amplifier; none: no limit."""
 
     @property
     def scale(self) -> DriveScale:
@@ -149,13 +149,13 @@ class DcMotor(FrozenRecord):
 
 
 class PlainGain(FrozenRecord):
-    """A drive whose force or torque is proportional to its recorded input: N·m or N per unit of drive."""
+    """A drive whose torque or force is proportional to its recorded input: N·m or N per unit of drive."""
 
     kind: Literal["gain"]
     gain: Annotated[Quantity, GAIN]
-    """Torque or force at the joint for a unit of the recorded drive (`N·m/V`, `N/N`): V, A, N·m, N, count, % or 1."""
+    """Torque or force at the joint per unit of the recorded drive (`N·m/V`, `N/N`): V, A, N·m, N, count, % or 1."""
     inertia: Annotated[Quantity, DRIVE_INERTIA, in_unit("kg·m²", "kg", at_least=0.0)] | None = None
-    """Of the drive, at the joint; kg on a sliding joint."""
+    """Inertia of the drive at the joint; mass (kg) on a prismatic joint."""
 
 
 class CurrentDrive(FrozenRecord):
@@ -163,54 +163,56 @@ class CurrentDrive(FrozenRecord):
 
     kind: Literal["current"]
     torque_constant: Annotated[Quantity, in_unit("N·m/A", above=0.0)]
-    """Torque of the motor for an ampere."""
+    """Motor torque per ampere."""
     gear_ratio: Ratio
     """Motor turns per joint turn."""
     rotor_inertia: Inertia | None = None
-    """On the motor's side."""
+    """Rotor inertia, on the motor side of the gear."""
 
 
 class Friction(FrozenRecord):
-    """Friction that is known beforehand. `viscous` is that of (7.30), on the motor's side, and multiplies the motor's
-    speed; `coulomb_arm` is μ̃ of (7.32)–(7.34), a length that multiplies the normal gravity force; `coulomb` is a plain
-    torque at the joint."""
+    """Known friction. `viscous` is that of (7.30): it multiplies the motor's speed, on the motor side. `coulomb_arm` is
+    μ̃ of (7.32)–(7.34), a length that multiplies the normal gravity force. `coulomb` is a constant torque at the
+    joint."""
 
     viscous_motor_side: Annotated[Quantity, in_unit("N·m·s/rad", at_least=0.0)] | None = None
-    """Per speed of the motor, on the motor's side."""
+    """Torque per motor speed, on the motor side."""
     viscous: Annotated[Quantity, VISCOUS] | None = None
-    """Per speed of the joint, at the joint (N·m·s/rad, N·s/m)."""
+    """Torque or force per joint speed, at the joint (N·m·s/rad, N·s/m)."""
     coulomb_arm: Annotated[Quantity, in_unit("m", at_least=0.0)] | None = None
-    """Lever of the friction that grows with the load."""
+    """Lever arm of the friction that grows with the load."""
     coulomb: Annotated[Quantity, TORQUE] | None = None
-    """Constant friction at the joint (N·m, N)."""
+    """Constant friction torque or force at the joint (N·m, N)."""
 
 
 class Sensor(FrozenRecord):
-    """Position sensor: `range` of the joint over 2^bits counts, the joint's value at count 0, the sign of counting."""
+    """Position sensor: `range` of the joint over 2^bits counts, the joint's position at count 0, the sign of
+    counting."""
 
     bits: Annotated[int, Field(ge=1, le=32)]
-    """Its range has 2^bits counts."""
+    """Resolution: the range has 2^bits counts."""
     range: Annotated[JointValue, AfterValidator(_positive)]
-    """Of the joint, over all counts."""
+    """Range of the joint over all counts."""
     at_zero: JointValue
-    """Position of the joint at count 0; a deviation turns the link against what the sensor shows."""
+    """Joint position at count 0. A deviation rotates the link against the sensor's reading."""
     direction: Literal[-1, 1] = 1
-    """1: counts grow with the position; −1: they fall."""
+    """1: counts increase with the position; −1: they decrease."""
     linearity: Plain | None = None
-    """Largest bend, as a share of the range, that a sound sensor may have."""
+    """Largest nonlinearity of a healthy sensor, as a share of the range."""
     noise: Annotated[Quantity, in_unit("count", at_least=0.0)] | None = None
-    """Standard deviation before rounding."""
+    """Standard deviation of the noise before rounding."""
     measures: Literal["position", "velocity"] = "position"
-    """A tachometer measures velocity, which is integrated from 0."""
+    """`velocity`: a tachometer, whose signal is integrated from 0."""
 
 
 class Joint(FrozenRecord):
-    """One joint with everything that belongs to it."""
+    """One joint with all its parts."""
 
     name: str
     """For people."""
     kind: Literal["revolute", "prismatic"]
-    """Turns about its z axis, or slides along it; both are the z axis of the frame before its own geometry."""
+    """Revolute: turns about its z axis; prismatic: slides along it. The axis is z of the frame before its own
+    geometry."""
     geometry: Geometry
     """See Geometry."""
     link: Annotated[Cylinder | Rod | Body, Field(discriminator="shape")]
@@ -220,7 +222,7 @@ class Joint(FrozenRecord):
     friction: Friction = Friction()
     """See Friction."""
     sensor: Sensor | None = None
-    """See Sensor; none: exact positions."""
+    """See Sensor; none: positions are exact."""
 
     @model_validator(mode="after")
     def _units_suit(self) -> Self:
@@ -242,7 +244,7 @@ class Joint(FrozenRecord):
 
     @property
     def drive_units(self) -> tuple[str, ...]:
-        """The units that its recorded drive may have: one, but for a gain that does not say it."""
+        """Units that the recorded drive may have. There is one, unless the drive is a gain without a stated unit."""
         if isinstance(self.drive, PlainGain):
             stated = drive_unit_of(self.drive.gain, self.units)
             return RECORDED_IN if stated is None else (stated,)
@@ -250,59 +252,59 @@ class Joint(FrozenRecord):
 
     @property
     def dc_motor(self) -> DcMotor:
-        """The motor. Raises SpecError when the drive is none."""
+        """The DC motor. Raises SpecError for another kind of drive."""
         if not isinstance(self.drive, DcMotor):
             raise SpecError(f"joint {self.name!r}: its drive is a {self.drive.kind}, a dc_motor is needed here")
         return self.drive
 
 
 class BoardPid(FrozenRecord):
-    """The MA2000's own controller: integer PID on ADC counts, every `period`, its output `delay` later."""
+    """The MA2000's own controller: integer PID on ADC counts once per `period`; its output acts `delay` later."""
 
     kind: Literal["board_pid"]
     period: Second
-    """Of control."""
+    """Control period."""
     delay: Second
-    """From reading a position to the change of the drive."""
+    """Time from reading a position to the change of the drive."""
     dac_counts_per_adc_count: Plain
-    """Output for an error of one count, per unit of P; a deviation is one of the gains."""
+    """Output for an error of one count, per unit of P. Its deviation is that of the gains."""
     gains: tuple[tuple[int, int, int], ...]
-    """P, I, D per joint; a record's own gains come before these."""
+    """P, I, D per joint; gains in a record replace these."""
 
 
 class SampledPid(FrozenRecord):
-    """PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) per joint. `velocity_gains` closes
-    an inner loop (cascade): the outer output is then a speed set point for it.
+    """Sampled PID in SI units: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) per joint. `velocity_gains` adds an
+    inner loop (cascade), whose set point is the output of the outer one.
 
-    The output is in the unit of the recorded drive. It is rounded to `drive_resolution`, then limited to
-    ± `output_limit` ahead of the amplifier, whose dead zone and supply limit come after; at that limit the error is not
-    integrated further. Set points are rounded to `set_point_resolution` before use. `gain_error` is relative: the
-    output is 1 + `gain_error` times what the gains say. One number for all joints, or one a joint.
+    The output has the unit of the recorded drive. It is rounded to `drive_resolution`, then limited to ±
+    `output_limit`; the amplifier's dead zone and supply limit follow. At the limit, the error is not integrated
+    further. Set points are rounded to `set_point_resolution` before use. `gain_error` is relative: the output is 1 +
+    `gain_error` times the output by the gains. All of these are one number for all joints, or one per joint.
     """
 
     kind: Literal["pid"]
     period: Second
-    """Of control."""
+    """Control period."""
     delay: Second
-    """From reading a position to the change of the drive."""
+    """Time from reading a position to the change of the drive."""
     gains: tuple[tuple[FiniteFloat, FiniteFloat, FiniteFloat], ...]
-    """P (drive's unit per rad or m), I (per rad·s), D (s/rad) per joint."""
+    """P (drive unit per rad or m), I (per rad·s), D (s/rad) per joint."""
     velocity_gains: tuple[tuple[FiniteFloat, FiniteFloat, FiniteFloat], ...] | None = None
-    """P, I, D per joint of an inner loop on speed; none: no such loop."""
+    """P, I, D per joint of an inner speed loop; none: no such loop."""
     drive_resolution: Annotated[Sizes, RECORDED] | None = None
-    """Step of the output, unit of the drive; none: not rounded."""
+    """Step of the output, in the drive's unit; none: not rounded."""
     output_limit: Annotated[Sizes, RECORDED] | None = None
-    """Largest output, unit of the drive, ahead of the amplifier; none: no limit."""
+    """Largest output, in the drive's unit, before the amplifier; none: no limit."""
     set_point_resolution: Annotated[Sizes, POSITION] | None = None
-    """Step to which set points are rounded before use, rad or m; none: not rounded."""
+    """Step to which set points are rounded before use (rad or m); none: not rounded."""
     dead_band: Annotated[Sizes, POSITION] | None = None
-    """Error, either way, on which it does not act, rad or m; none: it acts on every error."""
+    """Largest absolute error that the controller ignores (rad or m); none: no dead band."""
     gain_error: Annotated[Quantity, in_unit("1", above=-1.0)] | tuple[Plain, ...] | None = None
-    """Relative: the output is 1 + this times what the gains say; its deviation is that of the gains."""
+    """Relative gain error: the output is 1 + this times the output by the gains. Its deviation is that of the gains."""
 
 
 def of_joint(sizes: Quantity | tuple[Quantity, ...] | None, joint: int) -> Quantity | None:
-    """The number of joint `joint` (from 1), where one is stated for all joints or one a joint."""
+    """Returns the number for joint `joint` (from 1), if there is one for all joints or one per joint."""
     return sizes[joint - 1] if isinstance(sizes, tuple) else sizes
 
 
@@ -310,42 +312,42 @@ DEVIATIONS_ARE_USED_OF = (
     "lengths that are not 0, masses, centres, inertias, motor constants, gear ratio, supply and output limits, "
     "friction, at_zero, gains and delay"
 )
-"""Numbers of a machine file whose deviation becomes a tolerance parameter."""
+"""Numbers of a machine file whose deviation becomes an uncertain parameter of the model."""
 
 
 class NoController(FrozenRecord):
-    """No controller in the loop, or an unknown one: the recorded drive is the input."""
+    """No controller in the loop, or an unknown one: the recorded drive is the model's input."""
 
     kind: Literal["none"]
 
 
 class Machine(FrozenRecord):
-    """A machine file. `modelled_joints` are the joints (from 1) whose motion the model describes; the others are held
-    and their mass is part of `load`, a point mass at the end of the last modelled link."""
+    """A machine file. `modelled_joints`: the joints (from 1) whose motion the model describes. The others are held
+    still, and their mass is part of `load`, a point mass at the end of the last modelled link."""
 
     shown: ClassVar[tuple[str, ...]] = ("name", "title", "modelled_joints")
     version: Literal[1]
-    """Of the format."""
+    """Format version."""
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
-    """For files and commands."""
+    """Name for files and commands."""
     title: str
-    """For people."""
+    """Name for people."""
     notes: str = ""
-    """For people."""
+    """Remarks for people."""
     gravity: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-    """In the base's axes, m/s²."""
+    """Gravity in the base frame, m/s²."""
     joints: Annotated[tuple[Joint, ...], Field(min_length=1)]
-    """From the base on; see Joint."""
+    """Joints from the base on; see Joint."""
     modelled_joints: tuple[int, ...]
-    """1, 2, … up to the last joint that moves in the model; the others are held."""
+    """1, 2, … up to the last joint that moves in the model; the others are held still."""
     load: Kilogram | None = None
-    """A point at the end of the last modelled link, the held joints' mass included."""
+    """Point mass at the end of the last modelled link, including the mass of the held joints."""
     controller: Annotated[BoardPid | SampledPid | NoController, Field(discriminator="kind")]
     """See BoardPid, SampledPid and NoController."""
     limits: Limits = Limits()
-    """What the arm may do ([safety](safety.md)): experiments are planned within it."""
+    """Limits of the arm ([safety](safety.md)); experiments are planned within them."""
     rest_posture: tuple[Annotated[FiniteFloat, POSITION], ...] | None = None
-    """Position of every joint at rest, rad or m: where springs are expected to be slack."""
+    """Position of every joint at rest, rad or m, where springs are expected to be slack."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -376,7 +378,7 @@ class Machine(FrozenRecord):
         return self
 
     def _quantities(self) -> Iterator[tuple[str, Quantity]]:
-        """Every number of the whole machine and of the modelled joints, with its place in the file."""
+        """Yields every number of the whole machine and of the modelled joints, with its place in the file."""
         parts: list[tuple[str, object]] = [("controller", self.controller)]
         parts += [(f"joints.{j}", self.joints[j - 1]) for j in self.modelled_joints]
         while parts:
@@ -389,7 +391,7 @@ class Machine(FrozenRecord):
                 parts += [(f"{place}.{k + 1}", one) for k, one in enumerate(part)]
 
     def _takes_deviation(self, place: str) -> bool:
-        """Whether a model has a parameter for the deviation of the number at a place."""
+        """Whether a model has a parameter for the deviation of the number at this place."""
         words = place.split(".")
         if words[0] == "controller":
             return words[1] in ("delay", "gain_error", "output_limit", "dac_counts_per_adc_count")
@@ -399,12 +401,14 @@ class Machine(FrozenRecord):
         if part == "drive":
             return words[3] not in ("inductance", "amplifier_gain", "dac_full_scale")
         if part == "sensor":
-            slides = joint.kind == "prismatic" and joint.geometry.d.value != 0.0  # its zero is link's `d` itself
+            # the joint's zero is the link's `d` itself
+            slides = joint.kind == "prismatic" and joint.geometry.d.value != 0.0
             return words[3] == "at_zero" and not slides
         return True
 
     def calibration(self, joint: int) -> JointCalibration:
-        """Counts and posture units ↔ rad of joint `joint` (from 1). Raises SpecError when it has no sensor."""
+        """Returns the conversion of counts and posture units to rad for joint `joint` (from 1). Raises SpecError if it
+        has no sensor."""
         sensor = self.joint(joint).sensor
         if sensor is None:
             raise SpecError(f"machine {self.name}: joint {joint} has no sensor, so no calibration")
@@ -415,8 +419,8 @@ class Machine(FrozenRecord):
         )
 
     def drive_scale(self, joint: int) -> DriveScale:
-        """Counts of the controller's output ↔ motor volts, on joint `joint` (from 1): by the step of a sampled
-        controller's output where it is stated. Raises SpecError for a joint without a DC motor."""
+        """Returns the conversion of controller output counts to motor volts for joint `joint` (from 1). Uses the output
+        step of a sampled controller, if it is given. Raises SpecError for a joint without a DC motor."""
         motor = self.joint(joint).dc_motor
         step = of_joint(getattr(self.controller, "drive_resolution", None), joint)
         return motor.scale if step is None else DriveScale(step.value, 1.0, 1)
@@ -424,36 +428,35 @@ class Machine(FrozenRecord):
     def drive_sign(self, joint: int) -> int:
         """Sign of the drive for a positive output of the board's controller, on joint `joint` (from 1).
 
-        The controller works in counts, so on any arm that comes to rest a positive output makes the counts grow: a
-        sensor that counts down, or a gear that turns the motion round, belongs to a motor that is connected the other
-        way.
+        The controller works in counts, so on any arm that comes to rest, a positive output increases the counts. If the
+        sensor counts down, or the gear reverses the motion, the motor must be connected the other way round.
         """
         sensor, drive = self.joint(joint).sensor, self.joint(joint).drive
         counting = 1 if sensor is None else sensor.direction
         return counting if (drive.gain if isinstance(drive, PlainGain) else drive.gear_ratio).value > 0 else -counting
 
     def joint(self, number: int) -> Joint:
-        """Joint `number` (from 1). Raises SpecError when there is none."""
+        """Returns joint `number` (from 1). Raises SpecError if there is none."""
         if not 1 <= number <= len(self.joints):
             raise SpecError(f"joint {number}: {self.name} has joints 1 to {len(self.joints)}")
         return self.joints[number - 1]
 
 
 def joint_names(machine: Machine | None, joints: tuple[int, ...]) -> tuple[str, ...]:
-    """Names of joints: the machine's, or joint_1 and so on where it is not known or has fewer."""
+    """Returns the machine's names of joints, or joint_1 and so on if the machine is unknown or has fewer joints."""
     if machine is None or max(joints) > len(machine.joints):
         return tuple(f"joint_{joint}" for joint in joints)
     return tuple(machine.joint(joint).name for joint in joints)
 
 
 LONGEST_MISTAKE = 400
-"""Most characters of what is said of one mistake in a file."""
+"""Most characters in the message about one mistake in a file."""
 
 
 def parse_machine(text: str, origin: str = "machine file") -> Machine:
-    """A machine from TOML text, in the short form or in full; `origin` names the file in errors.
+    """Returns a machine from TOML text, in the short or the full form; `origin` names the file in errors.
 
-    Raises SpecError with a line for each mistake: where, the field, what was found, what is allowed.
+    Raises SpecError with a line per mistake: where, the field, what was found, what is allowed.
     """
     data = parse_toml(text, origin)
     places = places_of(text)
@@ -476,7 +479,7 @@ def parse_machine(text: str, origin: str = "machine file") -> Machine:
 
 
 def _within_a_line(words: str) -> str:
-    """The words without their middle, if what was found in the file made them very long."""
+    """Shortens a very long message by leaving out its middle."""
     return (
         words
         if len(words) <= LONGEST_MISTAKE
@@ -489,24 +492,24 @@ def _shown_place(path: Iterable[int | str]) -> Iterator[str]:
 
 
 def _named_place(words: str) -> tuple[int | str, ...]:
-    """The path of the place that the words about a whole machine begin with, if they do."""
+    """Returns the path at the beginning of a message about a whole machine, if it has one."""
     parts = words.removeprefix("machine: ").partition(" ")[0].rstrip(":").split(".")
     return tuple(int(part) - 1 if part.isdecimal() else part for part in parts)
 
 
 def load_machine(name_or_path: str) -> Machine:
-    """A shipped machine by name (`ma2000`) or any machine by the path of its file. Raises SpecError."""
+    """Returns a packaged machine by name (`ma2000`), or any machine by the path of its file. Raises SpecError."""
     if name_or_path in shipped_machines():
         return _shipped(name_or_path)
     path = Path(name_or_path)
     if not os.path.lexists(path):
         known = ", ".join(shipped_machines())
-        raise SpecError(f"machine {name_or_path!r:.200}: no such file, and not one of those that ship: {known}")
+        raise SpecError(f"machine {name_or_path!r:.200}: no such file, and not a packaged machine: {known}")
     return parse_machine(read_text(path, f"machine file {path}"), str(path))
 
 
 def shipped_machines() -> tuple[str, ...]:
-    """Names of the machines that ship."""
+    """Names of the packaged machines."""
     folder = resources.files("daq.contracts") / "machines"
     return tuple(sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")))
 

@@ -1,6 +1,6 @@
-"""The short form of a machine file, as people write it, in full as the data model wants it.
+"""Expands the short form of a machine file, as people write it, to the full form of the data model.
 
-What a drawing leaves at zero is left out, drives come from the library by name, and numbers are texts with units.
+In the short form, zeros are left out, drives are named from the library, and numbers are texts with units.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ TURN = {"value": 6.283185307179586, "unit": "rad"}
 
 
 class SpelledOut:
-    """A machine file's data in full.
+    """The full data of a machine file.
 
     Attributes:
-        data: as the data model wants them. problems: what cannot be read, by its path.
-        elsewhere: parts that are not written where they stand in the data, and where they are written.
+        data: as the data model requires. problems: unreadable entries, by path.
+        elsewhere: parts that were copied from another place of the file, and that place.
     """
 
     def __init__(self, data: Mapping[str, Any], model: type[BaseModel], places: Places) -> None:
@@ -62,7 +62,7 @@ class SpelledOut:
         machine["controller"] = controller
 
     def _take_over(self, joints: list[dict[str, Any]]) -> None:
-        """Gives a joint that is `like` another the parts of that, unless it states its own."""
+        """Copies the parts of another joint to a joint that is `like` it, except those that it states itself."""
         for k, joint in enumerate(joints):
             if "like" not in joint:
                 continue
@@ -79,7 +79,7 @@ class SpelledOut:
                 joint.update(copy.deepcopy(parts | joint))
 
     def _joint(self, joint: dict[str, Any], path: Path) -> dict[str, Any] | None:
-        """Fills in what a joint leaves out. Returns what the library says of its servo's own controller."""
+        """Adds the parts that a joint leaves out. Returns the library's data on its servo's controller."""
         slides = joint.setdefault("kind", "revolute") == "prismatic"
         servo = self._drive(joint, (*path, "drive"))
         geometry = joint.setdefault("geometry", {})
@@ -131,7 +131,7 @@ class SpelledOut:
         return servo
 
     def _at_supply(self, known: LibraryDrive, supply: Any, path: Path) -> dict[str, Any]:
-        """What the library says of a servo's own controller, whose volts are shares of the supply."""
+        """Returns the library's data on a servo's controller, whose volts are shares of the supply."""
         servo = dict(known.servo)
         if supply is None or not servo:
             return servo
@@ -149,7 +149,7 @@ class SpelledOut:
         return number if not isinstance(whole, dict) else {**whole, "value": factor * whole["value"], "source": source}
 
     def _fill_motor(self, motor: dict[str, Any], path: Path) -> None:
-        """What follows from a motor's stated numbers, and defaults."""
+        """Adds defaults, and values that follow from a motor's stated numbers."""
         for name, unit, other in (
             ("torque_constant", "N·m/A", "back_emf_constant"),
             ("back_emf_constant", "V·s/rad", "torque_constant"),
@@ -165,7 +165,7 @@ class SpelledOut:
             motor.setdefault("dac_full_scale", motor["supply_limit"])
 
     def _servo(self, stated: Mapping[str, Any], servos: list[dict[str, Any] | None]) -> dict[str, Any]:
-        """The sampled PID that the firmware of servos is, from gains as they stand in the servos' registers."""
+        """Returns the sampled PID of the servos' firmware, from gains as in the servos' registers."""
         unread = {path[1] for path, _ in self.problems if path[2:] == ("drive",)}
         without = [k + 1 for k, servo in enumerate(servos) if not servo and k not in unread]
         if without:
@@ -200,7 +200,7 @@ class SpelledOut:
         return self._scaled(limit, share["value"], f"PWM limit of {stated}") if isinstance(share, dict) else limit
 
     def _numbers(self, value: Any, notes: list[Any], path: Path, *, slides: bool) -> Any:
-        """The value with every number in it in full. notes: its type, and the marks of that."""
+        """Returns the value with every number in its full form. notes: its type, and the type's marks."""
         models, units = _kinds(notes)
         allowed = next((u.sliding if slides and u.sliding else u.allowed for u in units), ())
         if isinstance(value, list):
@@ -222,7 +222,7 @@ class SpelledOut:
         return found
 
     def _number(self, value: Any, allowed: tuple[str, ...], path: Path) -> Any:
-        """A number's fields; the value as it is where it cannot be read, which is then a problem."""
+        """Returns the fields of a number; an unreadable value is returned unchanged and noted as a problem."""
         written = self.elsewhere.get(path[:3])
         comment = self._places.comment(path if written is None else (*written, *path[3:]))
         if isinstance(value, dict):
@@ -230,7 +230,7 @@ class SpelledOut:
                 whole = value if "source" in value or not comment else {**value, "source": comment}
                 return converted(whole, allowed)
             except (ValueError, TypeError, KeyError):
-                return value  # the data model says what is wrong, or names the unit of its joint
+                return value  # the data model reports the error, or gives the unit of its joint
         try:
             return read_number(value, comment, allowed)
         except ValueError as error:
@@ -240,7 +240,7 @@ class SpelledOut:
 
 
 def _kinds(notes: list[Any]) -> tuple[list[type[BaseModel]], list[Units]]:
-    """Data models that a value may be of, and its units."""
+    """Returns the data models that a value may have, and its units."""
     models, units = [], []
     waiting = list(notes)
     while waiting:
@@ -256,7 +256,7 @@ def _kinds(notes: list[Any]) -> tuple[list[type[BaseModel]], list[Units]]:
 
 
 def _fits(model: type[BaseModel], table: Mapping[str, Any]) -> bool:
-    """Whether a table can be of a model: its kind is the model's, where both say one."""
+    """Whether a table may belong to a model: if both state a kind, the kinds agree."""
     for name in ("kind", "shape"):
         field = model.model_fields.get(name)
         if field is not None and name in table and len(get_args(field.annotation)) == 1:
@@ -265,7 +265,7 @@ def _fits(model: type[BaseModel], table: Mapping[str, Any]) -> bool:
 
 
 def _fill_link(link: dict[str, Any]) -> None:
-    """The shape that a link's numbers tell, and zeros."""
+    """Adds a link's shape, as its numbers imply, and zeros."""
     if "shape" not in link:
         body = "centre" in link or "inertia" in link
         link["shape"] = "cylinder" if "radius" in link else "body" if body else "rod"
@@ -290,7 +290,7 @@ def _list(value: Any) -> list[Any]:
 
 
 def defaults_of(machine: BaseModel) -> Iterator[str]:
-    """The places of numbers that a file has left out, and that are assumptions."""
+    """Yields the places of assumed numbers that a file leaves out."""
     waiting: list[tuple[str, Any]] = [("", machine)]
     while waiting:
         place, part = waiting.pop(0)

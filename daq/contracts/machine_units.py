@@ -1,5 +1,4 @@
-"""Units of a machine file's numbers where they depend on the joint: it turns or slides, and its drive is recorded in V
-or A."""
+"""Units of a machine file's numbers that depend on the joint: revolute or prismatic, and unit of its recorded drive."""
 
 from __future__ import annotations
 
@@ -10,7 +9,7 @@ from daq.contracts.quantity import Quantity
 from daq.contracts.written_numbers import Units
 
 RECORDED_IN = ("V", "A", "N·m", "N", "count", "%", "1")
-"""Units in which a drive may be recorded."""
+"""Units of a recorded drive."""
 TORQUE = Units(("N·m",), ("N",))
 VISCOUS = Units(("N·m·s/rad",), ("N·s/m",))
 GAIN = Units(
@@ -24,10 +23,10 @@ POSITION = Units(("rad", "m"))
 
 @dataclass(frozen=True)
 class JointUnits:
-    """Units at a joint that turns, or at one that slides.
+    """Units at a revolute or at a prismatic joint.
 
-    what: the joint, in messages. torque: of what moves it. viscous: of friction for a speed. inertia: the units that a
-    drive's moving mass at the joint may have.
+    what: the joint, in messages. torque: torque or force at the joint. viscous: friction per speed. inertia: the units
+    allowed for the moving inertia of a drive at the joint.
     """
 
     what: str
@@ -41,19 +40,19 @@ UNITS = {
     "revolute": JointUnits("a joint that turns", "rad", "N·m", "N·m·s/rad", ("kg·m²",)),
     "prismatic": JointUnits("a joint that slides", "m", "N", "N·s/m", ("kg", "kg·m²")),
 }
-"""By the kind of the joint."""
+"""Units by kind of joint."""
 
 
 def require_unit(place: str, quantity: Quantity | None, allowed: Sequence[str], what: str) -> None:
-    """Raises ValueError, with the place and the units that are `allowed` on `what`, for a number in another unit."""
+    """Raises ValueError, with the place and the units `allowed` on `what`, for a number in another unit."""
     if quantity is not None and quantity.unit not in allowed:
         listed = " or ".join(map(repr, dict.fromkeys(allowed)))
         raise ValueError(f"{place}: unit is {quantity.unit!r}, must be {listed} on {what}")
 
 
 def require_units(place: str, stated: Quantity | tuple[Quantity, ...] | None, allowed: Sequence[Sequence[str]]) -> None:
-    """Raises ValueError for a number of another unit than `allowed` on its joint; of one number for all joints, on none
-    of them."""
+    """Raises ValueError for a number in a unit that is not `allowed` on its joint; a single number applies to all
+    joints."""
     if isinstance(stated, tuple):
         for k, (one, units) in enumerate(zip(stated, allowed, strict=True), start=1):
             require_unit(f"{place}.{k}", one, units, f"joint {k}")
@@ -62,9 +61,9 @@ def require_units(place: str, stated: Quantity | tuple[Quantity, ...] | None, al
 
 
 def drive_unit_of(gain: Quantity, units: JointUnits) -> str | None:
-    """The unit of the drive that a gain is for: V of N·m/V; None where it is not written (N·m).
+    """Returns the drive's unit in a gain (V of N·m/V); None if the gain has none (N·m).
 
-    Raises ValueError, with what is allowed, for a unit that is no torque (on a joint that slides, no force) by a drive.
+    Raises ValueError, with what is allowed, for a unit that is not a torque (on a prismatic joint, a force) per drive.
     """
     torque, slash, drive = gain.unit.partition("/")
     drive = drive.removeprefix("(").removesuffix(")")

@@ -1,4 +1,4 @@
-"""A figure whose texts are shown as they are, and which a notebook shows whether or not pyplot was used before it."""
+"""A matplotlib figure that shows texts literally, and that notebooks show even if pyplot was not used before."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ OTHER_SCRIPTS = (
     "Droid Sans Fallback", "Microsoft YaHei", "SimHei", "PingFang SC", "Hiragino Sans", "Yu Gothic", "Malgun Gothic",
     "Arial Unicode MS", "Noto Sans", "Noto Sans Arabic", "Noto Sans Hebrew", "Noto Sans Devanagari",
 )  # fmt: skip
-"""Fonts that usual systems have, for characters that matplotlib's own font lacks."""
+"""Common system fonts for characters that matplotlib's own font lacks."""
 
 
 @cache
 def families() -> tuple[str, ...]:
-    """matplotlib's own font, and the installed ones of other scripts behind it."""
+    """Returns matplotlib's own font, followed by the installed fonts of other scripts."""
     installed = set(get_font_names())
     return ("DejaVu Sans", *(name for name in OTHER_SCRIPTS if name in installed))
 
@@ -34,32 +34,32 @@ def _drawable() -> frozenset[int]:
 
 
 def drawable(text: str) -> str:
-    """A text with each character that no font has as its printable escape, as `\\u6d4b`."""
+    """Replaces each character that no font has by its escape, such as `\\u6d4b`."""
     known = _drawable()
     return "".join(s if s in "\n\t" or ord(s) in known else ascii(s)[1:-1] for s in text)
 
 
 AS_WRITTEN: dict[Any, Any] = {"text.parse_math": False, "font.family": list(families())}
-"""Settings of matplotlib in which a text is never a formula: `$` in a robot's name is a dollar. They hold for texts
-that are made while they are set."""
+"""matplotlib settings in which text is never a formula, so that `$` in a robot's name is a dollar. They apply to texts
+created while they are active."""
 
 
 class NotebookFigure(Figure):
-    """A Figure of matplotlib. Notebooks learn to show figures from pyplot's first one, and print the others as text;
-    this one is not pyplot's."""
+    """A matplotlib Figure. Notebooks register a display only for pyplot's figures, and print others as text; this class
+    displays itself."""
 
     def draw(self, renderer: RendererBase) -> None:
-        """Draws it. A character that no font has is its escape: no caller can change a name."""
+        """Draws the figure. Characters that no font has are replaced by escapes, so that any name can be drawn."""
         for text in self.findobj(Text):
             text.set_text(drawable(text.get_text()))
         for axis in (axis for axes in self.axes for axis in (axes.xaxis, axes.yaxis)):
             for texts in getattr(getattr(axis.get_major_formatter(), "func", None), "args", ()):
-                if isinstance(texts, dict):  # labels by place, of which matplotlib makes texts while it draws
+                if isinstance(texts, dict):  # labels by place, from which matplotlib creates texts while it draws
                     texts.update({place: drawable(text) for place, text in texts.items()})
         super().draw(renderer)
 
     def _repr_png_(self) -> bytes:
-        """What a notebook shows."""
+        """PNG for notebooks."""
         picture = io.BytesIO()
         self.savefig(picture, format="png")
         return picture.getvalue()

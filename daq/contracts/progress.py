@@ -1,4 +1,4 @@
-"""How a long computation reports and how it is cancelled: `f(inputs, progress, cancel) → typed result`."""
+"""Progress and cancellation of a long computation: `f(inputs, progress, cancel) → typed result`."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ from collections.abc import Callable
 from typing import Protocol
 
 Progress = Callable[[float, str], None]
-"""Called with the fraction done (0 to 1) and one line that says what is being done."""
+"""Called with the fraction done (0 to 1) and a line about the current step."""
 
 
 class Cancel(Protocol):
-    """Anything with `is_set()`, such as `threading.Event`."""
+    """Any object with `is_set()`, such as `threading.Event`."""
 
     def is_set(self) -> bool:
-        """Whether the computation should end now."""
+        """Whether the computation must end now."""
         ...
 
 
 class CancelledError(Exception):
-    """The computation ended early because it was asked to."""
+    """The computation was cancelled."""
 
 
 def stop_if(cancel: Cancel) -> None:
-    """Raises CancelledError when the computation is to end."""
+    """Raises CancelledError if the computation must end."""
     if cancel.is_set():
-        raise CancelledError("it was cancelled")
+        raise CancelledError("the computation was cancelled")
 
 
 class Never:

@@ -1,4 +1,4 @@
-"""A number with its unit, its source and how well it is known."""
+"""A number with its unit, its source and its uncertainty."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from daq.contracts.written_numbers import Units
 class Quantity(FrozenRecord):
     """A value of a machine file.
 
-    `deviation` is the expected (standard) deviation between the value written here and the machine on the bench;
-    `low` and `high` bound what is physically possible. All three are None where nothing is claimed.
+    `deviation`: expected (standard) deviation between this value and the real machine. `low`, `high`: physical bounds.
+    Each is None if it is not stated.
     """
 
     value: FiniteFloat
@@ -40,7 +40,7 @@ class Quantity(FrozenRecord):
 
 
 def in_unit(unit: str, *others: str, above: float | None = None, at_least: float | None = None) -> Any:
-    """Validator that a quantity is written in `unit` (or in one of the others) and lies above (or at least at) a
+    """Returns a validator: the quantity must have `unit` (or one of the others) and lie above (or at least at) a
     bound."""
 
     def check(quantity: Quantity) -> Quantity:

@@ -1,4 +1,4 @@
-"""What of a trace its tables and its picture need, so that a trace can know these without a circle."""
+"""The interface of a trace that tables and figures use. It avoids a circular import with `daq.contracts.trace`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 
 class RecordedEvent(Protocol):
-    """An event of a trace, as `daq.contracts.trace.TraceEvent` has it."""
+    """An event of a trace, such as `daq.contracts.trace.TraceEvent`."""
 
     @property
     def time(self) -> float:
@@ -20,23 +20,23 @@ class RecordedEvent(Protocol):
 
     @property
     def kind(self) -> str:
-        """What happened."""
+        """Kind of event."""
 
     @property
     def message(self) -> str:
-        """One line."""
+        """Message, one line."""
 
     @property
     def joint(self) -> int | None:
-        """The joint that it belongs to, if to one."""
+        """The joint of the event, if it concerns one."""
 
 
 class Recorded(Protocol):
-    """A trace, as `daq.contracts.trace.Trace` has it."""
+    """A trace, such as `daq.contracts.trace.Trace`."""
 
     @property
     def record(self) -> Any:
-        """What the trace says about itself."""
+        """Metadata of the trace."""
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -52,7 +52,7 @@ class Recorded(Protocol):
 
     @property
     def set_point(self) -> NDArray[np.float64] | None:
-        """Set point (rad or m), where it was recorded, as the next three."""
+        """Set point (rad or m); None if not recorded, as for the next three."""
 
     @property
     def error(self) -> NDArray[np.float64] | None:
@@ -68,22 +68,22 @@ class Recorded(Protocol):
 
     @property
     def events(self) -> Sequence[RecordedEvent]:
-        """What happened."""
+        """Events of the record."""
 
     def column(self, joint: int) -> int:
         """Column of a joint. Raises TraceError."""
 
     @property
     def missing(self) -> int:
-        """Number of samples that are not there."""
+        """Number of missing samples."""
 
     @property
     def has_ticks(self) -> bool:
-        """Whether periods are counted, so that missing samples show."""
+        """Whether periods are counted, so that missing samples are detected."""
 
     @property
     def missing_text(self) -> str:
-        """The same for people, also where it is not known."""
+        """Text about missing samples, also if their number is unknown."""
 
     @property
     def drive_unit(self) -> str:
@@ -91,7 +91,7 @@ class Recorded(Protocol):
 
     @property
     def gaps(self) -> list[tuple[int, int]]:
-        """Row before each gap, and how many samples are missing in it."""
+        """Row before each gap, and the number of samples missing in it."""
 
     def __len__(self) -> int:
         """Number of samples."""

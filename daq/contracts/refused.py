@@ -1,4 +1,4 @@
-"""What a data model refused in a file, in one plain line: the field, what was found, what is allowed."""
+"""Formats pydantic's errors about a file: the field, what was found, what is allowed."""
 
 from __future__ import annotations
 
@@ -22,19 +22,20 @@ _TYPES = {
     "string": "text",
     "tuple": "a list",
 }
-"""What is allowed, by the first word of pydantic's name for a value of another type."""
+"""What is allowed, by the first word of pydantic's name of a type error."""
 
 
 def refused_words(error: ValidationError, model: type[BaseModel], whole: str) -> str:
-    """The first refused value of data that were read as `model`: its place, indices from 1, and what is allowed there.
+    """Returns the text about the first invalid value in data read as `model`: its place (indices from 1), and what is
+    allowed there.
 
-    whole: what is said in place of the place, where all of the data are refused.
+    whole: used instead of the place if all of the data are rejected.
     """
     return next(refusals(error, model, whole))[1]
 
 
 def refusals(error: ValidationError, model: type[BaseModel], whole: str) -> Iterator[tuple[tuple[int | str, ...], str]]:
-    """Every refused value: its path in the data, and the words of `refused_words`."""
+    """Yields every invalid value: its path in the data, and the text of `refused_words`."""
     for found in _told(error.errors()):
         unknown = found.kind == "extra_forbidden"
         place, path, models = _walk(found.place[:-1] if unknown else found.place, model)
@@ -47,8 +48,8 @@ def refusals(error: ValidationError, model: type[BaseModel], whole: str) -> Iter
 
 
 def _told(errors: Sequence[ErrorDetails]) -> Iterator[Invalid]:
-    """One of the errors of each refused value; of a value that may be of several kinds, that of the kind that fits
-    furthest. A field with a wrong name is told rather than the one that is therefore missing."""
+    """Yields one error per invalid value. If a value may have several types, it is the error of the best-fitting type.
+    A misspelt field is reported instead of the field that is therefore missing."""
     told: set[tuple[int | str, ...]] = set()
     for error in errors:
         place = error["loc"]
@@ -68,14 +69,14 @@ def _told(errors: Sequence[ErrorDetails]) -> Iterator[Invalid]:
 
 
 def _is_kind(part: int | str) -> bool:
-    """Whether a part of a place is pydantic's name for one of several kinds that a value may be of."""
+    """Whether a part of a place is pydantic's name for one of several types of a value."""
     return isinstance(part, str) and ("[" in part or part == "Quantity")
 
 
 def _walk(
     place: Sequence[int | str], model: type[BaseModel]
 ) -> tuple[list[str], list[int | str], list[type[BaseModel]]]:
-    """A place in words and as a path, without the kinds of which a value might have been; and the models of the table
+    """Returns a place in words and as a path, without the names of possible types; and the models of the table
     there."""
     named: list[str] = []
     path: list[int | str] = []
@@ -96,7 +97,7 @@ def _walk(
 
 
 def _words(first: Invalid) -> str:
-    """What was found, and what is allowed."""
+    """Returns what was found, and what is allowed."""
     if first.kind in _WORDS:
         return _WORDS[first.kind](first)
     kind, _, rest = first.kind.partition("_")
@@ -140,11 +141,11 @@ _WORDS: dict[str, Callable[[Invalid], str]] = {
     ),
     "union_tag_not_found": lambda e: f"its {e.bounds['discriminator'].strip(chr(39))} is missing",
 }
-"""By pydantic's name of the rule that is broken."""
+"""Messages by pydantic's error type."""
 
 
 def _of_kind(models: Sequence[type[BaseModel]], tag: str) -> list[type[BaseModel]]:
-    """Those of several models that a tag stands for; none where the part of a place is a field."""
+    """Returns the models with this tag; empty if the part of the place is a field."""
     if len(models) < 2:
         return []
     return [m for m in models if any(_is_tag(field.annotation, tag) for field in m.model_fields.values())]
@@ -155,7 +156,7 @@ def _is_tag(annotation: Any, tag: str) -> bool:
 
 
 def _models_at(model: type[BaseModel], field: str) -> Iterator[type[BaseModel]]:
-    """The data models that the value of a field may be."""
+    """Yields the data models that a field's value may have."""
     waiting: list[Any] = [model.model_fields[field].annotation]
     while waiting:
         annotation = waiting.pop(0)

@@ -1,4 +1,4 @@
-"""One sample on its way from the controller to a trace, a screen or a guard."""
+"""One sample, as passed from the controller to traces, views and guards."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class SampleRow:
-    """One control period of some joints, in SI units, one value per joint, in the order of the trace's joints.
+    """One control period of some joints in SI units: one value per joint, in the order of the trace's joints.
 
-    `time` is tick · period, in s from the record's first tick: the board's own time. `host_time` is the host's
-    monotonic clock (s) when the sample arrived. `set_point` is what the controller took in this period, not what was
-    sent, and `taken` the number of the first period that used it, 0 where that is not known. `status` holds the board's
-    flags (`firmware_protocol.commands.StatusFlag`). `velocity` is empty on a rig that does not measure it, such as the
+    `time`: tick · period, in s from the record's first tick, by the board's clock. `host_time`: the host's monotonic
+    clock (s) at the sample's arrival. `set_point`: the one that the controller used in this period, not the one that
+    was sent. `taken`: number of the first period that used it, 0 if unknown. `status`: the board's flags
+    (`firmware_protocol.commands.StatusFlag`). `velocity`: empty on a machine that does not measure it, such as the
     MA2000.
     """
 
@@ -31,20 +31,20 @@ class SampleRow:
 
 
 class SampleCount:
-    """Counts the samples that are missing where one is asked for in every `every` control periods.
+    """Counts missing samples if one sample is requested per `every` control periods.
 
-    A sample that is less than half its distance late is late, and not missing: its tick says when it was taken. But
-    lateness adds up: where every sample is a third of the distance late, every fourth one is missing. A sample that
-    comes early makes up for half a distance at most.
+    A sample that is late by less than half this distance is not missing: its tick shows when it was taken. But delays
+    add up: if every sample is a third of the distance late, every fourth one is missing. A sample that comes early
+    compensates for at most half a distance.
     """
 
     def __init__(self, every: int) -> None:
         self.every = every
         self._late = 0.0
-        """Periods by which the newest sample is beside its place; negative: before it."""
+        """Periods by which the newest sample is late; negative: early."""
 
     def missing(self, step: int) -> int:
-        """How many samples are missing between the sample before and one that is `step` periods newer."""
+        """Returns how many samples are missing between the previous sample and one that is `step` periods newer."""
         late = max(self._late + step - self.every, -self.every / 2)
         lost = max(0, math.floor(late / self.every + 0.5))
         self._late = late - lost * self.every

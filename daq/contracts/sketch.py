@@ -1,4 +1,4 @@
-"""What a notebook shows of a trace: facts and a small picture, in HTML without scripts."""
+"""HTML for notebooks: facts of a trace and a small picture, without scripts."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from daq.contracts.tables import is_prismatic
 
 WIDTH, HEIGHT, MARGIN = 420, 110, 6
 MOST_POINTS = 300
-"""Points of a line: more would not show in the picture's width."""
+"""Most points of a line; more would not be visible at the picture's width."""
 JOINT_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#A07800", "#4B4B9B")
-"""Colours of the joints: those of Okabe and Ito, which colour-blind readers can distinguish; yellow darkened for
-paper."""
+"""Colours of the joints by Okabe and Ito, which colour-blind readers can distinguish; yellow is darkened for paper."""
 
 
 def name_of(trace: Recorded) -> str:
-    """What people call it: its experiment's name, or else kind of motion; the robot, where it is of no experiment."""
+    """Returns the name of the trace for people: its experiment's name, else the kind of motion; without an experiment,
+    the robot."""
     spec = trace.record.spec
     return str(trace.record.robot if spec is None else spec.name or spec.trajectory.kind)
 
 
 def html_of(trace: Recorded) -> str:
-    """Facts, how far each joint moved from its first position over time, and its range. Every text is escaped."""
+    """Returns facts, a plot of each joint's distance from its first position over time, and its range. Every text is
+    escaped."""
     record, name = trace.record, name_of(trace)
     facts = f"{len(trace)} samples, {trace.missing_text}, {record.outcome or 'no outcome'}"
     head = f"<b>{escape(name)}</b> <code>{escape(record.trace_id)}</code> · {escape(facts)}"
@@ -34,7 +35,7 @@ def html_of(trace: Recorded) -> str:
 
 
 def _picture(trace: Recorded) -> str:
-    """Lines in a frame, with the first and the last time (s) below it; frame and text have the page's own colour."""
+    """Draws lines in a frame with the first and the last time (s) below; frame and text have the page's colour."""
     title = f"How far joints {', '.join(map(str, trace.joints))} moved over time"
     found = [f"<title>{title}</title>"]
     frame = f'width="{WIDTH - 1}" height="{HEIGHT - 1}" fill="none" stroke="currentColor" stroke-opacity="0.3"'
@@ -55,7 +56,7 @@ def _picture(trace: Recorded) -> str:
 
 
 def _key(trace: Recorded) -> str:
-    """Colour, number, name and range of each joint."""
+    """Returns colour, number, name and range of each joint."""
     found = []
     names = joint_names(trace.record.machine, trace.joints)
     for column, (joint, name) in enumerate(zip(trace.joints, names, strict=True)):
@@ -69,9 +70,9 @@ def _key(trace: Recorded) -> str:
 
 
 def _range(trace: Recorded, column: int) -> tuple[float, float, str]:
-    """Least and greatest position of a joint in degrees or mm, as people read them, with the unit."""
+    """Smallest and largest position of a joint in degrees or mm, with the unit."""
     scale, unit = (1000.0, " mm") if is_prismatic(trace, trace.joints[column]) else (180 / np.pi, "°")
-    values = (trace.position[:, column] * scale).round(1) + 0.0  # which turns -0.0 into 0.0
+    values = (trace.position[:, column] * scale).round(1) + 0.0  # turns -0.0 into 0.0
     return float(values.min()), float(values.max()), unit
 
 
@@ -80,8 +81,8 @@ def _colour(joint: int) -> str:
 
 
 def _moved(trace: Recorded) -> NDArray[np.float64]:
-    """Positions (n, joints) since the first sample, as shares of the widest range among joints of the same kind and
-    shifted into 0 to 1: so a joint at rest is a straight line, whatever its sensor's noise."""
+    """Positions (n, joints) since the first sample, scaled to 0 to 1 by the widest range among joints of the same kind.
+    A joint at rest is therefore a straight line, whatever its sensor noise."""
     found: NDArray[np.float64] = trace.position - trace.position[0]
     slides = np.array([is_prismatic(trace, joint) for joint in trace.joints])
     for kind in (slides, ~slides):

@@ -1,4 +1,4 @@
-"""What `daq status --json` prints, whether this process has the robot or a service has it."""
+"""Data of `daq status --json`, for a robot of this process or of a service."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from daq.contracts.service.robot import (
 
 
 class StatusReport(Wire):
-    """One robot at one moment: the fields of the service's `RobotStatus`, by the same names.
+    """One robot at one moment: the fields of the service's `RobotStatus`, with the same names.
 
-    `server` is the service that has the robot, None where the command itself looked; there is no queue then, and nobody
-    who could hold its control.
+    `server`: the service that owns the robot; None if the command itself read the status. Then there is no queue and no
+    control.
     """
 
     server: str | None = None
@@ -45,6 +45,6 @@ class StatusReport(Wire):
 
 
 def report_of(status: RobotStatus, server: str) -> StatusReport:
-    """The report of a service's status; fields that only a newer service has are left out."""
+    """Returns the report of a service's status, without fields that only a newer service has."""
     fields = {name: getattr(status, name) for name in StatusReport.model_fields if name != "server"}
     return StatusReport(server=server, **fields)

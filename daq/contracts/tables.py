@@ -1,4 +1,4 @@
-"""Traces as tables of pandas and arrays of xarray, with units and circumstances as attributes."""
+"""Converts traces to pandas tables and xarray datasets, with units and metadata as attributes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BY_SAMPLE = ("tick", "host_time", "status", "taken")
 
 
 def units_of(trace: Recorded) -> dict[str, str]:
-    """Unit of each signal; where joints of both kinds are mixed, `rad or m`."""
+    """Unit of each signal; `rad or m` if joints of both kinds are mixed."""
     length = _unit_of_position(trace)
     own = {"position": length, "set_point": length, "error": length, "velocity": f"({length})/s"}
     if " " not in length:
@@ -29,7 +29,7 @@ def units_of(trace: Recorded) -> dict[str, str]:
 
 
 def attributes_of(trace: Recorded) -> dict[str, Any]:
-    """What a table says of its trace, in types that every file format has."""
+    """Metadata of the trace, in types that every file format supports."""
     record = trace.record
     found = {
         "trace_id": record.trace_id,
@@ -48,9 +48,10 @@ def attributes_of(trace: Recorded) -> dict[str, Any]:
 
 
 def to_pandas(trace: Recorded) -> pd.DataFrame:
-    """One row a sample, indexed by time (s), one column a signal and joint, named as in CSV: `position_1`.
+    """Returns one row per sample, indexed by time (s), and one column per signal and joint, named as in CSV:
+    `position_1`.
 
-    `attrs` has the units by column, and what the trace says of itself. Raises MissingExtraError.
+    `attrs` has the units by column, and the trace's metadata. Raises MissingExtraError.
     """
     require_extra("tables", "to_pandas()", "pandas")
     import pandas as pd
@@ -72,7 +73,7 @@ def to_pandas(trace: Recorded) -> pd.DataFrame:
 
 
 def to_xarray(trace: Recorded) -> xr.Dataset:
-    """Signals over `time` (s) and `joint` (numbers, with names beside), with their units. Raises MissingExtraError."""
+    """Returns signals over `time` (s) and `joint` (numbers, with names), with their units. Raises MissingExtraError."""
     require_extra("tables", "to_xarray()", "xarray")
     import xarray as xr
 
@@ -91,7 +92,7 @@ def to_xarray(trace: Recorded) -> xr.Dataset:
 
 
 def is_prismatic(trace: Recorded, joint: int) -> bool:
-    """Whether a joint slides; one of an unknown machine turns."""
+    """Whether a joint is prismatic; False if the machine is unknown."""
     machine = trace.record.machine
     return machine is not None and joint <= len(machine.joints) and machine.joint(joint).kind == "prismatic"
 

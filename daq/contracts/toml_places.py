@@ -1,4 +1,4 @@
-"""Where in a TOML text each value stands, and what is written behind it: what `tomllib` does not tell."""
+"""Finds the line of each value in a TOML text, and the comment after it, which `tomllib` does not provide."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _TOKEN = re.compile(
 class Places:
     """Lines (from 1) of a TOML text.
 
-    lines: of each key and list entry, by its path. comments: behind something, by line. alone: lines that are comments,
-    with their `#`, by their number.
+    lines: line of each key and list entry, by path. comments: comments after a value, by line. alone: whole-line
+    comments, with their `#`, by line.
     """
 
     lines: dict[Path, int] = field(default_factory=dict)
@@ -29,16 +29,16 @@ class Places:
     alone: dict[int, str] = field(default_factory=dict)
 
     def line(self, path: Sequence[str | int]) -> int | None:
-        """The line of the value at a path, or of the innermost part of the path that is written."""
+        """Returns the line of the value at a path, or of the innermost part of the path that exists."""
         return next((self.lines[own] for n in range(len(path), 0, -1) if (own := tuple(path[:n])) in self.lines), None)
 
     def comment(self, path: Sequence[str | int]) -> str:
-        """What is written behind the value at a path, in its line."""
+        """Returns the comment after the value at a path, on the same line."""
         return self.comments.get(self.line(path) or 0, "")
 
 
 def places_of(text: str) -> Places:
-    """The places of a text that `tomllib` has parsed."""
+    """Returns the places of a text that `tomllib` has parsed."""
     return _Scan(text).places
 
 
@@ -74,7 +74,7 @@ class _Scan:
         return text
 
     def _skip_lines(self) -> bool:
-        """Goes on to what is no comment and no end of a line; whether there is any."""
+        """Skips comments and line ends. Returns whether any text follows."""
         while self._at < len(self._tokens) and self._tokens[self._at][0] in ("newline", "comment"):
             self._next()
         return self._at < len(self._tokens)

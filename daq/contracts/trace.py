@@ -1,4 +1,4 @@
-"""A recorded experiment in memory: what was asked, what was measured, when, and under which circumstances."""
+"""A recorded experiment in memory: its specification, measured signals, times and metadata."""
 
 from __future__ import annotations
 
@@ -31,47 +31,47 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 TRACE_FORMAT = 2
-"""Version of the trace's metadata and topics; a reader refuses newer ones. Format 1 had events and joint states in
+"""Version of a trace's metadata and topics; a reader refuses newer versions. Format 1 had events and joint states in
 JSON."""
 
 BY_JOINT = ("position", "set_point", "error", "drive", "velocity", "power_raw")
 """Signals of a trace with a column for each joint."""
 
 EventKind = Literal[
-    "start",
-    "ramp_start",
+    "start",  # of the record
+    "ramp_start",  # of any motion
     "ramp_end",
-    "reversal",
-    "gains",
-    "limit",
-    "pause",
-    "resume",
-    "retry",
-    "missing",
-    "missed_set_point",
-    "restart",
+    "reversal",  # the motion changes direction
+    "gains",  # changed for this run, or restored
+    "limit",  # a set point waits for a joint at its following-error limit
+    "pause",  # set points wait
+    "resume",  # set points continue
+    "retry",  # the link repeated requests
+    "missing",  # samples that were not delivered
+    "missed_set_point",  # sent in time, but the controller could not read it; sent late: LATE_SET_POINTS
+    "restart",  # of the board
     "link_lost",
     "stop",
     "fault",
     "note",
-    "end",
+    "end",  # of the record
 ]
 
 
 SLOW_LINE = "slow line: "
-"""Beginning of the note that not every control period is sampled. It is shown also where other notes are not."""
+"""Prefix of the note that not every control period is sampled. It is shown even where other notes are hidden."""
 INCOMPLETE = "INCOMPLETE: "
-"""Beginning of the note on what an imported file promises, or once held, and does not give."""
+"""Prefix of the note about data that an imported file announces but lacks."""
 LATE_SET_POINTS = "late_set_points"
-"""Counter of the control periods that used an older set point than the one that was sent for them. A record lacks it
-where that is not known."""
+"""Counter of the control periods that used an older set point than the one sent for them. A record lacks it if the
+number is unknown."""
 
 
 LATE_WORDS = "set points taken a period late, or not at all"
 
 
 def late_set_points_line(count: float) -> str:
-    """What set points that were sent late mean, for people; `count` of them."""
+    """Returns the warning text for `count` late set points."""
     return (
         f"{count:.0f} {LATE_WORDS}: they were sent late, so the motion was "
         "played with a jolt there; is the computer busy?"
@@ -83,20 +83,20 @@ EARLIEST, LATEST = datetime(1970, 1, 1, tzinfo=UTC), datetime(2262, 1, 1, tzinfo
 
 
 def _stamped_by_64_bits(moment: datetime) -> datetime:
-    """Raises ValueError for a moment outside of EARLIEST to LATEST."""
-    # Compared and not converted: near the year 9999 a moment may have no UTC.
+    """Raises ValueError for a moment outside EARLIEST to LATEST."""
+    # Compare, do not convert: `astimezone` overflows near the year 9999.
     aware = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
     if not EARLIEST <= aware < LATEST:
-        raise ValueError("a moment of the years 1970 to 2261 is expected")
+        raise ValueError("must be a time of the years 1970 to 2261")
     return moment
 
 
 Moment = Annotated[datetime, AfterValidator(_stamped_by_64_bits)]
-"""A moment at which a trace can have been recorded."""
+"""A time at which a trace can have been recorded."""
 
 
 class TraceEvent(FrozenRecord):
-    """Something that happened during the record. `time` is in s from the record's start."""
+    """An event during the record. `time` is in s from the start of the record."""
 
     time: float
     kind: EventKind
@@ -106,12 +106,12 @@ class TraceEvent(FrozenRecord):
 
 
 class TraceRecord(FrozenRecord):
-    """What a trace says about itself: the metadata record at the start of the file, and at its end the outcome."""
+    """Metadata of a trace: the metadata record at the start of the file and, at its end, the outcome."""
 
     format: Annotated[int, Field(le=TRACE_FORMAT)] = TRACE_FORMAT
     trace_id: str
     created: Moment
-    """UTC of the record's start, `time` = 0."""
+    """Start of the record in UTC, `time` = 0."""
     software: str
     source: Literal["mock", "real", "imported"]
     robot: str = "ma2000"
@@ -119,18 +119,18 @@ class TraceRecord(FrozenRecord):
     machine: Machine | None = None
     memory_map: dict[str, object] | None = None
     joint_names: Annotated[tuple[str, ...], Field(exclude_if=lambda names: not names)] = ()
-    """What an imported file calls the joints, in the order of the columns; empty where it does not name them."""
+    """Joint names of an imported file, in the order of the columns; empty if it has none."""
     columns: Annotated[dict[str, str], Field(exclude_if=lambda columns: not columns)] = {}
-    """What each signal was taken from in a table of another program, by signal; empty for all other files."""
+    """Source columns of each signal in an imported table; empty for all other files."""
     joints_chosen: Annotated[bool, Field(exclude_if=lambda chosen: not chosen)] = False
-    """Whether a person gave the order of the joints, so that names may be others than the machine's."""
+    """Whether a person gave the order of the joints, so that names may differ from the machine's."""
     spec: ExperimentSpec | None = None
     gains: dict[int, ReportedGain] | None = None
-    """P, I, D of each joint, as the controller reported them."""
+    """P, I, D of each joint, as reported by the controller."""
     period: float | None = None
-    """Control period (s); None where the record was not made tick by tick."""
+    """Control period (s); None if the record has no control periods."""
     every: Annotated[int, Field(ge=1, exclude_if=lambda every: every == 1)] = 1
-    """Control periods from one sample to the next: more than one where the line to the controller was slow."""
+    """Control periods from one sample to the next: more than one on a slow line."""
     drive_unit: Literal["V", "A", "N·m", "N"] | None = None
     clock: dict[str, float] = {}
     """Offsets between the board's ticks, the host's monotonic clock and UTC, in s."""
@@ -146,20 +146,20 @@ class Trace(WithArrays):
 
     time:      (n,)   s from the start of the record, strictly increasing
     position:  (n, j) rad (m on a prismatic joint)
-    set_point: (n, j) rad, as the controller took it in that period; None where the record has none
-    error:     (n, j) rad, set point − position as the controller formed it
-    drive:     (n, j) motor volts after the amplifier, or A, N·m, N where `record.drive_unit` says so. Positive volts
-               turn the joint to larger angles, whichever way its sensor counts, unless its gear ratio is negative
-    velocity:  (n, j) rad/s
+    set_point: (n, j) rad (m), as the controller used it in that period; None if not recorded
+    error:     (n, j) rad (m), set point − position, as computed by the controller
+    drive:     (n, j) motor volts after the amplifier, or the unit in `record.drive_unit`: A, N·m, N. Positive drive
+                      increases the angle (with a negative gear ratio, decreases it)
+    velocity:  (n, j) rad/s (m/s)
     power_raw: (n, j) the controller's output before the amplifier, DAC counts
-    tick:      (n,)   number of the control period; a step in which a sample is missing (`SampleCount`) is a gap
+    tick:      (n,)   number of the control period; a step that skips a sample (`SampleCount`) is a gap
     host_time: (n,)   s, the host's monotonic clock when the sample arrived
     status:    (n,)   the board's flags (`firmware_protocol.commands.StatusFlag`)
-    taken:     (n,)   number of the first control period that used the sample's set points, 0 where it is not known;
-                      None where every period has a sample, which shows it
-    file:             what whoever named the file calls it, for messages; empty where that is not known
+    taken:     (n,)   number of the first control period that used the sample's set points, 0 if unknown. None if every
+                      period was sampled: the set point is then seen in the sample itself
+    file:             path as given by the user, for messages; empty if unknown
 
-    Raises TraceError when shapes disagree, time does not increase, or a value is not finite.
+    Raises TraceError if shapes disagree, time does not increase, or a value is not finite.
     """
 
     record: TraceRecord
@@ -179,20 +179,20 @@ class Trace(WithArrays):
     file: str = field(default="", compare=False)
 
     def __repr__(self) -> str:
-        """One line: a notebook shows it, and an array of every signal would fill the page."""
+        """One line, for notebooks: arrays of all signals would fill the page."""
         record = self.record
         span = f"{self.time[-1] - self.time[0]:.1f} s" if len(self.time) else "0 s"
         joints = ", ".join(map(str, self.joints))
         return f"<Trace {record.trace_id}: {name_of(self)}, {len(self.time)} samples in {span}, joints {joints}>"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: facts and a small picture."""
+        """HTML for notebooks: facts and a small picture."""
         return html_of(self)
 
     def plot(self, joints: tuple[int, ...] | None = None) -> Figure:
-        """The figure, one column a joint: those that the experiment moves, unless `joints` names others.
+        """Plots the trace, one column per joint: the joints that the experiment moves, unless `joints` names others.
 
-        Raises TraceError for a joint that the trace does not have, and for a trace without samples; MissingExtraError.
+        Raises TraceError for a joint that the trace lacks, and for a trace without samples; MissingExtraError.
         """
         from daq.contracts.figure import figure_of
 
@@ -202,11 +202,11 @@ class Trace(WithArrays):
         return figure_of(self, joints)
 
     def to_pandas(self) -> pd.DataFrame:
-        """A table with one row a sample, indexed by time (s); units in `attrs`. Raises MissingExtraError."""
+        """Returns a table with one row per sample, indexed by time (s); units in `attrs`. Raises MissingExtraError."""
         return tables.to_pandas(self)
 
     def to_xarray(self) -> xr.Dataset:
-        """Arrays over time and joint, with units and circumstances as attributes. Raises MissingExtraError."""
+        """Returns arrays over time and joint, with units and metadata as attributes. Raises MissingExtraError."""
         return tables.to_xarray(self)
 
     def __post_init__(self) -> None:
@@ -233,50 +233,50 @@ class Trace(WithArrays):
 
     @property
     def called(self) -> str:
-        """What messages call the trace: its file where that is known, else its number."""
+        """Name of the trace in messages: its file if known, else its ID."""
         return self.file or f"trace {self.record.trace_id}"
 
     @property
     def missing(self) -> int:
-        """Number of samples that are not there between the first and the last."""
+        """Number of missing samples between the first and the last."""
         return sum(lost for _, lost in self.gaps)
 
     @property
     def drive_unit(self) -> str:
-        """Unit of the drive, for people: old recordings state none, and are in volts."""
+        """Unit of the drive for people. Old recordings state none; they are in volts."""
         return self.record.drive_unit or ("V" if self.record.source != "imported" else "unit not stated")
 
     @property
     def has_ticks(self) -> bool:
-        """Whether its control periods are counted, so that missing samples show."""
+        """Whether control periods are counted, so that missing samples are detected."""
         return self.tick is not None
 
     @property
     def missing_text(self) -> str:
-        """Whether samples are missing, for people; without ticks what the times between samples show."""
+        """Text about missing samples; without ticks, about the times between samples."""
         if self.tick is not None or len(self) < 2:
             return f"{self.missing} missing"
         steps = np.diff(self.time)
         usual, longest = float(np.median(steps)), int(steps.argmax())
         line = f"usually {usual:.4g} s apart, at most {steps[longest]:.4g} s (after {self.time[longest]:.4g} s)"
-        return f"{line}; it has no ticks, so whether some are missing is not known"
+        return f"{line}; it has no ticks, so missing samples cannot be detected"
 
     @property
     def gaps(self) -> list[tuple[int, int]]:
-        """Row before each gap, and how many samples are missing in it (`SampleCount`)."""
+        """Row before each gap, and the number of samples missing in it (`SampleCount`)."""
         if self.tick is None or len(self) == 0:
             return []
         steps, every = np.diff(self.tick.astype(np.int64)), self.record.every
-        if every == 1:  # no sample is late without that another is missing; records may have millions of them
+        if every == 1:  # a late sample then always means a missing one; fast path for long records
             rows = np.flatnonzero(steps > 1)
             return [(int(row), int(steps[row]) - 1) for row in rows]
         count = SampleCount(every)
         return [(row, lost) for row, step in enumerate(steps.tolist()) if (lost := count.missing(step))]
 
     def column(self, joint: int) -> int:
-        """Column of joint `joint` (from 1). Raises TraceError when the trace has none."""
+        """Returns the column of joint `joint` (from 1). Raises TraceError if the trace lacks it."""
         if joint not in self.joints:
-            raise TraceError(f"{self.called}: joint {joint} is not in it; it has {self.joints}")
+            raise TraceError(f"{self.called}: joint {joint} is not recorded; the joints are {self.joints}")
         return self.joints.index(joint)
 
 
@@ -284,6 +284,6 @@ Traces = Trace | Sequence[Trace]
 """One trace, or several."""
 
 
-def several(traces: Traces) -> Sequence[Trace]:
-    """The traces, where one stands for a list of one."""
+def as_sequence(traces: Traces) -> Sequence[Trace]:
+    """Wraps a single trace in a tuple."""
     return (traces,) if isinstance(traces, Trace) else traces

@@ -1,4 +1,4 @@
-"""A file that is written whole or not at all, whatever ends the process or the power."""
+"""Writes a file completely or not at all, even if the process or the power fails."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from pathlib import Path
 
 @contextmanager
 def replacing(path: Path, *, synced: bool = True) -> Iterator[Path]:
-    """Yields a file beside `path` to write to. At the end it replaces `path` in one step.
+    """Yields a file beside `path` to write to. At the end, it replaces `path` in one step.
 
-    The old file stays until then, and stays when the block raises. `synced`: the content and the name are on the disk
-    when the block has ended. Raises OSError when the file cannot be written.
+    The old file stays until then, and if the block raises. `synced`: content and name are on the disk when the block
+    has ended. Raises OSError if the file cannot be written.
     """
-    final = path.resolve()  # a link stays, and points at the new file
+    final = path.resolve()  # a symbolic link stays, and points at the new file
     part = final.with_name(f".{final.name}.{os.getpid()}.part")
     try:
         yield part
@@ -31,7 +31,7 @@ def replacing(path: Path, *, synced: bool = True) -> Iterator[Path]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Syncs the names in a folder to the disk."""
+    """Writes the file names of a folder to the disk."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(descriptor)

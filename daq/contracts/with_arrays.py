@@ -1,4 +1,4 @@
-"""Equality of data classes that hold arrays, which Python's own `==` cannot compare."""
+"""Equality of data classes with arrays, which `==` alone cannot compare."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 
 class WithArrays:
-    """A data class, made with `eq=False`, that equals another of its class with the same values in every field that is
-    compared; arrays are compared number by number. It can be a member of sets and a key."""
+    """A data class, made with `eq=False`. It equals another of its class if all compared fields are equal; arrays are
+    compared element by element. It is hashable."""
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):

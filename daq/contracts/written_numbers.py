@@ -1,4 +1,4 @@
-"""Numbers as people write them in a machine file: `"0.8 ± 0.08 kg, scales"`."""
+"""Parses numbers as people write them in a machine file: `"0.8 ± 0.08 kg, scales"`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import pint
 
 UNSTATED = "source not stated"
-"""Source of a number behind which nothing is written."""
+"""Source of a number without a comment."""
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _WRITTEN = re.compile(
     rf"(?P<value>{_NUMBER})\s*(?:(?:±|\+/?-)\s*(?P<deviation>{_NUMBER})\s*(?P<percent>%(?=\s*[^\s,\[%]))?)?"
@@ -30,16 +30,16 @@ _COMMON = {
     ("ms", "s"): 1e-3,
     ("mH", "H"): 1e-3,
 }
-"""Factors of common units; files that use no others load without pint, whose import takes half a second."""
+"""Factors of common units. Files with only these load without pint, whose import takes 0.5 s."""
 NUMBERS = ("value", "low", "high", "deviation")
 """Fields of a number that have its unit."""
 
 
 @dataclass(frozen=True)
 class Units:
-    """The units that a field's number may have in the model, as a mark of its type.
+    """Marks a type with the units that its number may have in the model.
 
-    sliding: those on a joint that slides, where they are others.
+    sliding: the units on a prismatic joint, if they differ.
     """
 
     allowed: tuple[str, ...]
@@ -47,14 +47,14 @@ class Units:
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is a number as people write it."""
+    """Whether a text has the form of a number with unit."""
     return _WRITTEN.fullmatch(_plain_signs(text)) is not None
 
 
 def read_number(written: str | float, comment: str, allowed: Sequence[str]) -> dict[str, Any]:
-    """The fields of a `Quantity` for a number as it is written, in the first of the `allowed` units that suits it.
+    """Returns the fields of a `Quantity` for a written number, in the first of the `allowed` units that it converts to.
 
-    comment: the source of a number that states none. Raises ValueError.
+    comment: the source, if the number states none. Raises ValueError.
     """
     text = _plain_signs(written) if isinstance(written, str) else repr(float(written))
     match = _WRITTEN.fullmatch(text)
@@ -83,7 +83,7 @@ def read_number(written: str | float, comment: str, allowed: Sequence[str]) -> d
 
 
 def converted(number: Mapping[str, Any], allowed: Sequence[str]) -> dict[str, Any]:
-    """A number's fields in the first of the `allowed` units that its own suits. Raises ValueError."""
+    """Returns a number's fields in the first of the `allowed` units that it converts to. Raises ValueError."""
     unit = _written_alike(str(number["unit"]))
     for one in allowed:
         if _written_alike(one) == unit:
@@ -102,7 +102,7 @@ def _scaled(number: Mapping[str, Any], unit: str, factor: float) -> dict[str, An
 
 
 def _inverted(number: Mapping[str, Any], unit: str, factor: float) -> dict[str, Any]:
-    """A speed constant as a back-EMF constant: 1/x, with the relative deviation of x."""
+    """Converts a speed constant to a back-EMF constant: 1/x, with the relative deviation of x."""
     value = number["value"]
     if value == 0.0:
         raise ValueError(f"value 0 {number['unit']} has no reciprocal in {unit}")
@@ -116,14 +116,14 @@ def _inverted(number: Mapping[str, Any], unit: str, factor: float) -> dict[str, 
 
 
 def _short(value: float) -> float:
-    """The number without the digits that only the conversion has added."""
+    """Removes the digits that only the conversion added."""
     rounded = float(f"{value:.12g}")
     return rounded if abs(rounded - value) <= 5e-16 * abs(value) else value
 
 
 @cache
 def _registry() -> pint.UnitRegistry[Any]:
-    import pint  # half a second, for files alone that are not in SI units
+    import pint  # takes 0.5 s; only for files with other units
 
     registry: pint.UnitRegistry[Any] = pint.UnitRegistry(cache_folder=None)
     registry.define("@alias turn = rev")
@@ -132,10 +132,10 @@ def _registry() -> pint.UnitRegistry[Any]:
 
 @cache
 def _factor(unit: str, target: str) -> tuple[float, bool] | None:
-    """What a number in `unit` is multiplied by to be in `target`; and whether it is its reciprocal that is.
+    """Returns the factor from `unit` to `target`, and whether the number must be inverted.
 
-    A radian is a number, except where an angle itself is meant. Pounds and kilograms are forces where a force is meant
-    (kg·cm, lb·in), as data sheets write them.
+    The radian counts as 1, unless an angle is required. Pounds and kilograms count as forces if a force is required
+    (kg·cm, lb·in), as in data sheets.
     """
     if (unit, target) in _COMMON:
         return _COMMON[unit, target], False
@@ -163,7 +163,7 @@ def _for_pint(unit: str) -> str:
 
 
 def _written_alike(unit: str) -> str:
-    """One spelling of a unit: middle dots for products, raised digits for powers."""
+    """Normalises a unit: middle dots for products, superscripts for powers."""
     text = re.sub(r"\s*(?:\*(?!\*)|⋅|∙|•|·)\s*", "·", unit.strip()).replace("Ω", "Ω").replace("\u00b5", "µ")
     text = re.sub(r"(?:\^|\*\*)([23])", lambda m: "²³"[int(m[1]) - 2], text)
     text = re.sub(r"(?<=[A-Za-z])[.-](?=[A-Za-z])", "·", re.sub(r"\bohms?\b", "Ω", text))  # oz-in, kgf.cm
@@ -175,7 +175,7 @@ def _plain_signs(text: str) -> str:
 
 
 def number_text(number: Mapping[str, Any], *, natural_low: bool = True) -> str:
-    """A number in the short form, without its source; `natural_low`: a lower bound of 0 goes without saying."""
+    """Returns a number in the short form, without its source. `natural_low`: a lower bound of 0 is left out."""
     unit = "" if number["unit"] == "1" else f" {number['unit']}"
     deviation = "" if number.get("deviation") is None else f" ± {_digits(number['deviation'])}"
     low, high = number.get("low"), number.get("high")

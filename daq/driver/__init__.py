@@ -1,4 +1,4 @@
-"""The controller as the host uses it: set points out, whole snapshots in, stop at any moment."""
+"""The host's view of the controller: sends set points, receives whole snapshots, stops at any moment."""
 
 from daq.driver.clock import Clock, LockStepClock, RealClock
 from daq.driver.controller import EVERY_JOINT, Controller, ControllerStatus, Identity

@@ -1,9 +1,9 @@
-"""The motor controller as the host uses it: what the source's host routines do, over any link.
+"""The motor controller as the host uses it: the host routines of the source, over any link.
 
 DRIVESA    one set point for the current motion            `set_points({joint: posture})`
 SAMOVE     set points of a step, all joints together       `set_points`, or `next_snapshot(set_points=…)`
-CONTPATH   plays a stored path of ministeps                `next_snapshot(set_points=…)` once a period
-LEADSA     current values while the arm is led by hand     `next_snapshot()`
+CONTPATH   plays a stored path of ministeps                `next_snapshot(set_points=…)` once per period
+LEADSA     current values during hand guiding              `next_snapshot()`
 REPORTG    reads the gains                                 `gains()`
 SETG       writes the gains of a motion                    `set_gains(joint, p, i, d)`
 REPORTEPP  errors, positions, powers                       `errors_positions_powers()`, `next_snapshot()`
@@ -62,7 +62,7 @@ EVERY_JOINT = joints_of(ALL_JOINTS)
 
 @dataclass(frozen=True)
 class Identity:
-    """What a controller says about itself. `period_s` is its control period, `boots` counts its resets."""
+    """Properties that the controller reports. `period_s`: control period (s); `boots`: number of its resets."""
 
     version: int
     capabilities: Capability
@@ -70,23 +70,23 @@ class Identity:
     ring_depth: int
     boots: int
     restarted: bool = False
-    """Whether it has been reset since this host last asked."""
+    """Whether it was reset after the previous greeting of this host."""
 
     @property
     def simulated(self) -> bool:
-        """Whether no arm is behind it."""
+        """Whether the controller is simulated, without an arm."""
         return Capability.SIMULATED in self.capabilities
 
     @property
     def keeps_samples(self) -> bool:
-        """Whether it samples every control period by itself, and keeps the samples until they are asked for."""
+        """Whether it samples every control period by itself, and stores the samples until they are read."""
         return Capability.SAMPLE in self.capabilities and Capability.POLLED not in self.capabilities
 
 
 @dataclass(frozen=True)
 class ControllerStatus:
-    """Board and link at one moment. `missed` counts the periods without new set points since the board's reset; `stop`
-    is the number of the newest stop, 0 for none."""
+    """State of board and link at one moment. `missed`: periods without new set points since the board's reset; `stop`:
+    number of the newest stop, 0 for none."""
 
     tick: int
     flags: StatusFlag
@@ -102,8 +102,8 @@ class Controller:
 
     `stop` may be called from any thread at any moment; everything else from one thread at a time.
 
-    Where `memory_map` leaves out gains, or process signals and gripper, no request for them is sent: a bridge that
-    works by another map would carry it out at places of which nothing is known.
+    If `memory_map` leaves out gains, or process signals and gripper, requests for them are not sent: a bridge with
+    another map would carry them out at unknown addresses.
     """
 
     def __init__(self, link: Link, memory_map: MemoryMap | None = None, clock: Clock | None = None) -> None:
@@ -117,7 +117,8 @@ class Controller:
 
     @classmethod
     def connect(cls, url: str, memory_map: MemoryMap | None = None) -> Self:
-        """The controller at a port URL, greeted. Raises TransportError, LinkError, ProtocolVersionError."""
+        """Connects to the controller at a port URL and greets it. Raises TransportError, LinkError,
+        ProtocolVersionError."""
         link = Link.open(url)
         try:
             return cls(link, memory_map)
@@ -132,17 +133,17 @@ class Controller:
 
     @property
     def counters(self) -> LinkCounters:
-        """Everything counted since the link was opened."""
+        """All counts since the link was opened."""
         return self.link.counters
 
     def line_rate(
         self, joints: Sequence[int] | None = None, moving: Sequence[int] = (), *, together: bool = True
     ) -> LineRate:
-        """Every how many periods the line has room for a sample of `joints`, with set points of the joints `moving`.
+        """Returns how many periods the line needs between samples of `joints` with set points for the joints `moving`.
 
-        `next_snapshot(last.tick + every - 1)` then yields every so many periods one sample, evenly. `together`: the
-        set points are given to `next_snapshot`, else to `set_points`. Without SAMPLE it is every period, or none: the
-        memory has to be read twice within one.
+        `next_snapshot(last.tick + every - 1)` then yields evenly spaced samples, `every` periods apart. `together`: set
+        points are passed to `next_snapshot`, otherwise to `set_points`. Without SAMPLE the result is every period, or
+        none: the memory must be read twice within one period.
         """
         joints = self.joints if joints is None else joints
         capabilities = self.identity.capabilities
@@ -153,7 +154,7 @@ class Controller:
         return rate if Capability.SAMPLE in capabilities else replace(rate, every=1, share=rate.share * rate.every)
 
     def hello(self) -> Identity:
-        """Greets the controller again, after a reconnection or a restart; `restarted` tells of the latter.
+        """Greets the controller again, after a reconnection or a reset; `restarted` shows a reset.
 
         Moves nothing. Raises ProtocolVersionError.
         """
@@ -166,9 +167,9 @@ class Controller:
         return self.identity
 
     def set_points(self, postures: Mapping[int, int]) -> SetPointsTaken:
-        """Sends set points (joint → posture units 0–999), which the controller takes together.
+        """Sends set points (joint → posture units 0–999), which the controller applies together.
 
-        Raises ControllerRestartedError, and RequestRefusedError when the arm has been stopped.
+        Raises ControllerRestartedError; RequestRefusedError if the arm was stopped.
         """
         return self._sampling.write(postures)
 
@@ -178,19 +179,20 @@ class Controller:
         joints: Sequence[int] | None = None,
         set_points: Mapping[int, int] | None = None,
     ) -> BoardSnapshot:
-        """The oldest snapshot newer than tick `after`; None waits for the next to be made.
+        """Returns the oldest snapshot newer than tick `after`; None waits for the next one to be made.
 
-        Passing each snapshot's tick on as the next `after` yields every period once, in order; those that are gone
-        are counted in `missing_before`. A tick still to come leaves the periods up to it out: the question waits
-        here. `set_points` travel with the question, in the same write. Never a torn or stale reading. Raises
-        ControllerRestartedError, NoSampleError; RequestRefusedError when the set points were refused: the snapshot is
-        still to be had.
+        Passing each snapshot's tick as the next `after` yields every period once, in order; lost periods are counted in
+        `missing_before`. For a future tick, the call waits and skips the periods up to it. `set_points` are sent in the
+        same write as the request. Readings are never torn or stale.
+
+        Raises ControllerRestartedError, NoSampleError; RequestRefusedError if the set points were refused, in which
+        case the snapshot can still be read.
         """
         return self._sampling.next(after, self.joints if joints is None else joints, set_points or {})
 
     def stop(self) -> StopConfirmation:
-        """Freezes the arm at its measured posture. At once, from any thread, as often as one likes; never raises
-        for a link that fails: the confirmation says what is known."""
+        """Freezes the arm at its measured posture. May be called at any time, from any thread, repeatedly. Never raises
+        for a failing link: the confirmation contains what is known."""
         try:
             return self._frozen(self.link.stop())
         except LinkError as error:
@@ -198,26 +200,27 @@ class Controller:
         except RequestRefusedError as error:
             return StopConfirmation(sent=True, acknowledged=False, problem=str(error))
 
-    def stop_here(self, stop: int) -> int:
-        """Ends the stop of number `stop` by another one, whose number it returns: the set points are then the posture
-        measured now. A second stop alone would change nothing: the board measures the posture when a stop begins.
+    def restart_stop_at_measured_posture(self, stop: int) -> int:
+        """Replaces the stop of number `stop` by a new one, so that the set points become the present measured posture.
+        Returns the new number. A second stop alone would change nothing: the board measures the posture when a stop
+        begins.
 
-        Raises RequestRefusedError when there is a newer stop than `stop`: that one holds. Raises NotFrozenError.
+        Raises RequestRefusedError if there is a newer stop than `stop`, which stays in force. Raises NotFrozenError.
         """
         self.release(stop)
         confirmation, number = self.stop_numbered()
         if not confirmation.acknowledged:
-            raise NotFrozenError(f"reset here: {confirmation.problem}; the set points are not known to be here")
+            raise NotFrozenError(f"reset here: {confirmation.problem}; the set points may be elsewhere")
         if number is None:
             raise RequestRefusedError("Release", Refusal.OTHER_STOP)
         return number
 
     def stop_numbered(self) -> tuple[StopConfirmation, int | None]:
-        """Freezes the arm as `stop` does, for a release to come. Returns the number of this very stop, too, by which
-        it alone is released; None where somebody else had stopped the arm already, so that nothing may be released.
+        """Freezes the arm as `stop` does, and also returns the number that is needed to release this stop. The number
+        is None if another host had stopped the arm already: then nothing may be released.
 
-        What the board is asked before and after the stop is written with it, so that nothing comes between. A line
-        protocol of another kind has one host, and is asked one after the other.
+        The status requests before and after the stop are written together with it, so that no other request comes
+        between. Other line protocols have only one host, and are asked one request at a time.
         """
         asked = (ReadStatus(), Stop(), ReadStatus())
         together = (asked,) if self.link.scale.turn_bytes is None else tuple((one,) for one in asked)
@@ -241,8 +244,8 @@ class Controller:
     def release(self, stop: int) -> None:
         """Ends the freeze; the set points stay where the stop put them. Takes the control back from another host.
 
-        `stop` is the number of the stop that is to end: `ControllerStatus.stop` as it was seen by whoever asks. Raises
-        RequestRefusedError when there is a newer one: that one holds. Raises ControllerRestartedError.
+        `stop`: number of the stop to end (`ControllerStatus.stop`), as the sender of the request saw it. Raises
+        RequestRefusedError if there is a newer stop, which stays in force. Raises ControllerRestartedError.
         """
         try:
             self.link.request(Release(stop), Released)
@@ -254,7 +257,7 @@ class Controller:
             self.link.request(Release(stop), Released)
 
     def gains(self) -> dict[int, tuple[int, int, int]]:
-        """Joint → (P, I, D), each 0–20; empty where the memory map, the bridge's or the own one, has no gains."""
+        """Returns joint → (P, I, D), each 0–20; empty if the bridge's or the host's memory map has no gains."""
         if not self.memory_map.has_gains:
             return {}
         try:
@@ -266,7 +269,7 @@ class Controller:
 
     def set_gains(self, joint: int, p: int, i: int, d: int, before_stop: int | None = None) -> None:
         """Writes the gains of a joint and reads them back. Raises GainsNotTakenError, ProtocolError outside 0–20,
-        RequestRefusedError where the memory map has no gains, StopCameFirstError as `Link.request` does."""
+        RequestRefusedError if the memory map has no gains, StopCameFirstError as `Link.request` does."""
         _require_mapped("SetGains", self.memory_map.has_gains)
         self.link.request(SetGains(joint, p, i, d), GainsSet, before_stop)
         read = self.gains()[joint]
@@ -274,18 +277,20 @@ class Controller:
             raise GainsNotTakenError(f"joint {joint}: gains {(p, i, d)} written, {read} read back")
 
     def errors_positions_powers(self, joints: Sequence[int] = EVERY_JOINT) -> dict[int, JointReading]:
-        """Readings as the memory holds them now. A value may be torn: to look at, never to record."""
+        """Returns the readings that are in the memory now. A value may be torn: only for display, never for a
+        record."""
         reply = self.link.request(ReportErrorsPositionsPowers(mask_of(tuple(joints))), ErrorsPositionsPowers)
         return dict(reply.joints)
 
     def process(self) -> Process:
-        """Process inputs and outputs (bit fields) and gripper. Raises RequestRefusedError where the memory map has
-        none; `write_outputs` and `set_gripper` as well."""
+        """Returns process inputs and outputs (bit fields) and gripper. Like `write_outputs` and `set_gripper`, raises
+        RequestRefusedError if the memory map has none."""
         _require_mapped("ReadProcess", self.memory_map.has_process)
         return self.link.request(ReadProcess(), Process)
 
     def write_outputs(self, mask: int, values: int, before_stop: int | None = None) -> None:
-        """Process outputs in `mask` take the bits of `values`. Raises StopCameFirstError as `Link.request` does."""
+        """Sets the process outputs in `mask` to the bits of `values`. Raises StopCameFirstError as `Link.request`
+        does."""
         _require_mapped("WriteOutputs", self.memory_map.has_process)
         self.link.request(WriteOutputs(mask, values), OutputsWritten, before_stop)
 
@@ -295,7 +300,7 @@ class Controller:
         self.link.request(SetGripper(int(closed)), GripperSet, before_stop)
 
     def status(self) -> ControllerStatus:
-        """Board and link now."""
+        """Reads the present state of board and link."""
         reply = self.link.request(ReadStatus(), Status)
         flags = StatusFlag(reply.status)
         return ControllerStatus(
@@ -303,7 +308,7 @@ class Controller:
         )
 
     def close(self) -> None:
-        """Ends the connection. Sends nothing: the arm stays at its last set points."""
+        """Closes the connection. Sends nothing: the arm stays at its last set points."""
         self.link.close()
 
     def __enter__(self) -> Self:
@@ -353,7 +358,7 @@ class Controller:
 
 
 def _require_mapped(request: str, has_registers: bool) -> None:
-    """Raises RequestRefusedError where the host's own memory map leaves out the registers that `request` is about."""
+    """Raises RequestRefusedError if the host's own memory map leaves out the registers that `request` needs."""
     if not has_registers:
-        why = "the memory map leaves out the registers for it (docs/commissioning.md), so it was not sent"
+        why = "the memory map lacks the registers for it (docs/commissioning.md), so it was not sent"
         raise RequestRefusedError(request, Refusal.NOT_CAPABLE, why)

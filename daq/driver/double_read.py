@@ -1,16 +1,17 @@
 """Consistent readings from the shared memory alone, for a bridge that cannot see the controller's period.
 
-The registers are read twice, whole, and delivered only when both readings agree byte by byte. Why that is enough:
+The registers are read twice, whole. A reading is delivered only if both agree byte by byte. This is enough because:
 
-1. The controller changes the bytes once a period. From the start of the first reading to the end of the second less
-   than a period passes, so at most one change falls into them. (Two changes could leave the same mixture twice: a
-   pair that took longer is thrown away even when it agrees.)
+1. The controller changes the bytes once per period. From the start of the first reading to the end of the second less
+   than a period passes, so at most one change falls into them. (Two changes could leave the same mixture twice, so a
+   pair that took longer is discarded even if it agrees.)
 2. The change itself takes time, byte after byte. SETTLING_S is longer, and passes between the end of the first
-   reading and the start of the second. If the first reading met any byte already changed, the second therefore sees
-   all of them changed: it is whole, and so is the first, which agrees. If it met none, it was whole itself.
+   reading and the start of the second. If the first reading contains any changed byte, the second therefore contains
+   all changes: it is whole, and so is the first, since they agree. Otherwise the first reading is whole itself.
 
-What remains is the assumption in 2: a controller that takes longer than SETTLING_S to store its results (the mock's
-takes 0.3 ms; that of a real one is not documented) could be read half way twice. Nothing in the memory would tell.
+The assumption in 2 remains. A controller that takes longer than SETTLING_S to store its results could be read half
+way through its change twice, and nothing in the memory would show it. The mock's controller takes 0.3 ms; the time of
+a real one is not documented.
 """
 
 from __future__ import annotations
@@ -27,25 +28,26 @@ from firmware_protocol.memory_map import MemoryMap
 from firmware_protocol.units import ADC_COUNTS, counts_to_posture
 
 SETTLING_S = 0.002
-"""Assumption: the controller stores all results of a period in less time (30 bytes at 10 to 60 µs each)."""
+"""Assumption: the controller stores all results of a period within this time (30 bytes at 10 to 60 µs each)."""
 READ_REGISTERS = ("position", "error", "power")
-"""Set points are not read: the memory holds what was sent, position + error tells what was taken."""
+"""Set points are not read: the memory holds what was sent, while position + error shows what the controller used."""
 MOST_READINGS = 8
-"""Largest number of readings in one period."""
+"""Most readings in one period."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """Addresses read with one request."""
+    """A range of addresses that one request reads."""
 
     start: int
     count: int
 
 
 def spans(addresses: Sequence[int], longest: int = MAX_PAYLOAD) -> tuple[Span, ...]:
-    """The fewest spans of at most `longest` bytes that cover `addresses`, ascending.
+    """Returns the fewest spans of at most `longest` bytes that cover `addresses`, ascending.
 
-    Covers from the lowest address not yet covered, as far as one request reaches: no choice of spans needs fewer.
+    Each span begins at the lowest address not yet covered and is as long as one request allows. No other choice needs
+    fewer spans.
     """
     result: list[Span] = []
     for address in sorted(set(addresses)):
@@ -57,7 +59,7 @@ def spans(addresses: Sequence[int], longest: int = MAX_PAYLOAD) -> tuple[Span, .
 
 
 class DoubleReader:
-    """Reads joints through the addresses of a memory map, documented or assumed."""
+    """Reads joints at the addresses of a memory map, documented or assumed."""
 
     def __init__(self, link: Link, memory_map: MemoryMap, clock: Clock, period_s: float) -> None:
         self._link = link
@@ -66,12 +68,12 @@ class DoubleReader:
         self._period_s = period_s
         self._delivered: dict[int, int] = {}
         self.disturbed = False
-        """Whether the last period's readings met the controller's change of the memory."""
+        """Whether the readings of the last period met the controller's change of the memory."""
 
     def read(self, joints: Sequence[int]) -> tuple[tuple[int, JointReading], ...] | None:
-        """A reading of one period; None when no two readings in a row agreed within one.
+        """Returns a reading of one period; None if no two readings in a row agreed within one.
 
-        None too when every byte is zero: so reads the memory of a board that has lost its supply. Raises LinkError.
+        Also None if every byte is zero, as in the memory of a board without supply. Raises LinkError.
         """
         wanted = [address for name in READ_REGISTERS for address in self._addresses(name, joints)]
         requests = [ReadBlock(span.start, span.count) for span in spans(wanted)]
@@ -94,7 +96,7 @@ class DoubleReader:
         return None
 
     def _read_once(self, requests: Sequence[ReadBlock]) -> dict[int, int]:
-        """Address → byte of all spans, asked for in one write. Raises RequestRefusedError for a wrong address."""
+        """Reads all spans with one write; returns address → byte. Raises RequestRefusedError for a wrong address."""
         memory: dict[int, int] = {}
         for request, reply in zip(requests, self._link.exchange(*requests), strict=True):
             data = expect(request, reply, Block).data
@@ -104,7 +106,7 @@ class DoubleReader:
         return memory
 
     def _accept(self, readings: list[dict[int, int]], joints: Sequence[int]) -> tuple[tuple[int, JointReading], ...]:
-        """Decodes the last reading; of those before it, the ones of neither this period nor the last were torn."""
+        """Decodes the last reading. Counts as torn each earlier one that matches neither this period nor the last."""
         memory = readings[-1]
         torn = sum(reading not in (memory, self._delivered) for reading in readings[:-1])
         if torn:

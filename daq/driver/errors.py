@@ -13,7 +13,7 @@ class ProtocolVersionError(DaqError):
 
 
 class ControllerRestartedError(DaqError):
-    """The board has been reset: set points and gains are those of power-up. Nothing goes on until `hello`."""
+    """The board was reset: set points and gains are those of power-up. Everything is refused until `hello`."""
 
     exit_code = exit_codes.FAULT
 
@@ -25,7 +25,7 @@ class NoSampleError(DaqError):
 
 
 class GainsNotTakenError(DaqError):
-    """Gains read back differ from those written."""
+    """The gains read back differ from the gains written."""
 
     exit_code = exit_codes.FAULT
 
@@ -37,6 +37,6 @@ class NotFrozenError(DaqError):
 
 
 class HardwareFaultError(DaqError):
-    """A drive reports that something is wrong with it, or does not hold its joint any more."""
+    """A drive reports a fault, or no longer holds its joint."""
 
     exit_code = exit_codes.FAULT

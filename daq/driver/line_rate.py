@@ -1,7 +1,7 @@
-"""What a line carries: how many control periods lie between two samples, and how long a stop takes.
+"""Capacity of a serial line: control periods between two samples, and the time that a stop takes.
 
-A turn is what passes for one sample: set points and the question on the way out, the confirmation and the sample on
-the way back. Host and bridge answer each other, so the bytes of both directions are added.
+One exchange per sample consists of set points and request on the way out, confirmation and sample on the way back. Host
+and bridge wait for each other, so the bytes of both directions are added.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from firmware_protocol.scale import LineScale
 from firmware_protocol.stamp import STAMP_BYTES
 
 LARGEST_SHARE = 0.8
-"""Share of the line's capacity that sampling may take. The rest is for repeats, a stop, the bridge's own time (5 ms)
-and an adapter that holds bytes back."""
+"""Largest share of the line's capacity for sampling. The rest is for repeats, a stop, the bridge's own time (5 ms) and
+an adapter that buffers bytes."""
 STOP_ANSWER_S = 0.010
-"""Time (s) within which a bridge has obeyed a stop that has arrived (section 3 of PROTOCOL.md)."""
+"""Time (s) within which a bridge carries out a stop that has arrived (section 3 of PROTOCOL.md)."""
 _MASK = 1
 _SAMPLE, _SNAPSHOT, _READING = 5, 6, 7
 _SET_POINT, _TAKEN = 2, 5
@@ -26,13 +26,13 @@ _COMPACT_SNAPSHOT, _COMPACT_READING = 7, 4
 
 @dataclass(frozen=True)
 class LineRate:
-    """Every how many control periods a sample of some joints can be had, set points being sent with each.
+    """The sampling rate of some joints that a line allows, with set points sent for each sample.
 
     joints: number of joints in a sample
     moving: number of set points sent with it
     every:  control periods from one sample to the next
-    share:  share of the line that this takes
-    stop_s: longest time (s) from the writing of a stop to the frozen set points, where no byte is lost
+    share:  share of the line's capacity used
+    stop_s: longest time (s) from writing a stop to the frozen set points, if no byte is lost
     """
 
     joints: int
@@ -42,32 +42,32 @@ class LineRate:
     period_s: float
     stop_s: float
     compact: bool = False
-    """Whether a turn is one `MoveAndSample`."""
+    """Whether an exchange is one `MoveAndSample`."""
 
     @property
     def samples_per_second(self) -> float:
-        """Samples of every joint in a second."""
+        """Samples per second, each of all joints."""
         return 1.0 / (self.every * self.period_s)
 
     @property
     def in_words(self) -> str:
-        """One line for the operator."""
+        """Returns a line for the operator."""
         each = "every control period" if self.every == 1 else f"every {_ordinal(self.every)} control period"
         return (
-            f"{self.samples_per_second:.3g} samples a second of {_counted(self.joints, 'joint')}, {each}, "
+            f"{self.samples_per_second:.3g} samples per second of {_counted(self.joints, 'joint')}, {each}, "
             f"{100 * self.share:.0f} % of the line; a stop takes up to {bound_ms(self.stop_s)} ms"
         )
 
 
 def bytes_of_a_turn(joints: int, moving: int) -> int:
-    """Bytes of one turn on the line, both directions together."""
+    """Bytes per exchange, both directions together."""
     sample = 2 * FRAME_OVERHEAD + _SAMPLE + _SNAPSHOT + _READING * joints
     written = 2 * FRAME_OVERHEAD + STAMP_BYTES + _MASK + _SET_POINT * moving + _TAKEN
     return sample + (written if moving else 0)
 
 
 def bytes_of_a_compact_turn(joints: int, moving: int) -> int:
-    """The same with `MoveAndSample`."""
+    """The same for an exchange by `MoveAndSample`."""
     asked = FRAME_OVERHEAD + STAMP_BYTES + _SAMPLE + _MASK + _SET_POINT * moving
     return asked + bytes_of_a_snapshot(joints, compact=True)
 
@@ -82,8 +82,8 @@ def bytes_of_a_snapshot(joints: int, *, compact: bool) -> int:
 def line_rate(
     bytes_per_second: float, period_s: float, joints: int, moving: int, *, can_be_compact: bool = False
 ) -> LineRate:
-    """The best rate at which the line has room left. Compact turns are used only where the line is too slow for others:
-    they tell the set point only by position and error."""
+    """Returns the best rate for which the line has capacity. Compact exchanges are used only on a line too slow for
+    others: in them the set point is known only from position and error."""
     size = bytes_of_a_turn(joints, moving)
     compact = can_be_compact and moving > 0 and size / bytes_per_second > LARGEST_SHARE * period_s
     if compact:
@@ -95,30 +95,30 @@ def line_rate(
 
 
 def polled_rate(scale: LineScale, bytes_per_second: float, period_s: float, joints: int, moving: int) -> LineRate:
-    """The rate of a line in another dialect: one turn for all joints, asked for every `scale.every` periods, or as
-    seldom as the line needs. A stop is two turns."""
+    """Returns the rate of a line with another dialect. One exchange covers all joints, every `scale.every` periods or
+    as rarely as the line requires. A stop takes two exchanges."""
     turn = (scale.turn_bytes or 0) / bytes_per_second
     every = max(scale.every, math.ceil(turn / (LARGEST_SHARE * period_s) - 1e-9))
     return LineRate(joints, moving, every, turn / (every * period_s), period_s, 2 * turn + STOP_ANSWER_S)
 
 
 def stop_latency_s(bytes_per_second: float) -> float:
-    """Longest time (s) from the writing of a stop until the bridge has frozen the set points: a frame of the largest
-    size that is already on its way, the stop itself, and the bridge's own time. No byte is lost."""
+    """Longest time (s) from writing a stop until the bridge has frozen the set points: a frame of the largest size
+    already on its way, the stop itself, and the bridge's own time. Assumes that no byte is lost."""
     return (MAX_PAYLOAD + 2 * FRAME_OVERHEAD) / bytes_per_second + STOP_ANSWER_S
 
 
 def bound_ms(longest_s: float) -> int:
-    """A longest time in whole milliseconds: rounded up, so that what is told still is a bound."""
+    """Longest time in whole milliseconds, rounded up, so that the value is still a bound."""
     return math.ceil(longest_s * 1e3 - 1e-6)
 
 
 TOLD = (1, 3, 6)
-"""Numbers of joints whose rates are told: one, the major axes, all."""
+"""Numbers of joints for which rates are reported: one, the major axes, all."""
 
 
 def told_rates(bytes_per_second: float, period_s: float, *, can_be_compact: bool) -> tuple[LineRate, ...]:
-    """What a line can give, for people: samples of some joints with a set point for each of them."""
+    """Returns the rates to report: samples of some joints, with a set point for each of them."""
     return tuple(
         line_rate(bytes_per_second, period_s, joints, joints, can_be_compact=can_be_compact) for joints in TOLD
     )

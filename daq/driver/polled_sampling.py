@@ -1,9 +1,9 @@
-"""Samples of a bus that answers with what is measured when it is asked: nothing keeps earlier samples.
+"""Samples a bus whose devices answer with their present readings and store nothing.
 
-The host's clock says when to ask, the controller's when the sample was taken: a sample keeps its own tick, also where
-it is a little beside the one that was wanted. A tick of 1 ms beside the truth is a speed of 1 rad/s times 1 ms beside
-the true position: more than half a count of a servo, and a diagnosis sees it. Set points are written as soon as
-they are given, right after the sample before, so that they are in force from there to the next sample.
+The host's clock determines when to ask, the controller's clock when the sample was taken. A sample keeps its own tick,
+even if that differs slightly from the wanted one. At 1 rad/s, a tick that is wrong by 1 ms is a position error of 1
+mrad: more than half a count of a servo, and visible to a diagnosis. Set points are written as soon as they are given,
+right after the previous sample, so that they act until the next sample.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from daq.driver.tick_time import TickTime
 from firmware_protocol.commands import AFTER_NEWEST, Sample, SetPointsTaken, Snapshot, StatusFlag, mask_of
 
 MOST_TRIES = 5
-"""Questions, a tick or more apart, after which a clock that has not moved counts as one that stands still."""
+"""Requests, at least a tick apart, after which a clock that has not advanced counts as stopped."""
 
 
 class PolledSampling:
-    """One question a sample. A controller whose clock stands still is not believed."""
+    """Sends one request per sample. Rejects the samples of a controller whose clock stands still."""
 
     def __init__(self, deliveries: Deliveries) -> None:
         self._deliveries = deliveries
         self._time = TickTime(deliveries.period_s)
         self._newest: int | None = None
         self._late = 0
-        """Ticks by which the newest sample came after the one that was wanted; negative: before it."""
+        """Ticks by which the newest sample came after the wanted tick; negative: before it."""
 
     def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
-        """Set points; the confirmation has read them back."""
+        """Writes set points; the confirmation has read them back."""
         deliveries = self._deliveries
         batch, request = deliveries.send(postures)
         (reply,) = deliveries.link.exchange(request)
@@ -40,9 +40,8 @@ class PolledSampling:
         return confirmation
 
     def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
-        """Writes the set points, waits until tick `after` is over, and asks; None is a usual pause after the sample
-        before. The next one is wanted as much earlier as this one is late: samples that come beside their ticks do not
-        move those after them."""
+        """Writes the set points, waits until tick `after` is over, and reads a sample. None waits the usual time after
+        the previous sample. A sample that is late or early does not shift the ticks wanted after it."""
         deliveries = self._deliveries
         if postures:
             self.write(postures)
@@ -58,7 +57,7 @@ class PolledSampling:
         return deliveries.deliver(tick, after, (now, tick_time), reply.joints, flags, "sample", every)
 
     def _newer(self, question: Sample) -> tuple[Snapshot, float]:
-        """A sample measured after the last one, and when it came (s). A question may come a little too early."""
+        """Returns a sample newer than the last one, and its arrival time (s). A request may come slightly too early."""
         deliveries = self._deliveries
         for _ in range(MOST_TRIES):
             reply, now = deliveries.link.request(question, Snapshot), deliveries.clock.now()
@@ -73,14 +72,14 @@ class PolledSampling:
         )
 
     def _due(self, after: int | None) -> int | None:
-        """The tick to ask for; None where it may be any."""
+        """Returns the tick to ask for; None if any will do."""
         if self._newest is None:
             return None
         usual = self._newest + self._deliveries.link.scale.every - 1
         return max((usual if after is None else after) - self._late, self._newest) + 1
 
     def _check(self, status: int) -> None:
-        """Raises HardwareFaultError for a drive that is damaged."""
+        """Raises HardwareFaultError if a drive is damaged."""
         if status & StatusFlag.HARDWARE_ERROR.value:
             why = self._deliveries.link.complaint or "a drive reports a hardware error"
             raise HardwareFaultError(f"{why}: its joint may be without torque; support it, and look for the cause")

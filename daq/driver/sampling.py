@@ -1,4 +1,4 @@
-"""One snapshot after the other, each period once and in order: from the bridge's ring, or from the memory itself."""
+"""Delivers snapshots, each period once and in order: from the bridge's ring buffer, or from the memory."""
 
 from __future__ import annotations
 
@@ -36,28 +36,29 @@ from firmware_protocol.commands import (
 from firmware_protocol.units import POSTURE_UNITS
 
 PHASE_STEP = 0.25
-"""Periods by which the readings move away from the controller's own moment after they have met it."""
+"""Periods by which the readings are delayed after they met the controller's change of the memory."""
 ASKED_AFTER = 0.25
-"""Periods that pass between the end of period `after` and the arrival of a question for the one that follows it: the
-host's estimate of that end is no better, and a question that arrives too early gets an earlier period."""
+"""Periods between the end of period `after` and the arrival of a request for the next one. The host estimates that end
+no better than this, and a request that arrives too early gets an earlier period."""
 MOST_MISSING = 10
 """Periods in a row without a consistent reading after which the memory counts as unreadable."""
 
 
 class Sampling(Protocol):
-    """How snapshots are obtained from one controller."""
+    """A way to obtain snapshots from one controller."""
 
     def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
-        """Sends set points (joint → posture units), which the controller takes together."""
+        """Sends set points (joint → posture units), which the controller applies together."""
         ...
 
     def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
-        """The oldest snapshot newer than tick `after` (None: the next to be made), set points being sent with it."""
+        """Returns the oldest snapshot newer than tick `after` (None: the next one to be made), and sends set points
+        with it."""
         ...
 
 
 class Deliveries:
-    """What both ways of sampling share: time stamps, missed set points, restarts, and their counts."""
+    """Common part of all ways of sampling: time stamps, missed set points, restarts, and their counts."""
 
     def __init__(self, link: Link, clock: Clock, period_s: float, watch: SetPointWatch) -> None:
         self.link = link
@@ -67,13 +68,14 @@ class Deliveries:
         self._count = SampleCount(1)
 
     def send(self, postures: Mapping[int, int]) -> tuple[SentSetPoints, WriteSetPoints]:
-        """The request for a batch of set points, noted as sent."""
+        """Returns the request for a batch of set points, and notes the batch as sent."""
         ordered, units = tuple(sorted(postures.items())), self.link.scale.set_point_units
         batch = self.watch.sending(postures)
         return batch, WriteSetPoints(ordered) if units == POSTURE_UNITS else FineSetPoints(ordered, units)
 
     def taken(self, batch: SentSetPoints, request: Request, reply: Reply, due: int | None) -> SetPointsTaken:
-        """The confirmation of a batch, which must show from period `due` on (None: as the confirmation says).
+        """Handles the confirmation of a batch, which snapshots must show from period `due` on (None: as the
+        confirmation says).
 
         Raises RequestRefusedError and ControllerRestartedError.
         """
@@ -89,7 +91,7 @@ class Deliveries:
         return confirmation
 
     def check_restart(self, status: int) -> None:
-        """Raises ControllerRestartedError when the status says that the board has been reset."""
+        """Raises ControllerRestartedError if the status shows a reset of the board."""
         if status & StatusFlag.RESTARTED.value:
             self.watch.forget()
             raise ControllerRestartedError(
@@ -107,8 +109,8 @@ class Deliveries:
         by: Consistency,
         every: int = 1,
     ) -> BoardSnapshot:
-        """A snapshot, with everything counted that it shows. `times` are host time and tick time (s). It counts as late
-        after the time between two samples, `every` periods. What is missing is counted in samples, too."""
+        """Returns a snapshot and counts its events. `times`: host time and tick time (s). A sample later than the time
+        between two samples (`every` periods) counts as late. Missing periods are counted in samples, too."""
         if after is None or every != self._count.every:
             self._count = SampleCount(every)
         missing = 0 if after is None else self._count.missing(tick - after + every - 1)
@@ -126,7 +128,7 @@ class Deliveries:
 
 
 class RingSampling:
-    """Through SAMPLE: the bridge keeps consistent snapshots with their ticks, and waits for the next one."""
+    """Samples by SAMPLE: the bridge stores consistent snapshots with their ticks, and waits for the next one."""
 
     def __init__(self, deliveries: Deliveries, line_rate: Callable[[Sequence[int], Sequence[int]], LineRate]) -> None:
         self._deliveries = deliveries
@@ -136,13 +138,13 @@ class RingSampling:
         self._newest: int | None = None
 
     def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
-        """Set points without a sample."""
+        """Sends set points without a sample."""
         batch, request = self._deliveries.send(postures)
         (reply,) = self._deliveries.link.exchange(request)
         return self._deliveries.taken(batch, request, reply, None)
 
     def next(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
-        """Set points and question travel in one write."""
+        """Sends set points and request in one write."""
         self._wait_for(after)
         if postures and self._line_rate(joints, tuple(postures)).compact:
             return self._compact(after, joints, postures)
@@ -157,7 +159,7 @@ class RingSampling:
         return self._received(snapshot, snapshot.joints, after)
 
     def _compact(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
-        """Set points and question in one frame."""
+        """Sends set points and request in one frame."""
         deliveries = self._deliveries
         batch, written = deliveries.send(postures)
         asked = AFTER_NEWEST if after is None else after
@@ -171,9 +173,9 @@ class RingSampling:
         return self._received(snapshot, tuple((joint, one.whole) for joint, one in snapshot.joints), after)
 
     def _wait_for(self, after: int | None) -> None:
-        """Waits where periods are left out: `after` is then a period to come, and to a bridge a question that arrives
-        before its end is one for the very next snapshot. A host that is late by less than the ring's depth gets the
-        right one."""
+        """Waits if periods are to be skipped. `after` is then a future period, and the bridge would answer an early
+        request with the very next snapshot. A host that is late by less than the depth of the ring buffer still gets
+        the right one."""
         if after is None or self._newest is None or after <= self._newest:
             return
         deliveries = self._deliveries
@@ -184,7 +186,7 @@ class RingSampling:
         try:
             return link.exchange(*requests)
         except LinkTimeoutError:
-            # A restarted board counts its ticks anew: the requested tick would never come.
+            # A restarted board counts its ticks from 0 again: the requested tick would never come.
             self._deliveries.check_restart(link.request(ReadStatus(), Status).status)
             raise
 
@@ -197,7 +199,7 @@ class RingSampling:
         every = 1 if known is None or after is None else after - known + 1
         if isinstance(deliveries.clock, LockStepClock):
             deliveries.clock.tick_seen(reply.tick)
-        waited = deliveries.link.waited()  # before the time, so that all of the wait lies before it
+        waited = deliveries.link.waited()  # read before the time, so that the whole wait lies before it
         now = deliveries.clock.now()
         times = (now, self._tick_time.arrived(reply.tick, now, waited))
         self._complete.arrived(reply.tick, now - self._time_on_line(reply), waited)
@@ -205,18 +207,18 @@ class RingSampling:
         return deliveries.deliver(reply.tick, after, times, joints, StatusFlag(reply.status), "sample", every)
 
     def _time_on_line(self, reply: Snapshot | CompactSnapshot) -> float:
-        """Time (s) that a reply has taken on the line; none in lock-step, where the clock is the board's."""
+        """Time (s) that a reply took on the line; 0 in lock-step, where the clock is the board's."""
         link = self._deliveries.link
         size = bytes_of_a_snapshot(len(reply.joints), compact=isinstance(reply, CompactSnapshot))
         return 0.0 if link.lock_step else size / link.bytes_per_second
 
 
 class MemorySampling:
-    """Without SAMPLE: the memory is read twice in every period of the host's own clock.
+    """Samples without SAMPLE: the memory is read twice in every period of the host's own clock.
 
-    Tick 1 is the period of the first reading. Host and board count periods with clocks of their own: over hours one
-    of them gets ahead, and a period is then read twice or left out without anyone knowing. Where the readings meet
-    the controller's change of the memory, they move a quarter of a period later and stay there.
+    Tick 1 is the period of the first reading. The clocks of host and board drift apart over hours: a period is then
+    read twice or skipped, which cannot be detected. If the readings meet the controller's change of the memory, later
+    readings are delayed by a quarter of a period.
     """
 
     def __init__(self, deliveries: Deliveries, reader: DoubleReader) -> None:
@@ -226,7 +228,7 @@ class MemorySampling:
         self._phase_s = 0.0
 
     def write(self, postures: Mapping[int, int]) -> SetPointsTaken:
-        """Set points; by the host's estimate they are taken one period after they have been confirmed."""
+        """Sends set points. By the host's estimate they are used one period after their confirmation."""
         batch, request = self._deliveries.send(postures)
         (reply,) = self._deliveries.link.exchange(request)
         return self._deliveries.taken(batch, request, reply, self._current_tick() + 2)
@@ -251,7 +253,7 @@ class MemorySampling:
         )
 
     def _status(self) -> int:
-        """The board's flags. Raises ControllerRestartedError."""
+        """Reads the board's flags. Raises ControllerRestartedError."""
         status = self._deliveries.link.request(ReadStatus(), Status).status
         self._deliveries.check_restart(status)
         return status

@@ -1,4 +1,4 @@
-"""Finds set points that the controller missed: what a snapshot shows it used is not what was sent (section 6.3)."""
+"""Detects missed set points: a snapshot shows that the controller used others than were sent (section 6.3)."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from firmware_protocol.commands import JointReading
 
 @dataclass(eq=False)
 class SentSetPoints:
-    """All set points in force after one batch was sent. From period `due` on the controller must show them, or later
-    ones; None as long as nobody has confirmed them."""
+    """All set points in force after a batch was sent. From period `due` on the controller must show these or later
+    ones; `due` is None until the batch is confirmed."""
 
     postures: dict[int, int]
     due: int | None = None
@@ -24,10 +24,10 @@ class SentSetPoints:
 
 @dataclass(frozen=True)
 class Used:
-    """What is known of the set points that a period used.
+    """Set points that a period used.
 
-    missed: they are older than those that were due; never while nothing is due
-    since:  the first period that used them; None where that is not known
+    missed: they are older than the ones that were due; False while none is due
+    since:  the first period that used them; None if unknown
     """
 
     missed: bool = False
@@ -36,23 +36,23 @@ class Used:
 
 @dataclass
 class SetPointWatch:
-    """What has been sent, in order.
+    """Records the set points that were sent, in order.
 
-    A batch that the board confirmed with tick T was in its memory before period T+1 began, so T+1 must show it; the
-    period in which it arrives may or may not. That is the pipeline of one period: a snapshot is right when it shows
-    the newest batch that was due, or any sent after that one. Anything older has been missed. Batches are sent as
-    increments upon those before, so each entry holds the set points of all joints commanded so far.
+    If the board confirmed a batch with tick T, the batch was in its memory before period T+1 began, so T+1 must show
+    it. The period in which it arrives may or may not show it. A snapshot is therefore correct if it shows the newest
+    due batch, or a later one. An older batch means that set points were missed. A batch changes some joints, so each
+    entry holds the set points of all joints commanded so far.
 
-    A snapshot's set point is what the board says it took or, read from the memory, what position + error come to.
-    The detection is exact where the board's ticks are known. With the host's own estimate of ticks a batch is due one
-    period later, and a single miss amid a stream of new set points may pass for a late arrival.
+    A snapshot's set point is the one that the board says it used or, read from the memory, the sum of position and
+    error. The detection is exact if the board's ticks are known. With ticks estimated by the host, a batch is due one
+    period later, and a single miss within a stream of new set points may look like a late arrival.
     """
 
     _sent: list[SentSetPoints] = field(default_factory=list)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def sending(self, postures: Mapping[int, int]) -> SentSetPoints:
-        """Records a batch that is about to be written: from now on snapshots may show it."""
+        """Records a batch that is about to be written: snapshots may show it from now on."""
         with self._lock:
             before = self._sent[-1].postures if self._sent else {}
             batch = SentSetPoints({**before, **postures})
@@ -60,28 +60,28 @@ class SetPointWatch:
             return batch
 
     def confirmed(self, batch: SentSetPoints, due: int) -> None:
-        """Records that the board has confirmed a batch: from period `due` on snapshots must show it."""
+        """Records that the board confirmed a batch: snapshots must show it from period `due` on."""
         with self._lock:
             batch.due = due
 
     def withdrawn(self, batch: SentSetPoints) -> None:
-        """Records that the board has refused a batch."""
+        """Records that the board refused a batch."""
         with self._lock:
             if batch in self._sent:
                 self._sent.remove(batch)
 
     def replaced(self, postures: Mapping[int, int], due: int) -> None:
-        """Records that a stop has put other set points in force; what was sent before no longer counts."""
+        """Records that a stop replaced the set points in force; earlier ones no longer count."""
         with self._lock:
             self._sent = [*self._sent[-1:], SentSetPoints(dict(postures), due)]
 
     def forget(self) -> None:
-        """Forgets everything: the set points in force are unknown."""
+        """Clears all records: the set points in force are unknown."""
         with self._lock:
             self._sent.clear()
 
     def seen(self, tick: int, joints: tuple[tuple[int, JointReading], ...]) -> Used:
-        """Judges the set points that period `tick` used."""
+        """Checks the set points that period `tick` used."""
         with self._lock:
             due = [i for i, batch in enumerate(self._sent) if batch.due is not None and batch.due <= tick]
             if not due:

@@ -1,4 +1,4 @@
-"""What the driver delivers: one consistent control period of the board, identified by its tick."""
+"""One consistent control period of the board, identified by its tick."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ Consistency = Literal["sample", "double-read"]
 class BoardSnapshot:
     """One control period, consistent over its joints.
 
-    `host_time` is the clock (s) when it arrived, `tick_time` the estimated clock of its tick. With "double-read" the
-    tick is the host's own estimate, and the set points are those that position and error show the controller used.
+    `host_time`: clock (s) at its arrival; `tick_time`: estimated clock (s) of its tick. With "double-read", the host
+    estimates the tick, and the set points are computed from position and error.
     """
 
     tick: int
@@ -27,20 +27,20 @@ class BoardSnapshot:
     flags: StatusFlag
     consistent_by: Consistency
     missing_before: int = 0
-    """Number of samples that were asked for and are not there, between the previous sample and this one."""
+    """Number of requested samples that are missing between the previous sample and this one."""
     set_points_missed: bool = False
-    """The controller did not take what was in its memory when the period began."""
+    """The controller did not use the set points that were in its memory when the period began."""
     taken: int | None = None
-    """The first period that used these set points, as the bridge confirmed them; None where it is not known."""
+    """The first period that used these set points, as confirmed by the bridge; None if unknown."""
 
     @property
     def tick_is_estimate(self) -> bool:
-        """Whether the tick's number comes from the host's clock and not from the board."""
+        """Whether the tick comes from the host's clock and not from the board."""
         return self.consistent_by == "double-read"
 
     @property
     def jitter(self) -> float:
-        """Time (s) by which this sample came later than the quickest ones after their ticks."""
+        """Delay (s) of this sample compared with the quickest ones."""
         return self.host_time - self.tick_time
 
     @property
@@ -54,7 +54,7 @@ class BoardSnapshot:
         return {joint: reading.set_point for joint, reading in self.joints}
 
     def __getitem__(self, joint: int) -> JointReading:
-        """Reading of a joint (from 1). Raises KeyError when it was not sampled."""
+        """The reading of a joint (from 1). Raises KeyError if it was not sampled."""
         for number, reading in self.joints:
             if number == joint:
                 return reading

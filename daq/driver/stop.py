@@ -1,4 +1,4 @@
-"""What is known after a stop."""
+"""Result of a stop."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class StopConfirmation:
-    """`sent`: the stop has been written to the line. `acknowledged`: the controller has confirmed the freeze, since
-    `tick`, at the postures `frozen` (joint → posture units); `seconds` from sending the stop to that, where they were
-    measured. Otherwise `problem` says in one line what failed, and the hardware's own stop is to be used."""
+    """Result of a stop.
+
+    `sent`: the stop was written to the line. `acknowledged`: the controller confirmed the freeze, since `tick`, at the
+    postures `frozen` (joint → posture units). `seconds`: time from sending to confirmation, if measured. Without
+    confirmation, `problem` states in one line what failed, and the emergency stop must be used.
+    """
 
     sent: bool
     acknowledged: bool

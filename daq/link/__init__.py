@@ -1,4 +1,4 @@
-"""Transactions with a controller: numbered, repeated until answered, matched, counted."""
+"""Transactions with a controller: numbered, repeated until answered, matched with replies, and counted."""
 
 from daq.link.counters import LinkCounters, RoundTrips
 from daq.link.errors import LinkError, LinkLostError, LinkTimeoutError, RequestRefusedError, StopCameFirstError

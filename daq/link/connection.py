@@ -1,4 +1,4 @@
-"""One channel at a time with its dialect: numbered requests out, replies in, and what is wrong when it has ended."""
+"""One channel with its dialect: sends numbered requests, receives replies, and stores why the channel ended."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ from firmware_protocol.dialect import LinkDialect
 
 
 class Connection:
-    """Shared by all threads that speak to one controller.
+    """A connection, shared by all threads that use one controller.
 
-    `changed` guards everything but the writing, and is notified when a reply has come or the channel has ended.
-    A dialect is called under a lock of its own. The write lock is held for one write only, so that a stop never waits
-    for another thread's reply; numbers are given out under it, so that the order on the wire is the order of the
-    numbers.
+    `changed` guards everything except writing, and is notified when a reply has come or the channel has ended. A
+    dialect has a lock of its own. The write lock is held for one write only, so that a stop never waits for another
+    thread's reply. Numbers are assigned under it, so requests are sent in the order of their numbers.
     """
 
     def __init__(
@@ -44,33 +43,33 @@ class Connection:
         self._dialect_lock = threading.Lock()
         self._failure: str | None = None
         self.stops = 0
-        """Stops that were written so far, by whichever thread."""
+        """Number of stops written so far, by all threads."""
 
     @property
     def damaged(self) -> int:
-        """Pieces of input that were no whole reply."""
+        """Pieces of input that are not a whole reply."""
         return self._dialect.damaged
 
     @property
     def description(self) -> str:
-        """Where the channel leads."""
+        """Names the endpoint of the channel."""
         return self._channel.description
 
     @property
     def complaint(self) -> str:
-        """What the dialect knows about why a request has no reply; empty where it knows nothing."""
+        """The dialect's explanation why a request has no reply; empty if there is none."""
         return self._dialect.complaint
 
     @property
     def failure(self) -> str | None:
-        """Why the channel has ended; None while it has not."""
+        """Why the channel ended; None while it is open."""
         return self._failure
 
     def begin(self, requests: Sequence[Request], before_stop: int | None = None) -> list[Transaction]:
-        """Writes new requests, all in one write. Raises LinkLostError; ProtocolError for what no frame can carry.
+        """Writes new requests, all in one write. Raises LinkLostError; ProtocolError if a frame cannot carry a request.
 
-        before_stop: the stops that had been written when these requests were allowed. Raises StopCameFirstError, and
-            writes nothing, if there is one more: no check of another thread's can be nearer to the wire.
+        before_stop: number of stops written when these requests were allowed. Raises StopCameFirstError, and writes
+        nothing, if another stop has been written since. This check is made last, under the write lock.
         """
         with self._write_lock:
             self.check()
@@ -87,7 +86,7 @@ class Connection:
         return transactions
 
     def repeat(self, transactions: Sequence[Transaction], ahead: Sequence[Request] = ()) -> list[Transaction]:
-        """Writes requests again under their numbers, after the new ones `ahead`; returns the latter. Raises
+        """Writes requests again under their numbers, after the new requests `ahead`, and returns the latter. Raises
         LinkLostError."""
         with self._write_lock:
             self.check()
@@ -98,7 +97,7 @@ class Connection:
         return first
 
     def receive(self, timeout_s: float) -> bytes:
-        """Reads what has arrived and matches its replies. One thread at a time. Raises LinkLostError."""
+        """Reads the bytes that have arrived and matches the replies. One thread at a time. Raises LinkLostError."""
         try:
             data = self._channel.read(timeout_s)
         except ChannelError as error:
@@ -114,7 +113,7 @@ class Connection:
                     if transaction is not None:
                         self._note_round_trip(transaction)
             if self._dialect.scale.half_duplex:
-                with self._write_lock:  # a stop may have been written meanwhile, and ends the steps of a release
+                with self._write_lock:  # a stop may have been written meanwhile, which ends the steps of a release
                     with self._dialect_lock:
                         answer = self._dialect.answer()
                     if answer:
@@ -125,7 +124,7 @@ class Connection:
         return data
 
     def forget(self, transactions: Sequence[Transaction]) -> None:
-        """Ends the wait for those that are still without reply."""
+        """Stops waiting for those transactions that still have no reply."""
         given_up = [transaction.sequence for transaction in transactions if transaction.reply is None]
         if given_up:
             with self._dialect_lock:
@@ -136,7 +135,7 @@ class Connection:
                 self._pending.forget(transaction)
 
     def fail(self, why: str) -> LinkLostError:
-        """Ends the channel; every thread that waits is told. Returns the error to raise."""
+        """Ends the channel and wakes every waiting thread. Returns the error to raise."""
         if self._failure is None:
             self._failure = why
         self._channel.close()
@@ -145,8 +144,8 @@ class Connection:
         return LinkLostError(self._failure)
 
     def replace(self, channel: ByteChannel) -> None:
-        """Goes on over a new channel after a failure, without a session. Sequence numbers go on too, so no old reply is
-        taken for a new one."""
+        """Continues on a new channel after a failure, without a session. Sequence numbers continue too, so that no old
+        reply is taken for a new one."""
         with self._write_lock, self.changed:
             with self._dialect_lock:
                 self._dialect.reset()
@@ -154,7 +153,7 @@ class Connection:
             self._failure = None
 
     def close(self) -> None:
-        """Ends the channel for good."""
+        """Closes the channel for good."""
         if self._failure is None:
             with self._dialect_lock:
                 last = self._dialect.farewell()
@@ -164,7 +163,7 @@ class Connection:
         self.fail(f"{self.description}: closed")
 
     def check(self) -> None:
-        """Raises LinkLostError when the channel has ended."""
+        """Raises LinkLostError if the channel has ended."""
         if self._failure is not None:
             raise LinkLostError(self._failure)
 
@@ -192,7 +191,7 @@ class Connection:
             raise self.fail(str(error)) from error
 
     def _note_round_trip(self, transaction: Transaction) -> None:
-        # With a repeated request it is unknown which copy was answered; a sample waits for its tick.
+        # If a request was repeated, it is unknown which copy was answered. A sample waits for its tick.
         if (
             self.timing.measured
             and transaction.written == 1

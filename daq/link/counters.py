@@ -1,4 +1,4 @@
-"""The counters of a link; an immutable copy is part of every status and trace."""
+"""Counters of a link. Every status and trace contains an immutable copy."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, fields
 
 @dataclass(frozen=True)
 class RoundTrips:
-    """Times from writing a request to having its reply, in s, of requests that are answered at once and were asked
-    once. None before the first. Not measured in lock-step, where they would be times of another machine's clock."""
+    """Times (s) from writing a request to receiving its reply; None before the first. Only requests that are answered
+    at once and were not repeated count. Not measured in lock-step, where the time is not the controller's."""
 
     count: int = 0
     mean_s: float | None = None
@@ -31,29 +31,29 @@ class LinkCounters:
     timeouts: int = 0
     """Waits for a reply that ended without one."""
     damaged: int = 0
-    """Pieces of input that were no whole reply (CRC, stuffing, length)."""
+    """Pieces of input that are not a whole reply (CRC, stuffing, length)."""
     stale: int = 0
-    """Replies that no request was waiting for."""
+    """Replies without a waiting request."""
     duplicates: int = 0
-    """Second replies to a request already answered."""
+    """Repeated replies to a request that was already answered."""
     refused: int = 0
-    """Requests that the controller would not carry out."""
+    """Requests that the controller refused."""
     torn: int = 0
-    """Readings caught with the bytes of two periods; none was delivered."""
+    """Readings that mix the bytes of two periods; they are not delivered."""
     missed_set_points: int = 0
-    """Periods in which the controller did not take the set points that were in its memory."""
+    """Periods in which the controller did not use the set points in its memory."""
     missing_samples: int = 0
-    """Samples that were asked for and not delivered: on a slow line one is asked for every n-th period."""
+    """Requested samples that were not delivered. On a slow line only every n-th period is requested."""
     late: int = 0
-    """Samples that came more than one period after the tick they describe."""
+    """Samples that came more than one period after their tick."""
     restarts: int = 0
-    """Resets of the board that were noticed."""
+    """Detected resets of the board."""
     reconnections: int = 0
     """New channels after a lost one."""
     round_trips: RoundTrips = RoundTrips()
 
     def numbers(self) -> dict[str, float]:
-        """All as name → number, for a trace's record; round-trip times as `round_trip_p99_s` and so on."""
+        """Returns all counts by name, for a trace's record; round-trip times as `round_trip_p99_s` and so on."""
         counts = {f.name: float(getattr(self, f.name)) for f in fields(self) if f.name != "round_trips"}
         trips = {f"round_trip_{f.name}": getattr(self.round_trips, f.name) for f in fields(self.round_trips)}
         return counts | {name: float(value) for name, value in trips.items() if value is not None}
@@ -64,12 +64,12 @@ COUNTED = frozenset(f.name for f in fields(LinkCounters)) - {"damaged", "round_t
 _FINEST_S = 10e-6
 _STEP = 1.1
 _EDGES_S = tuple(_FINEST_S * _STEP**i for i in range(120))
-"""Upper edges of the histogram's classes: 10 µs to 0.84 s, each a tenth above the one before."""
+"""Upper edges of the histogram's classes: 10 µs to 0.84 s, each 10 % above the previous one."""
 
 
 @dataclass(frozen=True)
 class Mark:
-    """The counts at one moment; all zero by default."""
+    """The counts at one moment; all 0 by default."""
 
     counts: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTED, 0))
     damaged: int = 0
@@ -78,7 +78,7 @@ class Mark:
 
 
 class Tally:
-    """The counters while they run; safe to use from any thread."""
+    """The running counters; safe to use from any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -88,7 +88,7 @@ class Tally:
         self._trip_max_s = 0.0
 
     def count(self, name: str, by: int = 1) -> None:
-        """Adds to one of the counters named in LinkCounters."""
+        """Adds to the counter of this name in LinkCounters."""
         with self._lock:
             self._counts[name] += by
 
@@ -100,12 +100,12 @@ class Tally:
             self._trip_max_s = max(self._trip_max_s, seconds)
 
     def mark(self, damaged: int) -> Mark:
-        """The counts now, from which `snapshot` can count; `damaged` is the dialect's own count."""
+        """Returns the present counts, as a start for `snapshot`; `damaged` is the dialect's own count."""
         with self._lock:
             return Mark(dict(self._counts), damaged, tuple(self._trips), self._trip_sum_s)
 
     def snapshot(self, damaged: int, since: Mark | None = None) -> LinkCounters:
-        """All counters at this moment, from the beginning or from a mark; `damaged` is the dialect's own count."""
+        """Returns all counts since the beginning or since a mark; `damaged` is the dialect's own count."""
         before = since or Mark()
         with self._lock:
             counts = {name: count - before.counts[name] for name, count in self._counts.items()}
@@ -121,8 +121,8 @@ class Tally:
         return RoundTrips(count, mean, self._quantile(trips, 0.5 * count), self._quantile(trips, 0.99 * count), longest)
 
     def _quantile(self, trips: Sequence[int], wanted: float) -> float:
-        """Upper edge (s) of the class in which the `wanted`-th round trip lies; within 10 % of its time. No longer than
-        the longest of all."""
+        """Upper edge (s) of the class of the `wanted`-th round trip, at most 10 % above its time. Limited to the
+        longest trip."""
         seen = 0
         for edge, count in zip(_EDGES_S, trips, strict=False):
             seen += count

@@ -1,4 +1,4 @@
-"""The line protocol that a port's URL names."""
+"""Selects the line protocol that a port's URL names."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from firmware_protocol.errors import ProtocolError
 
 
 def dialect_of(url: str) -> LinkDialect:
-    """A new dialect for a connection to this URL. Raises PortUrlError for a name that nobody has,
-    for a dialect that cannot be loaded, and for numbers that it does not take."""
+    """Returns a new dialect for a connection to this URL. Raises PortUrlError for an unknown name, a dialect that
+    cannot be loaded, or parameters that it rejects."""
     port: PortUrl = parse_port_url(url)
     if port.dialect == FRAMED:
         return FramedDialect()
@@ -30,9 +30,9 @@ def dialect_of(url: str) -> LinkDialect:
 
 
 def _loaded(name: str, reference: str) -> Callable[[tuple[int, ...]], LinkDialect]:
-    """What makes a dialect of another package. Raises ProtocolError where it cannot be imported."""
+    """Returns the factory of a dialect from another package. Raises ProtocolError if it cannot be imported."""
     try:
         made: Callable[[tuple[int, ...]], LinkDialect] = named(reference)
-    except Exception as error:  # another package's own code runs when it is imported
+    except Exception as error:  # the import runs the other package's code
         raise ProtocolError(f"dialect {name!r} ({reference}): {type(error).__name__}: {error}") from error
     return made

@@ -1,4 +1,4 @@
-"""How a transaction can fail."""
+"""Errors of a transaction."""
 
 from __future__ import annotations
 
@@ -8,32 +8,32 @@ from firmware_protocol.commands import Refusal
 
 
 class LinkError(DaqError):
-    """The controller cannot be spoken to."""
+    """The controller cannot be reached."""
 
     exit_code = exit_codes.NOT_REACHED
     sent = False
-    """Whether the request had been written when it failed, and may have been obeyed."""
+    """Whether the request was written before it failed, so that it may have been carried out."""
 
 
 class LinkTimeoutError(LinkError):
-    """No reply to one request, after all its repetitions."""
+    """A request got no reply, even after all repetitions."""
 
 
 class LinkLostError(LinkError):
-    """The channel has ended; nothing is asked again until `Link.reconnect` has succeeded."""
+    """The channel has ended; no request is sent until `Link.reconnect` has succeeded."""
 
 
 class StopCameFirstError(DaqError):
-    """A stop was written between the moment of a request's check and its own. It has not been written."""
+    """A stop was written after the request was checked. The request was not written."""
 
     exit_code = exit_codes.NOT_REACHED
 
     def __init__(self) -> None:
-        super().__init__("a stop came first: look at the arm, then ask again")
+        super().__init__("a stop came first: look at the arm, then try again")
 
 
 class RequestRefusedError(DaqError):
-    """The controller answered that it will not. Nothing has changed there."""
+    """The controller refused the request. Nothing has changed there."""
 
     exit_code = exit_codes.NOT_REACHED
 
@@ -41,13 +41,13 @@ class RequestRefusedError(DaqError):
         self.request = request
         self.reason = reason
         if reason == Refusal.NOT_CAPABLE and request in _BY_THE_MAP:
-            why = why or "its bridge's memory map leaves out the registers for it (docs/commissioning.md)"
+            why = why or "its bridge's memory map lacks the registers for it (docs/commissioning.md)"
         why = why or _EXPLANATION.get(reason, f"unknown reason {reason}")
         super().__init__(f"the controller refused {request}: {why}")
 
 
 _BY_THE_MAP = ("ReportGains", "SetGains", "ReadProcess", "WriteOutputs", "SetGripper")
-"""Requests that a bridge cannot carry out where its memory map leaves out their registers."""
+"""Requests that a bridge cannot carry out if its memory map lacks their registers."""
 _EXPLANATION: dict[int, str] = {
     Refusal.UNKNOWN_OPCODE: "it does not know this request",
     Refusal.BAD_LENGTH: "the request has a wrong length",
@@ -57,8 +57,8 @@ _EXPLANATION: dict[int, str] = {
     Refusal.FROZEN: "it has been stopped and holds its posture until it is released",
     Refusal.NOTHING_NEW: "there is nothing new",
     Refusal.BAD_SESSION: "the session has ended: the controller has restarted, or another host has taken "
-    "the control; connect again, or reset",
-    Refusal.OTHER_STOP: "another stop has come meanwhile, and holds",
-    Refusal.UNFIT: "it is not in a state in which it can be driven",
-    Refusal.STALE: "a later command (a stop, perhaps) has already been obeyed",
+    "control; connect again, or reset",
+    Refusal.OTHER_STOP: "a newer stop is in force",
+    Refusal.UNFIT: "it cannot be driven in its present state",
+    Refusal.STALE: "a later command, possibly a stop, was already carried out",
 }

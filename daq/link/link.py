@@ -1,4 +1,4 @@
-"""The link to a controller: requests in, replies out, with lost or damaged bytes made good by repetition."""
+"""The link to a controller: sends requests, receives replies, and repeats whatever was lost or damaged."""
 
 from __future__ import annotations
 
@@ -42,28 +42,28 @@ class LinkState(StrEnum):
 
     CONNECTED = "connected"
     DEGRADED = "degraded"
-    """Requests had to be repeated lately."""
+    """Requests had to be repeated recently."""
     LOST = "lost"
     """The channel has ended, or the last request was never answered."""
 
 
 class Wait(Protocol):
-    """What `reconnect` waits with; `threading.Event` is one."""
+    """Waiting function of `reconnect`; `threading.Event` has it."""
 
     def wait(self, timeout: float) -> bool:
-        """Waits; True ends the attempts."""
+        """Waits `timeout` s; True ends the attempts."""
         ...
 
 
 class Link:
     """Transactions with one controller, from any thread.
 
-    Requests that are written together are answered in order and cost one round trip. A request is repeated with its
-    number until it is answered or its budget is used up, and then the link is lost. `stop` goes ahead of everything
-    that is not yet written.
+    Requests that are written together are answered in order and take one round trip. A request is repeated under its
+    number until it is answered. Once its repetitions are used up, the link is lost. `stop` overtakes every request that
+    is not yet written.
 
-    `scale` is what the line's dialect can say of its machine. `chance` draws the first sequence number and, except in
-    lock-step, the nonces of `Hello`.
+    `scale`: properties of the machine that the dialect knows. `chance`: source of the first sequence number and, except
+    in lock-step, of the nonces of `Hello`.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Link:
         now: Callable[[], float] = time.monotonic,
         chance: Random | None = None,
     ) -> None:
-        # In lock-step a run repeats to the bit.
+        # In lock-step, runs are reproducible to the bit.
         self._chance = chance or (Random(0) if endpoint.lock_step else SystemRandom())
         self.tally = Tally()
         self._endpoint = endpoint
@@ -90,7 +90,7 @@ class Link:
 
     @classmethod
     def open(cls, url: str, dialect: LinkDialect | None = None) -> Self:
-        """A link to the controller at a port URL, in the dialect that the URL names; nothing is sent. Raises
+        """Opens a link to the controller at a port URL, in the dialect that the URL names. Sends nothing. Raises
         TransportError."""
         dialect = dialect or dialect_of(url)
         endpoint = open_endpoint(url)
@@ -102,21 +102,22 @@ class Link:
 
     @property
     def url(self) -> str:
-        """Port URL as the user wrote it."""
+        """Port URL as given by the user."""
         return self._endpoint.url
 
     @property
     def control(self) -> str | None:
-        """URL of the mock's control port; None for anything but mock://."""
+        """URL of the mock's control port; None for all but mock://."""
         return self._endpoint.control
 
     @property
     def bytes_per_second(self) -> float:
-        """Capacity of the line in each direction; infinite where nothing limits it."""
+        """Capacity of the line in each direction; infinite without a limit."""
         return self._endpoint.bytes_per_second
 
     def waited(self) -> float:
-        """Time (s) for which the clock of a mock's board has stood still, since the mock got no processor; else 0."""
+        """Time (s) for which the clock of a mock's board has stood still because the mock got no processor time; else
+        0."""
         return self._endpoint.waited()
 
     @property
@@ -133,42 +134,42 @@ class Link:
 
     @property
     def counters(self) -> LinkCounters:
-        """Everything counted so far."""
+        """All counts so far."""
         return self.tally.snapshot(self._connection.damaged)
 
     @property
     def complaint(self) -> str:
-        """What is known about a controller that does not do what it is asked, for people; empty where nothing is."""
+        """Explanation, for people, of a controller that does not respond as requested; empty if none is known."""
         return self._connection.complaint
 
     def mark(self) -> Mark:
-        """The counts now, for `counters_since`."""
+        """The present counts, for `counters_since`."""
         return self.tally.mark(self._connection.damaged)
 
     def counters_since(self, mark: Mark) -> LinkCounters:
-        """The counts since that mark."""
+        """The counts since this mark."""
         return self.tally.snapshot(self._connection.damaged, mark)
 
     def set_period(self, period_s: float) -> None:
-        """Tells the control period, for which `Sample` may have to wait."""
+        """Sets the control period (s): `Sample` may wait for as long."""
         self._connection.timing = replace(self._connection.timing, period_s=period_s)
 
     @property
     def stops(self) -> int:
-        """Stops that were written so far. What is allowed now is given this number (`before_stop`), so that it is not
-        written behind a stop of another thread."""
+        """Number of stops written so far. Pass it as `before_stop` with a request that was checked now, so that the
+        request is not written after another thread's stop."""
         return self._connection.stops
 
     def request(self, request: Request, reply: type[R], before_stop: int | None = None) -> R:
-        """The reply to one request. Raises RequestRefusedError, LinkTimeoutError, LinkLostError, ProtocolError, and
-        StopCameFirstError if `before_stop` is not the number of `stops` any more."""
+        """Returns the reply to one request. Raises RequestRefusedError, LinkTimeoutError, LinkLostError, ProtocolError;
+        StopCameFirstError if `stops` has changed from `before_stop`."""
         (answer,) = self.exchange(request, before_stop=before_stop)
         return expect(request, answer, reply)
 
     def exchange(self, *requests: Request, before_stop: int | None = None) -> tuple[Reply, ...]:
-        """The replies to requests written together, in their order; a refusal is a reply.
+        """Returns the replies to requests written together, in order; a refusal is a reply.
 
-        Raises LinkTimeoutError when one of them is never answered, LinkLostError; ProtocolError for a wrong value;
+        Raises LinkTimeoutError if one of them is never answered, LinkLostError; ProtocolError for a wrong value;
         StopCameFirstError as `request` does.
         """
         return self.exchange_timed(*requests, before_stop=before_stop)[0]
@@ -176,7 +177,7 @@ class Link:
     def exchange_timed(
         self, *requests: Request, before_stop: int | None = None
     ) -> tuple[tuple[Reply, ...], tuple[float, ...]]:
-        """The same, with the time (s) from its begin to each reply."""
+        """Like `exchange`, with the time (s) from the beginning to each reply."""
         begun = self._now()
         try:
             transactions = self._exchange.run(requests, before_stop)
@@ -193,32 +194,33 @@ class Link:
         return replies, tuple(transaction.answered_at - begun for transaction in transactions)
 
     def greet(self) -> HelloReply:
-        """Begins a session, without which no command is obeyed. Moves nothing.
+        """Starts a session, which every command requires. Moves nothing.
 
-        Raises RequestRefusedError where the controller speaks version 1, LinkTimeoutError, LinkLostError.
+        Raises RequestRefusedError if the controller uses version 1, LinkTimeoutError, LinkLostError.
         """
         return self.request(Hello(PROTOCOL_VERSION, self._nonce()), HelloReply)
 
     def _nonce(self) -> int:
-        """A different one for each `Hello`; in lock-step the controller's own time, so that a run repeats to the
-        bit."""
+        """Returns a new nonce for a `Hello`. In lock-step it is the controller's time, so that runs are reproducible to
+        the bit."""
         if self.lock_step:
             with contextlib.suppress(RequestRefusedError):
                 return self.request(Advance(0), Advanced).time_us & 0xFFFFFFFF
         return self._chance.getrandbits(32)
 
     def stop(self) -> Stopped:
-        """Freezes the arm. Written twice at once, ahead of all that waits. Raises LinkTimeoutError, LinkLostError."""
+        """Freezes the arm. The stop is written twice, ahead of all that waits. Raises LinkTimeoutError,
+        LinkLostError."""
         return self.request(Stop(), Stopped)
 
     def reconnect(self, wait: Wait | None = None, delay: ReconnectDelay | None = None) -> None:
-        """Opens a new channel after a lost one, again and again until it succeeds or `wait.wait` returns True.
+        """Opens a new channel after a lost one. Repeats this until it succeeds or `wait.wait` returns True.
 
-        Nothing is sent over it: what was under way has failed, and only the caller may start motion again.
-        Raises LinkLostError when the wait was ended.
+        Sends nothing: requests under way have failed, and only the caller may start motion again. Raises LinkLostError
+        if the wait was ended.
         """
         pause = wait or threading.Event()
-        self._connection.fail("connection given up in order to connect again")
+        self._connection.fail("connection closed in order to reconnect")
         error = "not tried"
         for seconds in (delay or ReconnectDelay()).delays():
             if pause.wait(seconds):
@@ -236,7 +238,7 @@ class Link:
         raise LinkLostError(f"not connected again: {error}")
 
     def close(self) -> None:
-        """Ends the channel, and the mock's process where there is one. May be called twice."""
+        """Closes the channel, and ends the mock's process if there is one. May be called twice."""
         self._connection.close()
         self._endpoint.close()
 
@@ -251,7 +253,7 @@ class Link:
 
 
 def expect(request: Request, reply: Reply, kind: type[R]) -> R:
-    """`reply` as the kind that answers `request`. Raises RequestRefusedError for a refusal."""
+    """Returns `reply` with the type that answers `request`. Raises RequestRefusedError for a refusal."""
     if isinstance(reply, Refused):
         why = reply.why if isinstance(reply, ExplainedRefusal) else ""
         raise RequestRefusedError(type(request).__name__, reply.reason, why)

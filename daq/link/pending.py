@@ -1,6 +1,6 @@
-"""Requests that wait for their replies: assigns numbers, matches replies, drops and counts everything else.
+"""Requests that wait for replies: assigns numbers, matches replies, drops and counts all others.
 
-Pure bookkeeping without a clock, a lock or a channel; `Link` guards it with its own lock.
+Pure bookkeeping without a clock, a lock or a channel; `Connection` guards it with its lock.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from firmware_protocol.commands import NO_SESSION, PROTOCOL_VERSION, Hello, Hell
 
 SEQUENCE_NUMBERS = 0x10000
 REMEMBERED = 256
-"""Number of answered requests that are remembered, so that a second reply counts as a duplicate and not as stale."""
+"""Number of answered requests that are remembered, so that a second reply counts as duplicate and not as stale."""
 
 
 @dataclass(eq=False)
 class Transaction:
-    """One request on its way: its number, how often it was written, when the last wait ends, and its reply."""
+    """One request under way: its number, how often it was written, when the last wait ends, and its reply."""
 
     request: Request
     sequence: int
@@ -27,14 +27,14 @@ class Transaction:
     written_at: float = 0.0
     deadline: float = 0.0
     frame: bytes = b""
-    """The bytes first written; a repeat sends the same ones."""
+    """The bytes as first written; a repeat sends the same."""
     reply: Reply | None = None
     answered_at: float = 0.0
 
 
 @dataclass
 class PendingReplies:
-    """The transactions that wait, by sequence number."""
+    """The waiting transactions, by sequence number."""
 
     tally: Tally
     first: int = 0
@@ -47,7 +47,7 @@ class PendingReplies:
         self._next = self.first % SEQUENCE_NUMBERS
 
     def begin(self, request: Request) -> Transaction:
-        """A transaction under the next free sequence number."""
+        """Starts a transaction with the next free sequence number."""
         while self._next in self._waiting:
             self._next = (self._next + 1) % SEQUENCE_NUMBERS
         transaction = Transaction(request, self._next)
@@ -57,7 +57,8 @@ class PendingReplies:
         return transaction
 
     def match(self, sequence: int, reply: Reply, now: float) -> Transaction | None:
-        """The transaction that `reply` ends; None for a reply that no request waits for, which is counted."""
+        """Returns the transaction that `reply` completes. A reply without a waiting request is counted, and gives
+        None."""
         transaction = self._waiting.get(sequence)
         if transaction is None or not _answers(reply, transaction.request):
             asked = reply.opcode if isinstance(reply, Refused) else reply.OPCODE & 0x7F
@@ -70,7 +71,7 @@ class PendingReplies:
         return transaction
 
     def forget(self, transaction: Transaction) -> None:
-        """Ends the wait for a transaction: a reply that still comes is stale."""
+        """Stops waiting for a transaction: a later reply is stale."""
         self._waiting.pop(transaction.sequence, None)
 
 

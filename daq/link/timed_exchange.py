@@ -1,4 +1,5 @@
-"""Transactions in real time: one waiting thread reads for all, and each repeats its request after its time-out."""
+"""Transactions in real time: one waiting thread reads for all, and each thread repeats its own request after a
+time-out."""
 
 from __future__ import annotations
 
@@ -7,15 +8,15 @@ from collections.abc import Sequence
 from daq.link.connection import Connection
 from daq.link.errors import LinkError, LinkTimeoutError
 from daq.link.pending import Transaction
-from daq.transport.holders import sharing_words
+from daq.transport.holders import shared_port_advice
 from firmware_protocol.commands import Request, Stop
 
 
 class TimedExchange:
-    """Any number of threads may wait at once. One of them reads and hands the others their replies.
+    """Lets any number of threads wait. One of them reads and passes the others their replies.
 
-    No thread of its own: a reply that comes while one thread waits wakes that thread and no other, which saves a
-    change of threads a round trip, and nothing is left running.
+    There is no separate reading thread. A reply then wakes only the thread that waits for it, which saves a thread
+    switch per round trip, and no thread is left running.
     """
 
     def __init__(self, connection: Connection) -> None:
@@ -24,7 +25,7 @@ class TimedExchange:
         self._followers = 0
 
     def run(self, requests: Sequence[Request], before_stop: int | None = None) -> list[Transaction]:
-        """Writes `requests` together, returns when all have replies.
+        """Writes `requests` together and returns once all have replies.
 
         Raises LinkTimeoutError, LinkLostError, ProtocolError; StopCameFirstError as `Connection.begin` does.
         """
@@ -79,9 +80,9 @@ class TimedExchange:
 
 
 def no_reply(connection: Connection, transaction: Transaction) -> str:
-    """One line about a request that was never answered."""
+    """Returns a line about a request that was never answered."""
     name = type(transaction.request).__name__
     why = connection.complaint or "is the controller on, and are port and baud rate the right ones?"
-    if not isinstance(transaction.request, Stop):  # looking for other programs takes a moment, which no stop has
-        why += sharing_words(connection.description)
+    if not isinstance(transaction.request, Stop):  # searching for other programs takes time, which a stop does not have
+        why += shared_port_advice(connection.description)
     return f"{connection.description}: no reply to {name}, asked {transaction.written} times: {why}"

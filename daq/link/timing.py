@@ -1,4 +1,4 @@
-"""How long to wait for a reply, and how often to repeat a request. All time-outs and retry counts of the link."""
+"""All time-outs and retry counts of the link."""
 
 from __future__ import annotations
 
@@ -9,23 +9,22 @@ from firmware_protocol.framing import FRAME_OVERHEAD, MAX_PAYLOAD
 from firmware_protocol.scale import LineScale
 
 REPLY_MARGIN_S = 0.025
-"""Time allowed for a reply beyond its time on the line, for bridge, adapter (USB holds bytes for up to 16 ms) and
-host."""
+"""Time (s) for a reply beyond its time on the line: for bridge, adapter (USB delays bytes by up to 16 ms) and host."""
 STOP_MARGIN_S = 0.010
-"""The same for a stop, which is repeated sooner because a repetition costs nothing."""
+"""The same for a stop. It is repeated sooner because a repetition has no cost."""
 SHARED_STOP_MARGIN_S = REPLY_MARGIN_S
-"""The same for a stop where both sides share one wire: a repetition sooner would collide with an answer, and would keep
-servos that have heard the stop from the 20 ms of silence after which they stop by themselves."""
+"""The same for a stop on a wire that both sides share. An earlier repetition would collide with an answer. It would
+also interrupt the 20 ms of silence after which servos that received the stop halt by themselves."""
 RETRIES = 8
-"""Repetitions of one request. With one frame in ten damaged, one transaction in 10^6 fails for good."""
+"""Repetitions of one request. If 10 % of the frames are damaged, one transaction in 10^6 fails."""
 HELLO_RETRIES = 40
-"""Repetitions of a `Hello`, some 2 s in all: an adapter that resets the bridge when its port is opened needs that long,
-and so does a controller whose machine is busy. A `Hello` moves nothing, so it can wait."""
+"""Repetitions of a `Hello`, about 2 s in all. Some adapters reset the bridge when the port opens, and a controller on a
+busy machine needs as long. A `Hello` moves nothing, so it may wait."""
 STOP_RETRIES = 50
 STOP_COPIES = 2
-"""Copies of a stop that are written at once: the second costs 0.8 ms at 115200 baud, a time-out 20 times that."""
+"""Copies of a stop that are written at once. The second takes 0.8 ms at 115200 baud, a time-out 20 times that."""
 LOCK_STEP_WATCHDOG_S = 10.0
-"""Time (s) of silence after which a process in lock-step counts as dead; lock-step otherwise uses no wall time."""
+"""Time (s) of silence after which a lock-step process counts as dead. Lock-step uses no other wall time."""
 CLEAN_TRANSACTIONS = 100
 """Transactions without repetition after which a degraded link counts as connected again."""
 
@@ -34,19 +33,19 @@ MAX_FRAME_BYTES = MAX_PAYLOAD + FRAME_OVERHEAD
 
 @dataclass(frozen=True)
 class LinkTiming:
-    """Time-outs that follow from the line and from the controller's period."""
+    """Time-outs derived from the line and from the controller's period."""
 
     bytes_per_second: float
     period_s: float = 0.020
-    """Control period; `Sample` waits for at most one."""
+    """Control period (s); `Sample` waits for at most one."""
     retries: int = RETRIES
     measured: bool = True
-    """Whether round trips are measured; in lock-step their times mean nothing."""
+    """Whether round trips are measured; meaningless in lock-step."""
 
     def reply_timeout_s(self, request: Request, bytes_ahead: int) -> float:
-        """How long (s) a reply to `request` may take when `bytes_ahead` bytes, its own included, are being sent.
+        """Longest time (s) for a reply to `request` while `bytes_ahead` bytes, including its own, are being sent.
 
-        The reply may wait for another one of full length that was already on its way.
+        The reply may wait for another full-length one that is already on its way.
         """
         line = (bytes_ahead + 2 * MAX_FRAME_BYTES) / self.bytes_per_second
         if isinstance(request, Stop):
@@ -55,7 +54,7 @@ class LinkTiming:
         return line + REPLY_MARGIN_S + waiting
 
     def shared_wire_s(self, request: Request, scale: LineScale) -> float:
-        """How much longer (s) it may take where both sides share one wire: a turn of that line, or its greeting."""
+        """Additional time (s) if both sides share one wire: an exchange on that line, or its greeting."""
         if not scale.half_duplex:
             return 0.0
         answer = max(scale.turn_bytes or 0, scale.greeting_bytes if isinstance(request, Hello) else 0)
@@ -63,7 +62,7 @@ class LinkTiming:
         return answer / self.bytes_per_second + stop
 
     def retries_of(self, request: Request) -> int:
-        """How often `request` is repeated before it counts as failed; greeting and stop have numbers of their own."""
+        """How often `request` is repeated before it fails. Greeting and stop have separate numbers."""
         if isinstance(request, Stop):
             return STOP_RETRIES
         return max(HELLO_RETRIES, self.retries) if isinstance(request, Hello) else self.retries

@@ -1,4 +1,4 @@
-"""Transactions in lock-step: host and controller take turns, independent of any clock of this machine."""
+"""Transactions in lock-step: host and controller take turns, independent of this machine's clocks."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _BETWEEN_ZEROS = re.compile(rb"[^\0]+")
 
 
 class TurnExchange:
-    """The controller answers each frame with all it has to say, and then IDLE_MARK.
+    """The controller answers each frame with all its replies, and then IDLE_MARK.
 
-    A request without its reply when all frames have had their marks has timed out. The controller's time is then
-    moved on by as much as the wait would have taken in real time, and the request is written again: faults cost what
-    they cost in reality, and every run repeats to the bit. A second thread, with a stop for example, has its turn
-    after the current one, at the same instant of the controller's time.
+    A request has timed out if all frames have had their marks and it has no reply. The controller's time is then
+    advanced by the wait that real time would have taken, and the request is written again. So faults cost the same time
+    as in reality, and every run is reproducible to the bit. A second thread, for example with a stop, has its turn
+    after the current one, at the same controller time.
     """
 
     def __init__(self, connection: Connection) -> None:
@@ -31,7 +31,7 @@ class TurnExchange:
         self._turn = threading.Lock()
 
     def run(self, requests: Sequence[Request], before_stop: int | None = None) -> list[Transaction]:
-        """Writes `requests` together, returns when all have replies.
+        """Writes `requests` together and returns once all have replies.
 
         Raises LinkTimeoutError, LinkLostError, ProtocolError; StopCameFirstError as `Connection.begin` does.
         """
@@ -57,7 +57,7 @@ class TurnExchange:
                 raise LinkTimeoutError(no_reply(connection, transaction))
         requests = [transaction.request for transaction in waiting]
         waited_s = min(connection.timing.reply_timeout_s(request, 0) for request in requests)
-        # Before an Advance that is asked again there must be no newer one: it would be refused as stale.
+        # No newer Advance may precede a repeated one: the repeat would be refused as stale.
         advances = any(isinstance(request, Advance) for request in requests)
         wait = [] if advances else [Advance(round(waited_s * 1e6))]
         passed = connection.repeat(waiting, ahead=wait)
@@ -67,7 +67,7 @@ class TurnExchange:
             connection.forget(passed)
 
     def _listen(self, written: Sequence[Request]) -> None:
-        """Takes in everything up to the last of the marks that the controller owes for `written`."""
+        """Reads until the last mark that the controller owes for `written`."""
         owed = sum(copies_of(request) for request in written)
         marks = MarkCounter()
         while marks.seen < owed:
@@ -79,14 +79,14 @@ class TurnExchange:
 
 
 class MarkCounter:
-    """Counts idle marks in a stream: a run of n zeros holds n // 4, since frames add at most two to a run."""
+    """Counts idle marks in a stream: a run of n zeros contains n // 4, since frames add at most two zeros to a run."""
 
     def __init__(self) -> None:
         self.seen = 0
         self._run = 0
 
     def feed(self, data: bytes) -> None:
-        """Takes the next bytes, however they were cut."""
+        """Reads the next bytes; the result does not depend on how they were split."""
         pieces = _BETWEEN_ZEROS.split(data)
         for index, zeros in enumerate(pieces):
             self._run = len(zeros) if index else self._run + len(zeros)

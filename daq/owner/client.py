@@ -1,4 +1,4 @@
-"""The client's side of the owner of a port: starts the process, sends orders, receives reports."""
+"""Client of the owner process: starts it, sends orders and receives reports."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ from daq.owner.messages import (
 from daq.owner.stop_socket import StopAnswer
 
 GRACE = 4.0
-"""Time (s) for the process to freeze the arm and close its trace when the service ends. If it needs longer it finishes
-alone, as the unit in deploy/ allows."""
+"""Time (s) for the owner to freeze the arm and close its trace when the service ends. An owner that needs longer
+finishes alone, as the unit in deploy/ allows."""
 OWN_GRACE = 8.0
-"""Time (s) for the same on demand, where nobody waits any more: a second of samples, a stop that the link may have to
-repeat, a slow disk."""
+"""The same time (s) for an owner on demand. Nobody waits for it, so it covers a second of samples, repeats of the stop
+on the link and a slow disk."""
 STOPS_WITHIN = 1.0
-"""Time (s) for the answer to a stop, as at the stop socket."""
+"""Longest wait (s) for the answer to a stop, the same as at the stop socket."""
 PROGRAM = (sys.executable, "-m", "daq.owner")
 log = logging.getLogger("daq.owner")
 
@@ -58,7 +58,7 @@ class OwnerGoneError(DaqError):
 
 
 class OwnerProcess:
-    """A running owner. `report` and `ended` are called on a thread of its own; `ended` is called once, last."""
+    """A running owner. `report` and `ended` are called on a separate thread; `ended` is called once, last."""
 
     def __init__(
         self,
@@ -86,7 +86,7 @@ class OwnerProcess:
 
     @property
     def pid(self) -> int:
-        """The process number, which is also in the name of its stop socket."""
+        """The process ID, which is also part of the name of its stop socket."""
         return self._process.pid
 
     def send(self, order: Order) -> None:
@@ -97,12 +97,12 @@ class OwnerProcess:
             self.halt()
 
     def halt(self) -> None:
-        """Stops what runs, now or later: a stop follows every order that is sent after it.
+        """Stops the current work and, from now on, each later order: a stop is sent after every order.
 
-        May be called from a signal handler, again and again: it waits for nobody.
+        Never waits, so a signal handler may call it repeatedly.
         """
         self.halted = True
-        if self._writing.acquire(blocking=False):  # otherwise the stop follows what is being written
+        if self._writing.acquire(blocking=False):  # otherwise `send` adds the stop after its order
             try:
                 self._write(HaltRun(here=True))
             finally:
@@ -122,12 +122,12 @@ class OwnerProcess:
         return future
 
     def stop(self) -> StopAnswer | None:
-        """Stops the arm through the pipe of orders, for which no file need be there. Returns None without an answer
-        within STOPS_WITHIN. Call it on a thread that may wait."""
+        """Stops the arm through the pipe of orders, so it works without the socket's file. Returns None if no answer
+        comes within STOPS_WITHIN. Call it on a thread that may block."""
         assert self._process.stdin is not None
         try:
             if not select.select([], [self._process.stdin], [], 0)[1]:
-                return None  # full, since the process does not read: writing would wait for it
+                return None  # the pipe is full because the process does not read; a write would block
             return StopAnswer.from_data(self.ask(Freeze).result(STOPS_WITHIN).data)
         except (OwnerGoneError, OSError, ValueError):  # a time-out is an OSError
             return None
@@ -142,7 +142,7 @@ class OwnerProcess:
         return not self._thread.is_alive()
 
     def kill(self) -> None:
-        """Ends a process that does not end by itself. Its arm holds the last set point."""
+        """Kills the process. Its arm holds the last set point."""
         self._process.kill()
         self._thread.join()
 
@@ -160,7 +160,7 @@ class OwnerProcess:
                 break  # half a line of a killed process
             try:
                 self._hear(REPORT.validate_json(line))
-            except Exception:  # no report of ours, or a listener's fault; the end is reported below
+            except Exception:  # an invalid report, or an error in a listener; the end of the process is reported below
                 log.exception("owner process %s: %.200r", self.pid, line)
         code = self._process.wait()
         self._process.stdout.close()
@@ -185,9 +185,10 @@ class OwnerProcess:
 
 
 class OwnerOnDemand:
-    """An owner for as long as the block is entered, and the robot that it has opened. For one thread, except `halt`.
+    """Starts an owner on entering the block and opens its robot. Leaving the block stops running work and ends the
+    owner.
 
-    Leaving the block ends what runs with a stop.
+    For one thread, except `halt`.
     """
 
     def __init__(self, opening: Open) -> None:
@@ -195,7 +196,7 @@ class OwnerOnDemand:
         self._heard: SimpleQueue[Report | Future[Answer] | str] = SimpleQueue()
 
     def __enter__(self) -> Self:
-        """Raises OrderFailedError when the robot is not reached."""
+        """Raises OrderFailedError if the robot cannot be reached."""
         self._process = OwnerProcess(self._opening, self._heard.put, self._heard.put)
         try:
             while not isinstance(report := self._heard.get(), Opened):
@@ -213,27 +214,28 @@ class OwnerOnDemand:
 
     @property
     def pid(self) -> int:
-        """Its process number."""
+        """The process ID."""
         return self._process.pid
 
     def halt(self) -> None:
-        """Stops what runs, now or later. May be called from a signal handler, again and again."""
+        """Stops the current work and each later order. A signal handler may call it repeatedly."""
         self._process.halt()
 
     def begin(self, kind: Callable[..., Any], **fields: object) -> Future[Answer]:
-        """Gives an order, whose answer `answer_to` waits for. Raises OrderFailedError after `halt`."""
+        """Sends an order; wait for its answer with `answer_to`. Raises OrderFailedError after `halt`."""
         if self._process.halted:
             raise OrderFailedError("stopped before it began (by Ctrl-C); nothing moved", exit_codes.STOPPED)
         return self._process.ask(kind, asked=time.monotonic(), **fields)
 
     def tell(self, order: Order) -> None:
-        """Gives an order that has no answer."""
+        """Sends an order that has no answer."""
         self._process.send(order)
 
     def answer_to(self, asked: Future[Answer], heard: Callable[[Report], None] = lambda _report: None) -> Answer:
-        """Waits for an answer, also one with a problem, while `heard` is called with every report.
+        """Waits for an answer and calls `heard` with every report that comes meanwhile. The answer may contain a
+        problem.
 
-        Raises OrderFailedError when the process has ended.
+        Raises OrderFailedError if the process has ended.
         """
         asked.add_done_callback(self._heard.put)
         while (report := self._heard.get()) is not asked:
@@ -244,7 +246,8 @@ class OwnerOnDemand:
             raise _gone(error.why) from error
 
     def hear(self, heard: Callable[[Report], None], within: float) -> None:
-        """Calls `heard` with every report that comes `within` s. Raises OrderFailedError for a process at fault."""
+        """Calls `heard` with every report that comes within `within` s. Raises OrderFailedError if the process
+        fails."""
         until = time.monotonic() + within
         while (left := until - time.monotonic()) > 0:
             with contextlib.suppress(Empty):
@@ -257,7 +260,7 @@ class OwnerOnDemand:
             heard(report)
 
     def ask(self, kind: Callable[..., Any], **fields: object) -> dict[str, Any]:
-        """Gives an order and returns its answer's data. Raises OrderFailedError."""
+        """Sends an order and returns the data of its answer. Raises OrderFailedError."""
         return done(self.answer_to(self.begin(kind, **fields))).data
 
     def run(
@@ -267,7 +270,7 @@ class OwnerOnDemand:
         *,
         moves_real_arm: bool = False,
     ) -> Finished:
-        """Runs an experiment. Raises OrderFailedError when there is no trace."""
+        """Runs an experiment. Raises OrderFailedError if it left no trace."""
         return end_of(self.answer_to(self.begin(RunExperiment, spec=spec, moves_real_arm=moves_real_arm), heard))
 
     def _close(self) -> None:
@@ -276,7 +279,7 @@ class OwnerOnDemand:
 
 
 def _require_opening(report: object) -> None:
-    """Raises OrderFailedError when the process has said that it ends, or has ended."""
+    """Raises OrderFailedError if the process could not open the robot, or has ended."""
     if isinstance(report, CannotOpen):
         raise OrderFailedError(report.problem, report.exit_code)
     if isinstance(report, str):
@@ -284,20 +287,20 @@ def _require_opening(report: object) -> None:
 
 
 def _gone(why: str) -> OrderFailedError:
-    line = f"the process that owned the port has ended without a word ({why})"
+    line = f"the process that owned the port ended unexpectedly ({why})"
     left = "the arm holds its last set point; `daq traces salvage` finishes what was recorded"
     return OrderFailedError(f"{line}: {left}", exit_codes.PROGRAM_FAULT)
 
 
 def done(answer: Answer) -> Answer:
-    """The answer to an order that was carried out. Raises OrderFailedError."""
+    """Returns the answer unchanged. Raises OrderFailedError if the order was not carried out."""
     if answer.problem:
         raise OrderFailedError(answer.problem, answer.exit_code)
     return answer
 
 
 def end_of(answer: Answer) -> Finished:
-    """The end of a run that has left a trace. Raises OrderFailedError for one that has left none."""
+    """Returns the end of a run that left a trace. Raises OrderFailedError if the run left none."""
     finished = done(answer).finished
     assert finished is not None
     return finished

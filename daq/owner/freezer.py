@@ -1,4 +1,4 @@
-"""Carries out a stop on a thread of its own, so that whoever asks for it is answered in time whatever the link does."""
+"""Carries out a stop on a separate thread, so that its sender gets an answer in time even if the link is blocked."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from daq.owner.stop_socket import StopAnswer
 from daq.runner.arm_control import ArmControl
 
 ANSWER_WITHIN = 0.7
-"""s after which a stop that the board has not confirmed is answered as just that; it goes on being repeated."""
+"""Time (s) after which an unconfirmed stop is answered as unconfirmed. The link goes on repeating it."""
 
 
 class Freezer:
-    """Freezes one robot. Before `control` is set nothing can move yet, and a stop only ends the run."""
+    """Freezes one robot. Until `control` is set nothing can move, and a stop only ends the run."""
 
     def __init__(self, robot: str, port: str) -> None:
         self.control: ArmControl | None = None
@@ -26,7 +26,7 @@ class Freezer:
         self._lock = threading.Lock()
 
     def __enter__(self) -> Self:
-        # The thread is made now: the moment of a stop is no moment to ask the operating system for one.
+        # Start the thread now: creating one during a stop could fail or take time.
         self._thread.submit(lambda: None)
         return self
 
@@ -36,7 +36,7 @@ class Freezer:
         self._thread.shutdown(wait=True)
 
     def freeze(self, cause: str) -> StopAnswer:
-        """Stops the arm; says within ANSWER_WITHIN what is known. For any thread."""
+        """Stops the arm and returns within ANSWER_WITHIN with the state known by then. For any thread."""
         control = self.control
         if control is None:
             return self._answer(text="the run has not reached its robot yet; it ends before anything moves")
@@ -47,7 +47,8 @@ class Freezer:
         try:
             return under_way.result(ANSWER_WITHIN)
         except TimeoutError:
-            # Writing takes half a second at most, or has failed by now: the stop is on the line, unconfirmed.
+            # A write takes at most 0.5 s, and an error would have been raised by now: the stop was sent, but is
+            # unconfirmed.
             return self._answer(delivered=True, text=f"no confirmation within {ANSWER_WITHIN} s; it is being repeated")
 
     def _stop(self, control: ArmControl, cause: str) -> StopAnswer:

@@ -1,7 +1,7 @@
-"""Whoever may end a run from outside: a signal, the stop socket, the parent process. One thread listens to all three.
+"""Listens for requests to end a run: signals, the stop socket, the parent process. One thread serves all three.
 
-A stop never waits for the acquisition loop: the guardian has it written to the line itself. It listens from before the
-port is opened until nothing can move any more.
+A stop never waits for the acquisition loop: the guardian sends it itself. It listens from before the port is opened
+until nothing can move any more.
 """
 
 from __future__ import annotations
@@ -23,36 +23,37 @@ from daq.owner.stop_socket import StopAnswer, StopSocket
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _CLOSE = b"\0"
-"""Byte in the wake-up pipe that ends the guardian's thread; every other byte is the number of a signal."""
+"""Byte in the wake-up pipe that ends the guardian's thread. Every other byte is a signal number."""
 CANCEL = b"cancel\n"
-"""What a parent says that is a service; anything else is a stop too."""
+"""Sent on the parent's pipe by a service that cancels the run. Any other bytes stop the run too, with cause PARENT."""
 LOOK_EVERY = 0.25
-"""s between two looks whether the stop socket's file is still there."""
+"""Time (s) between two checks that the file of the stop socket still exists."""
 CLIENT_PATIENCE = 0.1
-"""s that a client may take to accept its answer, a line that fits into any socket's buffer."""
+"""Time (s) for a client to accept its answer, a line that fits into the buffer of any socket."""
 
 
 class EndCause(Enum):
-    """Why a run is ended from outside: what stands behind "stopped:"."""
+    """Why a run was ended from outside: the text that follows "stopped: " in messages."""
 
     STOP = "on request, by daq stop or through the service"
-    """Through the stop socket, which does not tell who asks."""
+    """Through the stop socket, which does not identify the sender."""
     PARENT = "by Ctrl-C, or by the program that started the run"
-    CANCELLED = "by the service: what ran was cancelled, or nobody had the control any more"
+    CANCELLED = "by the service: the experiment was cancelled, or nobody had the control any more"
     SIGNAL = "by a signal"
     ORPHANED = "the process that started this run is gone"
-    DEAF = "this run could no longer be stopped from outside"
+    LISTENER_FAILED = "this run could no longer be stopped from outside"
 
 
 class Guardian:
-    """Listens until closed. Every request to end is kept in `cause` (the first one stays), then calls `freeze`.
+    """Listens until closed. A request to end is stored in `cause`, unless one is there already, and then calls
+    `freeze`.
 
-    freeze: sends STOP to the controller and says what became of it; called on any thread, must not take longer than a
-            stop's answer may
-    parent: descriptor of the parent's pipe: any byte is a stop, its end the loss of the parent
+    freeze: sends STOP to the controller and returns the result. It is called on any thread, and must return within
+    `stop_socket.ANSWER_TIMEOUT`.
+    parent: descriptor of the parent's pipe. Any byte is a stop; the end of the pipe means that the parent is gone.
 
-    Signals are written to the wake-up pipe by Python's own handler, at once, whatever the main thread is doing. Enter
-    and leave it on the main thread.
+    Python's own handler writes signals to the wake-up pipe at once, whatever the main thread is doing. Enter and leave
+    the guardian on the main thread.
     """
 
     def __init__(self, listener: StopSocket, parent: int | None, freeze: Callable[[str], StopAnswer]) -> None:
@@ -64,41 +65,41 @@ class Guardian:
         self._wakeup_before = -1
         self._closing = False
         self._cause: EndCause | None = None
-        self._answered = -math.inf
-        """When the newest request to end was carried out (monotonic clock, s); infinite while one is under way."""
+        self._last_stop_done = -math.inf
+        """When the newest stop was completed (monotonic clock, s); infinite while a stop is under way."""
         self._under_way = 0
         self._lock = threading.Lock()
-        """Held for moments only: of cause and time of the newest request together."""
+        """Keeps the cause and the time of the newest stop consistent. Never held during a stop."""
 
     @property
     def cause(self) -> EndCause | None:
-        """Why the run is to end; None while nobody wants it to."""
+        """Why the run must end; None if it need not."""
         if self._cause is None and not self._closing and not self._thread.is_alive():
-            return EndCause.DEAF
+            return EndCause.LISTENER_FAILED
         return self._cause
 
     @property
-    def unheard(self) -> str:
-        """Why no other process of this user can stop this run; empty where one can."""
+    def socket_problem(self) -> str:
+        """Why other processes of this user cannot stop this run; empty if they can."""
         return self._listener.problem
 
     def stop(self) -> StopAnswer:
-        """A stop that came neither by the socket nor by a signal; for any thread."""
+        """Stops the arm on request of this process. For any thread."""
         return self._end(EndCause.STOP)
 
-    def forget(self, asked: float) -> bool:
-        """For an explicit reset, asked for at this moment (monotonic clock, s): what ended the work before ends nothing
-        any more. False, and nothing is forgotten, for a request that is `outdated`."""
+    def clear_cause(self, asked: float) -> bool:
+        """Clears the cause of the last stop, for a reset that was requested at `asked` (monotonic clock, s). Returns
+        False and clears nothing if a newer stop came after that request."""
         with self._lock:
-            if self.outdated(asked):
+            if self.is_older_than_stop(asked):
                 return False
             self._cause = None
             return True
 
-    def outdated(self, asked: float) -> bool:
-        """Whether what was asked for at this moment (monotonic clock, s) was asked before the newest request to end had
-        been carried out: whoever asked did not know of that."""
-        return self._answered >= asked
+    def is_older_than_stop(self, asked: float) -> bool:
+        """Whether a request made at `asked` (monotonic clock, s) is older than the end of the newest stop. Its sender
+        could not know of that stop."""
+        return self._last_stop_done >= asked
 
     def __enter__(self) -> Self:
         self._wake_read, self._wake_write = os.pipe()
@@ -113,11 +114,12 @@ class Guardian:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._closing = True
-        with contextlib.suppress(BlockingIOError):  # a full pipe wakes it as well
+        with contextlib.suppress(BlockingIOError):  # a full pipe also wakes the thread
             os.write(self._wake_write, _CLOSE)
         self._thread.join()
         with contextlib.suppress(OSError):
-            while self._listener.fileno() >= 0:  # until nobody waits: the link is still there
+            # serve the queued clients; accept() raises BlockingIOError when none is left
+            while self._listener.fileno() >= 0:
                 self._serve(self._listener.socket.accept()[0])
         for number, handler in self._handlers.items():
             signal.signal(number, handler)  # type: ignore[arg-type]
@@ -129,13 +131,13 @@ class Guardian:
         try:
             self._listen()
         except BaseException:
-            # Nobody can stop this run any more: it does not go on.
-            self._end(EndCause.DEAF)
+            # Nobody could stop this run from outside any more, so it ends.
+            self._end(EndCause.LISTENER_FAILED)
             raise
 
     def _end(self, cause: EndCause) -> StopAnswer:
         with self._lock:
-            self._answered = math.inf
+            self._last_stop_done = math.inf
             self._under_way += 1
             self._cause = self._cause or cause
         try:
@@ -144,7 +146,7 @@ class Guardian:
             with self._lock:
                 self._under_way -= 1
                 if not self._under_way:
-                    self._answered = time.monotonic()
+                    self._last_stop_done = time.monotonic()
 
     def _listen(self) -> None:
         watched = select.poll()
@@ -158,17 +160,18 @@ class Guardian:
                 self._answer_client()
             if self._parent in ready and self._parent is not None and not self._parent_speaks():
                 watched.unregister(self._parent)
-            self._keep_heard(watched)
+            self._renew_socket(watched)
 
-    def _keep_heard(self, watched: select.poll) -> None:
-        """Listens at another socket if the file of this one is gone."""
+    def _renew_socket(self, watched: select.poll) -> None:
+        """Listens at a new socket if the file of the present one is gone."""
         before = self._listener.renew()
         if before is None:
             return
         watched.unregister(before)
         watched.register(self._listener.fileno(), select.POLLIN)
         with before, contextlib.suppress(OSError):
-            while True:  # until nobody waits who has found it while it was there
+            # serve the clients that connected to the old socket; accept() raises BlockingIOError after the last
+            while True:
                 self._serve(before.accept()[0])
 
     def _parent_speaks(self) -> bool:
@@ -181,7 +184,7 @@ class Guardian:
     def _answer_client(self) -> None:
         try:
             connection, _ = self._listener.socket.accept()
-        except (BlockingIOError, ConnectionError):  # it has gone away meanwhile: it asked for a stop all the same
+        except (BlockingIOError, ConnectionError):  # the client has gone, but connecting was its request to stop
             self._end(EndCause.STOP)
             return
         self._serve(connection)

@@ -1,6 +1,6 @@
-"""Reads orders to the owner of a port, on a thread of its own.
+"""Reads orders for the owner on a separate thread.
 
-An order that ends running work takes effect at once, through the guardian, whatever the main thread is doing.
+An order that ends running work goes to the guardian at once, whatever the main thread is doing.
 """
 
 from __future__ import annotations
@@ -24,43 +24,43 @@ from daq.owner.messages import (
     JogBegin,
     JogDrive,
     LeadBegin,
-    Long,
+    LongOrder,
     Open,
     Order,
-    Quick,
+    QuickOrder,
     RunExperiment,
     RunProgram,
 )
 from firmware_protocol.invalid import first_invalid
 
 STOP = b"stop\n"
-"""Tells the guardian to end the work as Ctrl-C does."""
+"""Makes the guardian end the work as Ctrl-C does."""
 LONGEST_ORDER = 256 << 20
-"""Largest order in bytes, enough for a recorded path of hours."""
+"""Largest order (bytes), enough for a recorded path of hours."""
 
 
 class Inbox:
     """Reads orders until the client closes its end, or sends `Close`.
 
-    closing: the client wants the port back, or has died
-    finish:  the teaching under way must end in good order
+    closing: set when the client returns the port, or has died
+    finish:  set when the current teaching must end in good order
     freeze:  stops the arm at once and answers, on the inbox's thread
     """
 
     def __init__(self, descriptor: int) -> None:
-        ORDER.rebuild()  # no stop waits for it
+        ORDER.rebuild()  # build the validators now, so that no stop waits for them
         self.closing = threading.Event()
         self.finish = threading.Event()
         self.freeze: Callable[[Freeze], None] = lambda _order: None
         self.guardian_end, self._to_guardian = os.pipe()
         self._input = os.fdopen(descriptor, "rb", closefd=False)
-        self._waiting: queue.Queue[Long | Quick | None] = queue.Queue()
+        self._waiting: queue.Queue[LongOrder | QuickOrder | None] = queue.Queue()
         self._lock = threading.Lock()
         self._drive: JogDrive | None = None
         self._said = -math.inf
-        """When the newest jog command was given."""
+        """Time (s) of the newest jog command."""
         self._long = 0
-        """Number of long orders that wait or run. If there are any, the loss of the client freezes the arm."""
+        """Number of long orders that wait or run. While there are any, losing the client freezes the arm."""
         self._thread = threading.Thread(target=self._read_all, name="inbox", daemon=True)
 
     def first(self) -> Open:
@@ -72,24 +72,24 @@ class Inbox:
             raise SpecError(f"owner: the first order: {first_invalid(error).message}") from error
 
     def begin(self) -> None:
-        """Reads orders from now on. The thread ends with the input, or with the process."""
+        """Starts the reading thread. It ends with the input, or with the process."""
         self._thread.start()
 
-    def take(self, patience: float = 0.0) -> Long | Quick | None:
-        """Returns the next order; None if none comes within `patience` s, or the client ends."""
+    def take(self, patience: float = 0.0) -> LongOrder | QuickOrder | None:
+        """Returns the next order; None if none comes within `patience` s, or if the input ends."""
         try:
             return self._waiting.get(timeout=patience) if patience else self._waiting.get_nowait()
         except queue.Empty:
             return None
 
     def drive(self) -> JogDrive | None:
-        """Returns the newest jog command, and forgets it."""
+        """Returns the newest jog command and clears it."""
         with self._lock:
             command, self._drive = self._drive, None
         return command
 
     def done(self) -> None:
-        """Notes that a long order has been carried out, or refused."""
+        """Notes that a long order was carried out or refused."""
         with self._lock:
             self._long -= 1
 
@@ -118,13 +118,13 @@ class Inbox:
                 self.finish.set()
             case JogDrive():
                 with self._lock:
-                    if order.said >= self._said:  # a command overtaken by a newer one is ignored
+                    if order.said >= self._said:  # a command that arrives after a newer one is ignored
                         self._drive, self._said = order, order.said
             case Open() | Close():
                 raise SpecError("owner: this robot is open already")
             case RunExperiment() | JogBegin() | RunProgram() | LeadBegin():
                 with self._lock:
-                    if not self._long:  # otherwise the command, and the request to finish, concern the running work
+                    if not self._long:  # otherwise the command, or the request to finish, belongs to the running work
                         self._drive = None
                         self.finish.clear()
                     self._long += 1
@@ -138,7 +138,7 @@ class Inbox:
                 os.write(self._to_guardian, said)
 
     def _leave(self, told: bool) -> None:
-        """Tells the guardian to end the work. The end of the guardian's pipe means that the client has died."""
+        """Makes the guardian end the work. To the guardian, the end of its pipe means that the client has died."""
         if told:
             self._end_what_runs(STOP)
         elif self._long:

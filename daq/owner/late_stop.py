@@ -1,7 +1,7 @@
-"""A stop that could not be delivered because the link was lost is delivered when the link comes back.
+"""Delivers a stop that the lost link held back, once the link returns.
 
-Until then the arm holds its last set point. Whoever plugs the cable back in must not find an arm that takes set points
-from anyone.
+Until then the arm holds its last set point. Nobody who plugs the cable back in must find an arm that accepts set points
+from any program.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from daq.runner.arm_control import stop_line
 
 @dataclass(frozen=True)
 class _UntilClosed:
-    """Ends the attempts when the window closes; waits no longer than that."""
+    """Ends the attempts when the time window closes."""
 
     closes: float
     sleep: Callable[[float], None]
 
     def wait(self, timeout: float) -> bool:
-        """True once the window has closed."""
+        """Returns True once the window has closed."""
         remaining = self.closes - time.monotonic()
         if remaining <= 0:
             return True
@@ -32,9 +32,9 @@ class _UntilClosed:
 
 
 def deliver_late_stop(controller: Controller, window: float, sleep: Callable[[float], None] = time.sleep) -> str:
-    """Tries to reach the controller again for `window` s, with doubling delays, and freezes the arm when it is there.
+    """Tries to reach the controller for `window` s, with doubling delays, and freezes the arm once it answers.
 
-    Returns one line that says what became of it. Sends nothing but the stop: a stop needs no greeting.
+    Returns a line with the result. It sends only the stop, for which the controller needs no greeting.
     """
     begun = time.monotonic()
     try:

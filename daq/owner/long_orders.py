@@ -1,4 +1,4 @@
-"""Carries out orders that move the arm, one at a time: an experiment, jogging, a taught program, leading by hand."""
+"""Carries out orders that move the arm, one at a time: an experiment, jogging, a taught program, hand guiding."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from daq.owner.messages import (
     JogBegin,
     JogDrive,
     LeadBegin,
-    Quick,
+    QuickOrder,
     RunExperiment,
     RunProgram,
 )
@@ -68,17 +68,18 @@ def run(robot: OwnedRobot, order: RunExperiment) -> Answer:
 
 
 def _with_late_stop(robot: OwnedRobot, result: RunResult) -> RunResult:
-    """Delivers the stop of a lost link; the result says what became of it. Nobody restores an unwatched arm's link."""
+    """Delivers the stop that a lost link held back, and adds the outcome to the result. Between orders nobody restores
+    the link of an arm that is not monitored."""
     link = robot.controller.link
     if link.state is not LinkState.LOST or link.control is not None:
-        return result  # a mock of our own has gone for good; anything else may come back
+        return result  # the package's own mock is gone for good; any other robot may come back
     robot.speaker.progress(1.0, "the link is lost: trying to deliver the stop")
     line = deliver_late_stop(robot.controller, robot.opening.late_stop_window)
     return replace(result, reason=f"{result.reason}; {line}")
 
 
 def jog_until_finished(robot: OwnedRobot, order: JogBegin) -> Answer:
-    """Jogs: the newest command drives the arm, for 0.3 s at most."""
+    """Jogs: the newest command drives the arm, for at most 0.3 s."""
     _require_ready(robot)
     newest: JogCommand | None = None
 
@@ -86,7 +87,7 @@ def jog_until_finished(robot: OwnedRobot, order: JogBegin) -> Answer:
         nonlocal newest
         _between_samples(robot)
         said = robot.inbox.drive()
-        if said is not None and not robot.guardian.outdated(said.said) and _allowed(robot, said):
+        if said is not None and not robot.guardian.is_older_than_stop(said.said) and _allowed(robot, said):
             on_its_way = time.monotonic() - said.said
             newest = JogCommand(said.velocities, robot.controller.clock.now() - on_its_way)
         return newest
@@ -96,7 +97,7 @@ def jog_until_finished(robot: OwnedRobot, order: JogBegin) -> Answer:
 
 
 def perform(robot: OwnedRobot, order: RunProgram) -> Answer:
-    """Runs a taught program, which is checked completely before its first motion."""
+    """Runs a taught program after checking all of it."""
     _require_ready(robot)
     here = robot.arm().next_sample()
     planned = plan_program(Program.model_validate(order.program), robot.machine, here.set_point)
@@ -113,7 +114,7 @@ def perform(robot: OwnedRobot, order: RunProgram) -> Answer:
 
 
 def lead(robot: OwnedRobot, order: LeadBegin) -> Answer:
-    """Lets joints be led by hand until `Finish`. The answer has the recorded path, even after a stop."""
+    """Lets a person guide joints by hand until `Finish`. The answer contains the recorded path, even after a stop."""
     _require_ready(robot)
     kept: dict[str, object] = {}
 
@@ -128,8 +129,8 @@ def lead(robot: OwnedRobot, order: LeadBegin) -> Answer:
     return Answer(number=order.number, data=kept, problem=problem, exit_code=exit_code)
 
 
-def answered_quickly(robot: OwnedRobot, order: Quick) -> Answer:
-    """Returns the answer to a quick order; a refusal is an answer, too."""
+def answered_quickly(robot: OwnedRobot, order: QuickOrder) -> Answer:
+    """Returns the answer to a quick order; for a refused order it contains the problem."""
     try:
         return Answer(number=order.number, data=carry_out(robot, order))
     except DaqError as error:
@@ -139,7 +140,7 @@ def answered_quickly(robot: OwnedRobot, order: Quick) -> Answer:
 
 
 def _require_ready(robot: OwnedRobot) -> None:
-    """Raises SafetyError or StoppedError if neither keys nor programs may move the arm."""
+    """Raises SafetyError or StoppedError if keys and programs must not move the arm."""
     if (cause := robot.end_cause() or robot.control.halted) is not None:
         raise StoppedError(cause)
     if not robot.opening.watched:
@@ -153,7 +154,7 @@ def _between_samples(robot: OwnedRobot) -> None:
     order = robot.inbox.take()
     if order is None:
         return
-    if isinstance(order, Quick):
+    if isinstance(order, QuickOrder):
         robot.speaker.ended(answered_quickly(robot, order))
     else:
         robot.inbox.done()
@@ -162,7 +163,8 @@ def _between_samples(robot: OwnedRobot) -> None:
 
 
 def _allowed(robot: OwnedRobot, said: JogDrive) -> bool:
-    """Whether a jog command is allowed: every joint exists and is not driven too fast. Otherwise the arm holds."""
+    """Whether a jog command is allowed: every joint exists and the speeds are within the limits. If not, the arm
+    holds."""
     for joint, velocity in said.velocities.items():
         if not 1 <= joint <= len(robot.machine.joints):
             robot.say(f"jog refused: joint {joint}")

@@ -1,6 +1,6 @@
-"""The owner's main loop: it carries out a waiting order, or else reads the next sample, and restores a lost link.
+"""The owner's main loop: carries out the next order or else reads a sample, and restores a lost link.
 
-An arm that is not watched is left alone between two orders.
+An arm that is not monitored (`Open.watched`) is not read between two orders.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from daq.driver import ControllerRestartedError, HardwareFaultError, NoSampleErr
 from daq.link import LinkError, LinkState
 from daq.owner import long_orders
 from daq.owner.guardian import EndCause
-from daq.owner.messages import BEGINS_WITHIN, Answer, JogBegin, LeadBegin, Long, Quick, RunExperiment
+from daq.owner.messages import BEGINS_WITHIN, Answer, JogBegin, LeadBegin, LongOrder, QuickOrder, RunExperiment
 from daq.owner.owned_robot import OwnedRobot
 from daq.owner.quick_orders import require_current
 from daq.owner.watched_controller import is_frozen
@@ -24,9 +24,9 @@ from firmware_protocol.commands import StatusFlag
 from firmware_protocol.errors import ProtocolError
 
 LOOK_EVERY = 0.1
-"""Time (s) between two looks whether somebody ends this process, if nothing else is to be done."""
-LEAVING = (EndCause.SIGNAL, EndCause.ORPHANED, EndCause.DEAF)
-"""Causes that end not only the work but this process."""
+"""Time (s) between two checks for the end of this process while nothing else is to be done."""
+LEAVING = (EndCause.SIGNAL, EndCause.ORPHANED, EndCause.LISTENER_FAILED)
+"""Causes that end the whole process, and not only the current work."""
 
 
 @dataclass
@@ -36,7 +36,7 @@ class _BetweenAttempts:
     robot: OwnedRobot
 
     def wait(self, timeout: float) -> bool:
-        """Returns True if the client wants the port back, or somebody ends this process."""
+        """Returns True if the client returns the port, or this process must end."""
         until = time.monotonic() + timeout
         while not _leaving(self.robot):
             self.robot.tell_arm()
@@ -49,7 +49,7 @@ class _BetweenAttempts:
 
 
 def serve(robot: OwnedRobot) -> None:
-    """Runs until the client wants the port back. Faults of this program freeze the arm and are raised."""
+    """Runs until the client returns the port. A program fault freezes the arm and is raised."""
     watched = robot.opening.watched
     if watched:
         _notice_a_stop_before_us(robot)
@@ -75,8 +75,8 @@ def serve(robot: OwnedRobot) -> None:
                 last = None
             except HardwareFaultError as error:
                 _trip_once(robot, str(error))
-                with suppress(LinkError):  # the next turn meets it
-                    robot.number_stop()  # no sample comes, and the stop is released by its number
+                with suppress(LinkError):  # the next round of the loop handles it
+                    robot.number_stop()  # no sample arrives, but releasing the stop needs its number
                 last = None
             except (LinkError, NoSampleError) as error:
                 _link_lost(robot, str(error))
@@ -84,20 +84,20 @@ def serve(robot: OwnedRobot) -> None:
 
 
 def _watch(robot: OwnedRobot, last: int | None) -> int:
-    """Reads the next sample of an arm that nobody moves. Returns its tick."""
+    """Reads the next sample of an arm at rest. Returns its tick."""
     every = robot.controller.line_rate().every
     snapshot = robot.controller.next_snapshot(None if last is None else last + every - 1)
     if is_frozen(snapshot) and robot.control.arm.state is State.IDLE:
-        robot.control.stop("on the board, by somebody else")
+        robot.control.stop("on the board, by another host")
     robot.number_stop()
     return snapshot.tick
 
 
-def _carry_out(robot: OwnedRobot, order: Long | Quick) -> None:
-    if isinstance(order, Quick):
+def _carry_out(robot: OwnedRobot, order: LongOrder | QuickOrder) -> None:
+    if isinstance(order, QuickOrder):
         answer = long_orders.answered_quickly(robot, order)
-        # Before the answer, since a client that knows of a reset may resume the queue at once. Even if the state equals
-        # that of the last report: the service may have noted a stop since, which this process has never reported.
+        # Report before answering: a client that knows of the reset may resume the queue at once. Report even an
+        # unchanged state: the service may have noted a stop that this process never reported.
         robot.tell_arm(anew=True)
         robot.speaker.ended(answer)
         return
@@ -106,7 +106,7 @@ def _carry_out(robot: OwnedRobot, order: Long | Quick) -> None:
             raise ReachError(_being_tried(robot))
         require_current(robot, order, BEGINS_WITHIN)
         robot.activity = order.activity
-        robot.tell_arm()  # at once, so that the service refuses orders that are not possible meanwhile
+        robot.tell_arm()  # at once, so that the service refuses the orders that are not possible now
         answer = _moved(robot, order)
     except DaqError as error:
         answer = Answer(number=order.number, problem=str(error), exit_code=error.exit_code)
@@ -120,7 +120,7 @@ def _carry_out(robot: OwnedRobot, order: Long | Quick) -> None:
         robot.read_gains()
 
 
-def _moved(robot: OwnedRobot, order: Long) -> Answer:
+def _moved(robot: OwnedRobot, order: LongOrder) -> Answer:
     if isinstance(order, RunExperiment):
         return long_orders.run(robot, order)
     if isinstance(order, JogBegin):
@@ -131,7 +131,7 @@ def _moved(robot: OwnedRobot, order: Long) -> Answer:
 
 
 def _trip_once(robot: OwnedRobot, why: str) -> None:
-    """A damaged drive is reported with every sample: the arm is frozen at the first."""
+    """Freezes the arm once for a damaged drive, which every sample reports."""
     if robot.control.arm.state is not State.FAULT:
         robot.control.handle(Event.TRIP, why)
 
@@ -142,7 +142,7 @@ def _link_lost(robot: OwnedRobot, why: str) -> None:
 
 
 def _is_away(robot: OwnedRobot) -> bool:
-    """Whether the link is lost, or the robot was silent for so long that it counts as lost."""
+    """Whether the link is lost, or the robot has been silent so long that it counts as lost."""
     return robot.controller.link.state is LinkState.LOST or not robot.control.arm.connected
 
 
@@ -151,7 +151,7 @@ def _being_tried(robot: OwnedRobot) -> str:
 
 
 def _come_back(robot: OwnedRobot) -> None:
-    """Tries to restore the link. A stop that could not be delivered is delivered before anything else."""
+    """Tries to restore the link. An undelivered stop is delivered before anything else."""
     _link_lost(robot, "link lost")
     try:
         if robot.controller.link.state is LinkState.LOST:
@@ -167,10 +167,10 @@ def _come_back(robot: OwnedRobot) -> None:
 
 
 def _answers_again(robot: OwnedRobot) -> None:
-    """Reads a sample of a robot that was silent, to check that it answers. Raises LinkError, NoSampleError."""
+    """Checks that a silent robot answers again, by reading a sample. Raises LinkError, NoSampleError."""
     if (cause := robot.control.halted) is not None:
         robot.control.stop(cause)
-    with suppress(HardwareFaultError):  # it answers; the next sample trips
+    with suppress(HardwareFaultError):  # the robot answers; the next sample trips the guard
         robot.controller.next_snapshot()
 
 
@@ -179,8 +179,8 @@ def _notice_a_stop_before_us(robot: OwnedRobot) -> None:
         robot.control.stop("before this connection")
 
 
-def _refuse(robot: OwnedRobot, order: Long | Quick, line: str, exit_code: int) -> None:
-    if not isinstance(order, Quick):
+def _refuse(robot: OwnedRobot, order: LongOrder | QuickOrder, line: str, exit_code: int) -> None:
+    if not isinstance(order, QuickOrder):
         robot.inbox.done()
     robot.speaker.ended(Answer(number=order.number, problem=line, exit_code=exit_code))
 

@@ -1,4 +1,4 @@
-"""Messages to and from the owner of a port: one JSON object a line, on its standard input and output."""
+"""Messages to and from the owner: one JSON object per line, on its standard input and output."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from daq.contracts.trace import TraceEvent
 from daq.traces.naming import new_trace_id
 
 WAITS_AT_MOST = 2.0
-"""Time (s) after which a quick order is refused: less than the service waits for the answer (an assumption)."""
+"""Age (s) at which a quick order is refused. Less than the service waits for the answer (an assumption)."""
 
 BEGINS_WITHIN = 5.0
-"""Time (s) after which an order that moves the arm is refused: the process may have been suspended meanwhile."""
+"""Age (s) at which an order that moves the arm is refused: the process may have been suspended meanwhile."""
 
 
 # ---- to the owner
 
 
 class Open(FrozenRecord):
-    """The first line: which robot to open, and where.
+    """The first order: which robot to open, and at which port.
 
-    With `watched`, samples are read at all times, and a lost link is restored. Without it nothing is read between two
-    orders, and a stop that a lost link has not delivered is tried for `late_stop_window` s after a run. With `live`,
-    every sample and the state of the arm are reported.
+    `watched`: the arm is monitored between orders, that is, samples are read at all times and a lost link is restored.
+    Without `watched`, nothing is read between orders; a stop that a lost link held back is tried for `late_stop_window`
+    s after a run. `live`: every sample and the state of the arm are reported.
     """
 
     kind: Literal["open"] = "open"
@@ -41,11 +41,11 @@ class Open(FrozenRecord):
     folder: Path
     robot: str = "ma2000"
     memory_map: str | None = None
-    """Text of a memory map file; None for the one in the package."""
+    """Text of a memory map file; None for the packaged one."""
     watched: bool = False
     live: bool = False
     late_stop_window: Annotated[float, Field(ge=0)] = 10.0
-    """An assumption: time enough to push a plug in."""
+    """Time (s); an assumption: long enough to push a plug in."""
 
 
 class _Request(FrozenRecord):
@@ -55,21 +55,21 @@ class _Request(FrozenRecord):
 
 
 class _QuickRequest(_Request):
-    """A quick request that arrived at the time `asked` (s, this computer's monotonic clock). It is refused after
-    WAITS_AT_MOST: the client may have given up, and another may have control of the arm by now."""
+    """A quick request that arrived at `asked` (s, this computer's monotonic clock). It is refused after WAITS_AT_MOST:
+    by then the client may have given up, and another client may control the arm."""
 
     asked: float
 
 
 class _LongRequest(_Request):
-    """A request that moves the arm, and arrived at the time `asked`. It is refused after BEGINS_WITHIN, since nobody
-    expects the motion any more."""
+    """A request that moves the arm and arrived at `asked` (s, this computer's monotonic clock). It is refused after
+    BEGINS_WITHIN, when nobody expects the motion any more."""
 
     asked: float
 
 
 class RunExperiment(_LongRequest):
-    """Runs an experiment. The answer comes when its trace is closed."""
+    """Runs an experiment. The answer comes once the trace is closed."""
 
     activity: ClassVar[Activity] = "experiment"
     kind: Literal["run"] = "run"
@@ -86,8 +86,9 @@ class JogBegin(_LongRequest):
 
 
 class JogDrive(FrozenRecord):
-    """Drives joints at these velocities (rad/s) for 0.3 s at most; replaces the command before. It has no answer.
-    `said`: when the client's command arrived (s, this computer's monotonic clock); a delayed command moves nothing."""
+    """Drives joints at these velocities (rad/s) for at most 0.3 s; replaces the previous command. There is no answer.
+    `said`: arrival time of the client's command (s, this computer's monotonic clock); a delayed command moves
+    nothing."""
 
     kind: Literal["jog_drive"] = "jog_drive"
     velocities: dict[int, float]
@@ -95,16 +96,16 @@ class JogDrive(FrozenRecord):
 
 
 class RunProgram(_LongRequest):
-    """Runs a taught program, or a step, which is a program of one instruction. The answer comes at the end."""
+    """Runs a taught program; a single step is a program of one instruction. The answer comes at the end."""
 
     kind: Literal["program"] = "program"
     activity: Literal["program", "step"] = "program"
     program: dict[str, object]
-    """The data of a `daq.teaching.Program`, of which the client need not load the code."""
+    """The data of a `daq.teaching.Program`. Plain data, so that the client need not load that code."""
 
 
 class LeadBegin(_LongRequest):
-    """Lets joints be led by hand until `Finish`. The answer has the recorded path."""
+    """Lets a person guide joints by hand until `Finish`. The answer contains the recorded path."""
 
     activity: ClassVar[Activity] = "lead"
     kind: Literal["lead_begin"] = "lead_begin"
@@ -112,27 +113,27 @@ class LeadBegin(_LongRequest):
 
 
 class Finish(FrozenRecord):
-    """Ends jogging or leading in good order. No answer of its own."""
+    """Ends jogging or hand guiding in good order. There is no answer."""
 
     kind: Literal["finish"] = "finish"
 
 
 class HaltRun(FrozenRecord):
-    """Ends whatever runs with a stop: as the operator's cancel at a service does, or with `here` as Ctrl-C in the
-    program that started the owner. No answer of its own."""
+    """Ends running work with a stop. With `here`, the cause is Ctrl-C in the program that started the owner; without, a
+    cancellation by the service. There is no answer."""
 
     kind: Literal["halt"] = "halt"
     here: StrictBool = False
 
 
 class Freeze(_Request):
-    """Stops the arm, as the stop socket does. The answer's data are those of a `StopAnswer`; it comes at once."""
+    """Stops the arm at once, as the stop socket does. The answer contains the data of a `StopAnswer`."""
 
     kind: Literal["freeze"] = "freeze"
 
 
 class ReadState(_QuickRequest):
-    """Reads status, sample and gains: the answer's data are those of a `Seen`."""
+    """Reads status, sample and gains. The answer contains the data of a `StateAnswer`."""
 
     kind: Literal["read_state"] = "read_state"
 
@@ -144,7 +145,7 @@ class ReadGains(_QuickRequest):
 
 
 class WriteGains(_QuickRequest):
-    """Writes gains. It is refused for a joint that would jump to its set point."""
+    """Writes gains. Refused for a joint that would jump to its set point."""
 
     kind: Literal["write_gains"] = "write_gains"
     gains: dict[int, Gain]
@@ -157,7 +158,7 @@ class ReadProcess(_QuickRequest):
 
 
 class WriteOutput(_QuickRequest):
-    """Switches one process output, 0 to 7. It is refused while the arm is stopped, unless `while_stopped`."""
+    """Switches one process output, 0 to 7. Refused while the arm is stopped, unless `while_stopped` is set."""
 
     kind: Literal["write_output"] = "write_output"
     output: int
@@ -166,7 +167,7 @@ class WriteOutput(_QuickRequest):
 
 
 class MoveGripper(_QuickRequest):
-    """Closes or opens the gripper. It is refused while the arm is stopped, unless `while_stopped`."""
+    """Closes or opens the gripper. Refused while the arm is stopped, unless `while_stopped` is set."""
 
     kind: Literal["gripper"] = "gripper"
     closed: StrictBool
@@ -174,8 +175,8 @@ class MoveGripper(_QuickRequest):
 
 
 class Reset(_QuickRequest):
-    """Ends the stop of number `stop` (`ArmReport.stop`), and no other. Without a number it ends the one that the board
-    is in when this begins."""
+    """Ends the stop with the number `stop` (`ArmReport.stop`), and no other. None ends the stop in force when the reset
+    begins. `here`: first set the set points to the measured posture."""
 
     kind: Literal["reset"] = "reset"
     stop: int | None
@@ -183,7 +184,7 @@ class Reset(_QuickRequest):
 
 
 class Close(FrozenRecord):
-    """Frees the port, after a stop of running work."""
+    """Stops running work and frees the port."""
 
     kind: Literal["close"] = "close"
 
@@ -210,15 +211,15 @@ Order = Annotated[
 ]
 ORDER: TypeAdapter[Order] = TypeAdapter(Order, config=WHEN_USED)
 
-Long = RunExperiment | JogBegin | RunProgram | LeadBegin
-Quick = ReadState | ReadGains | WriteGains | ReadProcess | WriteOutput | MoveGripper | Reset
+LongOrder = RunExperiment | JogBegin | RunProgram | LeadBegin
+QuickOrder = ReadState | ReadGains | WriteGains | ReadProcess | WriteOutput | MoveGripper | Reset
 
 
 # ---- from the owner
 
 
 class Opened(FrozenRecord):
-    """The controller has answered, and the robot is connected."""
+    """The controller has answered: the robot is connected."""
 
     kind: Literal["opened"] = "opened"
     identity: RobotIdentity
@@ -234,7 +235,7 @@ class LiveSample(ControlPeriod):
 
 
 class ArmReport(FrozenRecord):
-    """The state of the arm and of the link. It is sent when it changes, and once a second."""
+    """The state of the arm and of the link, sent on each change and once per second."""
 
     kind: Literal["arm"] = "arm"
     arm: ArmState
@@ -244,30 +245,30 @@ class ArmReport(FrozenRecord):
     link: Literal["connected", "degraded", "lost"]
     counters: dict[str, float]
     stop: int | None = None
-    """Number of the board's newest stop, 0 if there was none; None while it is not known, such as just after a stop."""
+    """Number of the board's newest stop, 0 if there was none; None while it is unknown, as just after a stop."""
     unheard: str = ""
-    """Why `daq stop` and the stop listener do not reach this process; empty where they do."""
+    """Why `daq stop` and the stop listener cannot reach this process; empty if they can."""
 
 
-class Seen(FrozenRecord):
-    """What one look at the robot has shown."""
+class StateAnswer(FrozenRecord):
+    """State, newest sample and gains of a robot at one moment."""
 
     arm: ArmReport
     sample: LiveSample
     gains: dict[int, Gain]
     missed: int
-    """Set points that the board has missed since its power-up."""
+    """Set points that the board has missed since power-up."""
 
 
 class TeachingText(FrozenRecord):
-    """A line for the person who is teaching."""
+    """A line for the person who teaches the arm."""
 
     kind: Literal["told"] = "told"
     text: str
 
 
 class Progress(FrozenRecord):
-    """How far a run is."""
+    """Progress of a run."""
 
     kind: Literal["progress"] = "progress"
     fraction: float
@@ -275,14 +276,14 @@ class Progress(FrozenRecord):
 
 
 class EventHappened(FrozenRecord):
-    """Something that is in the trace too."""
+    """An event that is also in the trace."""
 
     kind: Literal["event"] = "event"
     event: TraceEvent
 
 
 class Finished(FrozenRecord):
-    """A run is over and its trace is closed."""
+    """A run has ended and its trace is closed."""
 
     kind: Literal["finished"] = "finished"
     outcome: Outcome
@@ -294,7 +295,8 @@ class Finished(FrozenRecord):
 
 
 class Answer(FrozenRecord):
-    """The answer to a request. `problem` is empty if it was carried out; `exit_code` is that of the command line."""
+    """The answer to a request. `problem` is empty if the request was carried out; `exit_code` is for the command
+    line."""
 
     kind: Literal["answer"] = "answer"
     number: int
@@ -306,7 +308,7 @@ class Answer(FrozenRecord):
 
 
 class CannotOpen(FrozenRecord):
-    """The robot could not be reached, or the program has a fault; the process ends."""
+    """The robot could not be reached, or the program has a fault. The process ends."""
 
     kind: Literal["cannot_open"] = "cannot_open"
     problem: str

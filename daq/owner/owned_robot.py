@@ -1,4 +1,4 @@
-"""The robot in the process that owns its port: controller, state of the arm, and reports to the client."""
+"""The robot in its owner process: controller, state of the arm, and reports to the client."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from daq.safety import State
 from daq.teaching.controller_arm import ControllerArm
 
 REPORT_EVERY = 1.0
-"""Time (s) between two reports of the arm's state if nothing changes."""
+"""Time (s) between two reports of an unchanged state."""
 
 
 @dataclass
 class OwnedRobot:
-    """One connected robot in its owner's process."""
+    """One connected robot in its owner process."""
 
     opening: Open
     controller: WatchedController
@@ -38,7 +38,8 @@ class OwnedRobot:
     activity: Activity = "none"
     gains: dict[int, Gain] = field(default_factory=dict)
     _stop: tuple[int, int, float] = (0, -1, 0.0)
-    """Number of the board's newest stop, and the stops that this process had sent and the time (s) when it was read."""
+    """Number of the board's newest stop; count of stops that this process had sent when it was read; time of reading
+    (s)."""
     _told: ArmReport | None = None
     _told_at: float = 0.0
 
@@ -54,12 +55,12 @@ class OwnedRobot:
 
     @property
     def machine(self) -> Machine:
-        """The machine behind the port."""
+        """The machine at the port."""
         return self.opening.machine
 
     @property
     def limits(self) -> Limits:
-        """The limits that hold for it."""
+        """The limits of this machine."""
         return self.opening.limits
 
     def end_cause(self) -> str | None:
@@ -72,37 +73,37 @@ class OwnedRobot:
         return ControllerArm(self.controller, self.control, self.machine, self.end_cause)
 
     def read_gains(self) -> dict[int, Gain]:
-        """Reads the gains of the machine's joints, and remembers them to report limp joints."""
+        """Reads the gains of the machine's joints, and stores them to report limp joints."""
         count = len(self.machine.joints)
         self.gains = {joint: gain for joint, gain in self.controller.gains().items() if joint <= count}
         return self.gains
 
     @property
     def newest_stop(self) -> int | None:
-        """The number of the board's newest stop; None while it must be read anew, since there has been another."""
+        """Number of the board's newest stop; None if there has been another stop since it was read."""
         number, freezes, read = self._stop
-        return None if freezes != self.control.freezes or self.guardian.outdated(read) else number
+        return None if freezes != self.control.freezes or self.guardian.is_older_than_stop(read) else number
 
     def number_stop(self) -> None:
-        """Reads the number of the newest stop where it is not known; of an arm that is not idle once a second, since
-        somebody else may stop it again, which no sample shows. Raises LinkError."""
+        """Reads the number of the newest stop if it is unknown. For an arm that is not idle, reads it once per second,
+        since another host may stop it again without a trace in the samples. Raises LinkError."""
         due = self.control.arm.state is not State.IDLE and time.monotonic() - self._stop[2] >= REPORT_EVERY
         if due or self.newest_stop is None:
             self.read_status()
 
     def read_status(self) -> ControllerStatus:
-        """Reads the board's status; the next report has the number of its newest stop. Raises LinkError."""
+        """Reads the board's status; the next report contains the number of its newest stop. Raises LinkError."""
         now, freezes = time.monotonic(), self.control.freezes
         status = self.controller.status()
         self._stop = (status.stop, freezes, now)
         return status
 
     def say(self, line: str) -> None:
-        """Reports a line for the operator who teaches."""
+        """Reports a line to the person who teaches the arm."""
         self.speaker.say(TeachingText(text=line))
 
     def tell_arm(self, *, anew: bool = False) -> None:
-        """Reports the arm's state if it has changed, or once a second; in any case with `anew`."""
+        """Reports the arm's state if it has changed, once per second, or, with `anew`, always."""
         if not self.opening.live:
             return
         report = self.report()
@@ -111,7 +112,8 @@ class OwnedRobot:
             self.speaker.say(report)
 
     def report(self) -> ArmReport:
-        """The state of the arm and of the link now; counters are those of the last report unless another is due."""
+        """Returns the present state of the arm and of the link. Counters are from the last report until the next is
+        due."""
         arm, ended = self.control.arm, self.end_cause()
         # The arm counts as stopped even before the board has confirmed it:
         stopping = ended is not None and arm.connected and arm.state is not State.FAULT
@@ -124,7 +126,7 @@ class OwnedRobot:
             link=self.controller.link.state.value,
             counters=counters,
             stop=self.newest_stop,
-            unheard=self.guardian.unheard,
+            unheard=self.guardian.socket_problem,
         )
 
     def _due(self) -> bool:

@@ -1,4 +1,4 @@
-"""A stop through the port itself, where no process of this user holds it."""
+"""Stops an arm directly through its port, if no process of this user owns the port."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from firmware_protocol.commands import Gains, ReportGains
 
 
 def stop_at_port(robot: str, url: str) -> StopAnswer:
-    """Opens the port, freezes the arm behind it, closes it again. Never raises: the answer says what is known."""
+    """Opens the port, freezes the arm and closes the port. Never raises: the answer states the result."""
     try:
         with Link.open(url) as link:
             stopped = link.stop()
@@ -33,7 +33,7 @@ def stop_at_port(robot: str, url: str) -> StopAnswer:
 
 
 def _limp(link: Link) -> str:
-    """Which joints nothing holds; a board that does not say so has been stopped all the same."""
+    """Names the limp joints. Returns an empty text if the board does not report gains."""
     try:
         gains = link.request(ReportGains(), Gains).gains
     except (LinkError, RequestRefusedError):

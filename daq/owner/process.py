@@ -1,4 +1,4 @@
-"""The main program of the owner of a port."""
+"""Main program of the owner process."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from daq.owner.owned_robot import OwnedRobot
 from daq.owner.session import port_session
 from daq.owner.speaker import Speaker
 from daq.owner.watched_controller import WatchedController
-from daq.runner.preparation import require_fitting
+from daq.runner.preparation import require_matching_machine
 from daq.transport import PortBusyError
 from firmware_protocol.commands import Capability
 from firmware_protocol.errors import ProtocolError
@@ -27,7 +27,7 @@ from firmware_protocol.memory_map import default_memory_map, parse_memory_map
 def main(loaded: Callable[[], None] = lambda: None) -> int:
     """Opens the robot of the first order, and serves until the client closes its end. Returns the exit code.
 
-    loaded: called when the robot is open, before the client knows
+    loaded: called once the robot is open, before the client is informed
     """
     with Speaker(sys.stdout.fileno()) as speaker:
         inbox = Inbox(sys.stdin.fileno())
@@ -50,7 +50,7 @@ def main(loaded: Callable[[], None] = lambda: None) -> int:
 
 
 def own(opening: Open, inbox: Inbox, speaker: Speaker, loaded: Callable[[], None]) -> None:
-    """Owns the port until the client wants it back. Raises DaqError, ProtocolError if it cannot be opened."""
+    """Owns the port until the client returns it. Raises DaqError or ProtocolError if the port cannot be opened."""
     memory_map = default_memory_map() if opening.memory_map is None else parse_memory_map(opening.memory_map)
 
     def guarded(guardian: Guardian) -> None:
@@ -71,10 +71,10 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker, loaded: Callable[[], None
         controller, control = session.controller, session.take_control()
         robot = OwnedRobot(opening, controller, control, session.guardian, inbox, speaker)
         if (cause := robot.end_cause()) is not None:
-            # It came while there was nothing to freeze. Now there is.
+            # The stop came before there was an arm to freeze: freeze it now.
             control.stop(cause)
         if opening.watched:
-            require_fitting(controller, opening.machine)
+            require_matching_machine(controller, opening.machine)
             robot.read_gains()
         loaded()
         speaker.ended(Opened(identity=_identity(controller.identity)))

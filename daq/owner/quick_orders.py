@@ -1,28 +1,28 @@
-"""Carries out orders between two samples: gains, process signals, gripper, reset. Nothing here moves joints."""
+"""Carries out orders between two samples: gains, process signals, gripper, reset. None of them moves a joint."""
 
 from __future__ import annotations
 
 import time
 
 from daq.contracts.errors import ReachError, SafetyError
-from daq.contracts.limp import doubts_line, require_no_jump
+from daq.contracts.limp import limp_warning, require_no_jump
 from daq.link import RequestRefusedError, StopCameFirstError
 from daq.owner.messages import (
     WAITS_AT_MOST,
-    Long,
+    LongOrder,
     MoveGripper,
-    Quick,
+    QuickOrder,
     ReadGains,
     ReadProcess,
     ReadState,
     Reset,
-    Seen,
+    StateAnswer,
     WriteGains,
     WriteOutput,
 )
 from daq.owner.owned_robot import OwnedRobot
 from daq.runner.arm_control import StoppedError
-from daq.runner.preparation import require_fitting
+from daq.runner.preparation import require_matching_machine
 from daq.safety import Event, State
 from firmware_protocol.commands import Refusal, StatusFlag
 
@@ -32,22 +32,23 @@ _READS = (ReadState, ReadProcess, ReadGains)
 _WHILE_TEACHING = (*_READS, WriteOutput, MoveGripper)
 
 
-def require_current(robot: OwnedRobot, order: Long | Quick, within: float) -> None:
-    """Raises ReachError for an order that nobody expects any more `within` s after its arrival, and SafetyError for one
-    that changes something and arrived before the newest stop: whoever sent it did not know of that."""
-    name = order.kind if isinstance(order, Quick) else order.activity
+def require_current(robot: OwnedRobot, order: LongOrder | QuickOrder, timeout: float) -> None:
+    """Raises ReachError if the order is older than `timeout` s. Raises SafetyError if it changes something and is older
+    than the newest stop, of which its sender could not know."""
+    name = order.kind if isinstance(order, QuickOrder) else order.activity
     waited = time.monotonic() - order.asked
-    if waited > within:
-        line = f"{name}: the robot's process came to it {waited:.1f} s after its arrival, {within:g} s are allowed"
+    if waited > timeout:
+        line = f"{name}: the robot's process came to it {waited:.1f} s after its arrival, {timeout:g} s are allowed"
         raise ReachError(f"{line}; nothing was done")
-    if robot.guardian.outdated(order.asked) and not isinstance(order, _READS):
+    if robot.guardian.is_older_than_stop(order.asked) and not isinstance(order, _READS):
         raise _overtaken(name, robot.end_cause())
 
 
-def carry_out(robot: OwnedRobot, order: Quick) -> dict[str, object]:
-    """Carries out an order, and returns the answer's data. Raises DaqError; nothing has changed then, unless the error
-    says so."""
-    stops = robot.controller.link.stops  # before the look at stops: one that is written after it comes first
+def carry_out(robot: OwnedRobot, order: QuickOrder) -> dict[str, object]:
+    """Carries out an order and returns the answer's data. Raises DaqError; unless the error says otherwise, nothing has
+    changed then."""
+    # read the counter before checking for stops: a stop written after this line is then detected
+    stops = robot.controller.link.stops
     require_current(robot, order, WAITS_AT_MOST)
     if robot.activity != "none" and not isinstance(order, _WHILE_TEACHING):
         raise SafetyError(f"not while the arm is busy ({robot.activity}): wait for its end, or stop it")
@@ -57,9 +58,12 @@ def carry_out(robot: OwnedRobot, order: Quick) -> dict[str, object]:
         raise _overtaken(order.kind, robot.end_cause()) from error
 
 
-def _carried_out(robot: OwnedRobot, order: Quick, stops: int) -> dict[str, object]:
-    """The answer's data. Raises StopCameFirstError for what would change something behind a stop that was written since
-    there were so many `stops`."""
+def _carried_out(robot: OwnedRobot, order: QuickOrder, stops: int) -> dict[str, object]:
+    """Returns the answer's data.
+
+    `stops`: number of stops written when the order was checked. Raises StopCameFirstError if another stop has been
+    written since, and the order would change something.
+    """
     match order:
         case ReadState():
             return _state(robot).model_dump(mode="json")
@@ -80,15 +84,15 @@ def _carried_out(robot: OwnedRobot, order: Quick, stops: int) -> dict[str, objec
             return {"text": _reset(robot, order)}
 
 
-def _state(robot: OwnedRobot) -> Seen:
-    """Raises SafetyError for another machine's file: its angles would be wrong."""
-    require_fitting(robot.controller, robot.machine)
+def _state(robot: OwnedRobot) -> StateAnswer:
+    """Raises SafetyError if the machine file does not match the controller: its angles would be wrong."""
+    require_matching_machine(robot.controller, robot.machine)
     status, gains = robot.read_status(), robot.read_gains()
     sample = robot.samples.sample(robot.controller.next_snapshot(), time.monotonic())
     arm = robot.report()
     if StatusFlag.FROZEN in status.flags and arm.arm == "idle":
         arm = arm.model_copy(update={"arm": "stopped"})
-    return Seen(arm=arm, sample=sample, gains=gains, missed=status.missed)
+    return StateAnswer(arm=arm, sample=sample, gains=gains, missed=status.missed)
 
 
 def _write_gains(robot: OwnedRobot, order: WriteGains, stops: int) -> dict[str, object]:
@@ -101,8 +105,8 @@ def _write_gains(robot: OwnedRobot, order: WriteGains, stops: int) -> dict[str, 
 
 
 def _require_not_stopped(robot: OwnedRobot, order: WriteOutput | MoveGripper) -> None:
-    """Raises StoppedError, or SafetyError for a stop before this connection, if the arm is stopped, unless the order
-    says that its sender knows of the stop."""
+    """Raises StoppedError (for a stop before this connection: SafetyError) if the arm is stopped, unless the order's
+    `while_stopped` is set."""
     if order.while_stopped:
         return
     cause = robot.end_cause() or robot.control.halted
@@ -123,11 +127,12 @@ def _process(robot: OwnedRobot) -> dict[str, object]:
 
 
 def _release(robot: OwnedRobot, order: Reset, stop: int) -> None:
-    """Releases the arm from the stop of this number. Raises RequestRefusedError or SafetyError if there is a
-    newer one: of one from this computer the guardian knows first, of one from elsewhere the board alone."""
+    """Releases the arm from the stop of this number. Raises RequestRefusedError or SafetyError if there is a newer
+    stop. The guardian knows of stops from this computer, only the board of stops from elsewhere, so both are
+    checked."""
     controller, control = robot.controller, robot.control
-    number = controller.stop_here(stop) if order.here else stop
-    if not robot.guardian.forget(order.asked):
+    number = controller.restart_stop_at_measured_posture(stop) if order.here else stop
+    if not robot.guardian.clear_cause(order.asked):
         raise _overtaken(order.kind, robot.end_cause())
     if control.arm.state in (State.STOPPED, State.FAULT):
         control.handle(Event.RESET, stop=number)
@@ -137,11 +142,11 @@ def _release(robot: OwnedRobot, order: Reset, stop: int) -> None:
 
 def _overtaken(name: str, cause: str | None = None) -> SafetyError:
     why = f" ({cause})" if cause else ""
-    return SafetyError(f"{name}: the arm has been stopped since this was asked for{why}: look at it, then ask again")
+    return SafetyError(f"{name}: the arm has been stopped after this request was sent{why}: look at it, then try again")
 
 
 def _reset(robot: OwnedRobot, order: Reset) -> str:
-    """Ends the stop or fault that the sender of the reset saw. Another one remains."""
+    """Ends the stop or fault that the sender of the reset saw. A newer one remains in force."""
     control, here = robot.control, order.here
     stopped = control.arm.state in (State.STOPPED, State.FAULT)
     if robot.opening.watched and not stopped and not here:
@@ -149,22 +154,22 @@ def _reset(robot: OwnedRobot, order: Reset) -> str:
     status = robot.read_status()
     if not stopped and not status.flags & _STOPPED and not here:
         return "was not stopped"
-    if order.stop not in (None, status.stop):  # before anything changes; the board looks once more
+    if order.stop not in (None, status.stop):  # checked before anything changes; the board checks again
         raise _overtaken(order.kind)
     try:
         _release(robot, order, status.stop)
     except RequestRefusedError as error:
         if error.reason != Refusal.OTHER_STOP:
             raise
-        control.stop(robot.end_cause() or "on the board, by somebody else")
+        control.stop(robot.end_cause() or "on the board, by another host")
         raise _overtaken(order.kind) from error
     if (cause := robot.end_cause()) is not None:
         control.stop(cause)
         raise SafetyError(f"the arm has been stopped again: {cause}")
-    limp = doubts_line(robot.read_gains())
-    holds = "the arm takes set points again" if limp else "the arm holds its posture and takes set points again"
+    warning = limp_warning(robot.read_gains())
+    holds = "the arm takes set points again" if warning else "the arm holds its posture and takes set points again"
     return (
         f"released: {holds}"
         + ("; the set points are the posture measured now" if here else "")
-        + f". {limp}" * bool(limp)
+        + f". {warning}" * bool(warning)
     )

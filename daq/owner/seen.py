@@ -1,4 +1,4 @@
-"""What an owner has reported, in the form in which people and programs get it."""
+"""Converts the owner's reports to the records that people and programs get."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from firmware_protocol.commands import StatusFlag
 
 
 def link_of(arm: ArmReport, age: float, url: str, identity: RobotIdentity) -> LinkStatus:
-    """The state of the link at `url`, by a report of this age (s), with the rates that it allows."""
+    """Returns the state of the link at `url` from a report of this age (s), with the rates that the link allows."""
     link = LinkStatus(state=arm.link, counters=arm.counters, age=age)
     return with_rates(link, parse_port_url(url).baud / BITS_PER_BYTE, identity)
 
 
 def sample_of(sample: LiveSample, now: float, utc: float) -> Sample:
-    """A sample with its age. `now` (monotonic) and `utc` (wall clock) are the same time (s)."""
+    """Returns a sample with its age. `now` (monotonic) and `utc` (wall clock) are the same moment (s)."""
     age = now - sample.host_time
     return Sample(
         tick=sample.tick,

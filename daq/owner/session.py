@@ -1,7 +1,7 @@
-"""Opens a robot's port; requests for a stop are heard from before it is opened until nothing can move any more.
+"""Opens a robot's port, and accepts stop requests from before it is opened until nothing can move any more.
 
-Entered in this order: the thread that carries out a stop, the stop socket, the guardian that listens, the port. Left in
-the reverse order, except the port, which closes last, after everybody who asked for a stop has been answered.
+Entered in this order: the thread that carries out a stop, the stop socket, the guardian, the port. They are left in
+reverse order, except that the port closes last, after every sender of a stop was answered.
 """
 
 from __future__ import annotations
@@ -24,19 +24,20 @@ C = TypeVar("C", bound=Controller)
 
 @dataclass(frozen=True)
 class PortSession(Generic[C]):
-    """A connected controller and the guardian that hears every request to end the work."""
+    """A connected controller, and the guardian that receives every request to end the work."""
 
     controller: C
     guardian: Guardian
     _freezer: Freezer
 
     def take_control(self) -> ArmControl:
-        """The arm's state machine. From here on a stop freezes the arm itself; before, it only ended the work."""
+        """Returns the arm's state machine. From now on a stop freezes the arm itself; before, it only ended the
+        work."""
         control = self._freezer.control = ArmControl(self.controller)
         return control
 
     def end_cause(self) -> str | None:
-        """Why the work is to end: `daq stop`, a signal, the parent process; None while nobody asks for the end."""
+        """Why the work must end (`daq stop`, a signal, the parent process); None if it need not."""
         cause = self.guardian.cause
         return None if cause is None else cause.value
 
@@ -51,18 +52,18 @@ def port_session(
     parent: int | None = None,
     guarded: Callable[[Guardian], None] = lambda _guardian: None,
 ) -> Iterator[PortSession[C]]:
-    """Opens the port at `url`, with the guardian listening from before it is opened until nothing can move any more.
+    """Opens the port at `url`; the guardian listens from before that until nothing can move any more.
 
-    A stop that comes after the end finds nobody here, and opens the port itself. Enter on the main thread.
+    After the end, `daq stop` finds no socket here and opens the port itself. Enter on the main thread.
 
     Args:
         connect: opens the port and connects to the controller, such as `Controller.connect`.
-        parent: descriptor of the parent's pipe: any byte is a stop, its end the loss of the parent.
+        parent: descriptor of the parent's pipe. Any byte is a stop; the end of the pipe means that the parent is gone.
         guarded: called with the guardian before the port is opened.
 
-    Raises ReachError when the stop socket cannot be made, LinkError when the robot is not reached.
+    Raises ReachError if the stop socket cannot be made, LinkError if the robot cannot be reached.
     """
-    build_records()  # nothing that keeps time waits for it later
+    build_records()  # build the validators now, so that nothing time-critical waits for them later
     with (
         ExitStack() as closed_last,
         Freezer(robot, url) as freezer,

@@ -1,4 +1,4 @@
-"""Reports on their way to the client, off the control loop: a client that does not read delays nothing."""
+"""Sends reports to the client outside the control loop, so that a client that does not read delays nothing."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from daq.contracts.trace import TraceEvent
 from daq.owner.messages import EventHappened, Progress
 
 WAITING_REPORTS = 4096
-"""Reports that may wait for a parent that does not read (80 s of samples); those beyond are not told."""
+"""Most reports that wait for a client that does not read (80 s of samples); further reports are dropped."""
 
 
 class Speaker:
-    """Writes reports to a descriptor, one a line, on a thread of its own; a reader that has gone stops nobody.
+    """Writes reports to a descriptor, one per line, on a separate thread. If the reader is gone, reports are dropped.
 
-    The end of the run is told however long the reader takes: leaving the `with` block waits for it.
+    The last report is never dropped: leaving the `with` block waits until it is written.
     """
 
     def __init__(self, output: int) -> None:
         self.untold = 0
-        """Reports that found no room."""
+        """Number of reports that were dropped."""
         self._output = output
         self._queue: queue.Queue[BaseModel | None] = queue.Queue(WAITING_REPORTS)
         self._thread = threading.Thread(target=self._write_all, name="reports", daemon=True)
@@ -42,29 +42,29 @@ class Speaker:
         self._thread.join()
 
     def ended(self, report: BaseModel) -> None:
-        """The last report; waits for room."""
+        """Sends the last report; waits for room."""
         self._queue.put(report)
 
     def progress(self, fraction: float, text: str) -> None:
-        """How far the run is."""
+        """Reports the progress of the run."""
         self.say(Progress(fraction=fraction, text=text))
 
     def happened(self, event: TraceEvent) -> None:
-        """An event."""
+        """Reports an event."""
         self.say(EventHappened(event=event))
 
     def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
-        """Nothing: the controller's listener reports samples, whoever reads them."""
+        """Does nothing: the controller's listener reports samples."""
 
     def say(self, report: BaseModel) -> None:
-        """Any report; one that finds no room is counted."""
+        """Sends a report, or drops and counts it if the queue is full."""
         try:
             self._queue.put_nowait(report)
         except queue.Full:
             self.untold += 1
 
     def _write(self, data: bytes) -> None:
-        # Past Python's own buffer: what is left there would be tried again, and complained about, at exit.
+        # Bypass Python's buffer: it would retry unwritten data at exit, and report the error.
         while data:
             data = data[os.write(self._output, data) :]
 

@@ -1,9 +1,8 @@
-"""Stop from another terminal: a local socket beside every process that owns a robot's port.
+"""Stops robots from another terminal: every process that owns a port has a local stop socket.
 
-A client connects, and is answered with one JSON line (`StopAnswer`). There is nothing to send and nothing to confirm:
-connecting is the request. The socket lies in a folder that belongs to the user, one file a process, so `daq stop`
-needs no configuration to find every robot that this user is moving. Nothing beyond the standard library is imported
-here: a stop does not wait for imports.
+A client connects and gets one JSON line (`StopAnswer`). It sends nothing: connecting is the request. There is one
+socket file per process, in a folder that belongs to the user. So `daq stop` needs no configuration to find every robot
+that this user is moving. Only the standard library is imported here, so that a stop does not wait for imports.
 """
 
 from __future__ import annotations
@@ -25,13 +24,14 @@ from daq.contracts.errors import ReachError
 FOLDER_VARIABLE = "DAQ_RUNTIME_FOLDER"
 APP = "ma2000-daq"
 ANSWER_TIMEOUT = 1.0
-"""Seconds after which an unanswered stop is reported as not delivered."""
+"""Time (s) after which an unanswered stop is reported as not delivered."""
 BACKLOG = 16
 
 
 @dataclass(frozen=True, kw_only=True)
 class StopAnswer:
-    """What became of a stop: `delivered` to the controller, `confirmed` by it, frozen at `tick` and `postures`."""
+    """Result of a stop: whether it was `delivered` to the controller and `confirmed` by it; `tick` and `postures` of
+    the freeze."""
 
     robot: str
     port: str = ""
@@ -46,17 +46,17 @@ class StopAnswer:
         return asdict(self)
 
     def to_json(self) -> bytes:
-        """The answer encoded as one line of JSON, as the socket carries it."""
+        """The answer as one line of JSON, as sent through the socket."""
         return json.dumps(self.as_data()).encode() + b"\n"
 
     @classmethod
     def from_json(cls, line: bytes) -> Self:
-        """Raises ValueError for anything but what `to_json` makes."""
+        """Inverse of `to_json`. Raises ValueError for any other line."""
         return cls.from_data(json.loads(line))
 
     @classmethod
     def from_data(cls, data: dict[str, Any]) -> Self:
-        """Raises ValueError for anything but what `as_data` makes."""
+        """Inverse of `as_data`. Raises ValueError for any other data."""
         try:
             return cls(**(data | {"postures": tuple(data["postures"])}))
         except (TypeError, KeyError) as error:
@@ -65,7 +65,7 @@ class StopAnswer:
 
 @dataclass(frozen=True)
 class StopAttempt:
-    """One process that was asked, and its answer (None: it did not answer in time)."""
+    """A stop request to one process, and the answer; None if it did not answer in time."""
 
     path: Path
     answer: StopAnswer | None
@@ -73,52 +73,52 @@ class StopAttempt:
 
     @property
     def robot(self) -> str:
-        """The robot's name, from the socket's: that of a process that does not answer too."""
+        """The robot's name, taken from the name of the socket, so that it is known without an answer."""
         return self.path.stem.rpartition("-")[0]
 
 
 def runtime_folders() -> list[Path]:
-    """Where stop sockets may lie, the first being where they are made: DAQ_RUNTIME_FOLDER where it is set; else the
-    session's own folder, else one of this user's among the temporary files.
+    """Folders of stop sockets. New sockets are made in the first: DAQ_RUNTIME_FOLDER if it is set, else the session's
+    own folder, else a folder of this user among the temporary files.
 
-    A terminal may lack what another one has in its environment, and a folder may be removed for good while a robot
-    moves, so whoever stops looks into all of them. The second folder of DAQ_RUNTIME_FOLDER belongs to it alone.
+    `daq stop` searches all of them: a terminal may lack a variable that another one has, and a folder may be removed
+    while a robot moves. The second folder of DAQ_RUNTIME_FOLDER is used for that variable's value alone.
     """
-    # Not by `tempfile`, which writes a file first: a stop needs no room on a disk.
+    # Not `tempfile`, which first writes a file: a stop must work on a full disk.
     temporary = Path(os.environ.get("TMPDIR") or "/tmp") / f"{APP}-{os.getuid()}"
     if own := os.environ.get(FOLDER_VARIABLE):
         return [Path(own), temporary.with_name(f"{temporary.name}-{zlib.crc32(os.path.abspath(own).encode()):08x}")]
     sessions = [Path("/run/user") / str(os.getuid())]
     if session := os.environ.get("XDG_RUNTIME_DIR"):
         sessions.insert(0, Path(session))
-    # `os.path.isdir`, since that of `Path` raises an error for what may not be looked at.
+    # `os.path.isdir` returns False where `Path.is_dir` raises PermissionError.
     usable = [one for one in sessions if os.path.isdir(one) and os.access(one, os.W_OK | os.X_OK)]
     folders = [session / APP for session in usable]
     return list(dict.fromkeys([*folders, temporary]))
 
 
 class StopSocket:
-    """A listening, non-blocking socket for stop requests of one robot. Its file may be removed by whatever tidies the
-    folder up; `renew` then makes another one."""
+    """A listening, non-blocking socket for stop requests of one robot. If a clean-up program removes its file, `renew`
+    makes another one."""
 
     def __init__(self, robot: str) -> None:
-        """Raises ReachError when it cannot be made."""
+        """Raises ReachError if the socket cannot be made."""
         self._name = f"{robot}-{os.getpid()}.sock"
         self.problem = ""
-        """Why there is no file at which this robot can be stopped; empty where there is one."""
+        """Why there is no file by which this robot can be stopped; empty if there is one."""
         self.socket, self.path, self._file = self._made(runtime_folders()[0])
 
     def fileno(self) -> int:
-        """Descriptor, for `select`; -1 once it is closed."""
+        """The descriptor, for `select`; -1 once it is closed."""
         return self.socket.fileno()
 
     def is_there(self) -> bool:
-        """Whether the file is still this socket's."""
+        """Whether the file still belongs to this socket."""
         return _file_at(self.path) == self._file
 
     def renew(self) -> socket.socket | None:
-        """Makes another socket if the file is gone, in the first folder in which that works. Returns the one before,
-        for whoever has connected to it; None if nothing has changed."""
+        """Makes another socket if the file is gone, in the first folder that works. Returns the previous socket, whose
+        connected clients still wait; None if nothing has changed."""
         if self.is_there():
             self.problem = ""
             return None
@@ -135,15 +135,16 @@ class StopSocket:
         return None
 
     def close(self) -> None:
-        """Removes the file, unless another one lies there by now."""
+        """Closes the socket. Removes the file, unless it belongs to another socket by now."""
         if self.is_there():
             self.path.unlink(missing_ok=True)
         self.socket.close()
 
     def _made(self, folder: Path) -> tuple[socket.socket, Path, tuple[int, int] | None]:
-        """A socket in a folder, its path, and its file as `_file_at` tells. Raises ReachError."""
+        """Returns a new socket in a folder, its path, and its file as in `_file_at`. Raises ReachError."""
         path = folder / self._name
-        # Nobody finds the file before it listens: who is refused there takes it for that of a dead process.
+        # The file gets its name only once the socket listens. A refused connection would make clients take it for a
+        # leftover of a dead process.
         beside = path.with_suffix(".new")
         made: socket.socket | None = None
         try:
@@ -169,17 +170,17 @@ class StopSocket:
 def stop_listener(robot: str) -> Iterator[StopSocket]:
     """The stop socket of one robot, removed at the end.
 
-    Raises ReachError when it cannot be made: a robot that cannot be stopped from outside is not moved.
+    Raises ReachError if it cannot be made: a robot that cannot be stopped from outside must not move.
     """
     with contextlib.closing(StopSocket(robot)) as listener:
         yield listener
 
 
 def request_stop(robot: str | None = None, process: int | None = None) -> list[StopAttempt]:
-    """Stops every robot that this user's processes are moving; or the one named; or that of one process, by its id.
-    Never waits over a second for each.
+    """Stops every robot that this user's processes are moving, or only the robot of this name, or of this process ID.
+    Waits at most 1 s for each.
 
-    Sockets whose process is gone are removed and not counted.
+    Sockets of dead processes are removed and not counted.
     """
     asked = []
     for folder in runtime_folders():
@@ -199,7 +200,7 @@ def request_stop(robot: str | None = None, process: int | None = None) -> list[S
 
 
 def _file_at(path: Path) -> tuple[int, int] | None:
-    """Device and number of a file; None if there is none."""
+    """Device and inode number of a file; None if it does not exist."""
     try:
         found = path.lstat()
     except OSError:
@@ -208,7 +209,7 @@ def _file_at(path: Path) -> tuple[int, int] | None:
 
 
 def _require_own(folder: Path) -> None:
-    """Temporary files belong to everyone: another user's folder may hold another user's socket."""
+    """Raises ReachError if the folder is not this user's. Among temporary files, it may hold another user's socket."""
     if not _is_own(folder):
         raise ReachError(
             f"stop socket folder {folder}: must belong to this user and be writable by nobody else; "
@@ -226,7 +227,7 @@ def _is_own(folder: Path) -> bool:
 
 
 def _ask(path: Path) -> list[tuple[Path, socket.socket, float]]:
-    """Connects, which is the request; nothing when nobody is there any more."""
+    """Connects, which is the stop request. Returns an empty list if the process is gone."""
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     connection.settimeout(ANSWER_TIMEOUT)
     begun = time.monotonic()
@@ -237,13 +238,13 @@ def _ask(path: Path) -> list[tuple[Path, socket.socket, float]]:
         path.unlink(missing_ok=True)
         return []
     except OSError:
-        # Somebody is there and cannot be reached: that is an attempt without answer.
+        # The process exists but cannot be reached: count it as an attempt without answer.
         return [(path, connection, begun)]
     return [(path, connection, begun)]
 
 
 def _answer(connection: socket.socket) -> tuple[StopAnswer | None, bool]:
-    """The answer, and whether the process went away without giving one: it moves nothing any more."""
+    """Returns the answer, and whether the process ended without answering, so that it moves nothing any more."""
     received = b""
     try:
         while piece := connection.recv(4096):

@@ -1,4 +1,4 @@
-"""A controller with a listener, so that the live view gets every snapshot, whoever reads it."""
+"""A controller that passes every snapshot to a listener, so that the live view gets all of them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class WatchedController(Controller):
 
 
 class SampleMaker:
-    """Turns snapshots, of whatever joints, into samples in SI units."""
+    """Converts snapshots of any set of joints to samples in SI units."""
 
     def __init__(self, machine: Machine, period: float) -> None:
         self._machine = machine
@@ -57,5 +57,5 @@ class SampleMaker:
 
 
 def is_frozen(snapshot: BoardSnapshot) -> bool:
-    """Whether the board is stopped, whoever stopped it."""
+    """Whether the board is stopped, by any host."""
     return StatusFlag.FROZEN in snapshot.flags

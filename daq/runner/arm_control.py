@@ -1,4 +1,4 @@
-"""The state of the arm under this host, and the actions that its changes ask for, carried out."""
+"""The state machine of the arm on this host; carries out the actions that state changes require."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from daq.driver import Controller, StopConfirmation
 from daq.safety import Action, Arm, Event, State, advance
 
 _ORDERLY = (Event.ARM, Event.START, Event.FINISHED, Event.DISARM)
-"""Events of a run that goes as planned; all are refused once the arm has been halted."""
+"""Events of an undisturbed run; all are refused once the arm has been halted."""
 
 
 class StoppedError(DaqError):
-    """The arm has been stopped; the operation does not continue. cause: why, without saying that it was stopped"""
+    """The arm was stopped; the operation does not continue. `cause`: the reason, without "the arm was stopped"."""
 
     exit_code = exit_codes.STOPPED
 
@@ -26,10 +26,10 @@ class StoppedError(DaqError):
 
 
 class ArmControl:
-    """One arm. `stop` may come from any thread; everything else from the thread that runs the experiment.
+    """One arm. `stop` may be called from any thread; everything else from the thread that runs the experiment.
 
-    A halt (a stop, a trip, a lost link) is remembered before it is written to the line: from then on nothing that leads
-    to motion is begun here, and no freeze is released, until an explicit RESET.
+    A halt (a stop, a trip, a lost link) is stored before it is written to the line. From then on nothing here starts a
+    motion or releases a freeze, until an explicit RESET.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -39,7 +39,7 @@ class ArmControl:
         self._halted: str | None = None
         self._frozen = False
         self.freezes = 0
-        """Number of stops that have been sent and answered, or given up."""
+        """Number of stops that were sent and answered, or given up."""
         self.handle(Event.CONNECTED)
 
     @property
@@ -49,7 +49,7 @@ class ArmControl:
 
     @property
     def halted(self) -> str | None:
-        """Why the arm has been halted since the last reset; None while it has not."""
+        """Why the arm was halted since the last reset; None if it was not."""
         return self._halted
 
     @property
@@ -58,11 +58,11 @@ class ArmControl:
         return self._arm.state is State.RUNNING and self._halted is None
 
     def handle(self, event: Event, cause: str | None = None, stop: int = 0) -> StopConfirmation | None:
-        """Takes an event and carries out its actions; returns what became of a freeze, if there was one. A RESET ends
+        """Applies an event and carries out its actions; returns the result of a freeze, if there was one. A RESET ends
         the stop of number `stop` and no other.
 
-        Raises StoppedError for an orderly step when the arm has been halted meanwhile, IllegalEventError, LinkError
-        when a release cannot be sent, and RequestRefusedError when there is a newer stop.
+        Raises StoppedError for an event of an undisturbed run if the arm was halted meanwhile, IllegalEventError,
+        LinkError if a release cannot be sent, and RequestRefusedError if there is a newer stop.
         """
         with self._lock:
             if event in _ORDERLY:
@@ -81,7 +81,7 @@ class ArmControl:
         return confirmation
 
     def stop(self, cause: str) -> StopConfirmation:
-        """Freezes the arm at once, from any thread: the stop is on the line before any lock is waited for."""
+        """Freezes the arm at once, from any thread: the stop is written before any lock is acquired."""
         self._halted = self._halted or cause
         confirmation = self._freeze()
         with self._lock:
@@ -90,7 +90,7 @@ class ArmControl:
 
     @contextmanager
     def frozen_on_error(self) -> Iterator[None]:
-        """Freezes the arm before anything else when an exception ends the block."""
+        """Freezes the arm first if an exception ends the block."""
         try:
             yield
         except BaseException as error:
@@ -112,13 +112,13 @@ class ArmControl:
             self.require_not_halted()
 
     def require_not_halted(self) -> None:
-        """Raises StoppedError when the arm has been halted."""
+        """Raises StoppedError if the arm was halted."""
         if self._halted is not None:
             raise StoppedError(self._halted)
 
 
 def stop_line(confirmation: StopConfirmation) -> str:
-    """One line about the result of a stop."""
+    """Returns a line about the result of a stop."""
     if confirmation.acknowledged:
         return f"the board confirmed: set points are frozen since tick {confirmation.tick}"
     sent = "was sent but NOT CONFIRMED" if confirmation.sent else "could NOT BE DELIVERED"

@@ -1,4 +1,4 @@
-"""One experiment from the first look at the arm to the closed trace."""
+"""Runs one experiment, from the first reading of the arm to the closed trace."""
 
 from __future__ import annotations
 
@@ -30,25 +30,25 @@ from daq.traces.writer import TraceWriter
 from daq.trajectories.set_points import Plan
 
 AFTERMATH = 1.0
-"""Seconds recorded after a stop, a fault or the loss of the parent."""
+"""Time (s) recorded after a stop, a fault or the loss of the parent."""
 ARRIVED_WITHIN = 40.0
-"""ADC counts from its set point at which a joint counts as arrived at the start: an assumption, that of a joint at rest
-(gravity and friction leave some counts)."""
+"""Largest distance (ADC counts) from its set point at which a joint counts as arrived at the start (an assumption:
+gravity and friction leave a joint at rest off by some counts)."""
 ARRIVAL_TIME = 1.0
-"""Time (s) that a joint may take to arrive after its last set point: an assumption."""
+"""Time (s) for a joint to arrive after its last set point (an assumption)."""
 PATIENCE_IN_LOCK_STEP = 5.0
-"""Time (s) that a run in lock-step waits for the disk; in real time nothing waits."""
+"""Time (s) that a run in lock-step waits for the disk; a run in real time never waits."""
 
 
 class RunFaultError(DaqError):
-    """The run ended in a fault before there was anything to record, or its record was lost. The arm is frozen."""
+    """The run ended in a fault before recording began, or its record was lost. The arm is frozen."""
 
     exit_code = exit_codes.FAULT
 
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run left: its trace, how it ended and why, and the link's counters."""
+    """Result of a run: its trace, how and why it ended, and the link's counters."""
 
     outcome: Outcome
     reason: str
@@ -60,10 +60,10 @@ class RunResult:
 
 @dataclass(frozen=True)
 class StopRequests:
-    """External stop and interrupt requests, polled during a run.
+    """Requests to stop or interrupt a run, polled while it runs.
 
-    ended:       reason for ending the run; None while there is none
-    interrupted: whether the reason is that the process which started the run is gone
+    ended:       reason for ending the run; None if there is none
+    interrupted: whether the reason is that the process that started the run is gone
     """
 
     ended: Callable[[], str | None] = lambda: None
@@ -72,7 +72,7 @@ class StopRequests:
 
 @dataclass(frozen=True)
 class RunSetup:
-    """Everything that one run needs."""
+    """All inputs of one run."""
 
     controller: Controller
     control: ArmControl
@@ -84,22 +84,21 @@ class RunSetup:
     stop_requests: StopRequests
     robot: str = "ma2000"
     trace_id: str = field(default_factory=new_trace_id)
-    """Number of the trace to be made; a caller that keeps a list of runs chooses it, and finds the trace after a
-    crash."""
+    """ID of the new trace. A caller that keeps a list of runs chooses it, and can find the trace after a crash."""
 
 
 def run_experiment(run: RunSetup, consent: Consent) -> RunResult:
-    """Runs the experiment and returns when its trace is closed.
+    """Runs the experiment and returns once its trace is closed.
 
-    Nothing has moved and nothing is recorded when this raises SafetyError (a limit, a frozen board, no consent),
-    SpecError or TraceError (no room for a trace). Once the arm may move, every error freezes it before it goes on:
-    StoppedError (stopped before the record began) and RunFaultError (a fault before the record began, or the record
-    could not be written) say what is left.
+    Raises SafetyError (a limit, a frozen board, no consent), SpecError or TraceError (no room for a trace) before
+    anything has moved or was recorded. Once the arm may move, every error first freezes it. Then raises StoppedError
+    (stopped before recording began) or RunFaultError (a fault before recording began, or the record could not be
+    written).
     """
     try:
         prepared = prepare(run.controller, run.spec, run.machine, run.limits, run.folder, consent)
     except SafetyError:
-        run.control.require_not_halted()  # a stop at this moment is then the reason
+        run.control.require_not_halted()  # a stop at this moment becomes the reason
         raise
     with run.control.frozen_on_error():
         run.control.handle(Event.ARM)
@@ -113,7 +112,7 @@ def run_experiment(run: RunSetup, consent: Consent) -> RunResult:
 
 
 def _move_to_start(run: RunSetup, prepared: Prepared) -> None:
-    """Raises StoppedError or RunFaultError when the arm did not get there; it is frozen then."""
+    """Raises StoppedError or RunFaultError if the arm does not arrive; it is frozen then."""
     run.listener.progress(0.0, "moving to the start")
     approach = Follower(
         run.controller,
@@ -130,7 +129,7 @@ def _move_to_start(run: RunSetup, prepared: Prepared) -> None:
     if ending.kind == "finished":
         ending = approach.arrive(prepared.move.moving, ARRIVED_WITHIN, round(ARRIVAL_TIME / run.controller.period_s))
     if ending.kind != "finished":
-        line = f"the move to the start ended before it was there: {ending.cause}; nothing was recorded"
+        line = f"the move to the start was not completed: {ending.cause}; nothing was recorded"
         raise StoppedError(ending.cause, line) if ending.kind == "stopped" else RunFaultError(line)
 
 
@@ -182,7 +181,7 @@ def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) 
 
 
 def _finish(run: RunSetup, changes: tuple[GainChange, ...]) -> Ending:
-    """After the plan: gains are put back and the state is idle, unless the arm is stopped at this moment."""
+    """After the plan: restores the gains and makes the state idle, unless the arm is stopped at this moment."""
     try:
         put_back(run.controller, changes, run.stop_requests.ended)
         run.control.handle(Event.FINISHED)

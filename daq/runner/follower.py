@@ -1,4 +1,4 @@
-"""Follows a plan, one set point a control period, watched by the guards."""
+"""Follows a plan with one set point per control period, while guards check every sample."""
 
 from __future__ import annotations
 
@@ -24,34 +24,37 @@ RETRIES_LOOKED_AT_EVERY = 50
 
 
 class Observer(Protocol):
-    """Receives every row and event: the trace's writer, a live view."""
+    """Receives every row and event: the writer of the trace, a live view."""
 
     def row(self, row: SampleRow) -> None:
-        """A control period."""
+        """Receives a control period."""
         ...
 
     def event(self, time: float, kind: EventKind, message: str, tick: int | None, joint: int | None = None) -> None:
-        """Something that happened at `time` (s from the first row), in the period `tick`."""
+        """Receives an event at `time` (s from the first row), in the period `tick`."""
         ...
 
 
 @dataclass(frozen=True)
 class Ending:
-    """How following ended: plan `finished`, `stopped` by someone, a guard tripped (`fault`), or the robot is `lost`."""
+    """How following ended: the plan was `finished`, a program `stopped` the arm, a guard tripped (`fault`), or the
+    robot is `lost`."""
 
     kind: Literal["finished", "stopped", "fault", "lost"]
     cause: str = ""
 
 
 class Follower:
-    """Sends a plan's set points, one a control period, and takes the samples; the guards judge each.
+    """Sends a plan's set points, one per control period, and reads samples, which the guards check.
 
-    ended:        gives the reason of an external request to end; None while there is none
-    every_period: True takes each period once, in order, as a record needs; False takes the newest, which is all that a
-                  move needs
-    every:        control periods from one sample to the next: more than one where the line is slow. A set point is at
-                  most so many periods of the plan from the one before, and never more than have passed on the board, so
-                  that a motion is never faster than its plan
+    ended:        returns the reason of an external request to end; None if there is none
+    every_period: True reads each period once, in order, as a record requires. False reads the newest, which is enough
+                  for a move
+    every:        control periods from one sample to the next; more than one on a slow line. Between two set points the
+    plan
+                  advances by at most `every` periods, and by no more than the board has, so that a motion is never
+    faster
+                  than its plan
     """
 
     def __init__(
@@ -82,12 +85,12 @@ class Follower:
         self.last: SampleRow | None = None
         known = every == 1 and Capability.SAMPLE in controller.identity.capabilities
         self.late_set_points: int | None = 0 if known else None
-        """Periods in which the controller worked with an older set point than the one that was sent for them, because
-        it was sent late; a plan that is played so is deformed by a period there. None where it is not known: only where
-        each period has a sample, made by the bridge, is it seen what each period worked with."""
+        """Periods in which the controller used an older set point because the right one was sent late. Each of them
+        deforms the motion by one period. None if unknown: the set point of a period is visible only if the bridge
+        samples every period."""
 
     def arrive(self, joints: tuple[int, ...], within_counts: float, periods: int) -> Ending:
-        """Waits until `joints` are at their set points, at most so many periods; a joint that is not by then trips."""
+        """Waits at most `periods` until `joints` are at their set points; a joint that is not there by then trips."""
         scale = {joint: abs(self._machine.calibration(joint).rad_per_count) for joint in joints}
         late: dict[int, float] = {}
         until = self._tick_after(periods)
@@ -109,11 +112,11 @@ class Follower:
             return self._halted(Event.TRIP, "restart", "fault", str(error))
         except HardwareFaultError as error:
             return self._halted(Event.TRIP, "fault", "fault", str(error))
-        told_late = ", ".join(f"joint {joint} is {counts:.0f} ADC counts away" for joint, counts in late.items())
-        return self._halted(Event.TRIP, "fault", "fault", f"{told_late} from its set point and does not come nearer")
+        late_joints = ", ".join(f"joint {joint} is {counts:.0f} ADC counts away" for joint, counts in late.items())
+        return self._halted(Event.TRIP, "fault", "fault", f"{late_joints} from its set point and does not come nearer")
 
     def observe(self, periods: int) -> None:
-        """Records so many periods without sending anything, as far as the robot still answers."""
+        """Records for `periods` without sending set points, as long as the robot answers."""
         until = self._tick_after(periods)
         try:
             for _ in range(periods):
@@ -129,10 +132,10 @@ class Follower:
             self.tell("link_lost", str(error))
 
     def follow(self, plan: Plan, progress: Callable[[int], None]) -> Ending:
-        """Plays `plan` from its first set point, which is where the arm's set points are, to its last.
+        """Plays `plan` from its first set point, where the arm's set points already are, to its last.
 
-        Whatever the ending, the arm is frozen when this returns, unless the plan is finished: then it holds its last
-        set point. Raises only what the observer raises.
+        On return the arm is frozen, unless the plan is finished: then the arm holds its last set point. Raises only the
+        observer's errors.
         """
         guards = RunningGuards(self._machine, self._limits, self._joints, plan.moving, self._every)
         try:
@@ -145,12 +148,12 @@ class Follower:
             return self._halted(Event.TRIP, "fault", "fault", str(error))
 
     def tell(self, kind: EventKind, message: str) -> None:
-        """An event at the last row's time; at the beginning, when there is none."""
+        """Reports an event at the last row's time, or at the beginning if there is no row."""
         time, tick = (0.0, None) if self.last is None else (self.last.time, self.last.tick)
         self._observer.event(time, kind, message, tick)
 
     def _play(self, plan: Plan, guards: RunningGuards, progress: Callable[[int], None]) -> Ending:
-        # The first set point is where the arm's set points are already: sending it again makes row and plan agree.
+        # The first set point is already in force. Sending it again aligns rows and plan.
         index, following, hold, last = -1, 0, False, len(plan) - 1
         while True:
             go_on = not hold and index < last
@@ -182,18 +185,18 @@ class Follower:
                 return Ending("finished")
 
     def _count_late(self, snapshot: BoardSnapshot, before: SampleRow | None, sent: dict[int, int]) -> None:
-        """Counts a period that did not use what was sent for it, where that is known; a set point that the controller
-        has missed is counted as missed. The first one may come at any time."""
+        """Counts a period that did not use the set points sent for it, if that is known. A missed set point counts as
+        missed instead. The first set point may arrive at any time."""
         if self.late_set_points is not None and before is not None and not snapshot.set_points_missed:
             self.late_set_points += any(snapshot[joint].set_point != posture for joint, posture in sent.items())
 
     def _tick_after(self, periods: int) -> int | None:
-        """Number of the period that ends so many periods from the last sample; None before the first sample."""
+        """Tick at the end of `periods` periods after the last sample; None before the first sample."""
         return None if self.last is None else self.last.tick + periods
 
     def _step(self, before: SampleRow | None, row: SampleRow) -> int:
-        """Periods of the plan from the set point sent last to the next one: those between the last two samples, each of
-        which a set point follows; at most `every`. Before the first set point the arm has waited for long enough."""
+        """Periods by which the plan advances: as many as lie between the last two samples, at most `every`. Before the
+        first set point the arm has already waited long enough."""
         return self._every if before is None else max(0, min(self._every, row.tick - before.tick))
 
     def _set_points(self, plan: Plan, index: int) -> dict[int, int]:

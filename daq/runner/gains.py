@@ -1,6 +1,6 @@
-"""The gains an experiment asks for: written before it moves, put back when it has run to its end.
+"""Writes the gains of an experiment before it moves, and restores the previous ones after a complete run.
 
-After a stop or a fault nothing more is changed on the board: the experiment's gains stay, and the trace says so.
+After a stop or a fault nothing is changed on the board any more: the experiment's gains stay, which the trace states.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ class GainChange:
 
     @property
     def message(self) -> str:
-        """Text about the change, for the trace."""
+        """Message for the trace about the change."""
         return f"joint {self.joint}: gains {_text(self.during)} for this run, {_text(self.before)} before"
 
     @property
     def kept_message(self) -> str:
-        """Text about gains that were not put back, for the trace."""
+        """Message for the trace about gains that were not restored."""
         return f"joint {self.joint}: gains stay at {_text(self.during)}, they were {_text(self.before)} before the run"
 
 
 def set_gains(
     controller: Controller, wanted: dict[int, Gain], ended: Callable[[], str | None]
 ) -> tuple[GainChange, ...]:
-    """Writes gains that differ from those of the board, each read back. Raises StoppedError, GainsNotTakenError,
+    """Writes the gains that differ from the board's, and reads each back. Raises StoppedError, GainsNotTakenError,
     LinkError."""
     if not wanted:
         return ()
@@ -50,7 +50,7 @@ def set_gains(
 
 
 def put_back(controller: Controller, changes: tuple[GainChange, ...], ended: Callable[[], str | None]) -> None:
-    """Writes the gains that were there before. Raises as `set_gains`."""
+    """Restores the previous gains. Raises as `set_gains`."""
     for change in changes:
         _require_going_on(ended)
         controller.set_gains(change.joint, *change.before)

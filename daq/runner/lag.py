@@ -1,4 +1,4 @@
-"""Holds set points back while samples are too old to act on."""
+"""Pauses the set points while samples are too old."""
 
 from __future__ import annotations
 
@@ -8,25 +8,24 @@ from daq.safety import Verdict
 from daq.safety.findings import NOTHING, Finding
 
 OLDEST_TO_ACT_ON = 0.06
-"""Age (s) of a sample beyond which set points wait: an assumption, three control periods. A host that was held up
-briefly catches up within that time; acting on older samples, it would send many set points at once without seeing the
-arm."""
+"""Age (s) of a sample beyond which set points pause (an assumption: three control periods). A host that was held up
+briefly catches up within that time. With older samples it would send many set points at once without seeing the arm."""
 LONGEST_BEHIND = 1.0
-"""Time (s) for which samples may stay too old before the run ends in a fault: an assumption."""
+"""Time (s) for which samples may stay too old before the run ends in a fault (an assumption)."""
 
 
 def oldest_to_act_on(between: float) -> float:
-    """Age (s) of a sample beyond which nothing is done on the strength of it: on a slow line that of two samples, which
-    are `between` (s) apart."""
+    """Age (s) of a sample beyond which no action is based on it. On a slow line it is the age of two samples, which are
+    `between` s apart."""
     return max(OLDEST_TO_ACT_ON, 2 * between)
 
 
 @dataclass
 class Lag:
-    """Judges the age of each sample. Time is the board's.
+    """Checks the age of each sample, on the board's clock.
 
-    `every`: control periods between two samples. On a slow line both limits grow with it: two samples of age, and ten
-    for which they may stay too old.
+    `every`: control periods between two samples. On a slow line both limits grow: an age of two samples, for at most
+    ten samples.
     """
 
     period: float
@@ -34,13 +33,13 @@ class Lag:
     since: int | None = None
 
     def check(self, tick: int, age: float) -> Verdict:
-        """`age` (s): by how much a sample came later than the quickest ones after their ticks."""
+        """Returns the verdict. `age`: delay (s) of a sample compared with the quickest ones."""
         between = self.every * self.period
         if age <= oldest_to_act_on(between):
             was, self.since = self.since, None
             if was is None:
                 return NOTHING
-            line = f"samples are up to date again after {(tick - was) * self.period:.2f} s: set points go on"
+            line = f"samples are up to date again after {(tick - was) * self.period:.2f} s: set points continue"
             return Verdict(findings=(Finding("resume", line),))
         line = f"the sample of tick {tick} came {age * 1e3:.0f} ms late"
         findings: tuple[Finding, ...] = ()

@@ -1,4 +1,4 @@
-"""What the line to a controller can give, in the form of a service's status, and in one line for people."""
+"""Rates that a line allows, as part of a service's status, and as one line for people."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from daq.driver.line_rate import LineRate, bound_ms, stop_latency_s, told_rates
 
 
 def with_rates(link: LinkStatus, bytes_per_second: float, identity: RobotIdentity) -> LinkStatus:
-    """The status of a link with what its line can give. Without SAMPLE no rate is promised."""
+    """Adds the rates that the line allows to the status of a link. Without SAMPLE no rate is promised."""
     if not identity.samples:
         return link.model_copy(update={"stop_seconds": stop_latency_s(bytes_per_second)})
     rates = tuple(
@@ -17,13 +17,13 @@ def with_rates(link: LinkStatus, bytes_per_second: float, identity: RobotIdentit
 
 
 def rates_line(link: LinkStatus) -> str:
-    """One line for people; empty where nothing is known."""
+    """Returns a line for people; empty if nothing is known."""
     if not link.rates or link.stop_seconds is None:
         return ""
     told = ", ".join(
         f"{rate.joints} joint{'s' * (rate.joints > 1)} {rate.samples_per_second:.3g}" for rate in link.rates
     )
-    return f"the line gives samples a second: {told}; a stop takes up to {bound_ms(link.stop_seconds)} ms"
+    return f"samples per second on this line: {told}; a stop takes up to {bound_ms(link.stop_seconds)} ms"
 
 
 def _wire(rate: LineRate) -> SampleRate:

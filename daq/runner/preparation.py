@@ -1,4 +1,4 @@
-"""All checks before an arm may move. Nothing here changes anything on the board."""
+"""All checks before an arm may move. They change nothing on the board."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from firmware_protocol.framing import FRAME_OVERHEAD
 from firmware_protocol.stamp import STAMP_BYTES
 
 LINE_SHARE = 0.6
-"""Share of the line's capacity that samples of all joints may take; beyond it only the experiment's joints are
+"""Share of the line's capacity for samples of all joints; if they need more, only the experiment's joints are
 recorded."""
 PERIOD_TOLERANCE = 0.01
 """Largest relative difference between the controller's period and the machine file's."""
@@ -32,16 +32,16 @@ PERIOD_TOLERANCE = 0.01
 
 @dataclass(frozen=True)
 class Consent:
-    """The operator's consent. A controller with an arm behind it is not moved without `moves_real_arm`."""
+    """The operator's consent. Without `moves_real_arm`, a controller with an arm is not moved."""
 
     moves_real_arm: bool = False
 
     def __post_init__(self) -> None:
-        """Raises SpecError for a value that is merely truthy."""
+        """Raises SpecError for a value that is not a bool."""
         require_word(self.moves_real_arm)
 
     def require(self, controller: Controller) -> None:
-        """Raises MissingConsentError when a real arm would move without the operator's consent."""
+        """Raises MissingConsentError if a real arm would move without the operator's consent."""
         if lacks_consent(controller.identity, self.moves_real_arm):
             raise MissingConsentError(
                 f"{controller.link.url} is a real arm: it moves only with the operator's consent (--yes)"
@@ -54,8 +54,7 @@ class MissingConsentError(SafetyError):
 
 @dataclass(frozen=True)
 class Prepared:
-    """A run that has passed every check: joints to record, at what rate the line lets them be sampled, the way to the
-    start, the motion."""
+    """A run that passed every check: the joints to record, the sampling rate, the way to the start and the motion."""
 
     joints: tuple[int, ...]
     rate: LineRate
@@ -66,10 +65,10 @@ class Prepared:
 def prepare(
     controller: Controller, spec: ExperimentSpec, machine: Machine, limits: Limits, folder: Path, consent: Consent
 ) -> Prepared:
-    """Looks at the arm, plans, and checks. Raises SafetyError, SpecError, TraceError (no room), LinkError,
+    """Reads the arm's state, plans, and checks. Raises SafetyError, SpecError, TraceError (no room), LinkError,
     NoSampleError, ControllerRestartedError; nothing has changed on the board then."""
     consent.require(controller)
-    require_fitting(controller, machine)
+    require_matching_machine(controller, machine)
     _require_period(controller, machine)
     require_not_stopped(controller)
     _require_driven(controller, spec, machine)
@@ -86,11 +85,11 @@ def prepare(
 
 
 def recorded_joints(controller: Controller, spec: ExperimentSpec) -> tuple[int, ...]:
-    """Joints to record: as the experiment says, else all that the line has room for."""
+    """Joints to record: those of the experiment's `record`, else all for which the line has capacity."""
     if spec.record is not None:
         return spec.record
     if controller.link.scale.turn_bytes is not None:
-        return controller.joints  # every turn is one of all joints
+        return controller.joints  # every exchange covers all joints
     per_joint = 2 + 7
     both_ways = 4 * FRAME_OVERHEAD + STAMP_BYTES + 1 + 5 + 5 + 6 + per_joint * len(controller.joints)
     room = controller.link.bytes_per_second * controller.period_s * LINE_SHARE
@@ -98,7 +97,7 @@ def recorded_joints(controller: Controller, spec: ExperimentSpec) -> tuple[int, 
 
 
 def require_not_stopped(controller: Controller) -> None:
-    """Raises SafetyError for an arm that a stop has frozen, or whose drives are off."""
+    """Raises SafetyError if a stop has frozen the arm, or its drives are off."""
     flags = controller.status().flags
     if StatusFlag.NO_TORQUE in flags:
         raise SafetyError("a drive is switched off and holds nothing: support the arm, then `daq reset` switches it on")
@@ -106,9 +105,9 @@ def require_not_stopped(controller: Controller) -> None:
         raise SafetyError("the arm has been stopped and holds its posture; `daq reset` ends that")
 
 
-def require_fitting(controller: Controller, machine: Machine) -> None:
-    """Raises SafetyError where the machine file is of another machine than the one behind the line: set points in
-    other steps would be set points for other postures, and positions in other counts would be other angles."""
+def require_matching_machine(controller: Controller, machine: Machine) -> None:
+    """Raises SafetyError if the machine file describes another machine than the connected one. With other step sizes,
+    set points would be other postures and positions other angles."""
     scale, joints = controller.link.scale, len(machine.joints)
     if joints != scale.joints:
         raise SafetyError(
@@ -132,7 +131,8 @@ def require_fitting(controller: Controller, machine: Machine) -> None:
 
 
 def _require_period(controller: Controller, machine: Machine) -> None:
-    """Speeds are counted in set points a period: a controller with another period would move at another speed."""
+    """Raises SafetyError if the period differs: speeds are planned as set points per period, so the arm would move at
+    another speed."""
     planned = control_period(machine)
     if abs(controller.period_s - planned) > PERIOD_TOLERANCE * planned:
         raise SafetyError(
@@ -142,9 +142,9 @@ def _require_period(controller: Controller, machine: Machine) -> None:
 
 
 def _require_driven(controller: Controller, spec: ExperimentSpec, machine: Machine) -> None:
-    """A joint whose P is 0 has no drive: it would fall, or lag, instead of following."""
+    """Raises SafetyError if a moving joint has P = 0: it would fall, or lag, instead of following."""
     own = controller.gains()
-    if not own:  # its memory map has no gains: a joint without drive then shows by its following error alone
+    if not own:  # no gains in the memory map: a joint without drive then shows only by its following error
         if spec.gains:
             raise SafetyError(f"{controller.link.url}: its memory map has no gains, so none can be set for a run")
         return
@@ -156,12 +156,12 @@ def _require_driven(controller: Controller, spec: ExperimentSpec, machine: Machi
 
 
 def _look(controller: Controller, machine: Machine) -> SampleRow:
-    """The next control period of all joints; sends nothing."""
+    """Reads the next control period of all joints; sends nothing."""
     return RowMaker(machine, controller.joints, controller.period_s).row(controller.next_snapshot())
 
 
 def require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:
-    """The arm must be where its controller holds it, before it is asked for anything else. Raises SafetyError."""
+    """Raises SafetyError if a joint is not at its set point: the arm must stand where its controller holds it."""
     allowed = limits.following_error_counts
     for index, error in enumerate(row.error):
         counts = error / machine.calibration(index + 1).rad_per_count
@@ -174,7 +174,7 @@ def require_still(row: SampleRow, machine: Machine, limits: Limits) -> None:
 
 
 def require_allowed(what: str, violations: list[Violation]) -> None:
-    """Raises SafetyError where a plan violates limits."""
+    """Raises SafetyError if a plan violates limits."""
     if violations:
         more = f" (and {len(violations) - 1} more)" if len(violations) > 1 else ""
         raise SafetyError(f"{what} refused: {violations[0]}{more}; nothing moved")

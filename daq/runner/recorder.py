@@ -1,4 +1,4 @@
-"""Rows and events of a run go into the trace and to a listener."""
+"""Passes rows and events of a run to the trace and to a listener."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class RunListener(Protocol):
 
 @dataclass
 class Recorder:
-    """Records every row and event, and passes it on to the listener."""
+    """Records every row and event, and passes them to the listener."""
 
     writer: TraceWriter
     joints: tuple[int, ...]
@@ -38,14 +38,14 @@ class Recorder:
     last: int | None = None
     samples: int = 0
     missing: int = 0
-    """Number of samples that are not there between the first and the last, counted as `Trace.missing` counts them."""
+    """Number of missing samples between the first and the last, counted as in `Trace.missing`."""
     count: SampleCount = field(init=False)
 
     def __post_init__(self) -> None:
         self.count = SampleCount(self.every)
 
     def row(self, row: SampleRow) -> None:
-        """A control period. Raises TraceError."""
+        """Records a control period. Raises TraceError."""
         if self.last is not None:
             self.missing += self.count.missing(row.tick - self.last)
         self.last = row.tick
@@ -54,7 +54,7 @@ class Recorder:
         self.listener.sampled(self.joints, row)
 
     def event(self, time: float, kind: EventKind, message: str, tick: int | None, joint: int | None = None) -> None:
-        """An event. Raises TraceError."""
+        """Records an event. Raises TraceError."""
         event = TraceEvent(time=time, kind=kind, message=message, tick=tick, joint=joint)
         self.writer.event(event)
         self.listener.happened(event)
@@ -62,15 +62,15 @@ class Recorder:
 
 @dataclass
 class ApproachObserver:
-    """Observer of the move to the start: passes events on, except missing samples, and records nothing."""
+    """Observer of the move to the start: records nothing, and passes on all events except missing samples."""
 
     listener: RunListener
 
     def row(self, _row: SampleRow) -> None:
-        """Ignored."""
+        """Ignores the row."""
         return
 
     def event(self, time: float, kind: EventKind, message: str, tick: int | None, joint: int | None = None) -> None:
-        """Passed on to the listener."""
+        """Passes the event to the listener."""
         if kind != "missing":
             self.listener.happened(TraceEvent(time=time, kind=kind, message=message, tick=tick, joint=joint))

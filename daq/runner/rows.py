@@ -1,4 +1,4 @@
-"""Snapshots of the board in counts, turned into rows in SI units."""
+"""Converts snapshots of the board in counts to rows in SI units."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from daq.driver import BoardSnapshot
 
 
 class RowMaker:
-    """Turns the snapshots of one record into rows. Time 0 is the first tick it is given.
+    """Converts the snapshots of one record to rows. Time 0 is the first tick.
 
     Raises SpecError for joints without sensor or DC motor.
     """
@@ -24,7 +24,7 @@ class RowMaker:
         self._first: int | None = None
 
     def row(self, snapshot: BoardSnapshot) -> SampleRow:
-        """One period, angles in rad, drive in volts at the motor before any supply limit."""
+        """Converts one period: angles in rad, drive in volts at the motor before any supply limit."""
         if self._first is None:
             self._first = snapshot.tick
         by_joint = dict(snapshot.joints)

@@ -1,5 +1,5 @@
-"""Safety checks on the host's side. Pure: they judge, and the caller acts. They never replace the hardware's own
-emergency stop."""
+"""Safety checks on the host. They are pure: they return verdicts, on which the caller acts. They do not replace the
+hardware's emergency stop."""
 
 from daq.safety.check_plan import check_move_to_start, check_plan, unchecked
 from daq.safety.findings import Finding, Verdict

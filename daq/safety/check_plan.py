@@ -1,6 +1,6 @@
 """Checks a whole plan before anything moves.
 
-Floor and reach: where the ends of the links come over a whole plan.
+`workspace_violations` checks floor and reach at the ends of the links.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from daq.trajectories.kinematics import link_ends
 from daq.trajectories.set_points import Plan
 
 FINEST_LOOK = math.radians(1.0)
-"""Largest distance (rad, or m) between set points that is not subdivided for the check."""
+"""Larger distances (rad, or m) between set points are subdivided for the check."""
 
 
 def workspace_violations(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
@@ -65,11 +65,11 @@ def _looked_at(plan: Plan) -> tuple[Floats, Floats]:
 
 
 def check_plan(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
-    """All violations of `plan`; an empty list when there are none.
+    """Returns all violations of `plan`; an empty list if there are none.
 
-    Limits that are None are not checked: `unchecked` names them. Speed is that of the planned angles, not of the
-    rounded set points. A set point that jumps on purpose is judged by its size against the following-error limit: the
-    arm's speed in a step is its own.
+    Limits that are None are not checked: `unchecked` names them. Speed is computed from the planned angles, not from
+    the rounded set points. An intended jump of a set point is compared with the following-error limit, since the arm
+    moves at its own speed in a step.
     """
     if not np.isfinite(plan.angles).all():
         return _not_finite(plan)
@@ -77,7 +77,7 @@ def check_plan(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
 
 
 def check_move_to_start(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
-    """Checks a move to the start. An arm that stands outside its limits, perhaps led there by hand, may move back: only
+    """Checks the move to the start. An arm outside its limits (for example guided there by hand) may move back: only
     points further outside than its present position are violations."""
     if not np.isfinite(plan.angles).all():
         return _not_finite(plan)
@@ -85,7 +85,7 @@ def check_move_to_start(plan: Plan, machine: Machine, limits: Limits) -> list[Vi
 
 
 def unchecked(machine: Machine, limits: Limits) -> list[str]:
-    """Limits that are not set and so not monitored, one line each."""
+    """Returns the limits that are not set and so not checked, one line each."""
     lines = []
     for joint in range(1, len(machine.joints) + 1):
         own = limits.joint(joint)
@@ -105,14 +105,14 @@ def _not_finite(plan: Plan) -> list[Violation]:
 
 
 def _widened(limits: Limits, plan: Plan, machine: Machine) -> Limits:
-    """Limits that the plan's first set point just meets."""
+    """Limits widened as far as the plan's first set point needs."""
     (ends,) = link_ends(machine, plan.angles[:1])
     joints = []
     for joint, angle in enumerate(plan.angles[0].tolist(), start=1):
         own = limits.joint(joint)
         slack = rounding_slack(
             machine, joint
-        )  # otherwise repeated moves could creep past a limit, half a posture unit at a time
+        )  # the slack is only for rounding: repeated moves could otherwise creep past a limit
         low = None if own.low is None else min(own.low, angle + slack)
         high = None if own.high is None else max(own.high, angle - slack)
         joints.append(JointLimits(low=low, high=high, speed=own.speed))

@@ -1,4 +1,4 @@
-"""What guards find in one control period, and what they need to know of the machine."""
+"""Results of the guards in one control period, and the machine data that they need."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from firmware_protocol.units import JointCalibration
 
 @dataclass(frozen=True)
 class Finding:
-    """Something worth an event in the trace."""
+    """A finding that becomes an event in the trace."""
 
     kind: EventKind
     message: str
@@ -25,7 +25,7 @@ class Verdict:
     """The decision after one control period.
 
     hold:     set points stay as they are and the plan's time stands still
-    stop:     somebody has stopped the arm on the board; None when nobody has
+    stop:     who or what stopped the arm on the board; None if it is not stopped
     trips:    reasons for a fault: freeze now
     findings: events for the trace
     """
@@ -36,7 +36,7 @@ class Verdict:
     findings: tuple[Finding, ...] = ()
 
     def __or__(self, other: Verdict) -> Verdict:
-        # Nearly every verdict finds nothing.
+        # Fast path: nearly every verdict is empty.
         if other is NOTHING:
             return self
         if self is NOTHING:
@@ -47,12 +47,12 @@ class Verdict:
 
 
 NOTHING = Verdict()
-"""Go on."""
+"""Continue."""
 
 
 @dataclass(frozen=True)
 class Watched:
-    """The joints of each sample, in its order, with the calibrations that turn angles into counts and posture units."""
+    """The joints of each sample, in order, with the calibrations from angles to counts and posture units."""
 
     joints: tuple[int, ...]
     calibrations: tuple[JointCalibration, ...]
@@ -61,10 +61,10 @@ class Watched:
 
     @classmethod
     def of(cls, machine: Machine, limits: Limits, joints: tuple[int, ...]) -> Watched:
-        """Raises SpecError for joints that the machine does not have, or that have no sensor."""
+        """Raises SpecError for joints that the machine lacks, or that have no sensor."""
         calibrations = tuple(machine.calibration(joint) for joint in joints)
         return cls(joints, calibrations, control_period(machine), limits)
 
     def counts(self, angles: tuple[float, ...]) -> tuple[float, ...]:
-        """ADC counts, with the joint's sign, of differences of angle (rad) in the sample's order."""
+        """Converts angle differences (rad, in the sample's order) to ADC counts with the sign of the joint."""
         return tuple(angle / own.rad_per_count for angle, own in zip(angles, self.calibrations, strict=True))

@@ -1,14 +1,11 @@
-"""All guards of a running plan, or of an arm at rest, asked together once a control period.
+"""Guards of a running plan, or of an arm at rest. They are checked together once per control period.
 
-The following error: set points pause while it is too large, and a pause that lasts is a fault (section 6.5).
+- `FollowingError`: set points pause while the error is too large; a pause that lasts is a fault (section 6.5).
+- `Freshness`: ticks must continue without long gaps, and the board must not restart.
+- `MissedSetPoints`: set points that the controller could not read because the host had the memory (section 6.3).
+- `UnexpectedMotion`: a joint that should stand still must stand still.
 
-Checks that samples are current: ticks must continue without long gaps, and the board must not restart.
-
-The link itself notices silence: when its retries are used up it raises LinkTimeoutError.
-
-Set points that the controller did not take because the host had the memory (section 6.3 of the source).
-
-A joint that should stand still must stand still.
+Silence is detected by the link, which raises LinkTimeoutError once its retries are used up.
 """
 
 from __future__ import annotations
@@ -25,15 +22,15 @@ from firmware_protocol.commands import StatusFlag
 
 @dataclass
 class FollowingError:
-    """Two rules with one limit. A positional error outside the limit holds the set points; and no set point may be
-    further from the measured position than the limit, so that an arm whose host or cable dies stops within it. Time is
-    the board's. A hold that lasts longer than `limits.following_error_time` is a fault."""
+    """Applies one limit in two rules. A positional error outside the limit holds the set points. No set point may be
+    further from the measured position than the limit, so that the arm stops within it if host or cable fail. A hold
+    longer than `limits.following_error_time` (on the board's clock) is a fault."""
 
     watched: Watched
     held_since: int | None = None
 
     def check(self, row: SampleRow, planned: Mapping[int, int]) -> Verdict:
-        """`planned` are the postures (by joint) that would be sent next."""
+        """Returns the verdict. `planned`: the postures (by joint) to be sent next."""
         limit = self.watched.limits.following_error_counts
         if limit is None:
             return NOTHING
@@ -43,7 +40,7 @@ class FollowingError:
             if was_held is None:
                 return NOTHING
             waited = (row.tick - was_held) * self.watched.period
-            return Verdict(findings=(Finding("resume", f"set points go on after {waited:.2f} s"),))
+            return Verdict(findings=(Finding("resume", f"set points continue after {waited:.2f} s"),))
         findings: tuple[Finding, ...] = ()
         if self.held_since is None:
             self.held_since = row.tick
@@ -80,16 +77,16 @@ LONGEST_SILENCE = 0.2
 """Longest time (s) between two samples: an assumption, ten control periods."""
 
 SILENT_SAMPLES = 3
-"""Samples that may be missing in a row on a line so slow that ten control periods hold fewer: an assumption."""
+"""Most missing samples in a row on a slow line, where ten control periods hold fewer samples (an assumption)."""
 
 
 @dataclass
 class Freshness:
-    """Remembers the last tick."""
+    """Checks that ticks increase without long gaps."""
 
     watched: Watched
     every: int = 1
-    """Control periods from one sample to the next, as the line allows."""
+    """Control periods from one sample to the next."""
     tick: int | None = None
     count: SampleCount = field(init=False)
 
@@ -97,7 +94,7 @@ class Freshness:
         self.count = SampleCount(self.every)
 
     def check(self, row: SampleRow) -> Verdict:
-        """The verdict after a sample."""
+        """Returns the verdict after a sample."""
         last, self.tick = self.tick, row.tick
         if row.status & StatusFlag.RESTARTED.value or (last is not None and row.tick < last):
             line = f"the board has restarted: tick {row.tick}" + ("" if last is None else f" after {last}")
@@ -112,7 +109,7 @@ class Freshness:
         line = f"{lost} control periods between ticks {last} and {row.tick} have no sample"
         if self.every > 1:
             line = (
-                f"ticks {last} and {row.tick} are {row.tick - last} control periods apart, {self.every} were asked for"
+                f"ticks {last} and {row.tick} are {row.tick - last} control periods apart, {self.every} were requested"
             )
         gap = (row.tick - last) * self.watched.period
         longest = max(LONGEST_SILENCE, SILENT_SAMPLES * self.every * self.watched.period)
@@ -121,25 +118,27 @@ class Freshness:
 
 
 LONGEST_RUN = 10
-"""Most control periods in a row in which the controller may miss its set points: an assumption, 0.2 s."""
+"""Most control periods in a row in which the controller may miss its set points (an assumption: 0.2 s)."""
 
 
 @dataclass
 class MissedSetPoints:
-    """Counts missed set points. One is harmless, since set points are absolute; a run of them means a loss of
+    """Counts missed set points. A single one is harmless, since set points are absolute; a run of them is a loss of
     control."""
 
     watched: Watched
     every: int = 1
-    """Control periods from one sample to the next: on a slow line a run lasts as long, but is two samples at least."""
+    """Control periods from one sample to the next. On a slow line the limit is the same time, but at least two
+    samples."""
     missed: int = 0
     run: int = 0
 
     def check(self, row: SampleRow, expected: Mapping[int, int] | None) -> Verdict:
-        """`expected` are the postures (by joint) that this period should have taken; None when unknown."""
+        """Returns the verdict. `expected`: the postures (by joint) that this period should have used; None if
+        unknown."""
         line = self._difference(row, expected or {})
         if row.status & StatusFlag.SET_POINT_MISSED.value:
-            line = line or f"tick {row.tick}: the controller wanted the memory while the host had it"
+            line = line or f"tick {row.tick}: the controller could not read its set points: the host had the memory"
         if line is None:
             self.run = 0
             return NOTHING
@@ -160,15 +159,15 @@ class MissedSetPoints:
 
 
 STILL_WITHIN = 40
-"""ADC counts that a joint at rest may stray: an assumption. Gravity and the motion of other joints deflect the arm by a
-few counts at the default gain; 40 are 2.6° on the major axes."""
+"""ADC counts that a joint at rest may deviate (an assumption). Gravity and the motion of other joints deflect the arm
+by a few counts at the default gain; 40 counts are 2.6° on the major axes."""
 
 
 @dataclass
 class UnexpectedMotion:
-    """Judges the joints of `still`; the others are the following error's business.
+    """Checks the joints in `still`; `FollowingError` checks the others.
 
-    While nothing runs the reference is where each joint was first seen; while a plan runs, its set point.
+    The reference is the set point while a plan runs, otherwise the first measured position.
     """
 
     watched: Watched
@@ -177,7 +176,7 @@ class UnexpectedMotion:
     seen: dict[int, float] = field(default_factory=dict)
 
     def check(self, row: SampleRow) -> Verdict:
-        """The verdict after a sample."""
+        """Returns the verdict after a sample."""
         trips = []
         for joint, counts in self._strayed(row).items():
             if abs(counts) > STILL_WITHIN:
@@ -198,10 +197,10 @@ class UnexpectedMotion:
 
 
 class RunningGuards:
-    """Guards while a plan runs. They read no clock and touch nothing: the verdict is the caller's to carry out.
+    """Guards while a plan runs. They read no clock and change nothing: the caller carries out the verdict.
 
-    sampled: joints in every sample, in its order
-    moving:  joints that the plan moves; the other sampled ones must stay at their set points
+    sampled: joints in every sample, in order
+    moving:  joints that the plan moves; the other sampled joints must stay at their set points
     every:   control periods between two samples; more than one on a slow line
     """
 
@@ -215,15 +214,17 @@ class RunningGuards:
         self.unexpected_motion = UnexpectedMotion(watched, frozenset(sampled) - frozenset(moving), from_set_point=True)
 
     def check(self, row: SampleRow, planned: Mapping[int, int], expected: Mapping[int, int] | None = None) -> Verdict:
-        """The verdict after a sample. `planned`: postures to be sent next, by joint; they may be sent unless the
-        verdict says hold or stop, or trips. `expected`: postures that the sample's period should have taken, None when
-        not known."""
+        """Returns the verdict after a sample.
+
+        `planned`: postures to be sent next, by joint. They may be sent unless the verdict holds, stops or trips.
+        `expected`: postures that the sample's period should have used; None if unknown.
+        """
         verdict = self.freshness.check(row) | _frozen(row) | self.unexpected_motion.check(row)
         return verdict | self.following_error.check(row, planned) | self.missed_set_points.check(row, expected)
 
 
 class RestGuards:
-    """Guards of an arm that nothing is sent to. `led` joints are moved by hand and may move."""
+    """Guards of an arm at rest. `led` joints are guided by hand and may move."""
 
     def __init__(
         self, machine: Machine, limits: Limits, sampled: tuple[int, ...], led: tuple[int, ...] = (), every: int = 1
@@ -233,7 +234,7 @@ class RestGuards:
         self.unexpected_motion = UnexpectedMotion(watched, frozenset(sampled) - frozenset(led), from_set_point=False)
 
     def check(self, row: SampleRow) -> Verdict:
-        """The verdict after a sample."""
+        """Returns the verdict after a sample."""
         return self.freshness.check(row) | _frozen(row) | self.unexpected_motion.check(row)
 
 

@@ -1,4 +1,4 @@
-"""Range, speed and size of steps of each joint over a whole plan."""
+"""Checks range, speed and step size of each joint over a whole plan."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from daq.safety.violation import TOLERANCE, Violation
 from daq.trajectories.set_points import Plan
 
 STATIC_ERROR_MARGIN = 12
-"""ADC counts kept free between a step and the following-error limit for the arm's static error: an assumption. At the
-default gain gravity costs joint 2 about 3 counts; a step without this margin might never be let through."""
+"""ADC counts kept free between a step and the following-error limit for the arm's static error (an assumption). At the
+default gain gravity causes about 3 counts on joint 2. A step without this margin might be held for ever."""
 
 
 def joint_violations(plan: Plan, machine: Machine, limits: Limits) -> list[Violation]:
@@ -27,7 +27,7 @@ def joint_violations(plan: Plan, machine: Machine, limits: Limits) -> list[Viola
 
 
 def largest_step(machine: Machine, limits: Limits, joint: int) -> float | None:
-    """Largest step (rad) that set points of `joint` may make; None when no following-error limit is set."""
+    """Largest step (rad) of the set points of `joint`; None without a following-error limit."""
     if limits.following_error_counts is None:
         return None
     counts = max(limits.following_error_counts - STATIC_ERROR_MARGIN, 1)
@@ -36,8 +36,8 @@ def largest_step(machine: Machine, limits: Limits, joint: int) -> float | None:
 
 
 def rounding_slack(machine: Machine, joint: int) -> float:
-    """Angle (rad) by which a limit may be passed: it may lie inside a posture unit, and the posture nearest to an
-    allowed angle is allowed."""
+    """Angle (rad) by which a plan may exceed a limit. A limit may lie between two postures, and the posture nearest to
+    an allowed angle is allowed."""
     return abs(machine.calibration(joint).rad_per_posture_unit) / 2
 
 

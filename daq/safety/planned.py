@@ -1,4 +1,4 @@
-"""The planned and checked motion of an experiment, for programs that compare experiments before any is run."""
+"""Plans and checks the motion of an experiment, to compare experiments before any is run."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from daq.trajectories.planner import plan, start_angles
 
 
 def motion_of(spec: ExperimentSpec, machine: Machine) -> NDArray[np.float64]:
-    """Set points (k, joints) of an experiment, rad, whether or not it may be carried out. Raises SpecError."""
+    """Returns the set points (k, joints) of an experiment, rad, even if its plan is not allowed. Raises SpecError."""
     return plan(spec, machine, start_angles(spec, machine)).angles
 
 
 def planned(spec: ExperimentSpec, machine: Machine) -> NDArray[np.float64]:
-    """Set points (k, joints) of an experiment, rad. Raises SpecError, SafetyError where it may not be carried out."""
+    """Returns the set points (k, joints) of an experiment, rad. Raises SpecError; SafetyError if the plan is not
+    allowed."""
     motion = plan(spec, machine, start_angles(spec, machine))
     violations = check_plan(motion, machine, machine.limits)
     if violations:

@@ -1,6 +1,6 @@
-"""The states of an arm under this host, and what each event does to them. Pure: events in, state and actions out.
+"""State machine of the arm: for each event, the next state and the actions. Pure.
 
-A freeze on the board is ended by an explicit reset alone: arming never releases, so it cannot undo anybody's stop.
+Only an explicit reset ends a freeze on the board. Arming never releases, so it cannot undo anybody's stop.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from daq.contracts.errors import DaqError
 
 
 class State(StrEnum):
-    """Only in RUNNING are set points sent. FAULT is left by an explicit reset alone."""
+    """Set points are sent only in RUNNING. Only an explicit reset leaves FAULT."""
 
     DISCONNECTED = "disconnected"
     IDLE = "idle"
@@ -28,37 +28,38 @@ class Event(StrEnum):
     CONNECTED = "connected"
     LINK_LOST = "link lost"
     ARM = "arm"
-    """An operator wants to move the arm, and the plan has passed every check."""
+    """An operator wants to move the arm, and the plan passed every check."""
     DISARM = "disarm"
     START = "start"
     FINISHED = "finished"
     STOP = "stop"
-    """A stop was requested. Anyone may request one, at any moment."""
+    """A stop was requested. Any program may request one at any moment."""
     TRIP = "trip"
-    """A guard has found a reason for a fault."""
+    """A guard found a reason for a fault."""
     RESET = "reset"
 
 
 class Action(StrEnum):
-    """What the caller must do, in the order given."""
+    """Actions of the caller, in the order given."""
 
     CEASE = "cease"
-    """Send no further set point."""
+    """Send no more set points."""
     FREEZE = "freeze"
-    """Set points := measured position, on the board, ahead of every queue. Sent even when the link is thought dead."""
+    """Make the measured position the set points, on the board, ahead of every queue. Sent even if the link seems
+    dead."""
     RELEASE = "release"
-    """End the board's freeze; set points stay where it put them."""
+    """Ends the board's freeze; set points stay where the freeze put them."""
     SEND = "send"
     """Begin to send set points."""
 
 
 class IllegalEventError(DaqError):
-    """An event that the state does not allow; nothing has changed."""
+    """The state does not allow this event; nothing has changed."""
 
 
 @dataclass(frozen=True)
 class Arm:
-    """The state, whether the link is up, and why the arm was stopped or is at fault."""
+    """State of the arm and of the link, and the cause of a stop or fault."""
 
     state: State = State.DISCONNECTED
     connected: bool = False
@@ -86,10 +87,10 @@ _ADVICE = {
 
 
 def advance(arm: Arm, event: Event, cause: str | None = None) -> Outcome:
-    """State and actions after `event`; `cause` says in a few words why, for a stop or a fault.
+    """Returns the state and the actions after `event`. `cause`: a few words, for a stop or a fault.
 
-    STOP, TRIP and LINK_LOST are taken in every state. Raises IllegalEventError for any other event that the state does
-    not allow.
+    STOP, TRIP and LINK_LOST are accepted in every state. Raises IllegalEventError for any other event that the state
+    does not allow.
     """
     match event:
         case Event.STOP:
@@ -128,18 +129,18 @@ def _connected(arm: Arm) -> Outcome:
     if arm.state is State.FAULT:
         return replace(arm, connected=True), (Action.FREEZE,)
     if arm.cause is not None:
-        # Stopped before, or while there was no link: the stop may never have arrived.
+        # The arm was stopped before, or while there was no link: the stop may not have arrived.
         return replace(arm, state=State.STOPPED, connected=True), (Action.FREEZE,)
     return Arm(State.IDLE, True), ()
 
 
 def _reset(arm: Arm) -> Outcome:
     if not arm.connected:
-        # The board's freeze cannot be ended without a link: the arm comes back as stopped.
+        # Without a link the board's freeze cannot be ended: after reconnecting, the arm is stopped.
         return replace(arm, state=State.DISCONNECTED), ()
     return Arm(State.IDLE, connected=True), (Action.RELEASE,)
 
 
 def _first(arm: Arm, cause: str) -> str:
-    """Keeps the first cause, which its consequences would hide; a fault replaces the cause of a stop."""
+    """Returns the first cause: later ones are its consequences. A fault replaces the cause of a stop."""
     return arm.cause if arm.state is State.FAULT and arm.cause else cause

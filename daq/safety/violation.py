@@ -1,4 +1,4 @@
-"""One limit that a plan breaks."""
+"""A limit that a plan exceeds."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Literal
 Rule = Literal["finite", "posture", "range", "speed", "step", "floor", "reach"]
 
 TOLERANCE = 1e-9
-"""Excess (rad, m) that is attributed to floating-point rounding and is no violation."""
+"""Excess (rad, m) that is floating-point rounding and no violation."""
 
 
 @dataclass(frozen=True)
 class Violation:
-    """The worst place of one rule and joint, or link for `floor` and `reach`. `time` is in s from the plan's start;
-    `value` and `limit` are in rad, rad/s or m, in posture units for the rule `posture`."""
+    """The worst point for one rule and joint (or link, for `floor` and `reach`). `time` is in s from the start of the
+    plan; `value` and `limit` are in rad, rad/s or m, for the rule `posture` in posture units."""
 
     rule: Rule
     joint: int

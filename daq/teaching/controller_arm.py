@@ -12,7 +12,7 @@ from daq.contracts.sample import SampleRow
 from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkError, RequestRefusedError
 from daq.runner.arm_control import ArmControl, StoppedError
-from daq.runner.preparation import PERIOD_TOLERANCE, require_fitting
+from daq.runner.preparation import PERIOD_TOLERANCE, require_matching_machine
 from daq.runner.rows import RowMaker
 from daq.safety import Event
 from daq.teaching import halting
@@ -49,7 +49,7 @@ class ControllerArm:
         *,
         every_period: bool = True,
     ) -> None:
-        require_fitting(controller, machine)
+        require_matching_machine(controller, machine)
         require_period(controller, machine)
         self.joints = tuple(range(1, len(machine.joints) + 1))
         self.lateness = 0.0

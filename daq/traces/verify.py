@@ -178,7 +178,7 @@ def _signals(trace: Trace) -> Iterator[Finding]:
     if trace.set_point is None or trace.error is None or len(trace) == 0:
         return
     for column, joint in enumerate(trace.joints):
-        count = _rad_a_count(trace.record.machine, joint)
+        count = _rad_per_count(trace.record.machine, joint)
         if count is None:
             message = f"joint {joint}: its sensor is not known, so error = set point − position was not checked"
             yield Finding(level="note", check="error", message=message)
@@ -194,7 +194,7 @@ def _signals(trace: Trace) -> Iterator[Finding]:
             yield Finding(level="error", check="error", message=message)
 
 
-def _rad_a_count(machine: Machine | None, joint: int) -> float | None:
+def _rad_per_count(machine: Machine | None, joint: int) -> float | None:
     """Size of a sensor's count in rad (m), None where no sensor is known."""
     if machine is None or joint > len(machine.joints):
         return None

@@ -10,7 +10,7 @@ import serial
 
 from daq.transport.channel import ByteChannel, DescriptorChannel
 from daq.transport.embedded_mock import EmbeddedEndpoint
-from daq.transport.holders import FINDERS, other_holders
+from daq.transport.holders import PROBING_DAEMONS, other_holders
 from daq.transport.mock_process import MockProcess, start_mock
 from daq.transport.pseudo_terminal import Terminal, require_same, terminal_at
 from daq.transport.url import (
@@ -155,7 +155,7 @@ def _why_serial_failed(device: str, error: Exception) -> str:
     text = str(error)
     if _is_busy(error):
         line = f"{device} is in use by another program: end that one, or stop the arm with `daq stop` as its user"
-        return f"{line}; it is {' and '.join(other_holders(device)) or 'not one of yours: ' + FINDERS}"
+        return f"{line}; it is {' and '.join(other_holders(device)) or 'not one of yours: ' + PROBING_DAEMONS}"
     if "No such file" in text:
         return f"{device} does not exist: `daq ports` lists the ports that do"
     if "Permission denied" in text:

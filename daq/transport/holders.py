@@ -6,7 +6,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-FINDERS = "ModemManager and brltty open new ports by themselves: see `systemctl status ModemManager brltty`"
+PROBING_DAEMONS = "ModemManager and brltty open new ports by themselves: see `systemctl status ModemManager brltty`"
 
 
 def other_holders(device: str) -> list[str]:
@@ -24,13 +24,13 @@ def other_holders(device: str) -> list[str]:
     return found
 
 
-def sharing_words(device: str) -> str:
+def shared_port_advice(device: str) -> str:
     """What to do where a port does not answer because another program reads from it too; empty for no serial port."""
     if not device.startswith("/dev/"):
         return ""
     if others := other_holders(device):
         return f"; {' and '.join(others)} has {device} open too, and takes its bytes: end that program"
-    return f"; or does another program read from it (`fuser -v {device}`)? {FINDERS}"
+    return f"; or does another program read from it (`fuser -v {device}`)? {PROBING_DAEMONS}"
 
 
 def _holds(process: Path, wanted: int) -> bool:

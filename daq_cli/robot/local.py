@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from daq.contracts.machine import Machine
     from daq.contracts.service.robot import RobotIdentity
     from daq.contracts.status import StatusReport
-    from daq.owner.messages import Finished, Seen
+    from daq.owner.messages import Finished, StateAnswer
     from daq.owner.stop_socket import StopAnswer
     from daq.teaching.program import Program
     from daq.traces.catalogue import TraceSummary
@@ -65,10 +65,10 @@ class LocalRobot(RobotAccess):
     def state(self) -> RobotState:
         """The state that the board reports now."""
         from daq.contracts.limp import GAINS_UNKNOWN
-        from daq.owner.messages import ReadState, Seen
+        from daq.owner.messages import ReadState, StateAnswer
 
         with self._asked() as robot:
-            seen, identity = Seen.model_validate(robot.owner.ask(ReadState)), robot.owner.identity
+            seen, identity = StateAnswer.model_validate(robot.owner.ask(ReadState)), robot.owner.identity
             report = _report(self.call, self.machine, identity, seen)
         told = f"{headline(report)}; {seen.missed} set points missed since power-up"
         if not seen.gains:
@@ -145,7 +145,7 @@ class LocalRobot(RobotAccess):
         """Refuses nothing."""
 
 
-def _report(call: Invocation, machine: Machine, identity: RobotIdentity, seen: Seen) -> StatusReport:
+def _report(call: Invocation, machine: Machine, identity: RobotIdentity, seen: StateAnswer) -> StatusReport:
     """What was seen, in the form of a service's status."""
     from daq.contracts.status import StatusReport
     from daq.owner.seen import link_of, sample_of

@@ -126,11 +126,11 @@ def _experiment(robot: RobotAccess, folder: Path | None, name: str) -> Experimen
     if name in PRESETS:
         return PRESETS[name].spec
     if Path(name).suffix.lower() in (".json", ".toml"):
-        return read_spec(Path(name)).plain
+        return read_spec(Path(name)).wanted_motion
     trace = _trace(robot, folder, name)
     if trace.record.spec is None:
         raise TraceError(_of_no_experiment(trace))
-    return trace.record.spec.plain
+    return trace.record.spec.wanted_motion
 
 
 def _of_no_experiment(trace: Trace) -> str:

@@ -61,7 +61,7 @@ def feedforward(
     found = inverted(arm_in_loop(model, motion.wanted[0], len(longer), gains), longer, progress)[: len(motion)]
     arm = arm_in_loop(model, motion.wanted[0], len(motion), gains)
     expected, before = (_expected(arm, motion, one) for one in (found, motion.wanted))
-    source = Feedforward(asked=asked.as_asked, model=model.identity, expected=expected, before=before)
+    source = Feedforward(asked=asked.without_feedforward, model=model.identity, expected=expected, before=before)
     return computed_experiment(motion, found, gains, source)
 
 

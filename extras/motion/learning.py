@@ -146,7 +146,7 @@ def learn(
         found[:, column] = rounded[:count]
         predicted[:, column] += responses[column].applied(rounded - now[column])[:count]
     source = Feedforward(
-        asked=asked.as_asked,
+        asked=asked.without_feedforward,
         model=None if model is None else model.identity,
         learned_from=trace.record.trace_id,
         expected=errors_of(motion.joints, motion.miss(predicted)),
@@ -188,7 +188,7 @@ def asked_of(trace: Trace, machine: Machine) -> ExperimentSpec:
             raise TraceError(f"{called}: {what}, so it does not show what its set points do: repeat the run")
     if trace.missing > MOST_MISSING * len(trace):
         raise TraceError(f"{called}: lacks {trace.missing} of {len(trace) + trace.missing} samples: repeat the run")
-    return record.spec.plain
+    return record.spec.wanted_motion
 
 
 def _called(trace: Trace) -> str:

@@ -48,7 +48,7 @@ def followed(trace: Trace, plan: Planner) -> Followed | None:
     spec = trace.record.spec
     if spec is None or trace.record.machine is None or len(trace) == 0:
         return None
-    motion = plan(spec.plain)
+    motion = plan(spec.wanted_motion)
     rows = periods_of(trace)
     inside = rows < len(motion)
     rows = rows[inside]

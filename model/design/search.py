@@ -9,7 +9,7 @@ from pydantic import Field
 
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.frozen import FrozenRecord, SpokenRecord
+from daq.contracts.frozen import FrozenRecord, UserRecord
 from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from model.arrays import Floats
 from model.design.drawn_experiments import drawn_experiment
@@ -26,7 +26,7 @@ from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 
 
-class DesignOptions(SpokenRecord):
+class DesignOptions(UserRecord):
     """How to search: `experiments` of `duration` s each are chosen from `candidates` drawn with `seed`."""
 
     experiments: Annotated[int, Field(ge=1, le=50)] = 4

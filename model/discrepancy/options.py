@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field, FiniteFloat
 
 from daq.contracts.errors import SpecError
-from daq.contracts.frozen import FrozenRecord, SpokenRecord
+from daq.contracts.frozen import FrozenRecord, UserRecord
 from model.discrepancy.grounds import Method
 from model.effects.library import effect
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from model.machine_model.model import Model
 
 
-class DiagnosisOptions(SpokenRecord):
+class DiagnosisOptions(UserRecord):
     """Options of a diagnosis; the defaults suit traces of a machine with a known controller.
 
     effects: candidates by name; None for the whole library and loaded effects of the user's own.

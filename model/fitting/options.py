@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
-from daq.contracts.frozen import FrozenRecord, SpokenRecord
+from daq.contracts.frozen import FrozenRecord, UserRecord
 
 Bound = FiniteFloat | None
 
@@ -18,7 +18,7 @@ class Prior(FrozenRecord):
     deviation: Annotated[FiniteFloat, Field(gt=0)]
 
 
-class FitOptions(SpokenRecord):
+class FitOptions(UserRecord):
     """How a fit is to be done; the defaults suit traces of a known machine.
 
     parameters: names or patterns (`joint2.*`, `*.mass`) of what to find; None: every number with an expected deviation

@@ -125,7 +125,7 @@ def _keep(
 
     made = ModelFile.model_validate(data)
     # Everybody who may call the service sees the traces of all its robots, and of no other.
-    new = rig.models.keep(made, name, caller.name, robots=robots)
+    new = rig.models.add(made, name, caller.name, robots=robots)
     if new:
         rig.record_event("model", f"model {name!r} was uploaded", actor=caller.name)
     return models.get(rig.robot.name, made.identity), new

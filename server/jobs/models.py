@@ -28,15 +28,15 @@ class Models:
         self._machine = machine
         self._clock = clock
 
-    def take_in(self, path: Path, name: str, by: str, job: str) -> str:
+    def add_from_file(self, path: Path, name: str, by: str, job: str) -> str:
         """Adds a job's model, and returns its number. Adding it again changes nothing. Raises SpecError."""
         from model.machine_model.model_file import file_of, load_model
 
         made = file_of(load_model(path))
-        self.keep(made, name, by, job)
+        self.add(made, name, by, job)
         return made.identity
 
-    def keep(
+    def add(
         self, made: ModelFile, name: str, by: str, job: str | None = None, robots: Collection[str] | None = None
     ) -> bool:
         """Adds a model; returns False if the robot has it already. A number stands for one text, so its file is written
@@ -56,7 +56,7 @@ class Models:
 
         def write() -> None:
             path = self.folder / new.file
-            if _is_kept(path, made):
+            if _is_stored(path, made):
                 return
             self.folder.mkdir(parents=True, exist_ok=True)
             with replacing(path) as part:
@@ -103,7 +103,7 @@ class Models:
         self.store.remove(self._robot, identity, lambda file: (self.folder / file).unlink(missing_ok=True))
 
 
-def _is_kept(path: Path, made: ModelFile) -> bool:
+def _is_stored(path: Path, made: ModelFile) -> bool:
     """Whether a model is in its file. A file that is not there, or was damaged or changed, is to be written anew.
     Raises SpecError for a file of another model of the same number."""
     from model.machine_model.model_file import file_of, load_model

@@ -352,7 +352,7 @@ class JobService:
         job = context.jobs.get(context.robot, identity)
         name = job.request.name if isinstance(job.request, FitRequest | DiagnoseRequest) else None
         path = self._folder(identity) / MODEL
-        return context.models.take_in(path, name or f"{job.request.kind} {identity}", job.submitted_by, identity)
+        return context.models.add_from_file(path, name or f"{job.request.kind} {identity}", job.submitted_by, identity)
 
     def _tell_waiting(self) -> None:
         """Publishes waiting jobs again, since the jobs that they wait behind have changed."""

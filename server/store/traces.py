@@ -60,7 +60,7 @@ class TraceSearch:
     until: datetime | None = None
 
 
-class ArchivedTraces(Protocol):
+class ArchiveIndex(Protocol):
     """Which traces an archive has, as its plug-in tells within a transaction."""
 
     def among(self, session: Session, traces: Collection[str]) -> set[str]:
@@ -77,19 +77,19 @@ class TraceStore:
 
     def __init__(self, store: Store) -> None:
         self._store = store
-        self.archived: ArchivedTraces | None = None
+        self.archive_index: ArchiveIndex | None = None
         """What an archive has, of a plug-in; None where there is none."""
 
-    def insert(self, new: NewTrace, is_there: Callable[[str], bool] = lambda _file: True) -> None:
+    def insert(self, new: NewTrace, file_exists: Callable[[str], bool] = lambda _file: True) -> None:
         """Adds a trace. If its row exists and the row's file is gone, the row gets the new file, and keeps its tags and
-        notes. Raises a 409 if the row has another file that `is_there`."""
+        notes. Raises a 409 if the row has another file that `file_exists`."""
         columns = {**new.__dict__, "joints": list(new.joints), "missing": False}
         with self._store.writing() as session:
             row = session.get(TraceRow, new.id)
             tags: tuple[str, ...] = ()
             if row is None:
                 row = TraceRow(**columns, searched="")
-            elif row.robot == new.robot and (row.file == new.file or not is_there(row.file)):
+            elif row.robot == new.robot and (row.file == new.file or not file_exists(row.file)):
                 tags = _tags(session, [row.id]).get(row.id, ())
                 for name in columns.keys() - {"notes", "experiment"}:
                     setattr(row, name, columns[name])
@@ -137,10 +137,10 @@ class TraceStore:
 
     def archived_of(self, identities: Iterable[str]) -> set[str]:
         """Returns those of these traces that the archive has."""
-        if self.archived is None:
+        if self.archive_index is None:
             return set()
         with self._store.reading() as session:
-            return self.archived.among(session, list(identities))
+            return self.archive_index.among(session, list(identities))
 
     def page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a part of the list, newest first."""
@@ -185,14 +185,14 @@ class TraceStore:
             if users:
                 line = f"{label_of_row(row)} is used by {', '.join(user_label(session, user) for user in users)}"
                 raise conflict("trace-in-use", line, "delete those first")
-            if self.archived is not None:
-                self.archived.delete_later(session, identity)
+            if self.archive_index is not None:
+                self.archive_index.delete_later(session, identity)
             session.delete(row)
             session.flush()
             also()
 
     def _archived(self, session: Session, identities: list[str]) -> set[str]:
-        return set() if self.archived is None else self.archived.among(session, identities)
+        return set() if self.archive_index is None else self.archive_index.among(session, identities)
 
     def _entry(self, session: Session, row: TraceRow, tags: tuple[str, ...]) -> CatalogueEntry:
         return _entry(row, tags, archived=bool(self._archived(session, [row.id])))

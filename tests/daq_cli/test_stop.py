@@ -57,7 +57,7 @@ def test_a_reset_does_not_end_a_later_stop(
     assert daq("--port", port, "stop").code == 0
     with monkeypatch.context() as meanwhile:
         meanwhile.setattr(client, "PROGRAM", (sys.executable, "-c", OVERTAKEN))
-        daq("--port", port, *words).complains(4, "the arm has been stopped since this was asked for")
+        daq("--port", port, *words).complains(4, "the arm has been stopped after this request was sent")
     assert ask(mock, "state")["frozen"]
     assert daq("--port", port, *words).code == 0
     assert not ask(mock, "state")["frozen"]

@@ -6,7 +6,7 @@ import pytest
 
 import ma2000
 from daq.contracts.errors import SpecError, TraceError
-from daq.contracts.trace import several
+from daq.contracts.trace import as_sequence
 from tests.daq.traces.samples import write
 
 
@@ -37,6 +37,6 @@ def test_a_choice_says_what_is_taken_of_a_file_of_another_program(tmp_path: Path
     (tmp_path / "log.csv").write_text("stamp,angle\n0,90\n10,180\n")
     trace = ma2000.read_trace(tmp_path / "log.csv", map={"time": "stamp in ms", "position": "angle in deg"})
     assert trace.position[1, 0] == pytest.approx(3.14159, abs=1e-5)
-    assert (several(trace), several([trace, trace])) == ((trace,), [trace, trace])
+    assert (as_sequence(trace), as_sequence([trace, trace])) == ((trace,), [trace, trace])
     with pytest.raises(SpecError, match="read_trace: maps: a choice is one of topic, set_points, joints"):
         ma2000.read_trace(tmp_path / "log.csv", maps={})

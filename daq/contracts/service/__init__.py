@@ -1,1 +1,1 @@
-"""Messages between the service and its clients: one model for each resource, the same for server, client and page."""
+"""Messages between the service and its clients: one model per resource, used by server, client and page."""

@@ -1,4 +1,4 @@
-"""The archive of a robot's traces: its state, and what it has of one trace."""
+"""The archive of a robot's traces: its state, and the state of one trace in it."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from daq.contracts.service.base import Wire
 
 
 class Transfer(Wire):
-    """A trace on its way between this computer and the archive."""
+    """A transfer of a trace between this computer and the archive."""
 
     direction: Literal["send", "fetch"]
     state: Literal["waiting", "moving", "failed"]
     done: int
-    """Number of bytes moved so far."""
+    """Bytes transferred so far."""
     total: int
     problem: str = ""
-    """Why it failed, or what it waits for, in one line."""
+    """Why the transfer failed, or what it waits for, in one line."""
 
 
 class TraceArchive(Wire):
-    """Where a trace is, and how far it is on its way."""
+    """Where a trace is stored, and its transfer if there is one."""
 
     id: str
     local: bool
-    """Whether the folder of traces has it."""
+    """Whether the local folder contains the trace."""
     archived: AwareDatetime | None
-    """When the archive had it, read back and compared; None before that."""
+    """When the archived copy was read back and compared; None if it is not archived."""
     checked: AwareDatetime | None
-    """When it was last read back."""
+    """When the archived copy was last read back."""
     size: int | None
     sha256: str | None
     transfer: Transfer | None
 
 
 class ArchiveOrder(Wire):
-    """Asks for a trace to be archived now. `drop`: the local copy goes when that is done, whatever the policy says."""
+    """Requests that a trace is archived now. `drop`: then delete the local copy, whatever the policy is."""
 
     drop: bool = False
 
@@ -46,13 +46,13 @@ class ArchiveStatus(Wire):
     """State of the archive."""
 
     place: str
-    """Bucket and address."""
+    """Bucket and endpoint."""
     state: Literal["ok", "away", "refused"]
-    """`refused`: the store refuses the service, or has no such bucket, so that a person must look."""
+    """`refused`: the store denies access or has no such bucket; a person must act."""
     problem: str
-    """Why the last attempt failed, in one line; empty if it did not."""
+    """Why the last attempt failed, in one line; empty if it succeeded."""
     since: AwareDatetime | None
-    """Since when it fails."""
+    """Time of the first failure since the last success."""
     next_try: float | None
     """Time (s) until the next attempt."""
     archived: int
@@ -64,4 +64,4 @@ class ArchiveStatus(Wire):
     local_bytes: int
     """Total size of the local traces."""
     local_limit: int | None
-    """Size of local traces (bytes) beyond which the oldest archived ones go; None if there is no limit."""
+    """Size of local traces (bytes) above which the oldest archived ones are deleted locally; None for no limit."""

@@ -1,4 +1,4 @@
-"""The audit log: what was asked of the service, by whom, from where, and what became of it."""
+"""The audit log: each request to the service, its sender and its result."""
 
 from __future__ import annotations
 
@@ -9,36 +9,36 @@ from pydantic import AwareDatetime, Field
 from daq.contracts.service.base import Wire
 
 Outcome = Literal["done", "refused", "failed"]
-"""`refused`: nothing was changed, and the asker was told why. `failed`: the service could not carry it out."""
+"""`refused`: nothing was changed, and the sender was told why. `failed`: the service could not carry it out."""
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
 class AuditNote(Wire):
-    """What was asked, before it has a place in the log."""
+    """A request, before it is in the log."""
 
     at: AwareDatetime
     actor: str | None = None
-    """The name of the asker's token, `local` for a user of the service's computer; None for an unknown asker."""
+    """Name of the sender's token; `local` for a user of the service's computer; None for an unknown sender."""
     role: str | None = None
     origin: str
-    """Address of the asker's computer (that of the proxy, if there is one); `command line`, `service`."""
+    """Address of the sender's computer (or of the proxy, if there is one); or `command line`, `service`."""
     action: str
-    """What was asked: the name of the operation, as the API's description has it, or of the command."""
+    """Name of the operation in the API's description, or of the command."""
     request: str = ""
-    """Method and address of the request, or the command."""
+    """Method and path of the request, or the command."""
     robot: str | None = None
     subject: str | None = None
-    """Number or name of what was made or changed."""
+    """ID or name of the object that was made or changed."""
     outcome: Outcome
     status: int | None = None
-    """Status of the answer (HTTP)."""
+    """HTTP status of the response."""
     detail: str = ""
-    """Why it was refused, or what the arm answered."""
+    """Why it was refused, or the arm's answer."""
     content: str | None = None
-    """What the request said: JSON without secrets; of a long one, its size and SHA-256."""
+    """Body of the request: JSON without secrets. For a long body, its size and SHA-256."""
     request_id: str | None = None
     count: Annotated[int, Field(ge=1)] = 1
-    """Number of requests: those that a client repeats all the time are counted for a minute."""
+    """Number of requests: frequent repeats by one client are counted together for a minute."""
 
 
 class AuditEntry(AuditNote):
@@ -46,6 +46,6 @@ class AuditEntry(AuditNote):
 
     number: int
     previous: Digest
-    """The digest of the row before."""
+    """The digest of the previous row."""
     digest: Digest
-    """SHA-256 of the row with `previous`, so that a change of any row shows in all later ones."""
+    """SHA-256 of the row with `previous`, so that a change of any row changes all later digests."""

@@ -1,4 +1,4 @@
-"""Base of the service's models."""
+"""Base classes of the service's models."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import Annotated, Generic, TypeVar
 
 from pydantic import AfterValidator, AwareDatetime, Field
 
-from daq.contracts.frozen import FrozenRecord, SpokenRecord
+from daq.contracts.frozen import FrozenRecord, UserRecord
 
 
 class Wire(FrozenRecord):
-    """A message of the service. Unknown fields are refused, never ignored."""
+    """A message of the service. Unknown fields are rejected, never ignored."""
 
 
-class SpokenWire(Wire, SpokenRecord):
-    """A message that people make in their programs."""
+class UserWire(Wire, UserRecord):
+    """A message that users also construct in Python."""
 
 
 def _has_utc(moment: datetime) -> datetime:

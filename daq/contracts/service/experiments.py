@@ -9,24 +9,25 @@ from pydantic import AwareDatetime, Field, StrictBool, model_validator
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.in_unit import InUnit
 from daq.contracts.labels import Outcome
-from daq.contracts.service.base import Moment, SpokenWire, Wire
+from daq.contracts.service.base import Moment, UserWire, Wire
 from daq.contracts.trace import EventKind
 
 ExperimentState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
-"""`done`: the plan was carried out completely. `failed`: refused, or ended by a safety check. `cancelled`: by somebody,
-before it began or by a stop. `interrupted`: the link, a process or the power failed; it never runs again by itself."""
+"""`done`: the plan was carried out completely. `failed`: refused, or ended by a safety check. `cancelled`: by a person,
+before it began or by a stop. `interrupted`: the link, a process or the power failed; it is not run again
+automatically."""
 
 ENDS: frozenset[ExperimentState] = frozenset({"done", "failed", "cancelled", "interrupted"})
-"""End states, of experiments and of jobs."""
+"""Final states of experiments and of jobs."""
 
 ExperimentOrder = Literal["submitted", "ended"]
-"""Order of a list: the last submitted first; or only experiments that have ended, the last ended first."""
+"""Order of a list: `submitted`, the newest first; `ended`, only ended experiments, the last ended first."""
 
 Reviewer = Literal["operator", "owner"]
 """Who must approve an experiment before it moves a real arm: another operator, or another owner of the robot."""
 
 Priority = Annotated[int, Field(ge=-100, le=100)]
-"""Priority: the higher runs first; among equal ones, the one submitted first."""
+"""Priority: the highest runs first; of equal ones, the one submitted first."""
 Interval = Annotated[float, Field(ge=10, le=366 * 86400), InUnit("s")]
 """Time (s) between two runs of a schedule."""
 
@@ -35,7 +36,7 @@ Submission = TypeVar("Submission", "ExperimentRequest", "ScheduleRequest")
 PresetName = Annotated[str, Field(min_length=1, max_length=64)]
 
 
-class ExperimentRequest(SpokenWire):
+class ExperimentRequest(UserWire):
     """An experiment to run, not before the time `at` (with its time zone); None for as soon as possible."""
 
     spec: ExperimentSpec = ExperimentSpec()
@@ -59,7 +60,7 @@ class ExperimentPreset(Wire):
 
 
 class ExperimentChange(Wire):
-    """Changes of a waiting experiment; what is None stays. A new specification ends its approval."""
+    """Changes of a waiting experiment; fields that are None stay unchanged. A new specification ends its approval."""
 
     priority: Priority | None = None
     spec: ExperimentSpec | None = None
@@ -72,7 +73,7 @@ class ExperimentChange(Wire):
 
 
 class Approval(Wire):
-    """Who has approved an experiment or a schedule, and when. `as_owner`: whether they owned the robot."""
+    """Who approved an experiment or a schedule, and when. `as_owner`: whether this person owned the robot."""
 
     by: str
     at: AwareDatetime
@@ -80,7 +81,7 @@ class Approval(Wire):
 
 
 class ApprovalRequest(Wire):
-    """Approves exactly the `content` that the caller has looked at: that of the experiment or schedule."""
+    """Approves exactly the `content` that the caller has seen in the experiment or schedule."""
 
     content: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
@@ -99,30 +100,30 @@ class Experiment(Wire):
     submitted: AwareDatetime
     submitted_by: str
     owner: str = ""
-    """Who may change and cancel it besides the robot's owners: who submitted it, or made its schedule. Empty at
-    an older service."""
+    """Who may change and cancel it besides the robot's owners: the person who submitted it, or made its schedule. Empty
+    from an older service."""
     changed_by: str | None = None
-    """Who changed its specification last: like its owner and whoever submitted it, they cannot approve it."""
+    """Who last changed its specification. This person, its owner and its submitter cannot approve it."""
     content: str = ""
-    """While it waits: a digest of all that an approval is bound to. It changes with the specification, the start time,
-    the machine file and the limits."""
+    """While it waits: a digest of everything that an approval covers: the specification, the start time, the machine
+    file and the limits."""
     approval: Approval | None = None
     needs_approval_of: Reviewer | None = None
-    """Whose approval it still needs before it may begin; None if it needs none, or has it."""
+    """Whose approval it still needs before it may begin; None if it needs none, or has been approved."""
     started: AwareDatetime | None = None
     ended: AwareDatetime | None = None
     progress: float | None = None
     progress_text: str = ""
     outcome: Outcome | None = None
     reason: str = ""
-    """Why it is not done, in one line."""
+    """Why it was not completed, in one line."""
     trace: str | None = None
-    """The number of its trace, once there is one."""
+    """ID of its trace, once there is one."""
 
 
-class ScheduleRequest(SpokenWire):
-    """An experiment to run again and again, for studies of wear and drift: at even intervals (`every`), or by the wall
-    clock (`cron`)."""
+class ScheduleRequest(UserWire):
+    """An experiment to repeat, for studies of wear and drift: at even intervals (`every`), or by the wall clock
+    (`cron`)."""
 
     spec: ExperimentSpec = ExperimentSpec()
     preset: PresetName | None = None
@@ -134,7 +135,7 @@ class ScheduleRequest(SpokenWire):
     zone: Annotated[str, Field(pattern=r"^[A-Za-z0-9_+/-]{1,64}$")] | None = None
     """Time zone of `cron`, such as Europe/London; None for that of the service's computer."""
     starts: Moment | None = None
-    """Time of the first run, with `cron` the earliest time of it; None for now. Times that have passed are left out."""
+    """Time of the first run (with `cron`, its earliest time); None for now. Times in the past are skipped."""
     count: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
     """Number of runs; None for no end."""
     priority: Priority = 0
@@ -163,7 +164,7 @@ class Schedule(Wire):
     robot: str
     spec: ExperimentSpec
     every: float | None
-    """Time (s) from one run to the next; None where `cron` says when."""
+    """Time (s) from one run to the next; None with `cron`."""
     cron: str | None = None
     zone: str | None = None
     """Time zone of `cron`."""
@@ -175,20 +176,19 @@ class Schedule(Wire):
     next: AwareDatetime | None
     """When the next run is due; None if there is none."""
     problem: str = ""
-    """Why no run can be computed on the service's computer, such as a time zone that it no longer knows; empty if all
-    is well."""
+    """Why the service's computer cannot compute the next run, such as an unknown time zone; empty if it can."""
     created: AwareDatetime
     created_by: str
     content: str = ""
-    """A digest of all that an approval is bound to. Its runs have the approval of the schedule."""
+    """A digest of everything that an approval covers. An approval of the schedule applies to its runs."""
     approval: Approval | None = None
     needs_approval_of: Reviewer | None = None
-    """Whose approval its runs still need; None if they need none, or have it."""
+    """Whose approval its runs still need; None if they need none, or have been approved."""
 
 
 class MotionPreview(Wire):
-    """The motion of an experiment, computed and checked without a robot. Columns of `set_points` are the machine's
-    joints, in rad; `violations` lists the limits that it violates, and is empty if it may run."""
+    """The motion of an experiment, computed and checked without a robot. `set_points`: columns are the machine's
+    joints, in rad. `violations`: the limits that it violates; empty if it may run."""
 
     time: tuple[float, ...]
     set_points: tuple[tuple[float, ...], ...]
@@ -199,8 +199,8 @@ class MotionPreview(Wire):
 
 
 class MotionViolation(Wire):
-    """One limit that a motion violates: the worst place of one rule and joint (or link, for `floor` and `reach`).
-    `time` in s from the start of the record; `value` and `limit` in rad, rad/s or m, for `posture` in posture units."""
+    """A limit that a motion violates: the worst point of one rule and joint (or link, for `floor` and `reach`). `time`
+    in s from the start of the record; `value` and `limit` in rad, rad/s or m, for `posture` in posture units."""
 
     rule: Literal["finite", "posture", "range", "speed", "step", "floor", "reach"]
     joint: int
@@ -211,7 +211,7 @@ class MotionViolation(Wire):
 
 
 class MotionMark(Wire):
-    """Something that begins or ends during the motion."""
+    """The beginning or end of a part of the motion."""
 
     time: float
     kind: EventKind

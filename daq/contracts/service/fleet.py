@@ -1,4 +1,4 @@
-"""All robots of one service: their state at a glance, and the same experiment on several of them."""
+"""All robots of one service: overview, and one experiment on several robots."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ChosenRobot = Annotated[str, StringConstraints(min_length=1, max_length=64)]
 
 
 class FleetRobot(Wire):
-    """One robot at a glance. Nothing here is from before the connection was lost, and the sample has its age."""
+    """Overview of one robot. It contains no data from before a lost connection, and the age of its sample."""
 
     robot: str
     machine: str
@@ -33,37 +33,37 @@ class FleetRobot(Wire):
     activity: Activity
     limp: tuple[int, ...] = ()
     sample_age: float | None = None
-    """Time (s) since the newest sample arrived; None without one."""
+    """Time (s) since the newest sample arrived; None if there is none."""
     progress: float | None = None
-    """Fraction, from 0 to 1, of the experiment that runs."""
+    """Progress of the running experiment, from 0 to 1."""
     unattended: bool
-    """Whether its queue may move it, a real arm, while no operator has confirmed being present."""
+    """Whether its queue may move it, a real arm, without an operator who has confirmed being present."""
     control: Control
     queue: QueueStatus
 
 
 class FleetStatus(Wire):
-    """All robots of the service at one moment, in the order of the configuration."""
+    """All robots of the service at one moment, in configuration order."""
 
     utc: AwareDatetime
     robots: tuple[FleetRobot, ...]
 
 
 class FleetExperimentRequest(Wire):
-    """The same experiment for several robots; None for all of them. Each gets it in its own queue."""
+    """An experiment for several robots; None for all of them. It is added to the queue of each."""
 
     request: ExperimentRequest
     robots: Annotated[tuple[ChosenRobot, ...], Field(min_length=1, max_length=MOST_CHOSEN)] | None = None
 
 
 class FleetExperiments(Wire):
-    """The experiments that were queued, one a robot."""
+    """The queued experiments, one per robot."""
 
     experiments: tuple[Experiment, ...]
 
 
 class FittedNumber(Wire):
-    """A parameter that a fit has determined, with its 95 % interval."""
+    """A parameter estimated by a fit, with its 95 % interval."""
 
     name: str
     unit: str
@@ -74,7 +74,7 @@ class FittedNumber(Wire):
 
 
 class JointResidual(Wire):
-    """What a fit leaves of one joint: root mean square of simulated − measured, and of the measurement's own noise."""
+    """Residual of a fit at one joint: root mean square of simulated − measured, and of the measurement noise."""
 
     joint: int
     unit: str
@@ -90,13 +90,13 @@ class ArmFit(Wire):
     traces: tuple[str, ...]
     converged: bool
     whitened_mean_square: float
-    """Mean square of the whitened residual: 1 where the noise model describes what is left."""
+    """Mean square of the whitened residual; 1 if the noise model describes the residual."""
     residuals: tuple[JointResidual, ...]
     numbers: tuple[FittedNumber, ...]
 
 
 class NumberChange(Wire):
-    """A number that two fits of one robot have determined. `low` to `high`: 95 % interval of the difference."""
+    """A parameter that two fits of one robot estimated. `low` to `high`: 95 % interval of the difference."""
 
     name: str
     unit: str
@@ -106,14 +106,14 @@ class NumberChange(Wire):
     low: float
     high: float
     changed: bool
-    """Whether it changed by more than all intervals together allow: noise alone makes any number of the whole
-    comparison count as changed in one comparison out of twenty."""
+    """Whether the change is larger than all intervals together allow. By noise alone, only one comparison in twenty
+    marks any parameter as changed."""
 
 
 class ArmComparison(Wire):
-    """The fits of one robot to one experiment, the oldest first, and what has changed from `reference` to the newest.
+    """A robot's fits to one experiment, the oldest first, and the changes from `reference` to the newest.
 
-    `reference` is the newest fit that is older than the newest one by the time asked for; None if there is none.
+    `reference`: the newest fit that is older than the last one by the requested time; None if there is none.
     """
 
     robot: str
@@ -126,10 +126,10 @@ class FleetComparison(Wire):
     """The robots' fits to the same experiment, over time."""
 
     experiments: tuple[str, ...]
-    """Names of all experiments to which anything was fitted."""
+    """Names of all experiments with a fit."""
     experiment: str | None
-    """The one that is compared here."""
+    """The experiment that is compared here."""
     days: float
     robots: tuple[ArmComparison, ...]
     words: dict[str, ParameterWords] = Field(default_factory=dict)
-    """How people write the parameters."""
+    """Names of the parameters for people."""

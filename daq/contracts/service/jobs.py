@@ -1,4 +1,4 @@
-"""Computations in the background: fits, validations, comparisons, diagnoses; and the models they make."""
+"""Background jobs: fits, validations, comparisons and diagnoses; and the models that they make."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Annotated, Literal
 from pydantic import AwareDatetime, Field, FiniteFloat, StrictBool
 
 from daq.contracts.experiment import JointNumber
-from daq.contracts.service.base import SpokenWire, Wire
+from daq.contracts.service.base import UserWire, Wire
 
 JobKind = Literal["fit", "validate", "compare", "diagnose"]
 JobState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
-"""The same states as those of experiments; an interrupted job is not run again by itself either."""
+"""The same states as those of experiments. An interrupted job is not run again automatically."""
 
 JobFailure = Literal["refused", "program-fault", "lost"]
 """Why a job has no result: it was refused; the program has a fault; its process or the service ended."""
 
 MACHINE = "machine"
-"""Used instead of a model's number for the model that the robot's machine file describes."""
+"""Used instead of a model's ID for the model that the robot's machine file describes."""
 TraceNumber = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 TraceNumbers = Annotated[tuple[TraceNumber, ...], Field(min_length=1, max_length=200, fail_fast=True)]
 ModelNumber = Annotated[str, Field(pattern=r"^(machine|[0-9a-f]{12})$")]
@@ -34,15 +34,15 @@ class EffectChoice(Wire):
     joints: tuple[JointNumber, ...] = ()
 
 
-class FitStudy(SpokenWire):
-    """How parameters are estimated with which a model best reproduces traces. The fields are the options of
-    `daq fit`."""
+class FitStudy(UserWire):
+    """Options of a fit, which estimates the parameters with which a model best reproduces traces; those of `daq
+    fit`."""
 
     kind: Literal["fit"] = "fit"
     effects: tuple[EffectChoice, ...] = ()
     """Effects to add to the model before fitting."""
     parameters: tuple[Pattern, ...] | None = None
-    """Parameters to estimate; None for all uncertain ones."""
+    """Parameters to estimate; None for all with a stated deviation."""
     held: tuple[Pattern, ...] = ()
     bounds: dict[Pattern, tuple[Bound, Bound]] = Field(default_factory=dict)
     use_priors: StrictBool = True
@@ -51,11 +51,11 @@ class FitStudy(SpokenWire):
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     loop: Literal["closed", "open"] | None = None
     consistent_inertias: StrictBool = False
-    """Find only bodies that can exist."""
+    """Allow only physically consistent inertias."""
 
 
-class ValidateStudy(SpokenWire):
-    """How a model is validated against traces. The fields are the options of `daq validate`."""
+class ValidateStudy(UserWire):
+    """Options of a validation of a model against traces; those of `daq validate`."""
 
     kind: Literal["validate"] = "validate"
     parameters: tuple[Pattern, ...] | None = None
@@ -63,19 +63,19 @@ class ValidateStudy(SpokenWire):
     damping_ratio: Annotated[float, Field(gt=0, le=10)] = 0.5
 
 
-class DiagnoseStudy(SpokenWire):
-    """How a missing effect is looked for. The fields are the options of `daq diagnose`."""
+class DiagnoseStudy(UserWire):
+    """Options of a search for a missing effect; those of `daq diagnose`."""
 
     kind: Literal["diagnose"] = "diagnose"
     effects: tuple[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")], ...] | None = None
     """Candidate effects; None for all known ones."""
     joints: tuple[JointNumber, ...] | None = None
     most_steps: Annotated[int, Field(ge=1, le=10)] | None = None
-    """Most effects to add, one after another; None: 3 where the loop is simulated, 8 of torques."""
+    """Most effects to add, one after another; None: 3 by output error, 8 by inverse dynamics."""
     method: Literal["output-error", "inverse-dynamics"] | None = None
-    """How model and traces are compared; None: as machine and traces allow."""
+    """How model and traces are compared; None: chosen by machine and traces."""
     despite_doubts: StrictBool = False
-    """Compute although the check of the records raises doubts; the verdict stays `check-the-record`."""
+    """Continue although the check of the records reports doubts; the verdict stays `check-the-record`."""
 
 
 class FitRequest(FitStudy):
@@ -83,7 +83,7 @@ class FitRequest(FitStudy):
 
     traces: TraceNumbers
     held_out: tuple[TraceNumber, ...] = ()
-    """Traces that are held out: the model is checked on them and not fitted to them."""
+    """Held-out traces: the model is checked on them, but not fitted to them."""
     model: ModelNumber = MACHINE
     """The model to start from."""
     name: ModelName | None = None
@@ -97,7 +97,7 @@ class ValidateRequest(ValidateStudy):
     model: ModelNumber
 
 
-class CompareRequest(SpokenWire):
+class CompareRequest(UserWire):
     """Compares one model or several with the same traces, by simulation."""
 
     kind: Literal["compare"] = "compare"
@@ -113,7 +113,7 @@ class DiagnoseRequest(DiagnoseStudy):
     held_out: tuple[TraceNumber, ...] = ()
     model: ModelNumber = MACHINE
     design: bool = False
-    """Whether the next experiment may be a motion that is designed for the candidates; it takes longer."""
+    """Whether the next experiment may be a motion designed for the candidates, which takes longer."""
     name: ModelName | None = None
 
 
@@ -125,27 +125,27 @@ class KnownEffect(Wire):
 
     name: str
     called: str
-    """The name as people write it."""
+    """Its name for people."""
     family: str
     title: str
-    """One line for people."""
+    """A line for people."""
     physics: str
     """The equation, in the symbols of its parameters."""
     joints: tuple[int, ...]
     """The joints on which it may act; empty for any."""
     whole_machine: bool
-    """Whether it belongs to the machine, not to a joint."""
+    """Whether it belongs to the machine and not to a joint."""
 
 
 class WaitsBehind(Wire):
-    """The job that a queued job waits for: the first of those before it in its lane."""
+    """The job that a queued job waits for: the first one before it in its lane."""
 
     job: str
     request: JobRequest
     started: AwareDatetime | None
-    """When that job began; None if it is waiting, too."""
+    """When that job began; None if it also waits."""
     others: int
-    """Number of further jobs before this one."""
+    """Number of further jobs in between."""
 
 
 class LeadingEffect(Wire):
@@ -175,21 +175,21 @@ class Job(Wire):
     leading: tuple[LeadingEffect, ...] = ()
     """The candidates that lead while a diagnosis runs, the best first; no answer."""
     reason: str = ""
-    """Why it is not done, in one line."""
+    """Why it was not completed, in one line."""
     failure: JobFailure | None = None
-    """The same for programs; None if it was cancelled, or nothing failed."""
+    """The reason as a code; None if it was cancelled, or nothing failed."""
     headline: str = ""
     """The result in one line."""
     model: str | None = None
     """The model that it made."""
     has_report: bool = False
     waits_behind: WaitsBehind | None = None
-    """What it waits for while it is queued behind others. Short jobs (comparisons and validations of few traces) have a
-    worker of their own, and never wait for a fit or a diagnosis."""
+    """The job that it waits for in its queue. Short jobs (comparisons and validations of few traces) have a separate
+    worker, and never wait for a fit or a diagnosis."""
 
 
 class ModelEntry(Wire):
-    """A model of the service, and how it was made."""
+    """A model of the service, and its origin."""
 
     id: str
     robot: str
@@ -201,25 +201,25 @@ class ModelEntry(Wire):
     job: str | None
     """The job that made it."""
     traces: tuple[str, ...] = ()
-    """The traces from which it was made."""
+    """The traces to which it was fitted."""
     notes: str = ""
 
 
 class ParameterWords(Wire):
-    """A parameter as people write it. `joint`: the one that it, or its link, belongs to; None where it is not one."""
+    """Names of a parameter for people. `joint`: the joint that it, or its link, belongs to; None if there is none."""
 
     joint: int | None
     group: str
-    """Whose it is: joint 2, link 1, load."""
+    """Its owner: joint 2, link 1, load."""
     short: str
-    """What it is, beneath its group: motor back-EMF constant."""
+    """Its name within the group: motor back-EMF constant."""
     label: str
-    """Both: J2 motor back-EMF constant."""
+    """Its full name: J2 motor back-EMF constant."""
 
 
 class ModelParameter(Wire):
-    """A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None if
-    none is stated."""
+    """A parameter of a model, in its unit. `deviation`: standard deviation of the expected value; None if none is
+    stated."""
 
     name: str
     words: ParameterWords
@@ -231,13 +231,13 @@ class ModelParameter(Wire):
 
 
 class EffectInModel(EffectChoice):
-    """An effect of a model. `called`: the effect and its joints as people write them."""
+    """An effect of a model. `called`: names of the effect and its joints for people."""
 
     called: str
 
 
 class ModelDetails(Wire):
-    """A model: its effects, its parameters, and the models from which it was made, the nearest first."""
+    """A model: its effects, its parameters, and its ancestors, the nearest first."""
 
     entry: ModelEntry
     effects: tuple[EffectInModel, ...]
@@ -246,7 +246,7 @@ class ModelDetails(Wire):
 
 
 class ModelChange(Wire):
-    """A new name or notes; a field that is None stays as it is."""
+    """A new name or notes; fields that are None stay unchanged."""
 
     name: ModelName | None = None
     notes: Annotated[str, Field(max_length=10000)] | None = None
@@ -255,13 +255,13 @@ class ModelChange(Wire):
 class ModelLineage(Wire):
     """The models of a robot, and the jobs that made or used them.
 
-    A model's parent is another of these models, the one that the machine file describes, or one that has been
-    deleted. A job leads from the models and traces of its request to the model that it made, if it made one.
+    A model's parent is another of these models, the model of the machine file, or a deleted one. A job links the models
+    and traces of its request with the model that it made, if any.
     """
 
     machine: str
-    """Identity of the model that the machine file describes, as a parent."""
+    """ID of the machine file's model, as a parent."""
     models: tuple[ModelEntry, ...]
     """The robot's models, oldest first."""
     jobs: tuple[Job, ...]
-    """Jobs in the order in which they were submitted."""
+    """Jobs in the order of submission."""

@@ -1,7 +1,7 @@
 """The messages of the live WebSocket in both directions. Angles in rad, joints from 1.
 
-Every frame says `now`, the monotonic clock of the service's computer (s), and `utc`, its wall clock (s since 1970). A
-value's age is `now − host_time` when the frame was sent, and grows from then on.
+Every frame contains `now`, the monotonic clock of the service's computer (s), and `utc`, its wall clock (s since 1970).
+The age of a value is `now − host_time` when the frame was sent, and grows from then on.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from daq.contracts.experiment import JointNumber
-from daq.contracts.service.base import SpokenWire, Wire
+from daq.contracts.service.base import UserWire, Wire
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.queue import Control, QueueStatus
@@ -29,11 +29,11 @@ class SampleMessage(ControlPeriod):
     topic: Literal["sample"] = "sample"
     frozen: bool
     lateness: float
-    """Delay (s) beyond that of the quickest samples after their ticks: the link's jitter."""
+    """Delay (s) compared with the quickest samples: the link's jitter."""
 
 
 class HistoryMessage(Wire):
-    """The last minutes, thinned so that no peak is lost. A signal has one row per joint; a missing value is None."""
+    """The last minutes, thinned without losing peaks. A signal has one row per joint; a missing value is None."""
 
     topic: Literal["history"] = "history"
     joints: tuple[int, ...]
@@ -58,7 +58,7 @@ class RecordEventMessage(Wire):
     time: float
     """Time (s) from the start of the record."""
     experiment: str | None
-    """The experiment that is recorded."""
+    """The experiment being recorded."""
 
 
 class RobotMessage(Wire):
@@ -71,7 +71,7 @@ class RobotMessage(Wire):
     arm: ArmState
     cause: str
     stop: int | None
-    """Number of the newest stop, which a reset names; None while it is not known."""
+    """Number of the newest stop, which a reset names; None while it is unknown."""
     activity: Activity
     experiment: str | None
     limp: tuple[int, ...]
@@ -79,7 +79,7 @@ class RobotMessage(Wire):
 
 
 class LinkMessage(Wire):
-    """The link and its counters; sent once a second."""
+    """The link and its counters; sent once per second."""
 
     topic: Literal["link"] = "link"
     state: Literal["connected", "degraded", "lost", "none"]
@@ -111,28 +111,28 @@ class JobMessage(Wire):
 
 
 class EventMessage(Wire):
-    """Something that happened to the robot or its queue."""
+    """An event of the robot or its queue."""
 
     topic: Literal["event"] = "event"
     event: ServiceEvent
 
 
 class TeachingMessage(Wire):
-    """A line for the operator who teaches."""
+    """A line for the person who teaches the arm."""
 
     topic: Literal["teaching"] = "teaching"
     text: str
 
 
 class ThinnedMessage(Wire):
-    """This client reads too slowly, and samples were left out. It is disconnected if that goes on."""
+    """This client reads too slowly, so samples were left out. If this continues, it is disconnected."""
 
     topic: Literal["thinned"] = "thinned"
     left_out: int
 
 
 class RefusedMessage(Wire):
-    """The client's message cannot be carried out."""
+    """The client's message was refused."""
 
     topic: Literal["refused"] = "refused"
     detail: str
@@ -157,7 +157,7 @@ LiveMessage = Annotated[
 
 
 class LiveFrame(Wire):
-    """One frame of the WebSocket: messages in the order in which they happened."""
+    """One frame of the WebSocket: messages in chronological order."""
 
     now: float
     utc: float
@@ -171,10 +171,10 @@ class JogCommand(Wire):
     velocities: dict[JointNumber, Velocity]
 
 
-class LiveRequest(SpokenWire):
-    """A client's message over the WebSocket. Its fields may be given alone or together.
+class LiveRequest(UserWire):
+    """A client's message over the WebSocket. Its fields may be used alone or together.
 
-    The last `history` s of samples are sent at once, in about `points` points; `rate` is in samples per second.
+    `history`: the last samples (s) to send at once, in about `points` points; `rate`: samples per second.
     """
 
     subscribe: tuple[Topic, ...] = ()
@@ -186,7 +186,7 @@ class LiveRequest(SpokenWire):
 
 
 class Ticket(Wire):
-    """A ticket, valid once within `seconds` for a WebSocket, with which browsers cannot send a token."""
+    """A ticket for one WebSocket connection within `seconds`, for browsers, which cannot send a token there."""
 
     ticket: str
     seconds: float

@@ -1,4 +1,4 @@
-"""Notifications: what people who are elsewhere are told by a webhook or by e-mail, and how far that is."""
+"""Notifications by webhook or e-mail, and the state of their delivery."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import AwareDatetime
 from daq.contracts.service.base import Wire
 
 NotificationKind = Literal["done", "fault", "attention"]
-"""`done`: something has ended as it was asked. `fault`: something has failed. `attention`: somebody must look."""
+"""`done`: something ended as requested. `fault`: something failed. `attention`: a person must act."""
 Topic = Literal[
     "experiment.ended",
     "job.ended",
@@ -30,28 +30,29 @@ class Notification(Wire):
     kind: NotificationKind
     at: AwareDatetime
     text: str
-    """One line for people."""
+    """A line for people."""
     robot: str | None = None
     experiment: str | None = None
     job: str | None = None
     state: str | None = None
-    """How the experiment or job has ended."""
+    """Final state of the experiment or job."""
 
 
 class DestinationStatus(Wire):
-    """How far the messages to one destination are. Counts are since the service started, `waiting` is of now."""
+    """State of the messages to one destination. Counts are since the service started; `waiting` is the present
+    number."""
 
     name: str
     channel: Literal["webhook", "email"]
     host: str
-    """The host that is told; no more of the address, which may be a secret."""
+    """Host of the destination; the rest of the address is left out, since it may be a secret."""
     about: tuple[NotificationKind, ...]
     waiting: int
     sent: int
     failed: int
     """Number of attempts that failed."""
     given_up: int
-    """Number of messages that were given up, or left out because too many waited."""
+    """Number of messages that were given up, or dropped because too many waited."""
     last_sent: AwareDatetime | None = None
     problem: str = ""
     """Why the last attempt failed; empty if it succeeded."""

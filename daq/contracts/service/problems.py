@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict
 
 
 class FieldProblem(BaseModel):
-    """One field of a request that cannot be accepted."""
+    """A rejected field of a request."""
 
     field: str
     """Path of the field, such as `spec.trajectory.amplitude`."""
@@ -15,18 +15,18 @@ class FieldProblem(BaseModel):
 
 
 class ProblemDetails(BaseModel):
-    """What went wrong, and what to do about it."""
+    """An error and the advice on it."""
 
     model_config = ConfigDict(extra="allow")
 
     type: str
-    """Kind of problem: its place on a page of the service."""
+    """Kind of problem, as the address of its description on the service."""
     title: str
     status: int
     detail: str
-    """One line about this case."""
+    """A line about this case."""
     advice: str = ""
     """What to do."""
     fields: tuple[FieldProblem, ...] = ()
     request_id: str | None = None
-    """The same as in the service's log."""
+    """The request's ID in the service's log."""

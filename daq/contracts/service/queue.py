@@ -9,55 +9,55 @@ from pydantic import AwareDatetime, StrictBool
 from daq.contracts.service.base import Wire
 
 Role = Literal["viewer", "operator", "owner", "admin"]
-"""Who may do what (docs/service.md): a viewer looks and stops; an operator moves the arm, and changes their own
-experiments; an owner is responsible for an arm, and changes everybody's; an admin is an owner of all arms."""
+"""Roles (docs/service.md). A viewer looks and stops. An operator also moves the arm and changes their own experiments.
+An owner is responsible for an arm, and changes all its experiments. An admin is an owner of all arms."""
 ROLES: tuple[Role, ...] = ("viewer", "operator", "owner", "admin")
-"""All roles. Each may do everything that those before it may."""
+"""All roles in order; each includes the rights of those before it."""
 
 
 def role_of(text: str) -> Role:
-    """Returns the role of this name. One that this version does not know, but a newer one may, is a viewer."""
+    """Returns the role of this name. A role that only a newer version knows counts as viewer."""
     return next((role for role in ROLES if role == text), "viewer")
 
 
 class QueueStatus(Wire):
     """Whether experiments are taken from the queue, and if not, why.
 
-    `waiting_for` says in one line why nothing runs although the queue is not paused; it is empty if an experiment runs
-    or none waits.
+    `waiting_for`: why nothing runs although the queue is not paused, in one line; empty if an experiment runs or none
+    waits.
     """
 
     paused: bool
     reason: str
-    """Why it is paused; if it is not, who resumed it."""
+    """Why it is paused; otherwise who resumed it."""
     since: AwareDatetime
     queued: int
     running: str | None = None
-    """The experiment that runs."""
+    """The running experiment."""
     waiting_for: str = ""
     attended_until: AwareDatetime | None = None
-    """On a real arm that may not run unattended: until when an operator has confirmed being present."""
+    """For a real arm that may not run unattended: until when an operator has confirmed being present."""
 
 
 class QueueResume(Wire):
-    """The operator's consent that the queue may move the arm. A real arm needs `moves_real_arm`."""
+    """The operator's consent that the queue moves the arm. A real arm requires `moves_real_arm`."""
 
     moves_real_arm: StrictBool = False
 
 
 class Control(Wire):
-    """Who may move the robot now: nobody, one client, or the queue while an experiment runs."""
+    """Who may move the robot now: nobody, one client or, during an experiment, the queue."""
 
     holder: Literal["nobody", "client", "queue"]
     name: str | None = None
     """Name of the client."""
     expires: AwareDatetime | None = None
     remaining: float | None = None
-    """Time (s) until control lapses without a heartbeat."""
+    """Time (s) until control ends without a heartbeat."""
 
 
 class ControlRequest(Wire):
-    """Requests control of the robot. A real arm needs the operator's consent: `moves_real_arm`."""
+    """Requests control of the robot. A real arm requires the operator's consent: `moves_real_arm`."""
 
     moves_real_arm: StrictBool = False
 
@@ -70,4 +70,4 @@ class ControlLease(Wire):
     expires: AwareDatetime
     remaining: float
     heartbeat_every: float
-    """Time (s) after which the client should renew it, at the latest."""
+    """Time (s) within which the client should renew it."""

@@ -1,4 +1,4 @@
-"""The robot as the service sees it. Angles are in rad, joints are numbered from 1; every value has its age."""
+"""State of a robot, and requests to it. Angles are in rad, joints are numbered from 1; every value has its age."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ ConnectionState = Literal["disconnected", "connecting", "connected", "lost"]
 
 
 class ControlPeriod(Wire):
-    """Signals of one control period, columns in the order of `joints`. `host_time` is the monotonic clock (s) of the
-    service's computer when they arrived."""
+    """Signals of one control period, with columns in the order of `joints`. `host_time`: monotonic clock (s) of the
+    service's computer at their arrival."""
 
     tick: int
     host_time: float
@@ -29,8 +29,8 @@ class ControlPeriod(Wire):
 
 
 class Sample(ControlPeriod):
-    """One control period. `host_time` is the monotonic clock (s) of the service's computer, `utc` the wall clock (s
-    since 1970) when it arrived, `age` the time (s) since then."""
+    """One control period. At its arrival, `host_time` is the monotonic clock (s) of the service's computer and `utc`
+    its wall clock (s since 1970); `age` is the time (s) since then."""
 
     utc: float
     age: float
@@ -38,31 +38,31 @@ class Sample(ControlPeriod):
 
 
 class SampleRate(Wire):
-    """What the line can give: samples of so many joints, with a set point for each of them, every so many control
+    """A sampling rate that the serial link can sustain: `joints` joints with their set points, every `every` control
     periods."""
 
     joints: int
     every: int
     samples_per_second: float
     share: float
-    """Share of the line's capacity that this takes, both directions added."""
+    """Share of the link's capacity that this uses, both directions added."""
 
 
 class LinkStatus(Wire):
-    """The link to the controller. Counters since the link was opened (docs/traces.md names them)."""
+    """The link to the controller. Counters are since the link was opened (docs/traces.md names them)."""
 
     state: Literal["connected", "degraded", "lost", "none"]
     counters: dict[str, float] = Field(default_factory=dict)
     age: float | None = None
-    """Time (s) since they were read."""
+    """Time (s) since the counters were read."""
     rates: tuple[SampleRate, ...] = ()
-    """What the line can give, by its baud rate; empty without a connection."""
+    """Rates that the link can sustain at its baud rate; empty without a connection."""
     stop_seconds: float | None = None
-    """Longest time (s) that a stop takes on this line where no byte is lost."""
+    """Longest time (s) that a stop takes on this link if no byte is lost."""
 
 
 class RobotIdentity(Wire):
-    """What the controller says about itself."""
+    """Properties that the controller reports. `boots`: how often it has started."""
 
     simulated: bool
     protocol: int
@@ -70,13 +70,13 @@ class RobotIdentity(Wire):
     """Control period (s)."""
     boots: int
     samples: bool = True
-    """Whether its bridge sees the control period (SAMPLE): only then is a rate promised."""
+    """Whether its bridge sees the control period (SAMPLE): only then is a rate guaranteed."""
     compact: bool = False
-    """Whether its bridge understands the compact turn for slow lines (COMPACT)."""
+    """Whether its bridge supports the compact request and reply for slow links (COMPACT)."""
 
 
 class RobotStatus(Wire):
-    """Everything about one robot, at one moment."""
+    """State of one robot at one moment."""
 
     robot: str
     machine: str
@@ -87,13 +87,13 @@ class RobotStatus(Wire):
     identity: RobotIdentity | None = None
     arm: ArmState
     cause: str = ""
-    """Why the arm is stopped or at fault, as it stands behind "stopped:" or "fault:"."""
+    """Why the arm is stopped or at fault: the text that follows "stopped: " or "fault: " in messages."""
     stop: int | None = None
-    """Number of the newest stop, which a reset names; None while it is not known, such as for a moment after a stop."""
+    """Number of the newest stop, which a reset names; None while it is unknown, as just after a stop."""
     activity: Activity
     experiment: str | None = None
     limp: tuple[int, ...] = ()
-    """Joints without drive: their proportional gain is 0, so nothing holds them."""
+    """Limp joints: their proportional gain is 0, so nothing holds them."""
     sample: Sample | None = None
     link: LinkStatus
     control: Control
@@ -114,37 +114,36 @@ class StopResult(Wire):
     """Result of a stop. Unless it is `confirmed`, use the emergency stop."""
 
     delivered: bool
-    """Whether the stop has been written to the line to the controller."""
+    """Whether the stop was written to the link."""
     confirmed: bool
-    """Whether the board has confirmed that its set points are frozen."""
+    """Whether the board confirmed that its set points are frozen."""
     tick: int | None = None
     seconds: float
     """Time (s) from the request to this answer."""
     note: str = ""
-    """Further information: joints without drive, or why the stop was not confirmed."""
+    """Further information: limp joints, or why the stop was not confirmed."""
     detail: str = ""
-    """What `text` says beyond whether the stop was delivered and confirmed, and what to do about it."""
+    """Cause and advice: the part of `text` after "delivered" or "confirmed"."""
     text: str
     """The whole result in one line."""
 
 
 class FleetStopResult(StopResult):
-    """Result of a stop of all robots. It is `confirmed` only if every board has confirmed it, and the same holds for
-    `delivered`."""
+    """Result of a stop of all robots. It is `confirmed` or `delivered` only if that is true for every robot."""
 
     robots: dict[str, StopResult]
 
 
 class ResetRequest(Wire):
-    """Ends the stop of this number, and no later one. `here`: first make the measured posture the set points."""
+    """Ends the stop of this number, and no later one. `here`: first set the set points to the measured posture."""
 
     stop: int = Field(ge=0, le=0xFFFFFFFF)
-    """`stop` of the robot's status, as it was seen by whoever wants to end it."""
+    """`stop` of the robot's status, as the sender saw it."""
     here: StrictBool = False
 
 
 class JointGains(Wire):
-    """P, I, D of joints, each 0 to 20: the controller's numbers, not physical gains."""
+    """P, I, D of joints, each 0 to 20, in the controller's units."""
 
     gains: dict[JointNumber, Gain]
 
@@ -158,20 +157,21 @@ class ProcessState(Wire):
 
 
 class OutputRequest(Wire):
-    """One process output. Refused while the arm is stopped, unless `while_stopped`."""
+    """Switches one process output. Refused while the arm is stopped, unless `while_stopped`."""
 
     on: StrictBool
     while_stopped: StrictBool = False
 
 
 class GripperRequest(Wire):
-    """The gripper. Refused while the arm is stopped, unless `while_stopped`: it may hold a load, or somebody's hand."""
+    """Moves the gripper. Refused while the arm is stopped, unless `while_stopped`: it may hold a load, or a person's
+    hand."""
 
     closed: StrictBool
     while_stopped: StrictBool = False
 
 
 class Done(Wire):
-    """Something was carried out."""
+    """Result of a request, in one line."""
 
     text: str

@@ -11,12 +11,12 @@ from daq.contracts.service.queue import Role
 
 
 def stop_port_after(port: int) -> int:
-    """Port of the stop listener that belongs to a service at `port`, unless the configuration names another."""
+    """Returns the port of the stop listener for a service at `port`, unless the configuration sets another."""
     return port + 1 if port < 65535 else port - 1
 
 
 class Health(Wire):
-    """Whether the service answers, and can take experiments. `checks`: one line each; empty if the check succeeded."""
+    """Whether the service works and accepts experiments. `checks`: one line each; empty if the check succeeded."""
 
     status: Literal["ok", "not ready"]
     version: str
@@ -29,29 +29,29 @@ class Me(Wire):
     name: str
     role: Role
     owner_of: tuple[str, ...] = ()
-    """Robots of which they are an owner: there they may change and cancel everybody's experiments."""
+    """Robots that the caller owns. An owner may change and cancel all experiments of the robot."""
     is_known: bool = True
-    """Whether a token or a session says who they are. A user of this computer without one cannot approve experiments:
-    nobody can tell them from whoever submitted them."""
+    """Whether a token or session identifies the caller. A local user without one cannot approve experiments, since this
+    user might have submitted them."""
     session_until: AwareDatetime | None = None
-    """When they must sign in again; None for a token, and for a user of this computer."""
+    """When the caller must sign in again; None for a token, and for a local user."""
 
 
 class OpenIdWay(Wire):
-    """A provider of OpenID Connect. `start`: the address at this service that a browser opens to sign in."""
+    """A provider of OpenID Connect. `start`: the path on this service that a browser opens to sign in."""
 
     label: str
     start: str
 
 
 class LoginWays(Wire):
-    """How people sign in besides by a token. `openid` is None where no provider is configured."""
+    """Ways to sign in besides a token. `openid` is None if no provider is configured."""
 
     openid: OpenIdWay | None = None
 
 
 class SignedOut(Wire):
-    """The session has ended. `provider`: where the provider's own session is left, if it has such an address."""
+    """The session has ended. `provider`: the address that ends the provider's own session, if there is one."""
 
     provider: str | None = None
 
@@ -62,7 +62,7 @@ class StorageStatus(Wire):
     traces_folder: str
     traces_free: int
     traces_reserve: int
-    """New experiments are refused if less than this is free."""
+    """New experiments are refused if less than this is free (bytes)."""
     traces_size: int
     """Size of the disk of the traces (bytes)."""
     traces: int
@@ -79,12 +79,12 @@ class SystemStatus(Wire):
     """Time (s) since the service started."""
     storage: StorageStatus
     warnings: tuple[str, ...] = ()
-    """What will need somebody soon, one line each: a disk that fills, an archive that is away."""
+    """Things that will soon need a person, one line each: a disk that fills, an archive that cannot be reached."""
     live_clients: int
     live_dropped: int
     jobs_at_once: int
     short_jobs_at_once: int
-    """Number of further workers, for short jobs only."""
+    """Number of additional workers for short jobs."""
     unattended: bool
     stop_port: int
-    """Port of the stop listener, which answers even while the service is too busy."""
+    """Port of the stop listener, which answers even if the service is too busy."""

@@ -1,4 +1,4 @@
-"""Moving the arm by hand and by program, as the original's teach pendant did."""
+"""Moves the arm by hand and by program, as the original teach pendant did."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Angle = Annotated[float, Field(ge=-7, le=7)]
 
 class JogRequest(Wire):
     """Velocities (rad/s) of joints, applied for at most 0.3 s: the client repeats the request while the key is held.
-    No velocities: hold."""
+    Without velocities, the arm holds."""
 
     velocities: dict[JointNumber, Velocity]
 
 
 class StepRequest(Wire):
-    """One off-line step to absolute angles (`to`) or by relative ones (`by`), in rad; give one of the two. `speed` is
-    that of the fastest joint, in rad/s."""
+    """One off-line step to absolute angles (`to`) or by relative ones (`by`), in rad; give one of the two. `speed`:
+    speed of the fastest joint (rad/s)."""
 
     to: dict[JointNumber, Angle] | None = None
     by: dict[JointNumber, Angle] | None = None
@@ -31,14 +31,14 @@ class StepRequest(Wire):
 
 
 class LeadRequest(Wire):
-    """Joints to be led by hand. They lose their drive and sink: hold the arm."""
+    """Joints to be guided by hand. They lose their drive and sink: hold the arm."""
 
     joints: Annotated[tuple[JointNumber, ...], Field(min_length=1)] = (1, 2, 3)
 
 
 class TaughtPath(Wire):
     """Measured angles (rad), one row per control period, one column per joint; times (s) from the first row. An
-    experiment with this as its `path` plays it back."""
+    experiment can play it back as its `path`."""
 
     joints: tuple[int, ...]
     times: tuple[float, ...]
@@ -46,7 +46,7 @@ class TaughtPath(Wire):
 
 
 class TeachingLine(Wire):
-    """A line for the operator who teaches, such as a refused joint, or the beginning of an instruction."""
+    """A line for the person who teaches, such as a refused joint, or the beginning of an instruction."""
 
     number: int
     at: AwareDatetime
@@ -54,21 +54,21 @@ class TeachingLine(Wire):
 
 
 class TeachingStatus(Wire):
-    """The teaching activity under way, and how the last one ended."""
+    """The current teaching activity, and how the last one ended."""
 
     activity: Activity
     lines: tuple[TeachingLine, ...] = ()
-    """The newest lines, the oldest of them first."""
+    """The newest lines, oldest first."""
     result: str = ""
-    """How the last teaching ended; empty while one goes on, or before the first."""
+    """How the last teaching ended; empty during teaching, or before the first."""
     problem: str = ""
     """Why the last teaching ended early."""
     path: TaughtPath | None = None
-    """The path that was last led by hand."""
+    """The last path guided by hand."""
 
 
 class ProgramEntry(Wire):
-    """A taught program that the service keeps. `revision` grows with every change; `instructions` is their number."""
+    """A taught program stored by the service. `revision` grows with every change; `instructions` is their number."""
 
     name: str
     robot: str
@@ -86,7 +86,7 @@ class CalibrationRequest(Wire):
 
 class MeasuredGain(Wire):
     """The actual proportional gain of one joint, in DAC counts per ADC count of error, and in V/rad at the motor; or
-    the reason why the trace does not determine it. Gains between `lowest` and `highest` agree with every sample."""
+    the reason why the trace does not determine it. All gains between `lowest` and `highest` agree with every sample."""
 
     joint: int
     gain: float | None = None

@@ -32,15 +32,15 @@ class CatalogueEntry(Wire):
     """Size of the file (bytes)."""
     operator: str | None
     experiment: str | None
-    """The experiment of the queue that made it."""
+    """The queued experiment that made it."""
     tags: tuple[str, ...] = ()
     notes: str = ""
     missing: bool = False
-    """Whether its file is gone, though the catalogue has it: neither the folder nor the archive has it."""
+    """Whether its file is gone from both the folder and the archive."""
     archived: bool = False
     """Whether the archive has it."""
     local: bool = True
-    """Whether the folder has it; if not, it is fetched from the archive when somebody opens it."""
+    """Whether the folder has it; if not, it is fetched from the archive when it is opened."""
 
 
 class TraceDetails(Wire):
@@ -54,17 +54,17 @@ class TraceDetails(Wire):
 
 
 class TraceChange(Wire):
-    """New tags or notes; a field that is None stays as it is."""
+    """New tags or notes; fields that are None stay unchanged."""
 
     tags: Annotated[tuple[Tag, ...], Field(max_length=50)] | None = None
     notes: Annotated[str, Field(max_length=10000)] | None = None
 
 
 class TraceSignals(Wire):
-    """Signals of a trace for a plot, thinned to the extremes of short stretches, so that no peak is lost.
+    """Signals of a trace for a plot, thinned to the extremes of short intervals, so that no peak is lost.
 
-    `time` is in s; a signal has one row per joint, in the order of `joints`, in rad, or in m for a prismatic joint; the
-    drive is in `drive_unit`. A signal that the trace does not have is None.
+    `time` is in s. A signal has one row per joint, in the order of `joints`, in rad (m for a prismatic joint); the
+    drive is in `drive_unit`. A signal that was not recorded is None.
     """
 
     id: str

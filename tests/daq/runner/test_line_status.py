@@ -37,7 +37,7 @@ def test_a_bridge_that_does_not_see_the_control_period_is_promised_no_rate() -> 
 def test_one_line_tells_the_rates_and_the_stop() -> None:
     line = rates_line(with_rates(LINK, 1920.0, identity()))
     assert (
-        line == "the line gives samples a second: 1 joint 16.7, 3 joints 16.7, 6 joints 12.5; a stop takes up to 45 ms"
+        line == "samples per second on this line: 1 joint 16.7, 3 joints 16.7, 6 joints 12.5; a stop takes up to 45 ms"
     )
 
 

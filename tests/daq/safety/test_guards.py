@@ -45,7 +45,7 @@ def test_they_go_on_when_it_is_back_inside() -> None:
     assert guards.check(row(1, error=(128, 0, 0)), {}).findings == ()
     verdict = guards.check(row(2, error=(127, 0, 0)), {})
     assert not verdict.hold
-    assert [(f.kind, f.message) for f in verdict.findings] == [("resume", "set points go on after 0.04 s")]
+    assert [(f.kind, f.message) for f in verdict.findings] == [("resume", "set points continue after 0.04 s")]
 
 
 def test_a_pause_is_counted_from_the_period_in_which_it_began() -> None:
@@ -53,7 +53,7 @@ def test_a_pause_is_counted_from_the_period_in_which_it_began() -> None:
     assert guards.check(row(100, error=(0, -130, 0)), {}).findings == (
         Finding("pause", "joint 2: positional error of -130 ADC counts, set points pause outside ±127", 2),
     )
-    assert guards.check(row(103), {}).findings[-1].message == "set points go on after 0.06 s"
+    assert guards.check(row(103), {}).findings[-1].message == "set points continue after 0.06 s"
 
 
 def test_a_set_point_may_be_exactly_as_far_from_the_arm_as_the_limit() -> None:
@@ -90,7 +90,7 @@ def test_a_run_of_missed_set_points_begins_anew_after_one_that_was_taken() -> No
 
 def test_a_missed_set_point_says_in_which_period() -> None:
     (finding,) = running().check(row(9, status=StatusFlag.SET_POINT_MISSED), {}).findings
-    assert finding.message == "tick 9: the controller wanted the memory while the host had it"
+    assert finding.message == "tick 9: the controller could not read its set points: the host had the memory"
 
 
 def test_the_end_of_a_gap_is_judged_by_its_own_tick() -> None:
@@ -291,7 +291,7 @@ def test_on_a_slow_line_every_nth_period_is_what_was_asked_for() -> None:
     guards = RunningGuards(MA2000, LIMITS, (1, 2, 3), (1, 2, 3), every=3)
     assert guards.check(row(10), {}) == guards.check(row(13), {}) == Verdict()
     (finding,) = guards.check(row(19), {}).findings
-    assert finding.message == "ticks 13 and 19 are 6 control periods apart, 3 were asked for"
+    assert finding.message == "ticks 13 and 19 are 6 control periods apart, 3 were requested"
 
 
 @pytest.mark.parametrize(("every", "gap", "trips"), [(1, 10, False), (1, 11, True), (5, 15, False), (5, 16, True)])

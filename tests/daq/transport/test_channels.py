@@ -13,7 +13,7 @@ from contextlib import closing
 import pytest
 
 from daq.transport import ChannelError, ReconnectDelay, TransportError, open_endpoint
-from daq.transport.holders import _ours, other_holders, sharing_words
+from daq.transport.holders import _ours, other_holders, shared_port_advice
 
 
 @pytest.fixture
@@ -57,14 +57,14 @@ def test_another_program_that_reads_from_a_port_is_named(terminal: tuple[int, st
         other = subprocess.Popen(["sleep", "60"], stdin=held)
     try:
         assert other_holders(device) == []  # what this process started is no stranger
-        asked = f"from daq.transport import holders; print(holders.sharing_words({device!r}))"
+        asked = f"from daq.transport import holders; print(holders.shared_port_advice({device!r}))"
         told = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout
         assert f"sleep (process {other.pid}) has {device} open too, and takes its bytes: end that program" in told
     finally:
         other.kill()
         other.wait()
-    assert "ModemManager and brltty open new ports by themselves" in sharing_words(device)
-    assert sharing_words("127.0.0.1:5000") == ""
+    assert "ModemManager and brltty open new ports by themselves" in shared_port_advice(device)
+    assert shared_port_advice("127.0.0.1:5000") == ""
 
 
 def test_relatives_of_a_process_are_no_strangers() -> None:

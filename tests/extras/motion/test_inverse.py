@@ -35,9 +35,9 @@ def test_the_mock_follows_a_ramp_with_less_than_a_third_of_the_plain_error(
     assert plain.record.spec == RAMP
     spec = better.record.spec
     assert spec is not None
-    assert spec.plain == RAMP
+    assert spec.wanted_motion == RAMP
     assert spec.feedforward is not None
-    assert (spec.feedforward.asked, spec.feedforward.model) == (RAMP.as_asked, arm().identity)
+    assert (spec.feedforward.asked, spec.feedforward.model) == (RAMP.without_feedforward, arm().identity)
     for joint, error in judged(better).errors.items():
         expected, before = spec.feedforward.expected[joint], spec.feedforward.before[joint]
         assert expected.rms / 2 < error.rms < 2 * expected.rms

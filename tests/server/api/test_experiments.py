@@ -51,7 +51,7 @@ def test_a_running_experiment_is_cancelled_by_a_stop_and_the_queue_waits_for_a_p
     assert (ended["state"], ended["outcome"], ended["reason"]) == ("cancelled", "stopped", "cancelled by local")
     status = service.status()
     assert status["arm"] == "stopped"
-    assert status["cause"].startswith("by the service: what ran was cancelled")
+    assert status["cause"].startswith("by the service: the experiment was cancelled")
     assert status["queue"]["paused"]
     assert "look at the arm" in status["queue"]["reason"]
     assert service.robot.post("/queue/resume", json={}).status_code == 409

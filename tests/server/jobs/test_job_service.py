@@ -203,7 +203,7 @@ class HandArchive:
         self._bench = bench
         self._file = bench.catalogue.folder / "1.mcap"
         self.has = {TRACE}
-        bench.kept_traces.archived = self
+        bench.kept_traces.archive_index = self
         self._file.unlink()
         bench.catalogue.archive = self
 
@@ -361,7 +361,7 @@ def _makes_a_model(folder: Path) -> Ended:
 
 def test_a_model_that_could_not_be_kept_at_once_is_kept_at_the_next_look(bench: Bench) -> None:
     bench.carry_out = _makes_a_model
-    bench.models.before("take_in", raising(OperationalError("INSERT", {}, Exception("database or disk is full"))))
+    bench.models.before("add_from_file", raising(OperationalError("INSERT", {}, Exception("database or disk is full"))))
     job = bench.service.submit(FitRequest(traces=(TRACE,)), "anna", None)[0]
     bench.service.start()
     ended = bench.end_of(job)
@@ -372,7 +372,7 @@ def test_a_model_that_could_not_be_kept_at_once_is_kept_at_the_next_look(bench: 
 
 @pytest.mark.parametrize("error", [ValueError("no model"), OSError("read-only")])
 def test_a_model_that_can_never_be_kept_holds_up_no_other_job(bench: Bench, error: Exception) -> None:
-    bench.models.before("take_in", *[raising(error)] * 1000)
+    bench.models.before("add_from_file", *[raising(error)] * 1000)
     bench.carry_out = lambda folder: _makes_a_model(folder) if folder.name == first.id else Ended()
     first = bench.service.submit(FitRequest(traces=(TRACE,)), "anna", None)[0]
     second = _submitted(bench)
@@ -545,8 +545,8 @@ def test_a_model_is_not_taken_for_another_that_is_in_its_file(bench: Bench) -> N
     path.parent.mkdir(exist_ok=True)
     path.write_text(made.text, "utf-8")
     with pytest.raises(SpecError, match="another model has this number"):
-        bench.models.keep(made.model_copy(update={"text": made.text.replace("1", "2", 1)}), "forged", "bert")
+        bench.models.add(made.model_copy(update={"text": made.text.replace("1", "2", 1)}), "forged", "bert")
     assert path.read_text("utf-8") == made.text
     path.write_text("cut off", "utf-8")
-    assert bench.models.keep(made, "sound", "anna")
+    assert bench.models.add(made, "sound", "anna")
     assert path.read_text("utf-8") == made.text

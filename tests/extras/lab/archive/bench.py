@@ -47,7 +47,7 @@ class Bench:
         self.folder = folder
         self.store = migrated_store(folder / "service.sqlite")
         self.traces = TraceStore(self.store)
-        self.traces.archived = self.archived = ArchivedStore(self.store)
+        self.traces.archive_index = self.archive_index = ArchivedStore(self.store)
         self.catalogue = Catalogue(folder / "traces", ROBOT, self.traces, ExperimentStore(self.store))
         self.catalogue.folder.mkdir(exist_ok=True)
         self.clock = TurnedClock()
@@ -61,7 +61,7 @@ class Bench:
                 settings=found,
                 bucket=Bucket(found, CREDENTIALS),
                 catalogue=self.catalogue,
-                archived=self.archived,
+                archived=self.archive_index,
                 clock=self.clock,
                 tell=self._tell,
                 fetched=self._change,
@@ -108,7 +108,7 @@ class Bench:
 
     def until_archived(self, *traces: str) -> None:
         """Waits until the archive has these traces."""
-        self.until(lambda: all(self.archived.get(trace) is not None for trace in traces))
+        self.until(lambda: all(self.archive_index.get(trace) is not None for trace in traces))
 
     def nobody_reads(self) -> None:
         """As when ten minutes have passed since somebody opened a trace."""
