@@ -40,7 +40,7 @@ class Problem(Protocol):
         ...
 
     def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
-        """Returns residuals, with exact derivatives on request. Raises SpecError where the model has no finite answer."""
+        """Returns residuals, with exact derivatives on request. Raises SpecError if the model has no finite answer."""
         ...
 
 
