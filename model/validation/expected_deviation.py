@@ -55,6 +55,6 @@ def expected_deviation(parameter: Parameter, convention: Convention) -> tuple[fl
         return abs(parameter.value) * deviation_share(basis, convention), basis
     if parameter.deviation is None or not parameter.deviation > 0:
         raise SpecError(
-            f"{parameter.name}: no expected deviation is stated, and none follows from {parameter.value} {parameter.unit}"
+            f"{parameter.name}: no expected deviation is stated, none follows from {parameter.value} {parameter.unit}"
         )
     return parameter.deviation, basis
