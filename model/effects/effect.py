@@ -1,4 +1,4 @@
-"""The types of an effect and its parameters, and the sizes of a joint that give bounds and expected deviations."""
+"""Types of an effect and its parameters, and the joint sizes from which bounds and expected deviations are computed."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from model import layout as at
 
 @dataclass(frozen=True)
 class JointScale:
-    """Sizes that are natural for a joint, so that one effect suits every machine.
+    """Typical sizes of a joint, so that the same effect suits every machine.
 
     Args:
         torque: largest torque (N·m, or N) of the drive at standstill.
         volts: largest voltage at the motor.
-        strongest, highest: bounds of torque (N·m, N) and drive: those two for a motor; infinite for a plain gain, of
-            which a machine file does not say how far it is driven.
-        speed: speed without load at that voltage, rad/s (m/s); 1 where the drive has no back-EMF.
-        fastest: bound of speed: that one, or infinite where the drive has no back-EMF.
+        strongest, highest: bounds of torque (N·m, N) and of drive. For a motor they equal `torque` and `volts`. For a
+            plain gain they are infinite, because its machine file states no largest drive.
+        speed: speed without load at `volts`, rad/s (m/s); 1 where the drive has no back-EMF.
+        fastest: bound of speed: equals `speed`, or infinite where the drive has no back-EMF.
         resolution: one count of its sensor, rad (m); a 4096th of a turn where it has none.
         range: of its sensor, rad (m); one turn where it has none.
         gear: motor turns per joint turn. viscous: motor-side damping from the machine file, N·m·s/rad.
-        inertia: seen by the transmission between rotor and link in series, kg·m² (kg).
+        inertia: of rotor and link in series, as a flexible transmission between them feels it, kg·m² (kg).
         period: control period, s. length, mass: of its link. supply: the supply's limit, V.
         resistance: of the winding, Ω.
     """
@@ -54,7 +54,7 @@ Size = float | Callable[[JointScale], float]
 
 
 def evaluate_size(size: Size, scale: JointScale) -> float:
-    """The value of a size: a number, or a function of the joint."""
+    """Returns the value of a size, which is a number or a function of the joint."""
     return size(scale) if callable(size) else size
 
 
@@ -67,9 +67,9 @@ class EffectParameter:
         column: its index in `model.layout`: a column of the joint, or a shared slot for an effect of the whole machine.
         unit: in SI.
         null: value at which the effect is absent; None for a parameter that only shapes it.
-        start: value when the effect is added without one: the null value, or a typical shape.
+        start: value in a model to which the effect is added without a value; by default the null value.
         low, high: bounds. deviation: expected size on a machine that has the effect.
-        source: where its numbers come from; the effect's own source where it is empty.
+        source: where its numbers come from; if empty, the effect's own source.
     """
 
     name: str
@@ -83,7 +83,7 @@ class EffectParameter:
     source: str = ""
 
     def starting_value(self, scale: JointScale) -> float:
-        """Value of the parameter in a model to which the effect has just been added."""
+        """Returns the value of the parameter in a model to which the effect has just been added."""
         chosen = self.null if self.start is None else self.start
         if chosen is None:
             raise ValueError(f"effect parameter {self.name} has neither a null nor a starting value")
@@ -91,14 +91,14 @@ class EffectParameter:
 
 
 class Tone(StrEnum):
-    """What a torque of sine and cosine repeats over; the value is the parameter that says how often."""
+    """Whether a sinusoidal torque repeats over position or time; the value is the name of its rate parameter."""
 
     OVER_POSITION = "cycles"
     OVER_TIME = "frequency"
 
 
 class EffectFile(FrozenRecord):
-    """The file that an effect of the user's own comes from: its name, and the first digits of its SHA-256."""
+    """The file that defines a user's effect: its name, and the first digits of its SHA-256."""
 
     name: str
     sha256: str
@@ -117,9 +117,10 @@ class Effect:
         whole_machine: it belongs to the machine, not to a joint.
         group: first part of its parameters' names when it belongs to the whole machine.
         joints: on which it may act; empty for any.
-        tone: what it repeats over, if it is a tone: no trial size can find one, a spectrum proposes its rate.
-        family, torque, file: of an effect of the user's own (`model.effects.own`).
-        own_entry: of one that the shared list lacks, the entry that it would have there (`machine_numbers`).
+        tone: the variable over which it repeats, if it is a tone. Trial values of its parameters cannot find a tone; a
+            spectrum proposes its rate.
+        family, torque, file: only for a user's own effect (`model.effects.own`).
+        own_entry: for an effect that is not in the shared list, its entry in that form (`machine_numbers`).
     """
 
     name: str
@@ -138,12 +139,12 @@ class Effect:
 
     @property
     def is_flexible(self) -> bool:
-        """Whether rotor and link move apart, which takes short steps of integration."""
+        """Whether rotor and link move relative to each other, which requires short integration steps."""
         return self.flag == at.HAS_FLEXIBILITY
 
     @property
     def shared_name(self) -> EffectName:
-        """Its entry in the shared list; for a user's own effect, an entry of the same form."""
+        """Returns its entry in the shared list; for a user's own effect, an entry of the same form."""
         if self.file is not None:
             return EffectName(self.name, "joint torque", self.family, self.physics)
         if self.own_entry is not None:

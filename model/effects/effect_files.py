@@ -1,7 +1,7 @@
-"""Effects from files of the user's own: read once, kept in the library until they are taken out.
+"""Loads users' effects from files into the library, where they stay until they are removed.
 
-Reading such a file runs it, so it is read only where a person names it: a saved model says which file it needs, by
-name and hash, and never makes a program run it.
+Loading runs the file, so only a file that a person names is loaded. A saved model states the name and hash of the file
+that it needs, but never makes a program run it.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ EFFECT = "EFFECT"
 
 
 def load_effect_file(path: Path) -> Effect:
-    """The effect that a file states as `EFFECT`, now in the library; the same file again changes nothing.
+    """Returns the effect that a file defines as `EFFECT`, and adds it to the library; loading it twice changes nothing.
 
-    Raises SpecError, in one line, for a file that cannot be read or run, that states no effect, or states it wrongly,
-    and for a name that another file has taken.
+    Raises SpecError, in one line, for a file that cannot be read or run, or that defines no valid effect, and for an
+    effect name that another loaded file uses.
     """
     source = read_text(path, f"effect file {path}").encode()
     if path.suffix != ".py":
-        raise SpecError(f"effect file {path}: is Python, so its name ends in .py")
+        raise SpecError(f"effect file {path}: it is Python, so its name must end in .py")
     file = EffectFile(name=path.name, sha256=hashlib.sha256(source).hexdigest()[:HASH_DIGITS])
     for known in own_effects().values():
         if known.file == file:
@@ -40,19 +40,19 @@ def load_effect_file(path: Path) -> Effect:
 
 
 def _stated(path: Path, file: EffectFile) -> OwnEffect:
-    """Runs the file under a module name of its own; returns the effect that it states."""
+    """Runs the file under a module name of its own; returns the effect that it defines."""
     name = f"own_effect_{file.sha256}"
     spec = spec_from_file_location(name, path.resolve())
     if spec is None or spec.loader is None:
         raise SpecError(f"effect file {path}: cannot be loaded as Python")
     module = module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses and numba look a function's module up by its name
+    sys.modules[name] = module  # dataclasses and numba look up a function's module by its name
     try:
         spec.loader.exec_module(module)
     except Exception as error:
         del sys.modules[name]
-        raise SpecError(f"effect file {path}: running it gives {type(error).__name__}: {error}") from error
+        raise SpecError(f"effect file {path}: running it raises {type(error).__name__}: {error}") from error
     stated = getattr(module, EFFECT, None)
     if not isinstance(stated, OwnEffect):
-        raise SpecError(f"effect file {path}: states no effect; write {EFFECT} = OwnEffect(…), see docs/own-effect.md")
+        raise SpecError(f"effect file {path}: defines no effect; write {EFFECT} = OwnEffect(…), see docs/own-effect.md")
     return stated

@@ -25,7 +25,7 @@ EXTERNAL = (
     Effect(
         "one_sided_spring",
         physics="τ = −|k| (q − q_0) where k (q − q_0) > 0: it pulls beyond q_0, or, where k < 0, before it",
-        source="Hooke; a cable that hangs slack on one side of q_0, or a stop that gives",
+        source="Hooke; a cable that hangs slack on one side of q_0, or an elastic stop",
         parameters=(
             EffectParameter(
                 "stiffness",
@@ -53,9 +53,9 @@ EXTERNAL = (
             ),
         ),
     ),
-    # Its phase counts from the start of a record, so each record has another one. Held-out records get a phase of their
-    # own (`model.discrepancy.output_error.holdout`); records that are fitted together share one, which is right for a
-    # single record only.
+    # Its phase counts from the start of a record, so each record needs a phase of its own. Held-out records get one
+    # (`model.discrepancy.output_error.holdout`). Records that are fitted together share one, which is exact only for a
+    # single record.
     Effect(
         "periodic_disturbance",
         physics="τ = a sin(2πft) + b cos(2πft), t from the start of the record",

@@ -1,4 +1,4 @@
-"""Friction, all of it opposing motion. z is the deflection of the contact, sign of the motion once it slides."""
+"""Friction effects. All oppose motion. z is the deflection of the contact; while sliding, the sign of the motion."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from model.effects.effect import Effect, EffectParameter, JointScale
 
 
 def noticeable_damping(scale: JointScale) -> float:
-    """Viscous friction (N·m·s/rad, motor side) of another size than stated, or of a fiftieth of the joint's torque."""
+    """Returns the expected deviation of viscous friction (N·m·s/rad, motor side).
+
+    The larger of a third of the stated value and 2 % of rated torque over no-load speed.
+    """
     return max(scale.viscous / 3, 0.02 * scale.torque / scale.speed / scale.gear**2)
 
 
@@ -44,7 +47,7 @@ FRICTION = (
     ),
     Effect(
         "gravity_torque_friction",
-        physics="τ = −μ |G(q)| z: friction in proportion to the torque that gravity asks of the joint",
+        physics="τ = −μ |G(q)| z: friction in proportion to the gravity torque of the joint",
         source="Bittencourt and Gunnarsson 2012, J. Dyn. Sys. Meas. Control 134(5): friction by load torque",
         parameters=(EffectParameter("share", at.GRAVITY_SHARE, "1", low=0.0, high=1.0, deviation=0.1),),
     ),

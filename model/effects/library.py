@@ -1,4 +1,4 @@
-"""Every effect the library knows, by name."""
+"""The library of effects, by name."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ BESIDE = {
     "direction_dependent_gear_loss": "gear_loss",
     "direction_dependent_viscous_friction": "viscous_friction",
 }
-"""Effects that a diagnosis tries, unless asked for by name, only on joints that have another effect already, and which.
+"""Effects that a diagnosis tries only on joints that already have a certain other effect, unless requested by name.
 
-A gear that loses κ only while its motor drives gives the torque of one that loses κ/2 both ways, with a constant
-K_T (1 − κ/2). Within the tolerance of K_T it is `gear_loss`; to try both at once would make a group of every gear loss.
-Friction in proportion to speed in one direction, and none in the other, is no law of the field; alone, it stands for a
-constant force and friction together.
+A gear that loses κ only while its motor drives gives the same torque as one that loses κ/2 both ways with a constant
+K_T (1 − κ/2). Within the tolerance of K_T, that is `gear_loss`: trying both at once would make every gear loss
+ambiguous. Friction in proportion to speed in only one direction is no law of the field. Alone, it imitates a constant
+force plus friction.
 """
 
 _own: dict[str, Effect] = {}
@@ -38,59 +38,61 @@ def _shipped() -> dict[str, Effect]:
 
 
 def library() -> dict[str, Effect]:
-    """Effects by name, in the order of the shared list; then the user's own that have been loaded."""
+    """Returns effects by name, in the order of the shared list, then users' loaded effects."""
     return {**_shipped(), **_own}
 
 
 def own_effects() -> dict[str, Effect]:
-    """Effects of the user's own that have been loaded, by name."""
+    """Returns users' loaded effects by name."""
     return dict(_own)
 
 
 def add_own(found: Effect) -> None:
-    """Adds an effect of the user's own. Raises SpecError when another file's effect has its name."""
+    """Adds a user's effect. Raises SpecError if an effect of another file has its name."""
     other = _own.get(found.name)
     if other is not None and other != found:
         assert other.file is not None
-        raise SpecError(f"effect {found.name}: loaded from another file {other.file.name} already; one at a time")
+        raise SpecError(
+            f"effect {found.name}: already loaded from another file, {other.file.name}; only one can be loaded"
+        )
     _own[found.name] = found
 
 
 def remove_own(name: str) -> None:
-    """Removes an effect of the user's own from the library; models that have it can no longer be used."""
+    """Removes a user's effect from the library; models that contain it can no longer be used."""
     _own.pop(name, None)
 
 
 def effect(name: str) -> Effect:
-    """The effect of that name. Raises SpecError with the names there are."""
+    """Returns the effect of that name. Raises SpecError with the available names."""
     found = _shipped().get(name) or _own.get(name)
     if found is None and name in FORMER_EFFECTS:
         raise SpecError(f"effect {name}: no longer in the library: {FORMER_EFFECTS[name]}")
     if found is None:
-        raise SpecError(f"effect {name!r}: not in the library; it has {', '.join(library())}")
+        raise SpecError(f"effect {name!r}: not in the library; available: {', '.join(library())}")
     return found
 
 
 def find_named_effect(name: str) -> Effect:
-    """What a step of an answer names: an effect, or a number of the machine. Raises SpecError with the names."""
+    """Returns the effect or machine parameter that a step of an answer names. Raises SpecError with the names."""
     return MACHINE_NUMBERS.get(name) or effect(name)
 
 
 def effect_from(name: str, file: EffectFile | None) -> Effect:
-    """The effect of that name, from the file that a model was made with.
+    """Returns the effect of that name, from the file that a model was made with.
 
-    Raises SpecError when that file has not been loaded, or has changed since.
+    Raises SpecError if that file has not been loaded, or has changed since.
     """
     if file is None:
         return effect(name)
     found = _own.get(name)
     if found is None or found.file is None:
         raise SpecError(
-            f"effect {name}: of the user's own; name its file, {file.name} (SHA-256 {file.sha256}…), with --effect-file"
+            f"effect {name}: defined by a user; name its file, {file.name} (SHA-256 {file.sha256}…), with --effect-file"
         )
     if found.file.sha256 != file.sha256:
         raise SpecError(
-            f"effect {name}: the model was made with {file.name} of SHA-256 {file.sha256}…, and {found.file.name} now "
-            f"has {found.file.sha256}…: it was changed since; take the old file back, or fit again"
+            f"effect {name}: the model was made with {file.name} of SHA-256 {file.sha256}…, but that file now has "
+            f"{found.file.sha256}…: restore the old file, or fit again"
         )
     return found

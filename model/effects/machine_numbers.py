@@ -1,8 +1,9 @@
-"""Numbers of a machine that may be other than its file states, where no effect of the shared list does the same.
+"""Machine parameters that may differ from the file, where no effect of the shared list has the same result.
 
-A heavier link is `link_mass`. A rotor of another inertia has no such name: the machine has nothing that the model
-lacks, one of its numbers is wrong. They are named like effects so that an answer has one kind of step, but they are
-not in the library: nothing can be added to a model for them. `machine_numbers.toml` has their words.
+A heavier link is the effect `link_mass`. A rotor of another inertia has no such effect: the model lacks nothing, but
+one of its parameters is wrong. These parameters are named like effects so that an answer has only one kind of step.
+They are not in the library, because nothing can be added to a model for them. Their words are in
+`machine_numbers.toml`.
 """
 
 from __future__ import annotations
@@ -18,4 +19,4 @@ MACHINE_NUMBERS: dict[str, Effect] = {
         resources.files("model.effects").joinpath("machine_numbers.toml").read_text("utf-8")
     ).items()
 }
-"""By name, with the entry that the shared list would have."""
+"""By name, with an entry in the form of the shared list."""

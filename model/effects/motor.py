@@ -6,7 +6,7 @@ from model import layout as at
 from model.effects.effect import Effect, EffectParameter
 
 LONGEST_ELECTRICAL = 0.05
-"""Longest electrical time constant L/R of a winding, s: 0.1 to 10 ms in servo motors, some tens above a kilowatt."""
+"""Longest electrical time constant L/R of a winding, s: 0.1 to 10 ms in servo motors, a few tens above a kilowatt."""
 
 MOTOR = (
     Effect(
@@ -18,9 +18,10 @@ MOTOR = (
     Effect(
         "resistance_drift",
         physics="R → R (1 + x), ẋ = h i² − x/T: the winding warms",
-        source="first-order heat balance; copper gains 0.39 % a kelvin",
+        source="first-order heat balance; copper gains 0.39 % per kelvin",
         parameters=(
-            # up to a winding of 10 mA that gains a tenth in a hundredth of a second: small motors have few amperes
+            # Upper bound: a winding of 10 mA that gains a tenth in a hundredth of a second. Small motors draw few
+            # amperes.
             EffectParameter("heating", at.HEATING, "1/(A²·s)", low=0.0, high=1e5, deviation=0.005),
             EffectParameter(
                 "time_constant", at.COOLING_TIME, "s", null=None, start=60.0, low=1.0, high=3600.0, deviation=40.0
@@ -30,7 +31,7 @@ MOTOR = (
     Effect(
         "resistance_rise",
         physics="R → R (1 + r (1 − exp(−t/T))), t from the start of the record",
-        source="a winding that its housing or a neighbour warms, of one thermal mass; copper gains 0.39 % a kelvin",
+        source="a winding that its housing or a neighbour warms, of one thermal mass; copper gains 0.39 % per kelvin",
         parameters=(
             EffectParameter("rise", at.TIMED_RISE, "1", low=-0.5, high=2.0, deviation=0.2),
             EffectParameter(
@@ -59,7 +60,7 @@ MOTOR = (
     Effect(
         "dead_zone",
         physics="u = 0 for |u_c| < w, else u_c − w sign(u_c)",
-        source="input dead zone of a linear amplifier; volts at the motor",
+        source="input dead zone of a linear amplifier; in volts at the motor",
         parameters=(
             EffectParameter(
                 "width", at.DEAD_ZONE, "V", low=0.0, high=lambda s: s.highest, deviation=lambda s: 0.03 * s.volts
@@ -69,7 +70,7 @@ MOTOR = (
     Effect(
         "amplifier_threshold",
         physics="u = 0 for |u_c| ≤ w, else u_c",
-        source="least pulse of a switched output stage, or an input that is acted on from a level on; commanded volts",
+        source="least pulse of a switched output stage, or an input threshold; in commanded volts",
         parameters=(
             EffectParameter(
                 "width", at.THRESHOLD, "V", low=0.0, high=lambda s: s.highest, deviation=lambda s: 0.03 * s.volts

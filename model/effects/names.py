@@ -1,4 +1,4 @@
-"""Names of effects and their joints as the field writes them."""
+"""Names of effects and their joints for people."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ _HYPHENATED = {
 
 
 def effect_name(effect: str) -> str:
-    """Coulomb friction, back-EMF error, dead zone."""
+    """Returns the name in words, such as "Coulomb friction"."""
     for identifier, name in _HYPHENATED.items():
         effect = effect.replace(identifier, name)
     return " ".join(_PROPER.get(word, word) for word in effect.split("_"))
 
 
 def effect_on(effect: str, joints: Sequence[int]) -> str:
-    """An effect in a sentence: Coulomb friction on joint 2. Of the whole machine, the effect alone."""
+    """Returns an effect within a sentence: "Coulomb friction on joint 2"; without joints for the whole machine."""
     return f"{effect_name(effect)} on {joints_in_words(joints)}" if joints else effect_name(effect)
 
 
 def placed(effect: str, joints: Sequence[int]) -> str:
-    """An effect in a list: Coulomb friction, joint 2. Of the whole machine, the effect alone."""
+    """Returns an effect within a list: "Coulomb friction, joint 2"; without joints for the whole machine."""
     if not joints:
         return effect_name(effect)
     return f"{effect_name(effect)}, joint{'s' if len(joints) > 1 else ''} {'+'.join(map(str, joints))}"
 
 
 def joints_in_words(joints: Sequence[int]) -> str:
-    """joint 2; joints 1 and 2; joints 1, 2 and 3."""
+    """Returns "joint 2", "joints 1 and 2", or "joints 1, 2 and 3"."""
     names = [str(j) for j in joints]
     if len(names) == 1:
         return f"joint {names[0]}"
@@ -42,5 +42,5 @@ def joints_in_words(joints: Sequence[int]) -> str:
 
 
 def capitalised(text: str) -> str:
-    """The text with a capital first letter, the rest as it is."""
+    """Returns the text with a capital first letter and the rest unchanged."""
     return text[:1].upper() + text[1:]

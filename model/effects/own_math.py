@@ -1,7 +1,7 @@
-"""For the torque of an effect of the user's own: functions with corners, which also carry exact derivatives.
+"""Functions with corners for the torque of a user's effect; they also carry exact derivatives.
 
-Python's abs, min, max and comparisons carry none: a derivative travels in the imaginary part of a complex number.
-Smooth functions are numpy's: np.exp, np.sin, np.cos, np.tanh, np.sqrt, np.log. Comparisons look at `.real`.
+Python's abs, min, max and comparisons lose them: a derivative is carried in the imaginary part of a complex number. For
+smooth functions use numpy's: np.exp, np.sin, np.cos, np.tanh, np.sqrt, np.log. Compare `.real` parts only.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ __all__ = ["clamped", "larger", "magnitude", "outside", "sign", "smaller"]
 
 @inlined
 def sign(x: Any) -> Any:
-    """−1, 0 or 1; its derivative is zero."""
+    """Returns −1, 0 or 1; its derivative is zero."""
     return 0.0 * x + (1.0 if x.real > 0.0 else (-1.0 if x.real < 0.0 else 0.0))
 
 
 @inlined
 def larger(x: Any, y: Any) -> Any:
-    """The larger of two numbers, with its derivative."""
+    """Returns the larger of two numbers, with its derivative."""
     return x + 0.0 * y if x.real >= y.real else y + 0.0 * x
 
 
 @inlined
 def smaller(x: Any, y: Any) -> Any:
-    """The smaller of two numbers, with its derivative."""
+    """Returns the smaller of two numbers, with its derivative."""
     return x + 0.0 * y if x.real <= y.real else y + 0.0 * x

@@ -1,4 +1,4 @@
-"""Effects of the potentiometer: its reading against the angle."""
+"""Effects of the potentiometer: the difference between its reading and the angle."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ def _bend(scale: JointScale) -> float:
     return 0.0025 * scale.range
 
 
-def _bend_limit(scale: JointScale) -> float:
+def _upper_limit(scale: JointScale) -> float:
     return 0.1 * scale.range
 
 
-def _least_bend(scale: JointScale) -> float:
+def _lower_limit(scale: JointScale) -> float:
     return -0.1 * scale.range
 
 
@@ -22,20 +22,20 @@ SENSOR = (
     Effect(
         "potentiometer_gain",
         physics="reading = q + g (q − middle of the range)",
-        source="scale of a potentiometer",
+        source="assumed: calibration error of a potentiometer's scale",
         parameters=(EffectParameter("relative", at.POTENTIOMETER_GAIN, "1", low=-0.5, high=0.5, deviation=0.03),),
     ),
     Effect(
         "potentiometer_offset",
         physics="reading = q + o",
-        source="zero of a potentiometer",
+        source="assumed: calibration error of a potentiometer's zero",
         parameters=(
             EffectParameter(
                 "offset",
                 at.POTENTIOMETER_OFFSET,
                 "rad",
-                low=_least_bend,
-                high=_bend_limit,
+                low=_lower_limit,
+                high=_upper_limit,
                 deviation=lambda s: 10 * s.resolution,
             ),
         ),
@@ -43,9 +43,9 @@ SENSOR = (
     Effect(
         "potentiometer_nonlinearity",
         physics="reading = q + Σ b_k sin(kπx), x = 0 to 1 over the range",
-        source="±0.25 % linearity of the plastic film (section 6.2), as the first terms of a sine series",
+        source="section 6.2: ±0.25 % linearity of the plastic film, as the first terms of a sine series",
         parameters=tuple(
-            EffectParameter(f"bend_{k}", column, "rad", low=_least_bend, high=_bend_limit, deviation=_bend)
+            EffectParameter(f"bend_{k}", column, "rad", low=_lower_limit, high=_upper_limit, deviation=_bend)
             for k, column in enumerate(at.BENDS, start=1)
         ),
     ),

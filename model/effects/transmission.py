@@ -8,7 +8,7 @@ from model import layout as at
 from model.effects.effect import Effect, EffectParameter, JointScale, Tone
 
 CONTACT_RATE = 1500.0
-"""Highest natural frequency (rad/s) of parts in contact, which steps of 1 ms can follow (RK4 is stable up to 2785)."""
+"""Highest natural frequency (rad/s) of parts in contact. Steps of 1 ms can follow it (RK4 is stable up to 2785)."""
 CONTACT_DAMPING = 0.1
 """Damping ratio of that oscillation: an assumption."""
 
@@ -18,17 +18,20 @@ def _damping(scale: JointScale) -> float:
 
 
 def contact_compliance(scale: JointScale) -> float:
-    """Compliance of a contact that oscillates at `CONTACT_RATE`, rad/(N·m)."""
+    """Returns the compliance of a contact that oscillates at `CONTACT_RATE`, rad/(N·m)."""
     return 1.0 / (CONTACT_RATE**2 * scale.inertia)
 
 
 def _noticeable_compliance(scale: JointScale) -> float:
-    """Compliance at which a joint yields by two counts under a twentieth of its rated torque."""
+    """Returns the compliance at which a joint yields by two counts under a twentieth of its rated torque."""
     return 2 * scale.resolution / (0.05 * scale.torque)
 
 
 def _softest_contact(scale: JointScale) -> float:
-    """Most that a contact gives, rad/(N·m). Of a drive that is a plain gain no torque is known without a record."""
+    """Returns the upper bound of a contact's compliance, rad/(N·m).
+
+    The torque of a plain gain is not known without a record.
+    """
     known = scale.torque == scale.strongest
     return contact_compliance(scale) + 10 * _noticeable_compliance(scale) if known else math.inf
 

@@ -1,1 +1,1 @@
-"""Parameters of a model from traces: bounded robust least squares with exact Jacobians, priors and honest intervals."""
+"""Estimates parameters of a model from traces: bounded robust least squares, exact Jacobians, priors and intervals."""

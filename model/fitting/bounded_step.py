@@ -1,4 +1,4 @@
-"""The step of a Gauss–Newton or Levenberg–Marquardt search within bounds."""
+"""Computes the step of a Gauss–Newton or Levenberg–Marquardt search within bounds."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from model.arrays import Floats
 
 
 def bounded_step(curvature: Floats, descent: Floats, low: Floats, high: Floats) -> Floats:
-    """The step (p,) that minimises ½ sᵀ A s − dᵀ s with the unknowns that meet a bound held at it.
+    """Returns the step (p,) that minimises ½ sᵀ A s − dᵀ s within bounds.
 
-    Unknowns that the step would take over a bound go to the bound and stay there; the others are solved for again and
-    take that into account. Cutting such a step off instead would spoil the descent of all others.
+    Unknowns that the step would take over a bound stop at the bound and are held there; the others are then solved for
+    again. Cutting the first step off instead would spoil the descent of the others.
 
     Args:
-        curvature: A (p, p), symmetric and positive definite: the damped information. descent: d (p,), minus the
-            gradient. low, high: (p,) what is left to the bounds, low ≤ 0 ≤ high.
+        curvature: A (p, p), symmetric and positive definite: the damped information.
+        descent: d (p,), minus the gradient.
+        low, high: (p,) distances to the bounds, low ≤ 0 ≤ high.
     """
     step = np.zeros_like(descent)
     held = np.zeros(len(descent), dtype=bool)

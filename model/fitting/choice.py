@@ -1,4 +1,4 @@
-"""Which parameters of a model a fit changes, with bounds and priors, and the nuisance parameters beside them."""
+"""Chooses the parameters that a fit changes, with bounds and priors, and its nuisance parameters."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ from model.record_check.readings import sensor_deviation
 
 BEND = "potentiometer_nonlinearity"
 BEND_SHARE = 0.5
-"""Standard deviation of a bend's first term as a share of the stated linearity; later terms fall as one over their
-number, which makes the whole curve stay within the linearity in about nine of ten cases."""
+"""Standard deviation of a bend's first term as a share of the stated linearity. Later terms fall with one over their
+number. The whole curve then stays within the linearity in about nine of ten cases.
+"""
 SLIDING_FRICTION = (
     "coulomb_friction",
     "load_dependent_friction",
@@ -34,14 +35,15 @@ SLIDING_FRICTION = (
 )
 """Effects whose torque builds up over the presliding distance."""
 PRESLIDING_SHARE = 0.5
-"""Standard deviation of the presliding distance as a share of what the model assumes: an assumption."""
+"""Standard deviation of the presliding distance as a share of the model's value: an assumption."""
 SHAPE, SHAPE_DEVIATION = 0.5, 0.5
-"""Expected shape of the rise of friction where motion turns, and its standard deviation: 0 is Prandtl's law and 1 is
-Dahl's, and nothing tells which of them holds."""
+"""Expected shape of the rise of friction after a reversal, and its standard deviation. 0 is Prandtl's law and 1 is
+Dahl's; either is equally likely.
+"""
 
 
 def chosen_unknowns(model: Model, options: FitOptions) -> tuple[Unknown, ...]:
-    """The parameters that the options ask for. Raises SpecError for a pattern that matches none, or a wrong bound."""
+    """Returns the parameters that the options select. Raises SpecError for a pattern without match or a wrong bound."""
     for name in (*options.bounds, *options.priors):
         model.parameter(name)
     expected = {
@@ -52,13 +54,12 @@ def chosen_unknowns(model: Model, options: FitOptions) -> tuple[Unknown, ...]:
         if not any(fnmatchcase(p.name, pattern) for p in model.parameters):
             model.parameter(pattern)
     if not wanted:
-        raise SpecError("nothing to fit: no parameter is left; name some, or give them expected deviations")
+        raise SpecError("nothing to fit: no parameter is selected; name some, or state their expected deviations")
     return tuple(_unknown(p, expected[p.name], options) for p in wanted)
 
 
 def with_bends(model: Model, options: FitOptions, signal: Signal) -> tuple[Model, tuple[Unknown, ...]]:
-    """The model with bent potentiometers, and the bends as nuisance parameters; the model alone if bends are not asked
-    for."""
+    """Returns the model with bent potentiometers and the bends as nuisances; without bends, the model as given."""
     if options.sensor_bend is False or signal != "position":
         return model, ()
     taken = {j for use in model.effects if use.name == BEND for j in use.joints}
@@ -85,7 +86,7 @@ def with_bends(model: Model, options: FitOptions, signal: Signal) -> tuple[Model
 
 
 def start_postures(machine: Machine, records: Sequence[Record], bends: bool) -> tuple[Unknown, ...]:
-    """One unknown for each record and joint: how far the arm starts off the posture that was read."""
+    """Returns one unknown for each record and joint: the distance of the arm's start from the measured posture."""
     found = []
     for t in range(len(records)):
         for joint in machine.modelled_joints:
@@ -101,11 +102,12 @@ def start_postures(machine: Machine, records: Sequence[Record], bends: bool) -> 
 
 
 def friction_forms(model: Model) -> tuple[Unknown, ...]:
-    """Nuisance parameters that allow for another law of friction near zero speed than the model's.
+    """Returns nuisance parameters for the law of friction near zero speed.
 
-    Two unknowns a joint with sliding friction: the distance over which friction builds up when motion starts or turns,
-    and the shape of that rise, between Prandtl's corner and Dahl's exponential. Neither is in any machine file, the
-    sensor hardly shows them, and laws of friction differ in them; both affect every reversal a little.
+    Each joint with sliding friction gets two: the distance over which friction builds up when motion starts or
+    reverses, and the shape of that rise, between Prandtl's corner and Dahl's exponential. No machine file states
+    either, the sensor hardly shows them, and laws of friction differ in them. Both have a small influence on every
+    reversal.
     """
     joints = tuple(
         j
@@ -142,7 +144,7 @@ def _unknown(p: Parameter, expected: float, options: FitOptions) -> Unknown:
         raise SpecError(f"{p.name}: lower bound {low:g} {p.unit} is not below the upper bound {high:g} {p.unit}")
     if low < p.low or high > p.high:
         raise SpecError(
-            f"{p.name}: bounds {low:g} to {high:g} {p.unit} leave what is possible, {p.low:g} to {p.high:g}"
+            f"{p.name}: bounds {low:g} to {high:g} {p.unit} exceed the physical limits, {p.low:g} to {p.high:g}"
         )
     prior = Prior(expected=expected, deviation=p.deviation) if p.deviation else None
     prior = options.priors.get(p.name, prior if options.use_priors else None)

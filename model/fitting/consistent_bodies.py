@@ -1,9 +1,10 @@
-"""Coordinates in which a search finds only bodies that can exist: log-Cholesky parameters for the bodies' numbers.
+"""Coordinates in which every point is a physically consistent body: log-Cholesky parameters of its inertia.
 
-The number of coordinates stays that of the unknowns, each in the place of the one that it stands for: α for a mass, d1,
-d2, d3 for the moments xx, yy, zz, and s12, s13, s23 for xy, xz, yz; a centre of mass is t itself. The change is smooth
-and can be undone, so a covariance is the same by either: D (Dᵀ A D)⁻¹ Dᵀ = A⁻¹ for an information A about the numbers
-and the derivatives D of the numbers by the coordinates. Fits therefore take it by the numbers, as without the option.
+There are as many coordinates as unknowns, each in the place of an unknown: α for a mass, d1, d2, d3 for the moments xx,
+yy, zz, and s12, s13, s23 for xy, xz, yz. A centre of mass is the coordinate t itself. The change of coordinates is
+smooth and invertible, so both give the same covariance: D (Dᵀ A D)⁻¹ Dᵀ = A⁻¹ for an information A about the unknowns
+and the derivatives D of the unknowns by the coordinates. Fits therefore compute it from the unknowns, as without this
+option.
 """
 
 from __future__ import annotations
@@ -25,34 +26,36 @@ from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 
 COLUMNS = (at.MASS, *range(at.CENTRE_X, at.CENTRE_Z + 1), *range(at.INERTIA_XX, at.INERTIA_YZ + 1))
-"""Columns of a body's ten numbers."""
+"""Columns of a body's ten inertial parameters."""
 PARTS = ("mass", "centre_x", "centre_y", "centre_z", *(f"inertia_{e}" for e in ("xx", "yy", "zz", "xy", "xz", "yz")))
 MASS, MOMENTS, PRODUCTS = 0, slice(4, 10), slice(7, 10)
-"""Places among the ten."""
+"""Positions among the ten."""
 THINNEST = 1e-3
-"""Least e^d, as a share of the body's root mean square radius as stated: no body comes out thinner, as long as the
-stated one is not. It keeps a fit that would rather leave what can exist away from its very edge."""
+"""Least e^d, as a share of the stated body's root mean square radius. No body becomes thinner, unless the stated one
+is. The bound keeps a fit off the limit of physical consistency.
+"""
 WIDEST = 1e3
-"""Most e^d, as a multiple of that radius."""
+"""Largest e^d, as a multiple of that radius."""
 LIGHTEST = 1e-4
-"""Least mass, as a share of the stated one, and the inverse of the most; narrower bounds are the user's. Where nothing
-tells a mass from others, a search may go anywhere."""
+"""Least mass, as a share of the stated one, and the inverse of the largest. Users may state narrower bounds. Where the
+data do not determine a mass, a search may go anywhere.
+"""
 LONGEST_STEP = 1.0
-"""Farthest that one step changes a logarithm: beyond that, the derivatives of where it began say nothing."""
+"""Largest change of a logarithm in one step: farther away the derivatives at its beginning are useless."""
 LEAST_SHARE = 1e-12
-"""Least of the second moments, as a share of their sum, of a body of which log-Cholesky parameters are taken."""
+"""Least second moment, as a share of their sum, from which log-Cholesky parameters are computed."""
 FLAT = 1e-4
-"""Share of the second moments of a body below which the least one is told: a hundredth of its size in thickness."""
+"""Share of the second moments of a body below which the smallest is reported: a thickness of a hundredth of its size.
+"""
 EDGE = 1e-9
-"""Share of the sum of second moments by which the least may be below 0: numbers of a file are rounded."""
+"""Share of the sum of second moments by which the smallest may be below 0, because a file's values are rounded."""
 INSIDE = 1e-6
-"""Share of that sum which the least second moment has at the start: a plate without thickness lies on the edge."""
+"""Share of that sum that the smallest second moment gets at the start: a plate without thickness lies on the limit."""
 
 
 @dataclass(frozen=True)
 class _Body:
-    """A body of which numbers are fitted. numbers: (10,) as the search starts; places: which unknown each is, −1 for
-    none."""
+    """A body with fitted parameters. numbers: (10,) at the start; places: index of the unknown of each, −1 for none."""
 
     name: str
     numbers: Floats
@@ -67,12 +70,12 @@ class _Body:
         return np.array([place < 0 for place in self.places[PRODUCTS]])
 
     def with_values(self, values: Floats) -> Floats:
-        """The ten numbers (10,) with values of the unknowns."""
+        """Returns the ten parameters (10,) with values of the unknowns."""
         return np.array([n if p < 0 else values[p] for n, p in zip(self.numbers, self.places, strict=True)])
 
     @property
     def free(self) -> list[tuple[int, int]]:
-        """Number among the seven (α, d, s) and unknown, of all that are coordinates."""
+        """Returns (index among the seven (α, d, s), index of the unknown) of all coordinates."""
         seven = (self.places[MASS], *self.places[MOMENTS])
         if not self.has_fitted_moments:
             seven = seven[:1]
@@ -81,20 +84,20 @@ class _Body:
 
 @dataclass(frozen=True)
 class _Start:
-    """Where a body's search begins: its moments (6,), and α, d, s (7,)."""
+    """Start of the search for a body: its moments (6,), and α, d, s (7,)."""
 
     moments: Floats
     seven: Floats
 
 
 class ConsistentBodies(Scaled):
-    """Coordinates of unknowns of a model for which every body of which a number is fitted can exist.
+    """Coordinates of unknowns that keep every body with fitted parameters physically consistent.
 
-    All other unknowns are scaled, as ever. Of a body with fitted moments, xx, yy and zz must be unknown; mass, centre
-    and products may each be unknown or held, and what is held keeps its value exactly.
+    All other unknowns are only scaled. If moments of a body are fitted, xx, yy and zz must all be unknown. Mass, centre
+    and products may each be unknown or held; held ones keep their values exactly.
 
-    Raises SpecError for a body that cannot exist as it is stated, for xx, yy and zz of which only some are unknown, for
-    bounds of moments, and for a number that bodies share with something else.
+    Raises SpecError if the stated body is not physically consistent, if only some of xx, yy and zz are unknown, if
+    moments have bounds, or if an unknown sets parameters of several bodies.
     """
 
     def __init__(self, model: Model, unknowns: tuple[Unknown, ...]) -> None:
@@ -106,7 +109,9 @@ class ConsistentBodies(Scaled):
             self._bound(body, start)
 
     def of_values(self, values: Floats) -> Floats:
-        """Coordinates (p,); of a body that cannot exist, those of the nearest on the way from the start that can."""
+        """Returns coordinates (p,); for an inconsistent body, those of the last consistent one on the way from the
+        start.
+        """
         x = super().of_values(values)
         for body, start in zip(self.bodies, self._starts, strict=True):
             wanted, share = body.with_values(values), 1.0
@@ -123,13 +128,13 @@ class ConsistentBodies(Scaled):
         return x
 
     def values(self, x: Floats) -> Floats:
-        """Values (p,) of the unknowns at coordinates (p,)."""
+        """Returns values (p,) of the unknowns at coordinates (p,)."""
         found = super().values(x)
         for body, start in zip(self.bodies, self._starts, strict=True):
             seven = self._seven_at(body, start, x)
             if body.places[MASS] >= 0:
                 mass = self.unknowns[body.places[MASS]]
-                found[body.places[MASS]] = np.clip(np.exp(2 * seven[0]), mass.low, mass.high)  # for rounding alone
+                found[body.places[MASS]] = np.clip(np.exp(2 * seven[0]), mass.low, mass.high)  # only against rounding
             if body.has_fitted_moments:
                 moments, _ = body_of(seven, body.held_products, body.numbers[MOMENTS])
                 for moment, place in zip(moments, body.places[MOMENTS], strict=True):
@@ -138,11 +143,11 @@ class ConsistentBodies(Scaled):
         return found
 
     def chain(self, x: Floats, jacobian: Floats) -> Floats:
-        """Derivatives (k, p) by the coordinates at x, of derivatives (k, p) by the unknowns."""
+        """Converts derivatives (k, p) by the unknowns to derivatives (k, p) by the coordinates at x."""
         return np.asarray(jacobian @ self.derivatives(x))
 
     def derivatives(self, x: Floats) -> Floats:
-        """D (p, p): derivatives of the unknowns (rows) by the coordinates at x (p,)."""
+        """Returns D (p, p): derivatives of the unknowns (rows) by the coordinates at x (p,)."""
         found = np.diag(self.scale)
         for body, start in zip(self.bodies, self._starts, strict=True):
             seven = self._seven_at(body, start, x)
@@ -160,7 +165,7 @@ class ConsistentBodies(Scaled):
         return found
 
     def information_of_values(self, x: Floats, information: Floats) -> Floats:
-        """Information (p, p) about the unknowns, of information about the coordinates at x."""
+        """Converts information (p, p) about the coordinates at x to information about the unknowns."""
         derivatives = self.derivatives(x)
         half = np.linalg.solve(derivatives.T, information)
         return np.asarray(np.linalg.solve(derivatives.T, half.T))
@@ -173,7 +178,7 @@ class ConsistentBodies(Scaled):
 
     @staticmethod
     def _start(body: _Body) -> _Start:
-        """Where the search begins: as stated, moved inside where the stated body lies on the edge."""
+        """Returns the start of the search: the stated body, moved inside where it lies on the limit."""
         moments = body.numbers[MOMENTS].copy()
         if body.has_fitted_moments:
             second = second_moments(moments)
@@ -186,7 +191,7 @@ class ConsistentBodies(Scaled):
         return _Start(moments, seven)
 
     def _bound(self, body: _Body, start: _Start) -> None:
-        """Sizes, bounds and reach of a body's coordinates."""
+        """Sets sizes, bounds and reach of a body's coordinates."""
         radius = np.sqrt(np.trace(second_moments(start.moments)) / np.exp(2 * start.seven[0]))
         for number, place in body.free:
             begun, low, high = start.seven[number], -np.inf, np.inf
@@ -206,7 +211,7 @@ class ConsistentBodies(Scaled):
 
 
 def _bodies(model: Model, unknowns: Sequence[Unknown]) -> list[_Body]:
-    """The bodies of which any number is unknown. Raises SpecError as `ConsistentBodies` says."""
+    """Returns the bodies with unknown parameters. Raises SpecError as `ConsistentBodies` does."""
     places = {slot: k for k, u in enumerate(unknowns) for slot in u.parameter.slots}
     found = []
     for number in model.machine.modelled_joints:
@@ -219,8 +224,8 @@ def _bodies(model: Model, unknowns: Sequence[Unknown]) -> list[_Body]:
         for place in own:
             if place >= 0 and len(unknowns[place].parameter.slots) > 1:
                 raise SpecError(
-                    f"{unknowns[place].name}: stands for several numbers at once; with consistent inertias each number "
-                    "of a body is fitted by itself: take the tie out of the model, or hold it"
+                    f"{unknowns[place].name}: sets several parameters at once; with consistent inertias each parameter "
+                    "of a body is fitted separately: remove the tie from the model, or hold it"
                 )
         numbers = np.array([model.vector[s] if p < 0 else unknowns[p].start for s, p in zip(slots, own, strict=True)])
         body = _Body(f"link{number}", numbers, own)
@@ -237,15 +242,15 @@ def _check_choice(body: _Body, unknowns: Sequence[Unknown]) -> None:
     if held := [names[k] for k in range(4, 7) if body.places[k] < 0]:
         fitted = [names[k] for k in range(4, 10) if body.places[k] >= 0]
         raise SpecError(
-            f"{', '.join(fitted)}: with consistent inertias xx, yy and zz of a body are fitted together: free "
+            f"{', '.join(fitted)}: with consistent inertias xx, yy and zz of a body are fitted together: fit "
             f"{' and '.join(held)} as well, or hold {body.name}.inertia_*"
         )
     for number, place in enumerate(body.places[MOMENTS]):
         u = unknowns[place]
         if place >= 0 and (u.low, u.high) != (0.0 if number < 3 else -np.inf, np.inf):
             raise SpecError(
-                f"{u.name}: bounds {u.low:g} to {u.high:g} {u.unit}: with consistent inertias a moment has none but "
-                "those of its body; take them out, or state an expected deviation"
+                f"{u.name}: bounds {u.low:g} to {u.high:g} {u.unit}: with consistent inertias a moment cannot have "
+                "bounds; remove them, or state an expected deviation"
             )
 
 
@@ -257,11 +262,13 @@ def _check_stated(body: _Body) -> None:
     stated = f"{body.name}: {mass:.4g} kg with the principal moments {principal} kg·m²"
     if mass < 0.0 or least < -EDGE * abs(whole):
         raise SpecError(
-            f"{stated} is no body that can exist (mass above 0, no moment above the sum of the others): consistent "
-            "inertias start from one that can"
+            f"{stated} is not physically consistent (mass above 0, no moment above the sum of the others); consistent "
+            "inertias must start from a consistent body"
         )
     if mass == 0.0 or (whole == 0.0 and body.has_fitted_moments):
-        raise SpecError(f"{stated}: consistent inertias start from a mass and moments above 0; state some, or hold it")
+        raise SpecError(
+            f"{stated}: consistent inertias start from a mass and moments above 0; state them, or hold the body"
+        )
 
 
 def _is_inside(numbers: Floats, body: _Body) -> bool:
@@ -274,14 +281,15 @@ def _is_inside(numbers: Floats, body: _Body) -> bool:
 
 
 def _seven(numbers: Floats, body: _Body) -> Floats:
-    """α, d, s (7,) of ten numbers; α alone where no moment is fitted."""
+    """Returns α, d, s (7,) of ten parameters; only α where no moment is fitted."""
     if body.has_fitted_moments:
         return log_cholesky(float(numbers[MASS]), numbers[MOMENTS])
     return np.array([0.5 * np.log(numbers[MASS]), *np.zeros(6)])
 
 
 def on_the_edge(before: Model, fitted: Model, options: FitOptions) -> tuple[str, ...]:
-    """Links whose fitted body is flat or thin as their stated one is not: the records ask for one that cannot exist.
+    """Returns links whose fitted body is flat or thin although the stated one is not: the records suggest an
+    inconsistent one.
 
     Empty without consistent inertias.
     """
@@ -299,10 +307,14 @@ def on_the_edge(before: Model, fitted: Model, options: FitOptions) -> tuple[str,
 
 
 def coordinates_of(model: Model, unknowns: tuple[Unknown, ...], options: FitOptions) -> Coordinates | None:
-    """The coordinates that the options ask for; None: the unknowns themselves. Raises SpecError as `ConsistentBodies`
-    does, and for a method that has no coordinates but these."""
+    """Returns the coordinates that the options select; None: the unknowns themselves.
+
+    Raises SpecError as `ConsistentBodies` does, and for a method without a choice of coordinates.
+    """
     if not options.consistent_inertias:
         return None
     if options.method != "least_squares":
-        raise SpecError(f"consistent_inertias: not with the method {options.method}; it takes least_squares")
+        raise SpecError(
+            f"consistent_inertias: cannot be used with the method {options.method}, only with least_squares"
+        )
     return ConsistentBodies(model, unknowns)

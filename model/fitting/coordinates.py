@@ -1,4 +1,4 @@
-"""The coordinates in which a search goes: by default the numbers themselves, each from its start and by its size."""
+"""Coordinates of a search: by default the distance of each unknown from its start, divided by its size."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from model.fitting.unknowns import Unknown, scales
 
 
 class Coordinates(Protocol):
-    """As many coordinates x (p,) as there are unknowns, and what the unknowns are for them.
+    """Converts between p coordinates x and the p unknowns.
 
-    low, high: (p,) bounds of x, ±inf for none. reach: (p,) how far one step may go, inf for any distance.
+    low, high: (p,) bounds of x, ±inf for none. reach: (p,) largest change in one step, inf for no limit.
     """
 
     low: Floats
@@ -21,24 +21,24 @@ class Coordinates(Protocol):
     reach: Floats
 
     def of_values(self, values: Floats) -> Floats:
-        """Coordinates (p,) of values (p,) of the unknowns."""
+        """Returns coordinates (p,) of values (p,) of the unknowns."""
         ...
 
     def values(self, x: Floats) -> Floats:
-        """Values (p,) of the unknowns at coordinates (p,)."""
+        """Returns values (p,) of the unknowns at coordinates (p,)."""
         ...
 
     def chain(self, x: Floats, jacobian: Floats) -> Floats:
-        """Derivatives (k, p) by the coordinates at x, of derivatives (k, p) by the unknowns."""
+        """Converts derivatives (k, p) by the unknowns to derivatives (k, p) by the coordinates at x."""
         ...
 
     def information_of_values(self, x: Floats, information: Floats) -> Floats:
-        """Information (p, p) about the unknowns, of information about the coordinates at x."""
+        """Converts information (p, p) about the coordinates at x to information about the unknowns."""
         ...
 
 
 class Scaled:
-    """Every unknown less its start, over its natural size."""
+    """(value − start) / natural size of every unknown."""
 
     def __init__(self, unknowns: tuple[Unknown, ...]) -> None:
         self.scale = scales(unknowns)
@@ -48,17 +48,17 @@ class Scaled:
         self.reach = np.full(len(unknowns), np.inf)
 
     def of_values(self, values: Floats) -> Floats:
-        """Coordinates (p,) of values (p,) of the unknowns."""
+        """Returns coordinates (p,) of values (p,) of the unknowns."""
         return np.asarray((values - self.origin) / self.scale)
 
     def values(self, x: Floats) -> Floats:
-        """Values (p,) of the unknowns at coordinates (p,)."""
+        """Returns values (p,) of the unknowns at coordinates (p,)."""
         return np.asarray(self.origin + self.scale * x)
 
     def chain(self, x: Floats, jacobian: Floats) -> Floats:  # noqa: ARG002
-        """Derivatives (k, p) by the coordinates, of derivatives (k, p) by the unknowns."""
+        """Converts derivatives (k, p) by the unknowns to derivatives (k, p) by the coordinates."""
         return np.asarray(jacobian * self.scale)
 
     def information_of_values(self, x: Floats, information: Floats) -> Floats:  # noqa: ARG002
-        """Information (p, p) about the unknowns, of information about the coordinates."""
+        """Converts information (p, p) about the coordinates to information about the unknowns."""
         return np.asarray(information / np.outer(self.scale, self.scale))

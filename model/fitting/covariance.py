@@ -1,9 +1,9 @@
-"""Covariance of fitted parameters whose residuals are correlated, or larger than the noise model says.
+"""Covariance of fitted parameters whose residuals are correlated, or larger than the noise model states.
 
-Whitening takes out the correlation that is the same everywhere. What is left is of another kind: an arm that comes to
-rest a little off stays off for the whole hold, and the noise differs between motion and rest. The sandwich A⁻¹ B A⁻¹
-with A = JᵀJ + prior, and B from the sums of neighbouring scores (Newey and West 1987), accounts for that. Since B is
-itself estimated from few independent stretches, no parameter gets a smaller deviation from it than from A alone.
+Whitening removes correlation that is the same everywhere. Other correlation remains: an arm that comes to rest with an
+error keeps it for the whole hold, and the noise differs between motion and rest. The sandwich A⁻¹ B A⁻¹ accounts for
+that, with A = JᵀJ + prior and B from sums of neighbouring scores (Newey and West 1987). B is itself estimated from few
+independent stretches, so each deviation is at least that from A alone.
 """
 
 from __future__ import annotations
@@ -15,15 +15,14 @@ import numpy as np
 from model.arrays import Floats
 
 BANDWIDTH = 50
-"""Samples over which scores are taken to be correlated: one second at 50 Hz, longer than a reversal, shorter
-than a hold."""
+"""Samples over which scores count as correlated: one second at 50 Hz, longer than a reversal, shorter than a hold."""
 
 
 def score_covariance(scores: Sequence[Floats], bandwidth: int = BANDWIDTH) -> Floats:
-    """Covariance (p, p) of the sum of scores of all runs, with Bartlett weights up to `bandwidth` samples.
+    """Returns the covariance (p, p) of the sum of scores of all runs, with Bartlett weights up to `bandwidth` samples.
 
     Args:
-        scores: one array (n, p) a run: at each sample the gradient of the sum over joints of half the squared residual.
+        scores: one array (n, p) per run: at each sample the gradient of half the squared residual, summed over joints.
     """
     size = scores[0].shape[1]
     total = np.zeros((size, size))
@@ -36,11 +35,12 @@ def score_covariance(scores: Sequence[Floats], bandwidth: int = BANDWIDTH) -> Fl
 
 
 def sandwich(information: Floats, scores: Sequence[Floats], prior: Floats, bandwidth: int = BANDWIDTH) -> Floats:
-    """Covariance (p, p) of the estimates.
+    """Returns the covariance (p, p) of the estimates.
 
     Args:
-        information: (p, p) JᵀJ of the whitened data. prior: (p,) one over the prior variances, 0 for none.
-        scores: as for `score_covariance`, whitened. Neither may lack information in any direction beyond the prior's.
+        information: (p, p) JᵀJ of the whitened data. Together with the prior it must be positive definite.
+        prior: (p,) 1 / prior variance, 0 for none.
+        scores: as for `score_covariance`, whitened.
     """
     count, size = sum(len(run) for run in scores), information.shape[0]
     bread = inverse(information + np.diag(prior))
@@ -54,10 +54,10 @@ def sandwich(information: Floats, scores: Sequence[Floats], prior: Floats, bandw
 
 
 def inverse(information: Floats) -> Floats:
-    """Inverse (p, p) of a symmetric matrix that is positive but for rounding, positive whatever rounding did.
+    """Returns the inverse (p, p) of a positive semidefinite matrix, positive definite despite rounding.
 
-    In a direction without information, rounding may leave a slightly negative value; it is replaced by the smallest
-    value that exceeds rounding. Rows and columns are brought to one size first.
+    In a direction without information, rounding may leave a slightly negative eigenvalue. It is replaced by the
+    smallest value above rounding. Rows and columns are scaled to one size first.
     """
     sizes = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
     eigenvalues, vectors = np.linalg.eigh(information / np.outer(sizes, sizes))

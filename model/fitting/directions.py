@@ -1,10 +1,10 @@
-"""Directions in parameter space along which the data do not change, named as combinations.
+"""Finds directions in parameter space along which the data do not change, and names them as combinations.
 
-In scaled coordinates (a unit is the expected deviation, else the value) the whitened Jacobian has a singular value for
-every direction; its inverse is the deviation with which the data alone know that direction. Where that is above one,
-the data tell less than was expected beforehand. These directions span a space; a basis of it with few members each is
-what can be put into words. One of them has a name of its own: scaling all masses, torque constants, friction and rotor
-inertias together leaves the motion as it is (positions and voltages do not fix the scale of torque).
+In scaled coordinates one unit is the expected deviation, else the value. Each direction has a singular value of the
+whitened Jacobian; its inverse is the deviation that the data alone give that direction. Above one, the data give less
+than was expected beforehand. These directions span a space, and a basis whose vectors have few members can be put into
+words. One direction has a name: scaling all masses, torque constants, friction and rotor inertias together does not
+change the motion, because positions and voltages do not fix the scale of torque.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ UNKNOWN_DEVIATION = 1.0
 NEGLIGIBLE = 0.12
 """Share of a direction's largest member below which a member is left out of its name."""
 FREE_SCALE = 0.03
-"""Change of the whitened residual (all samples together) for the natural size of a direction that still counts
-as none."""
+"""Largest change of the whitened residual (all samples together) by the natural size of a direction that counts as
+zero.
+"""
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,8 @@ class Direction:
 
     Args:
         members: (p,) change of every unknown, in natural sizes, largest member 1.
-        deviation: with which the data alone know it, natural sizes of its largest member; inf where they say nothing.
-        torque_scale: it is the scale of all torques.
+        deviation: from the data alone, in natural sizes of the largest member; inf if the data do not depend on it.
+        torque_scale: whether it is the scale of all torques.
     """
 
     members: Floats
@@ -41,10 +42,10 @@ class Direction:
 
 
 def undetermined(jacobian: Floats, values: Floats, natural: Floats, torque: Sequence[int]) -> list[Direction]:
-    """Directions that the data do not determine, the torque scale first.
+    """Returns the directions that the data do not determine, the torque scale first.
 
     Args:
-        jacobian: (m, p) whitened, per unit of each unknown. values: (p,) where it was taken.
+        jacobian: (m, p) whitened, per unit of each unknown. values: (p,) at which it was computed.
         natural: (p,) natural sizes. torque: (p,) power with which each unknown scales with torque.
     """
     scaled = jacobian * natural
@@ -63,8 +64,11 @@ def undetermined(jacobian: Floats, values: Floats, natural: Floats, torque: Sequ
 
 
 def torque_scale(values: Floats, natural: Floats, torque: Sequence[int]) -> Floats | None:
-    """The direction in which every unknown with torque in its unit changes by the same share, largest member 1; None
-    when there are fewer than two of them. Each relative change is its power of torque."""
+    """Returns the direction that scales all torques, largest member 1; None with fewer than two unknowns that contain
+    torque.
+
+    The relative change of each unknown is its power of torque.
+    """
     direction = values * np.asarray(torque) / natural
     if np.count_nonzero(direction) < 2:
         return None
@@ -72,9 +76,11 @@ def torque_scale(values: Floats, natural: Floats, torque: Sequence[int]) -> Floa
 
 
 def sparse_basis(rows: Floats) -> list[Floats]:
-    """Another basis of the space that the orthonormal rows (k, p) span, each vector with a member that is its own:
-    reduced echelon form on the k best-conditioned columns."""
-    from scipy.linalg import qr  # here: the service shows results of fits, and makes none
+    """Returns another basis of the span of the orthonormal rows (k, p): each vector has a member that no other has.
+
+    It is the reduced echelon form on the k best-conditioned columns.
+    """
+    from scipy.linalg import qr  # imported here: the service shows fits without making any
 
     if len(rows) == 0:
         return []
@@ -84,7 +90,7 @@ def sparse_basis(rows: Floats) -> list[Floats]:
 
 
 def _without(rows: Floats, coordinates: Floats) -> Floats:
-    """An orthonormal basis of the part of the space of `rows` that is orthogonal to the combination `coordinates`."""
+    """Returns an orthonormal basis of the part of the span of `rows` that is orthogonal to `coordinates`."""
     size = np.linalg.norm(coordinates)
     if size < 0.5:
         return rows

@@ -39,16 +39,16 @@ from model.record_check.finding import doubts_headline
 from model.record_check.replicas import motion_there, noise_left
 
 INTERVAL = 1.959964
-"""Standard deviations on either side that hold 95 % of a Gaussian."""
+"""Number of standard deviations to either side that contain 95 % of a Gaussian."""
 SETTLED = 0.33
 """Largest change of the values in a round, in their deviations, at which the rounds end."""
 LEAST_SQUARES_EVALUATIONS = 60
 ROUND_EVALUATIONS = 2
 """Most evaluations in a round that is not the last: the next round changes the weights anyway."""
 FIRST_TOLERANCE = 100.0
-"""Tolerance of the first search, as a multiple of that of the rounds: it only has to come close."""
+"""Tolerance of the first search, as a multiple of that of the rounds: it only needs to come close."""
 SIMPLEX_EVALUATIONS = 400
-"""Most evaluations of Nelder and Mead's search for each parameter."""
+"""Most evaluations of the Nelder–Mead search per parameter."""
 
 
 def fit(
@@ -58,16 +58,16 @@ def fit(
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> FitResult:
-    """The parameters with which the model best repeats the traces, and how far each can be trusted.
+    """Returns the parameters with which the model reproduces the traces best, with intervals and identifiability.
 
-    This is an output-error fit: the model's own loop follows the recorded set points, and its readings are compared
-    with the recorded ones. A first search weighs every sample by the sensor's noise. Then, in rounds, the mean effect
-    of the noise is subtracted, residual and Jacobian are whitened, and the search goes on from where it was. The traces
-    are checked first: `record` of the result has what was found.
+    This is an output-error fit: the model's own control loop follows the recorded set points, and its readings are
+    compared with the recorded ones. A first search weights every sample by the sensor's noise. Rounds follow, each in
+    three steps: the mean effect of the noise is subtracted, residual and Jacobian are whitened, and the search
+    continues. The traces are checked first; `record` of the result holds the findings.
 
     Raises:
         TraceError, SpecError: for traces or options that cannot give a result; one line says why.
-        CancelledError: when asked to end.
+        CancelledError: when cancelled.
     """
     options, cancel, begun = options or FitOptions(), cancel or Never(), time.perf_counter()
     record = check_records(model, traces, torques=False)
@@ -90,7 +90,7 @@ def fit(
         solution = solve(problem, whiteners, solution.values, cancel, search, coordinates)
         evaluations += solution.evaluations
         if _settled(last.values, solution):
-            solution = replace(solution, converged=True, message="no value moves any more")
+            solution = replace(solution, converged=True, message="values have converged")
             break
     progress(0.95, "intervals and identifiability")
     estimate = _estimate(problem, whiteners, solution.values, options)
@@ -102,7 +102,7 @@ def fit(
 
 
 def fit_problem(model: Model, traces: Sequence[Trace], options: FitOptions) -> SimulatedProblem:
-    """Residuals and unknowns of a fit, before any search. Raises TraceError and SpecError as `fit` does."""
+    """Returns residuals and unknowns of a fit, before any search. Raises TraceError and SpecError as `fit` does."""
     signal = _signal(model, options)
     unknowns = chosen_unknowns(model, options)
     loop = _loop(model, options)
@@ -132,7 +132,7 @@ def _signal(model: Model, options: FitOptions) -> Signal:
         return options.signal
     kinds = {s.measures for j in model.machine.modelled_joints if (s := model.machine.joint(j).sensor) is not None}
     if len(kinds) > 1:
-        raise SpecError("some joints measure position and some velocity: say with `signal` which is to be fitted")
+        raise SpecError("some joints measure position and some velocity: state with `signal` which to fit")
     return "velocity" if kinds == {"velocity"} else "position"
 
 
@@ -143,24 +143,24 @@ def _starts(problem: SimulatedProblem) -> Floats:
 def _first_search(
     problem: SimulatedProblem, coordinates: Coordinates | None, options: FitOptions, progress: Progress, cancel: Cancel
 ) -> Solution:
-    """The best of the searches from the model's own values and from seeded draws, every sample weighed alike."""
+    """Returns the best search from the model's own values and from seeded draws, with equal weights for all samples."""
     whiteners = [white(d) for d in problem.floor]
     found: list[Solution] = []
     failure: SpecError | None = None
     for number, begin in enumerate(_beginnings(problem, options)):
         share = 0.5 / options.starts
 
-        def tell(count: int, rms: float, number: int = number, share: float = share) -> None:
+        def report(count: int, rms: float, number: int = number, share: float = share) -> None:
             done = share * (number + 1 - np.exp(-count / 20))
             progress(done, f"start {number + 1} of {options.starts}: {count} evaluations, residual {rms:.3g} noises")
 
         try:
             if options.method == "nelder_mead":
                 most = options.most_evaluations or SIMPLEX_EVALUATIONS * len(problem.unknowns)
-                found.append(climb(problem, begin, cancel, most, options.tolerance, tell))
+                found.append(climb(problem, begin, cancel, most, options.tolerance, report))
             else:
                 most = options.most_evaluations or LEAST_SQUARES_EVALUATIONS
-                search = Search(False, FIRST_TOLERANCE * options.tolerance, most, tell)
+                search = Search(False, FIRST_TOLERANCE * options.tolerance, most, report)
                 found.append(solve(problem, whiteners, begin, cancel, search, coordinates))
         except SpecError as error:
             failure = failure or error
@@ -184,8 +184,7 @@ def _beginnings(problem: SimulatedProblem, options: FitOptions) -> list[Floats]:
 def with_noise(
     problem: SimulatedProblem, values: Floats, options: FitOptions
 ) -> tuple[SimulatedProblem, list[Whitener]]:
-    """The problem with the mean effect of noise that goes round the loop subtracted, and whiteners fitted to its
-    residual."""
+    """Subtracts the mean effect of noise in the control loop, and fits whiteners to the residual."""
     if options.replicas and problem.loop == "closed" and problem.signal == "position":
         problem = problem.with_offset(noise_effect(problem, values, options.replicas, options.seed))
     evaluations = problem.evaluate(values, derivatives=False)
@@ -201,8 +200,7 @@ def with_noise(
 
 @dataclass(frozen=True)
 class _Estimate:
-    """What is estimated at the solution. `after` is simulated − measured as it stands, with what the noise does on
-    average left in."""
+    """Estimates at the solution. `after` is simulated − measured, without subtracting the mean effect of the noise."""
 
     covariance: Floats
     report: IdentifiabilityReport
@@ -213,7 +211,7 @@ class _Estimate:
 def _estimate(
     problem: SimulatedProblem, whiteners: Sequence[Whitener], values: Floats, options: FitOptions
 ) -> _Estimate:
-    """Covariance and identifiability at the solution."""
+    """Estimates covariance and identifiability at the solution."""
     evaluations = problem.evaluate(values, derivatives=True)
     data = whitened(problem, evaluations, whiteners)
     scale = scales(problem.unknowns)
@@ -222,17 +220,17 @@ def _estimate(
     prior = np.maximum(prior_precision(problem.unknowns) * scale**2, 1e-12)
     covariance = sandwich(scaled.information, scaled.scores(cut), prior) * np.outer(scale, scale)
     if options.replicas and problem.offset is not None:
-        covariance = covariance * (1.0 + 1.0 / options.replicas)  # the replicas' mean has noise of its own
+        covariance = covariance * (1.0 + 1.0 / options.replicas)  # the mean of the replicas has its own noise
     report = judged(data.jacobian.reshape(data.residual.size, -1), values, problem.unknowns)
     after = problem.with_offset(None).evaluate(values, derivatives=False)
     return _Estimate(covariance, report, after, float(np.mean(data.residual**2)))
 
 
 def _settled(last: Floats, solution: Solution) -> bool:
-    """Whether the last round moved the values by less than matters, in the mean over all directions. The replicas of
-    each round are new draws of the noise, which alone move every direction by a third of its deviation.
+    """Whether the last round changed the values by little, averaged over all directions.
 
-    Values that stay only because no step of the search helped have not settled.
+    Each round draws new noise for its replicas, which alone moves every direction by a third of its deviation. Values
+    that stay only because no step of the search improved them have not settled.
     """
     if solution.information is None:
         return True
@@ -307,7 +305,7 @@ def _left(problem: SimulatedProblem, error: JointError, traces: Sequence[Trace])
 
 
 def fitted_parameter(u: Unknown, value: float, deviation: float, verdict: ParameterVerdict) -> FittedParameter:
-    """The result for one parameter, without a number and an interval where the data do not determine it."""
+    """Returns the result for one parameter, without value and interval if the data do not determine it."""
     near = 1e-6 * u.scale
     at_bound = "low" if value - u.low < near else "high" if u.high - value < near else None
     known = verdict.verdict == "known"

@@ -1,4 +1,4 @@
-"""A parameter and the error of a joint after a fit."""
+"""Results of a fit for one parameter and for one joint."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from model.fitting.identifiability import Verdict
 class FittedParameter(FrozenRecord):
     """One parameter after a fit.
 
-    `value`, `deviation` and the 95 % interval `low` to `high` are None unless the data determine the parameter;
-    `model_value` is what the fitted model carries all the same, since a model needs a number.
+    `value`, `deviation` and the 95 % interval `low` to `high` are None unless the data determine the parameter.
+    `model_value` is the value in the fitted model, which needs one in any case.
     """
 
     name: str
@@ -31,8 +31,10 @@ class FittedParameter(FrozenRecord):
 
 
 class JointError(FrozenRecord):
-    """Root mean square of simulated − measured on one joint over all traces, and the noise of the measurement
-    itself. `noise`: what a right model would leave, where noise goes round the loop; None in older results."""
+    """Root mean square of simulated − measured on one joint over all traces, and the noise of the measurement.
+
+    `noise`: the error of a right model, with noise in its control loop; None in older results.
+    """
 
     joint: int
     unit: str

@@ -1,4 +1,4 @@
-"""The identifiability report: a verdict on every parameter, and the combinations that the data cannot determine."""
+"""Reports identifiability: a verdict on every parameter, and the combinations that the data cannot determine."""
 
 from __future__ import annotations
 
@@ -18,20 +18,22 @@ from model.fitting.unknowns import Unknown
 Verdict = Literal["known", "combination", "unknown"]
 
 KNOWN_SHARE = 0.5
-"""Largest deviation, as a share of the natural size, that the data alone may leave of a parameter that is known."""
+"""Largest deviation from the data alone, as a share of the natural size, of a parameter that counts as known."""
 LARGEST_DEVIATION = 30.0
-"""Largest deviation that is reported, in natural sizes: over a larger distance the model is not linear."""
+"""Largest deviation that is reported, in natural sizes: farther away the model is not linear."""
 STRONG_CORRELATION = 0.95
-"""Correlation of estimates beyond which parameters belong to one group."""
+"""Correlation of estimates above which parameters form a group."""
 WEAKEST_PRIOR = 1e3
-"""Deviation of a very wide prior, in natural sizes: it only keeps the arithmetic finite where the data say nothing."""
+"""Deviation of a very wide prior, in natural sizes: it keeps the arithmetic finite where the data have no information.
+"""
 
 
 class ParameterVerdict(FrozenRecord):
-    """What the data say about one parameter.
+    """Verdict on one parameter.
 
-    `data_deviation` is what the data alone give, all other parameters being free too, `alone` if all others were
-    known exactly; both in the parameter's unit, None where they say nothing. `expected_deviation` is the prior's.
+    `data_deviation` follows from the data alone, with all other parameters free; `alone`, if all others were known
+    exactly. Both are in the parameter's unit; None if the data do not depend on it. `expected_deviation` is the
+    prior's.
     """
 
     name: str
@@ -44,7 +46,7 @@ class ParameterVerdict(FrozenRecord):
 
 
 class Member(FrozenRecord):
-    """A parameter's part in a combination: its change relative to its own value (or, at zero, in its unit)."""
+    """A parameter's part in a combination: its change as a share of its value (if that is zero, in its unit)."""
 
     name: str
     change: float
@@ -52,26 +54,27 @@ class Member(FrozenRecord):
 
 
 class Combination(FrozenRecord):
-    """Changes that leave the records as they are, within the noise."""
+    """A combination of changes that leaves the records unchanged, within the noise."""
 
     text: str
     members: tuple[Member, ...]
     torque_scale: bool
     deviation: float | None
-    """Its deviation by the data alone, in natural sizes of its largest member; None where they say nothing."""
+    """Its deviation from the data alone, in natural sizes of its largest member; None if the data do not depend on it.
+    """
 
 
 class IdentifiabilityReport(FrozenRecord):
-    """What the data of a fit determine, and what they do not."""
+    """The parameters and combinations that the data of a fit determine, and those that they do not."""
 
     parameters: tuple[ParameterVerdict, ...]
     undetermined: tuple[Combination, ...]
     correlated: tuple[tuple[str, ...], ...]
-    """Groups of parameters whose estimates move together (correlation above 0.95, data and priors together)."""
+    """Groups of parameters whose estimates are correlated above 0.95 (data and priors together)."""
     torque_scale_free: bool
 
     def verdict(self, name: str) -> ParameterVerdict:
-        """The verdict on one parameter. Raises KeyError when it was not among the unknowns."""
+        """Returns the verdict on one parameter. Raises KeyError if it was not among the unknowns."""
         return {p.name: p for p in self.parameters}[name]
 
     @property
@@ -81,10 +84,10 @@ class IdentifiabilityReport(FrozenRecord):
 
 
 def judged(jacobian: Floats, values: Floats, unknowns: Sequence[Unknown]) -> IdentifiabilityReport:
-    """The report for a whitened Jacobian (m, p) of the data alone at `values` (p,).
+    """Returns the report for a whitened Jacobian (m, p) of the data alone at `values` (p,).
 
-    Nuisances take part with their prior, since they stand for what is known of sensor and start; they get no verdict.
-    Other priors take no part in the verdicts: what is only expected is not known.
+    Nuisances enter with their priors, which describe sensor and start; they get no verdict. Other priors do not enter
+    the verdicts, because an expected value is not a known one.
     """
     natural = np.array([u.scale for u in unknowns])
     nuisance = np.array([u.nuisance for u in unknowns])
@@ -109,7 +112,7 @@ def judged(jacobian: Floats, values: Floats, unknowns: Sequence[Unknown]) -> Ide
 
 
 def _without_nuisances(scaled: Floats, nuisance: NDArray[np.bool_], claimed: NDArray[np.bool_]) -> Floats:
-    """A square root of the information about the other parameters, nuisances (with their priors) marginalised."""
+    """Returns a square root of the information about the other parameters; nuisances (with priors) are marginalised."""
     other = scaled[:, ~nuisance]
     information = other.T @ other
     if nuisance.any():
@@ -129,10 +132,10 @@ def _verdict(
     inside = [c for c in combinations if any(m.name == unknown.name for m in c.members)]
     verdict: Verdict
     if marginal <= KNOWN_SHARE:
-        verdict, reason = "known", f"the data alone give it to {marginal:.2g} of its {size}"
+        verdict, reason = "known", f"the data alone determine it to {marginal:.2g} of its {size}"
     elif alone is not None and alone <= KNOWN_SHARE:
         verdict = "combination"
-        reason = f"alone it would be known to {alone:.2g} of its {size}, but others can stand in for it" + (
+        reason = f"alone it would be known to {alone:.2g} of its {size}, but others can compensate for it" + (
             f": {inside[0].text}" if inside else ""
         )
     else:
@@ -170,7 +173,7 @@ def _combination(direction: Direction, unknowns: Sequence[Unknown], values: Floa
 
 
 def _smallest_readable(members: list[Member]) -> list[Member]:
-    """Scaled so that the largest relative change is 1 (a hundred per cent)."""
+    """Returns members scaled so that the largest relative change is 1 (100 %)."""
     largest = max((abs(m.change) for m in members if m.relative), default=0.0)
     if largest == 0.0:
         return members
@@ -178,7 +181,7 @@ def _smallest_readable(members: list[Member]) -> list[Member]:
 
 
 def undetermined_in_words(report: IdentifiabilityReport, words: Mapping[str, ParameterWords]) -> tuple[str, ...]:
-    """The text of each undetermined combination, with the parameters as people write them."""
+    """Returns the text of each undetermined combination, with parameters in words."""
     units = {p.name: p.unit for p in report.parameters}
     labels = {name: own.label for name, own in words.items()}
     return tuple(_text(one.members, one.torque_scale, units, labels) for one in report.undetermined)

@@ -1,5 +1,7 @@
-"""Bounded robust least squares with priors and exact Jacobians, in coordinates scaled by the expected deviations or
-in others (`coordinates`)."""
+"""Bounded robust least squares with priors and exact Jacobians.
+
+Coordinates are scaled by the expected deviations, or chosen (`coordinates`).
+"""
 
 from __future__ import annotations
 
@@ -19,24 +21,24 @@ from model.fitting.unknowns import prior_precision
 from model.fitting.whitening import Whitener
 
 DIVERGED = 1e3
-"""Whitened residual given to every sample where the model has no finite answer, so that the search turns back."""
+"""Whitened residual of every sample where the model has no finite answer, so that the search turns back."""
 FIRST_DAMPING, LEAST_DAMPING = 1e-3, 1e-9
-"""Damping of the first step and the least damping, as shares of the information's diagonal (Marquardt 1963)."""
+"""Damping of the first step and least damping, as shares of the information's diagonal (Marquardt 1963)."""
 MOST_DAMPING = 1e15
-"""Steps are shorter by so much than Gauss and Newton's: an unstable arm multiplies a change beyond all use."""
+"""Largest damping: with an unstable arm only very short steps stay useful."""
 TINY = 1e-12
-"""Amount added to the diagonal of the damped information, which keeps it positive definite where nothing is known."""
+"""Amount added to the diagonal of the damped information; keeps it positive definite without data."""
 LEAST_GAIN, FAIR_GAIN, GOOD_GAIN = 1e-3, 0.25, 0.6
-"""Shares of the promised fall in cost: below the first a step is not taken, below the second the next step is damped
-more, above the third the Jacobian serves for another step."""
+"""Shares of the predicted fall in cost. Below the first, a step is rejected; below the second, the next step is damped
+more; above the third, the Jacobian is used for another step.
+"""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Where a search ended: values (p,), half the sum of squares with priors, evaluations, and why it ended.
+    """End of a search: values (p,), half the sum of squares with priors, evaluations, and the reason.
 
-    `information` (p, p) is JᵀJ there, priors included; None where no derivatives were taken. `steps` is how many steps
-    were taken, of those that were tried.
+    `information` (p, p) is JᵀJ there, priors included; None without derivatives. `steps` counts the accepted steps.
     """
 
     values: Floats
@@ -50,16 +52,16 @@ class Solution:
 
 @dataclass(frozen=True)
 class Search:
-    """How to search. `tell` is called with the number of evaluations and the root mean square of whitened residuals."""
+    """How to search. `report` gets the number of evaluations and the root mean square of whitened residuals."""
 
     robust: bool = True
     tolerance: float = 1e-6
     most_evaluations: int = 60
-    tell: Callable[[int, float], None] | None = None
+    report: Callable[[int, float], None] | None = None
 
 
 class _Objective:
-    """Residuals and Jacobian of the scaled problem; both of one point come from one simulation."""
+    """Residuals and Jacobian of the scaled problem; one simulation gives both at a point."""
 
     def __init__(
         self,
@@ -83,7 +85,7 @@ class _Objective:
         return len(self.whiteners) * sum(run.stop - run.start for runs in self.problem.runs for run in runs)
 
     def values(self, x: Floats) -> Floats:
-        """Values of the unknowns at coordinates."""
+        """Returns values of the unknowns at coordinates."""
         return self.coordinates.values(x)
 
     def residual(self, x: Floats) -> Floats:
@@ -104,8 +106,8 @@ class _Objective:
             return np.concatenate([np.full(self.samples, DIVERGED), prior]), np.zeros((0, 0))
         if not derivatives:
             self.evaluations += 1
-            if self.search.tell is not None:
-                self.search.tell(self.evaluations, float(np.sqrt(np.mean(data.residual**2))))
+            if self.search.report is not None:
+                self.search.report(self.evaluations, float(np.sqrt(np.mean(data.residual**2))))
         whole = np.zeros((0, 0))
         if derivatives:
             flat = data.jacobian.reshape(data.residual.size, -1)
@@ -121,18 +123,18 @@ def solve(
     search: Search | None = None,
     coordinates: Coordinates | None = None,
 ) -> Solution:
-    """The values that minimise Σ ρ(whitened residual²) + Σ ((value − expected)/deviation)², within the bounds.
+    """Returns the values that minimise Σ ρ(whitened residual²) + Σ ((value − expected)/deviation)², within the bounds.
 
-    The search is Levenberg and Marquardt's with Huber's weights and bounded steps (`bounded_step`). A Jacobian costs
-    some thirty simulations and a step one, so a Jacobian serves as long as its steps gain what they promise; only a new
-    Jacobian can end the search. A step on which the simulation diverges is not taken.
+    The search is Levenberg–Marquardt with Huber's weights and bounded steps (`bounded_step`). A Jacobian costs about
+    thirty simulations and a step one. A Jacobian is therefore reused as long as steps gain what they predict, but only
+    a new one can end the search. A step on which the simulation diverges is rejected.
 
     Args:
-        begin: (p,) values to begin from, moved inside the bounds where they lie on one.
-        coordinates: those in which to search; None: the unknowns themselves, scaled. Priors are on the unknowns.
+        begin: (p,) starting values; those on a bound are moved inside.
+        coordinates: of the search; None: the unknowns themselves, scaled. Priors are on the unknowns.
 
     Raises:
-        SpecError: when the model has no finite answer at the beginning. CancelledError: when asked to end.
+        SpecError: if the model has no finite answer at the beginning. CancelledError: when cancelled.
     """
     search = search or Search()
     coordinates = coordinates or Scaled(problem.unknowns)
@@ -141,7 +143,7 @@ def solve(
     x = _inside(coordinates.of_values(begin), low, high)
     residual = objective.residual(x)
     cost, weights = _cost_and_weights(residual, objective.samples, search.robust)
-    damping, fresh, message, reason = FIRST_DAMPING, False, "", "as many evaluations as allowed"
+    damping, fresh, message, reason = FIRST_DAMPING, False, "", "evaluation limit reached"
     jacobian = information = np.zeros((0, 0))
     steps = 0
     while objective.evaluations < search.most_evaluations and not message:
@@ -152,13 +154,13 @@ def solve(
         with np.errstate(over="ignore", invalid="ignore"):
             damped = information + damping * np.diag(np.diag(information)) + TINY * np.eye(len(gradient))
         if damping > MOST_DAMPING or not np.isfinite(damped).all():
-            reason = "no step helps, however short: do the records begin as the model does, and does it stay stable?"
+            reason = "no step helps, however short: does the model start like the records, and does it stay stable?"
             break
         step = bounded_step(damped, -gradient, np.maximum(low - x, -reach), np.minimum(high - x, reach))
         promised = -float(gradient @ step + 0.5 * step @ information @ step)
         if promised <= search.tolerance * cost:
             if fresh:
-                message = "no step promises anything any more"
+                message = "no step promises an improvement"
             else:
                 jacobian = np.zeros((0, 0))
             continue
@@ -180,13 +182,13 @@ def solve(
 
 
 def _information(jacobian: Floats, weights: Floats) -> Floats:
-    """(p, p); infinite where derivatives are too large for their square."""
+    """Returns (p, p); infinite where derivatives are too large for their square."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray((jacobian * weights[:, None]).T @ jacobian)
 
 
 def _cost_and_weights(residual: Floats, samples: int, robust: bool) -> tuple[float, Floats]:
-    """Half the sum of ρ, and ρ′ of every residual."""
+    """Returns half the sum of ρ, and ρ′ of every residual."""
     if not robust:
         return 0.5 * float(residual @ residual), np.ones_like(residual)
     loss = huber(residual**2, samples)
@@ -194,6 +196,6 @@ def _cost_and_weights(residual: Floats, samples: int, robust: bool) -> tuple[flo
 
 
 def _inside(x: Floats, low: Floats, high: Floats) -> Floats:
-    """Moved off the bounds by a thousandth of the natural size (or of the room there is): the search starts inside."""
+    """Moves coordinates off the bounds by a thousandth of the natural size (or of the distance between the bounds)."""
     room = np.minimum(1e-3, 0.25 * (high - low))
     return np.clip(x, low + room, high - room)

@@ -1,13 +1,13 @@
-"""The log-Cholesky parameters of a rigid body's inertia.
+"""Log-Cholesky parameters of a rigid body's inertia.
 
-Rucker and Wensing, "Smooth parameterization of rigid-body inertia", IEEE Robotics and Automation Letters 7 (2022):
-the pseudo-inertia J (4, 4) is U Uᵀ with U = e^α [[e^d1, s12, s13, t1], [0, e^d2, s23, t2], [0, 0, e^d3, t3],
-[0, 0, 0, 1]]. Every choice of the ten numbers is a body that can exist, and every body that can exist has one choice
-(Wensing, Kim and Slotine, same journal 3, 2018: mass above 0, and principal moments that satisfy the triangle
-inequality strictly, are the same as J being positive definite).
+Rucker and Wensing, "Smooth parameterization of rigid-body inertia", IEEE Robotics and Automation Letters 7 (2022): the
+pseudo-inertia J (4, 4) is U Uᵀ with U = e^α [[e^d1, s12, s13, t1], [0, e^d2, s23, t2], [0, 0, e^d3, t3], [0, 0, 0, 1]].
+Every choice of the ten parameters is a physically consistent body, and every such body has exactly one choice.
+Consistent means that J is positive definite: mass above 0, and principal moments that satisfy the triangle inequality
+strictly (Wensing, Kim and Slotine, same journal 3, 2018).
 
-From the last column of U follows the mass e^2α and the centre of mass t. With the centre known, the rest of U is a
-factor of the second moments about it, Σ = ½ tr(I) 1 − I, so that the six moments I depend on α, d and s alone.
+The last column of U gives the mass e^2α and the centre of mass t. With the centre known, the rest of U is a factor of
+the second moments about it, Σ = ½ tr(I) 1 − I. The six moments I thus depend on α, d and s alone.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from model.arrays import Floats
 
 ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-"""Places of xx, yy, zz, xy, xz and yz in a matrix."""
+"""Positions of xx, yy, zz, xy, xz and yz in a matrix."""
 
 
 def matrix_of(moments: Floats) -> Floats:
-    """The symmetric matrix (3, 3) of xx, yy, zz, xy, xz, yz (6,)."""
+    """Returns the symmetric matrix (3, 3) of xx, yy, zz, xy, xz, yz (6,)."""
     matrix = np.zeros((3, 3))
     for value, (row, column) in zip(moments, ENTRIES, strict=True):
         matrix[row, column] = matrix[column, row] = value
@@ -30,19 +30,19 @@ def matrix_of(moments: Floats) -> Floats:
 
 
 def second_moments(moments: Floats) -> Floats:
-    """Σ (3, 3) = ∫ r rᵀ dm, kg·m², of the moments of inertia (6,) about the same point."""
+    """Returns Σ (3, 3) = ∫ r rᵀ dm, kg·m², of the moments of inertia (6,) about the same point."""
     inertia = matrix_of(moments)
     return np.asarray(0.5 * np.trace(inertia) * np.eye(3) - inertia)
 
 
 def moments_of(second: Floats) -> Floats:
-    """Moments of inertia (6,), kg·m², of second moments (3, 3); linear, so of their changes, too."""
+    """Returns moments of inertia (6,), kg·m², of second moments (3, 3); linear, so it also converts their changes."""
     inertia = np.trace(second) * np.eye(3) - second
     return np.array([inertia[place] for place in ENTRIES])
 
 
 def log_cholesky(mass: float, moments: Floats) -> Floats:
-    """α, d1, d2, d3, s12, s13, s23 (7,) of a body; its centre is t. Raises LinAlgError if there is no such body."""
+    """Returns α, d1, d2, d3, s12, s13, s23 (7,) of a body; its centre is t. Raises LinAlgError for no real body."""
     if not mass > 0.0:
         raise np.linalg.LinAlgError("no mass")
     second = second_moments(moments) / mass
@@ -51,14 +51,14 @@ def log_cholesky(mass: float, moments: Floats) -> Floats:
 
 
 def body_of(parameters: Floats, held: NDArray[np.bool_], moments: Floats) -> tuple[Floats, Floats]:
-    """Moments (6,) of a body, kg·m², and their derivatives (6, 7) by α, d1, d2, d3, s12, s13, s23.
+    """Returns moments (6,) of a body, kg·m², and their derivatives (6, 7) by α, d1, d2, d3, s12, s13, s23.
 
-    A product of inertia may be held. Its s then follows from the numbers that come before it in U, and is no parameter
-    of its own: every choice of the others is still a body that can exist, and has that product exactly.
+    A product of inertia may be held. Its s then follows from the parameters that precede it in U and is no free
+    parameter. Every choice of the others is still a consistent body with exactly that product.
 
     Args:
-        parameters: (7,); of held products, s is not looked at. held: (3,) which of xy, xz, yz are held.
-        moments: (6,) the body's, of which the held ones are taken.
+        parameters: (7,); s of held products is ignored. held: (3,) which of xy, xz, yz are held.
+        moments: (6,) of the body; only held ones are used.
     """
     scale, (d1, d2, d3) = np.exp(parameters[0]), np.exp(parameters[1:4])
     unit = np.eye(7)
@@ -91,5 +91,5 @@ def body_of(parameters: Floats, held: NDArray[np.bool_], moments: Floats) -> tup
     ):
         slopes[:, row, column] = by
     found = moments_of(factor @ factor.T)
-    found[3:][held] = moments[3:][held]  # to the last digit
+    found[3:][held] = moments[3:][held]  # exact to the last digit
     return found, np.array([moments_of(slope @ factor.T + factor @ slope.T) for slope in slopes]).T

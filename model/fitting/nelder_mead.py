@@ -1,4 +1,4 @@
-"""Nelder and Mead's simplex within bounds: the hill climbing of the source (section 7.2), as one choice of method."""
+"""Nelder–Mead simplex within bounds: the hill climbing of the source (section 7.2), offered as a method."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ def climb(
     cancel: Cancel,
     most_evaluations: int,
     tolerance: float = 1e-6,
-    tell: Callable[[int, float], None] | None = None,
+    report: Callable[[int, float], None] | None = None,
     goal: float | None = None,
 ) -> Solution:
-    """Values that minimise the mean squared error summed over the joints, without priors, weights or derivatives.
+    """Returns values that minimise the mean squared error summed over joints, without priors, weights or derivatives.
 
-    `goal`: end as soon as that mean squared error is reached. A simulation that diverges counts as infinitely bad.
+    `goal`: end as soon as the mean squared error is this low. A simulation that diverges counts as infinitely bad.
 
     Raises CancelledError.
     """
-    from scipy.optimize import minimize  # here: no other fit needs it, and it takes a while to import
+    from scipy.optimize import minimize  # imported here: only this method needs it, and it is slow to import
 
     scale = scales(problem.unknowns)
     bounds = [((u.low - b) / s, (u.high - b) / s) for u, b, s in zip(problem.unknowns, begin, scale, strict=True)]
@@ -49,8 +49,8 @@ def climb(
         mean = sum(float((r**2).sum()) for r in compared) / sum(map(len, compared))
         if mean < best[0]:
             best = (mean, values)
-        if tell is not None:
-            tell(count, mean**0.5)
+        if report is not None:
+            report(count, mean**0.5)
         if goal is not None and mean <= goal:
             raise _GoalReachedError
         return mean
@@ -61,20 +61,20 @@ def climb(
     options = {**ends, "initial_simplex": simplex, "adaptive": True}
     try:
         start = np.zeros(len(begin))
-        # The stubs know no tuple of floats as bounds.
+        # scipy's stubs do not accept tuples of floats as bounds
         found = minimize(error, start, method="Nelder-Mead", bounds=bounds, options=options)  # type: ignore[call-overload]
         message, converged = str(found.message), bool(found.success)
     except _GoalReachedError:
-        message, converged = "the error asked for is reached", True
+        message, converged = "the requested error is reached", True
     return Solution(best[1], best[0], count, converged, message)
 
 
 class _GoalReachedError(Exception):
-    """The goal is met."""
+    """Raised inside scipy's search when the goal is reached."""
 
 
 def _first_simplex(low: Floats, high: Floats) -> Floats:
-    """The beginning and one natural size along every axis, towards the side with more room."""
+    """Returns the starting point and one natural size along every axis, towards the farther bound."""
     size = len(low)
     simplex = np.zeros((size + 1, size))
     for k in range(size):

@@ -1,11 +1,11 @@
-"""The mean effect of the sensor's noise on the arm.
+"""Computes the mean effect of the sensor's noise on the arm.
 
-The controller acts on readings with noise and rounding, which keeps an arm creeping where a simulation without noise
-would stick: Coulomb friction would be estimated too small (by 8 % of its arm at 0.3 counts). The model itself, with
-noise drawn and readings rounded, therefore takes the arm's place in several replicas. Their mean difference from the
-simulation without noise is the expected residual (indirect inference, Gouriéroux, Monfort and Renault 1993). Feeding
-the record's own noise into the simulation would do the same in part, but makes the derivatives correlate with the
-residual, and the estimates of inertia and delay are then wrong by several of their deviations.
+The controller reacts to readings with noise and rounding. They keep an arm creeping where a simulation without noise
+would stick, so a fit would underestimate Coulomb friction (by 8 % of its arm at 0.3 counts). Therefore several replicas
+of the record are simulated with drawn noise and rounded readings. Their mean difference from the simulation without
+noise is the expected residual (indirect inference, Gouriéroux, Monfort and Renault 1993). Feeding the record's own
+noise into the simulation would have a similar effect. But then derivatives correlate with the residual, and estimates
+of inertia and delay are wrong by several of their deviations.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from model.fitting.simulated import SimulatedProblem
 
 
 def noise_effect(problem: SimulatedProblem, values: Floats, replicas: int, seed: int) -> tuple[Floats, ...]:
-    """Mean (m, n) a record of the residual over replicas in which the model with these values takes the arm's place.
+    """Returns per record the mean (m, n) of the residual over replicas, which simulate the model with these values.
 
     The same seed draws the same noise, so that the result changes smoothly with the values.
     """

@@ -1,4 +1,4 @@
-"""What the numerics of a fit need: residuals and their derivatives for values of the unknowns."""
+"""Interface between a fit's numerics and its model: residuals and derivatives for values of the unknowns."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Problem(Protocol):
         ...
 
     def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
-        """Residuals, with exact derivatives when asked for. Raises SpecError where the model has no finite answer."""
+        """Returns residuals, with exact derivatives on request. Raises SpecError if the model has no finite answer."""
         ...
 
 
@@ -57,20 +57,19 @@ class Whitened:
 
     @property
     def information(self) -> Floats:
-        """JᵀJ, (p, p)."""
+        """Returns JᵀJ, (p, p)."""
         flat = self.jacobian.reshape(-1, self.jacobian.shape[-1])
         return np.asarray(flat.T @ flat)
 
     def scores(self, influence: Floats | None = None) -> list[Floats]:
-        """Per stretch (k, p): Σ over signals of J ψ(r) at each sample; ψ is the identity unless `influence` is
-        given."""
+        """Returns per stretch (k, p): Σ over signals of J ψ(r) at each sample; by default ψ is the identity."""
         r = self.residual if influence is None else influence
         every = np.einsum("mnp,mn->mp", self.jacobian, r)
         return [every[a:b] for a, b in zip(self.starts, self.starts[1:], strict=False)]
 
 
 def whitened(problem: Problem, evaluations: Sequence[Evaluation], whiteners: Sequence[Whitener]) -> Whitened:
-    """All traces, whitened run by run and signal by signal."""
+    """Whitens all traces, run by run and signal by signal."""
     residuals, jacobians, starts, done = [], [], [0], 0
     for evaluation, runs in zip(evaluations, problem.runs, strict=True):
         for run in runs:
@@ -86,5 +85,5 @@ def whitened(problem: Problem, evaluations: Sequence[Evaluation], whiteners: Seq
 
 
 def whitened_residual(residual: Floats, whiteners: Sequence[Whitener]) -> Floats:
-    """One run (k, n), each signal by its own filter."""
+    """Whitens one run (k, n), each signal by its own filter."""
     return np.stack([w.whitened(residual[:, k]) for k, w in enumerate(whiteners)], axis=1)

@@ -1,12 +1,14 @@
-"""Profile likelihood: how much worse the best fit becomes when one parameter is moved and all others are fitted again.
+"""Profile likelihood: how much worse the best fit becomes if one parameter is fixed elsewhere and all others are
+refitted.
 
-An interval from a covariance takes the model to be linear about the fit. A profile does not: it shows a parameter that
-the data bound on one side alone, on neither, or by a curve that is no parabola. In its 95 % interval −2 ln L rises by
-less than 3.84, the quantile of χ² with one degree of freedom (Wilks 1938; Raue et al. 2009, Bioinformatics 25).
+An interval from a covariance assumes that the model is linear about the fit. A profile does not. It shows parameters
+that the data limit on one side only or on neither, and those whose likelihood is not parabolic. In its 95 % interval −2
+ln L rises by less than 3.84, the quantile of χ² with one degree of freedom (Wilks 1938; Raue et al. 2009,
+Bioinformatics 25).
 
-That holds for white residuals of the stated noise. Where residuals are correlated or larger, the fit's own variance is
-the sandwich's (`model.fitting.covariance`), and the rise that ends the interval is 3.84 times the same ratio of
-variances (Kent 1982, Biometrika 69, for one parameter).
+That threshold holds for white residuals of the stated noise. For correlated or larger residuals the fit uses the
+sandwich variance (`model.fitting.covariance`). The threshold is then 3.84 times the ratio of the sandwich variance to
+the white-noise variance (Kent 1982, Biometrika 69, for one parameter).
 """
 
 from __future__ import annotations
@@ -32,25 +34,25 @@ from model.fitting.whitening import Whitener
 
 RISE = 3.841459
 """Rise of −2 ln L at the ends of a 95 % interval, for white residuals of the stated noise."""
-POINTS = 12
-"""Most steps outwards on either side. They double while the likelihood hardly changes."""
-HARDLY = 0.25
-"""Share of RISE below which the next step is twice as long."""
-CLOSE = 0.005
-"""Share of RISE within which an end of the interval is found."""
+MOST_STEPS = 12
+"""Most steps to either side. A step is twice as long as the last while the likelihood hardly changes."""
+SLOW_RISE_SHARE = 0.25
+"""Share of the rise below which the next step is twice as long."""
+END_TOLERANCE = 0.005
+"""Accuracy of an end of the interval, as a share of the rise there."""
 REFINEMENTS = 16
-BETTER = 0.05
-"""Fall of −2 ln L, as a share of RISE, from which another value counts as a better fit than the one found."""
+BETTER_FIT_SHARE = 0.05
+"""Fall of −2 ln L, as a share of the rise, from which another value counts as a better fit."""
 
 
 class Profile(FrozenRecord):
     """Profile likelihood of one parameter.
 
-    `rises` of −2 ln L (0 at the best fit) belong to `values`, which ascend. `low` and `high` end the 95 % interval;
-    None where the data set no end on that side, as far as `values` reach. There −2 ln L has risen by `rise`, or, at the
-    edge of values for which the model has no finite answer, by less. The parameter's own prior takes no part;
-    those of all others do. `better` tells that another value fits better than the fit's own: the search had ended in a
-    local minimum, and a fit with more `starts` is needed.
+    `rises` of −2 ln L (0 at the best fit) belong to `values`, which ascend. `low` and `high` are the ends of the 95 %
+    interval, where −2 ln L has risen by `rise`; by less where the simulation stops being finite. None: the data give no
+    end on that side within `values`. The parameter's own prior is left out; those of all others are used. `better`:
+    another value fits better than the fit's own. The search then ended in a local minimum, and a fit with more `starts`
+    is needed.
     """
 
     name: str
@@ -65,17 +67,17 @@ class Profile(FrozenRecord):
 
 
 @dataclass(frozen=True)
-class _Held:
-    """A problem with unknown number `index` held at a value, or free (None) without its prior."""
+class _WithFixed:
+    """A problem in which unknown `index` is fixed at a value, or free and without its prior if that is None."""
 
     problem: Problem
     index: int
-    value: float | None
+    fixed_value: float | None
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
         own = list(self.problem.unknowns)
-        if self.value is None:
+        if self.fixed_value is None:
             own[self.index] = replace(own[self.index], deviation=None, size=own[self.index].scale)
         else:
             del own[self.index]
@@ -90,9 +92,9 @@ class _Held:
         return self.problem.floor
 
     def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
-        if self.value is None:
+        if self.fixed_value is None:
             return self.problem.evaluate(values, derivatives)
-        found = self.problem.evaluate(np.insert(values, self.index, self.value), derivatives)
+        found = self.problem.evaluate(np.insert(values, self.index, self.fixed_value), derivatives)
         return [
             replace(one, jacobian=None if one.jacobian is None else np.delete(one.jacobian, self.index, axis=0))
             for one in found
@@ -106,18 +108,20 @@ def profile(
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> Profile:
-    """The profile likelihood of a fitted parameter, whether the data determine it or not.
+    """Returns the profile likelihood of a fitted parameter, whether the data determine it or not.
 
     Args:
         traces: those that were fitted to.
 
-    Raises SpecError for a parameter that was not fitted, other traces, or a fit with consistent inertias, since a
-    profile holds one number of a body at a time; CancelledError when asked to end.
+    Raises SpecError for a parameter that was not fitted, for other traces, and for a fit with consistent inertias,
+    whose parameters are coupled so that none can be fixed alone. Raises CancelledError when cancelled.
     """
     fitted.parameter(name)
     options, values = fitted.options, np.array(fitted.values)
     if options.consistent_inertias:
-        raise SpecError(f"profile of {name}: takes no fit with consistent inertias; fit without them for a profile")
+        raise SpecError(
+            f"profile of {name}: not possible for a fit with consistent inertias; fit without them for a profile"
+        )
     problem = fit_problem(fitted.model, traces, options)
     if tuple(record.name for record in problem.records) != fitted.traces:
         raise SpecError(f"profile of {name}: needs the traces that were fitted to, {', '.join(fitted.traces)}")
@@ -130,7 +134,7 @@ def profile(
 
 
 def _stretch(fitted: FitResult, problem: Problem, whiteners: Sequence[Whitener], values: Floats, index: int) -> float:
-    """Variance that the fit states for an unknown, over the one that white residuals of the stated noise would give."""
+    """Returns the variance that the fit states for an unknown, over that for white residuals of the stated noise."""
     data = whitened(problem, problem.evaluate(values, derivatives=True), whiteners)
     scale = scales(problem.unknowns)
     prior = np.maximum(prior_precision(problem.unknowns) * scale**2, 1e-12)
@@ -151,16 +155,16 @@ def profiled(
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> Profile:
-    """The profile of unknown number `index` about the values (p,) of a fit; `size` is its deviation there, about."""
+    """Returns the profile of unknown `index` about the values (p,) of a fit; `size` is roughly its deviation there."""
     cancel, unknown = cancel or Never(), problem.unknowns[index]
-    best = solve(_Held(problem, index, None), whiteners, values, cancel, search)
+    best = solve(_WithFixed(problem, index, None), whiteners, values, cancel, search)
     centre = float(best.values[index])
     others = np.delete(best.values, index)
 
-    def risen(value: float, begin: Floats) -> tuple[float, Floats]:
+    def rise_at(value: float, begin: Floats) -> tuple[float, Floats]:
         try:
-            found = solve(_Held(problem, index, value), whiteners, begin, cancel, search)
-        except SpecError:  # held there, the simulation does not stay finite
+            found = solve(_WithFixed(problem, index, value), whiteners, begin, cancel, search)
+        except SpecError:  # with this value the simulation does not stay finite
             return math.inf, begin
         return 2 * (found.cost - best.cost), found.values
 
@@ -168,10 +172,10 @@ def profiled(
     ends: list[float | None] = []
     for number, bound in enumerate((unknown.low, unknown.high)):
 
-        def tell(step: int, number: int = number) -> None:
+        def report_progress(step: int, number: int = number) -> None:
             progress(0.5 * (number + 1 - float(np.exp(-step / 4))), f"{unknown.name}: {len(points)} values")
 
-        ends.append(_end(risen, points, (centre, others), bound, size, rise, tell))
+        ends.append(_end(rise_at, points, (centre, others), bound, size, rise, report_progress))
     progress(1.0, "done")
     order = sorted(value for value, risen_by in points.items() if math.isfinite(risen_by))
     return Profile(
@@ -183,47 +187,48 @@ def profiled(
         values=tuple(order),
         rises=tuple(points[value] for value in order),
         rise=rise,
-        better=min(points.values()) < -BETTER * rise,
+        better=min(points.values()) < -BETTER_FIT_SHARE * rise,
     )
 
 
 def _end(
-    risen: Callable[[float, Floats], tuple[float, Floats]],
+    rise_at: Callable[[float, Floats], tuple[float, Floats]],
     points: dict[float, float],
     begin: tuple[float, Floats],
     bound: float,
     size: float,
     rise: float,
-    tell: Callable[[int], None],
+    report_progress: Callable[[int], None],
 ) -> float | None:
-    """Goes from the best fit towards a bound until −2 ln L has risen enough, and adds what is found to `points`.
+    """Steps from the best fit towards a bound until −2 ln L has risen by `rise`; adds all values to `points`.
 
-    Returns where it has risen by `rise`; None where it does not as far as the bound, or as POINTS steps reach.
+    Returns the value with that rise, or None if neither the bound nor MOST_STEPS steps reach it.
     """
     (inside, others), step = begin, math.copysign(size, bound - begin[0])
-    for number in range(POINTS):
+    for number in range(MOST_STEPS):
         if inside == bound:
             return None
         value = min(inside + step, bound) if step > 0 else max(inside + step, bound)
-        points[value], others = risen(value, others)
-        tell(number)
+        points[value], others = rise_at(value, others)
+        report_progress(number)
         if points[value] >= rise:
-            return _crossing(risen, points, (inside, value), others, rise)
-        step *= 2 if points[value] < HARDLY * rise else 1
+            return _crossing(rise_at, points, (inside, value), others, rise)
+        step *= 2 if points[value] < SLOW_RISE_SHARE * rise else 1
         inside = value
     return None
 
 
 def _crossing(
-    risen: Callable[[float, Floats], tuple[float, Floats]],
+    rise_at: Callable[[float, Floats], tuple[float, Floats]],
     points: dict[float, float],
     between: tuple[float, float],
     others: Floats,
     rise: float,
 ) -> float:
-    """Where −2 ln L has risen by `rise`, between two values: its square root is nearly straight there.
+    """Returns the value between two others at which −2 ln L has risen by `rise`.
 
-    Where it is not, as before a cliff, the middle is tried: whenever the same end has moved twice.
+    Uses secant steps on √rise, which is nearly linear. It bisects after the same end has moved twice in a row, as
+    happens next to a region where the simulation is not finite.
     """
     (inside, outside), wanted, moved = between, math.sqrt(rise), [""]
     for _ in range(REFINEMENTS):
@@ -231,8 +236,8 @@ def _crossing(
         is_straight = math.isfinite(high) and moved[-2:] not in (["inside"] * 2, ["outside"] * 2)
         share = min(max((wanted - low) / (high - low), 0.02), 0.98) if is_straight else 0.5
         value = inside + (outside - inside) * share
-        points[value], others = risen(value, others)
-        if abs(points[value] - rise) <= CLOSE * rise:
+        points[value], others = rise_at(value, others)
+        if abs(points[value] - rise) <= END_TOLERANCE * rise:
             return value
         moved = [*moved, "inside" if points[value] < rise else "outside"]
         inside, outside = (value, outside) if points[value] < rise else (inside, value)

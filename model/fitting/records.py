@@ -1,4 +1,6 @@
-"""Traces prepared for a fit: checked, put on the grid of control periods, cut where samples are missing."""
+"""Prepares traces for a fit: checks them, puts them on the grid of control periods, cuts them where samples are
+missing.
+"""
 
 from __future__ import annotations
 
@@ -19,20 +21,21 @@ from model.simulation.inputs import RunInputs, inputs_of
 Signal = Literal["position", "velocity"]
 
 LEAST_SAMPLES = 10
-"""Least number of samples of a trace; fewer say nothing about motion."""
+"""Least number of samples of a trace; fewer do not show motion."""
 SETTLING = 0.4
-"""Time at the start of a record, s, that is simulated but not compared: how friction holds the arm there is not known,
-and the small jump of a simulation that finds its own balance would be taken for inertia."""
+"""Time at the start of a record, s, that is simulated but not compared. The friction that holds the arm there is
+unknown, and a fit would attribute the simulation's small initial jump to inertia.
+"""
 LEAST_MOTION_COUNTS = 4.0
 """Least motion, in counts of the sensor, of at least one joint in at least one trace: less is rounding and noise."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """One trace as a fit reads it.
+    """One trace in the form that a fit reads.
 
     Args:
-        inputs: what drives the simulation. measured: (m, n) rad (or rad/s), one column a modelled joint.
+        inputs: of the simulation. measured: (m, n) rad (or rad/s), one column per modelled joint.
         runs: stretches of samples without a gap.
     """
 
@@ -43,16 +46,16 @@ class Record:
 
     @property
     def samples(self) -> int:
-        """Samples that are compared."""
+        """Number of samples that are compared."""
         return sum(run.stop - run.start for run in self.runs)
 
 
 def records_of(traces: Sequence[Trace], machine: Machine, signal: Signal) -> tuple[Record, ...]:
-    """Traces prepared for a fit of `machine`.
+    """Prepares traces for a fit of `machine`.
 
     Raises:
-        TraceError: no traces, the same one twice, a joint missing, fewer than ten samples, no motion anywhere, or
-            no velocity where it is fitted.
+        TraceError: no traces, the same one twice, a joint missing, fewer than ten samples, no motion anywhere, or no
+            velocity where it is fitted.
     """
     if not traces:
         raise TraceError("no traces: a fit needs at least one")
@@ -69,8 +72,11 @@ def records_of(traces: Sequence[Trace], machine: Machine, signal: Signal) -> tup
 
 
 def noise_floor(records: Sequence[Record], machine: Machine, signal: Signal) -> Floats:
-    """(n,) standard deviation of a measurement: rounding (1/12 count²) and the sensor's noise. Where the machine states
-    no sensor it is estimated from the record by the median second difference, which is zero on a straight line."""
+    """Returns (n,) standard deviations of a measurement: rounding (1/12 count²) and the sensor's noise.
+
+    Where the machine states no sensor, it is estimated from the record by the median second difference, which is zero
+    on a straight line.
+    """
     floor = []
     for column, joint in enumerate(machine.modelled_joints):
         sensor = machine.joint(joint).sensor
@@ -81,8 +87,8 @@ def noise_floor(records: Sequence[Record], machine: Machine, signal: Signal) -> 
         if not readings:
             names = ", ".join(r.name for r in records)
             raise TraceError(
-                f"{names}: no three samples follow one another, so the noise of joint {joint} is not known; state its "
-                "`sensor` in the machine file, or use a record without gaps"
+                f"{names}: no three samples are consecutive, so the noise of joint {joint} cannot be estimated; "
+                "state its `sensor` in the machine file, or use a record without gaps"
             )
         spread = float(np.median([noise_of(reading) for reading in readings]))
         size = max(float(np.abs(r.measured[:, column]).max()) for r in records)
@@ -91,7 +97,7 @@ def noise_floor(records: Sequence[Record], machine: Machine, signal: Signal) -> 
 
 
 def resolution(sensor: Sensor) -> float:
-    """One count, rad or m."""
+    """Returns one count, rad or m."""
     return sensor.range.value / 2**sensor.bits
 
 
@@ -100,11 +106,13 @@ def _record(trace: Trace, machine: Machine, signal: Signal) -> Record:
     if len(trace) < LEAST_SAMPLES:
         raise TraceError(f"{trace.called}: {len(trace)} samples; a fit needs at least {LEAST_SAMPLES}")
     if trace.record.machine is not None and trace.record.machine.name != machine.name:
-        raise TraceError(f"{trace.called}: made on {trace.record.machine.name}, the model describes {machine.name}")
+        raise TraceError(
+            f"{trace.called}: recorded on {trace.record.machine.name}, but the model describes {machine.name}"
+        )
     inputs = inputs_of(trace, machine)
     columns = [trace.column(j) for j in machine.modelled_joints]
     if signal == "velocity" and trace.velocity is None:
-        raise TraceError(f"{trace.called}: has no velocity, which is what is to be fitted")
+        raise TraceError(f"{trace.called}: has no velocity, which is to be fitted")
     source = trace.velocity if signal == "velocity" and trace.velocity is not None else trace.position
     inputs = _calm_start(inputs, trace, columns)
     begin = int(np.searchsorted(inputs.rows * inputs.period, SETTLING))
@@ -117,7 +125,7 @@ def _record(trace: Trace, machine: Machine, signal: Signal) -> Record:
 
 
 def _calm_start(inputs: RunInputs, trace: Trace, columns: list[int]) -> RunInputs:
-    """Takes the mean drive over the initial rest as the drive before the record, because one sample is mostly noise."""
+    """Uses the mean drive over the initial rest as the drive before the record; one sample is mostly noise."""
     if trace.set_point is None or trace.drive is None:
         return inputs
     changed = np.abs(trace.set_point[:, columns] - trace.set_point[0, columns]).max(axis=1) > 1e-9
@@ -127,7 +135,7 @@ def _calm_start(inputs: RunInputs, trace: Trace, columns: list[int]) -> RunInput
 
 
 def _moves(record: Record, machine: Machine, signal: Signal) -> bool:
-    """Whether some joint was asked to move and did. An arm that only sags to its first set point does not count."""
+    """Whether a joint had moving set points and moved. An arm that only sags to its first set point does not count."""
     for column, joint in enumerate(machine.modelled_joints):
         sensor = machine.joint(joint).sensor
         least = LEAST_MOTION_COUNTS * resolution(sensor) if sensor is not None and signal == "position" else 0.0

@@ -1,4 +1,4 @@
-"""What a fit found: typed, saved as JSON, with lineage back to the traces."""
+"""Result of a fit: typed, saved as JSON, with lineage back to the traces."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from model.machine_model.record_verdict import RecordVerdict
 from model.record_check.finding import RecordFinding, doubts_headline
 
 RESULT_FORMAT = 1
-"""Version of the file; a reader refuses newer ones."""
+"""Version of the file; a reader rejects newer ones."""
 
 
 class FitResult(FrozenRecord):
-    """What a fit found. `names` and `covariance` are of everything that was free, nuisances included."""
+    """Result of a fit. `names` and `covariance` include all that was free, nuisances too."""
 
     format: Annotated[int, Field(ge=1)] = RESULT_FORMAT
     model: Model
@@ -37,7 +37,7 @@ class FitResult(FrozenRecord):
     verdict: RecordVerdict | None = None
     """Whether the model explains the records; None in results of older versions."""
     whitened_mean_square: float
-    """Mean square of the whitened residual: 1 where the noise model describes what is left."""
+    """Mean square of the whitened residual: 1 where the noise model describes the residual."""
     names: tuple[str, ...]
     values: tuple[float, ...]
     covariance: tuple[tuple[float, ...], ...]
@@ -49,12 +49,12 @@ class FitResult(FrozenRecord):
     converged: bool
     message: str
     on_the_edge: tuple[str, ...] = ()
-    """With consistent inertias, links whose body came out flat or thin: the traces ask for one that cannot exist."""
+    """With consistent inertias, links with a flat or thin fitted body: the traces suggest an inconsistent one."""
     record: tuple[RecordFinding, ...] = ()
-    """What the check of the traces found, before anything was fitted."""
+    """Findings of the check of the traces before the fit."""
 
     def __repr__(self) -> str:
-        """One line; `print` shows the parameters, too."""
+        """Returns one line; `print` shows the parameters, too."""
         traces = f"{len(self.traces)} trace{'s' if len(self.traces) > 1 else ''}"
         ended = "" if self.converged else ", not converged"
         return (
@@ -62,16 +62,16 @@ class FitResult(FrozenRecord):
         )
 
     def __str__(self) -> str:
-        """The line of `repr`, the parameters as a table, what is not determined, and the verdict."""
+        """Returns the line of `repr`, the parameters as a table, what is not determined, and the verdict."""
         return "\n".join([repr(self), text_of(self.parameters, self.identifiability), *self.said])
 
     def _repr_html_(self) -> str:
-        """The same, for a notebook."""
+        """Returns the same as HTML, for a notebook."""
         return html_of(repr(self)[1:-1], self.parameters, self.identifiability, self.said)
 
     @property
     def said(self) -> list[str]:
-        """The verdict in words, and a doubt that is not in it."""
+        """Returns the verdict in words, and a doubt that it does not contain."""
         if self.verdict is not None and self.verdict.doubt:
             return [self.verdict.text]
         verdict = [] if self.verdict is None else [self.verdict.text]
@@ -79,13 +79,16 @@ class FitResult(FrozenRecord):
 
     @property
     def doubt(self) -> str:
-        """One line where the traces are to be checked first, or the model ends much farther from them than it began;
-        empty where neither is so."""
+        """Warns, in one line, to check the traces first, or that the fitted model is much farther from them than
+        before.
+
+        Empty without such a reason.
+        """
         doubt = doubts_headline(self.record)
         return f"check the record first: {doubt}" if doubt else doubt_of(self.errors)
 
     def parameter(self, name: str) -> FittedParameter:
-        """The parameter of that name. Raises SpecError when it was not fitted."""
+        """Returns the parameter of that name. Raises SpecError if it was not fitted."""
         for parameter in self.parameters:
             if parameter.name == name:
                 return parameter
@@ -93,11 +96,11 @@ class FitResult(FrozenRecord):
 
     @property
     def covariance_matrix(self) -> NDArray[np.float64]:
-        """(p, p), in the order of `names`."""
+        """Covariance (p, p), in the order of `names`."""
         return np.array(self.covariance)
 
     def save(self, path: Path) -> None:
-        """Writes the result as JSON. Raises SpecError when the file cannot be written."""
+        """Writes the result as JSON. Raises SpecError if the file cannot be written."""
         try:
             path.write_text(self.model_dump_json(indent=1) + "\n", "utf-8")
         except OSError as error:
@@ -105,7 +108,7 @@ class FitResult(FrozenRecord):
 
 
 def is_result(path: Path) -> bool:
-    """Whether a file is a fit's result rather than a model alone, as far as can be told without reading it as one."""
+    """Whether a file looks like a fit's result rather than a model alone; it is not validated."""
     try:
         data = parse_json(read_text(path, str(path)), str(path))
     except SpecError:
@@ -114,13 +117,15 @@ def is_result(path: Path) -> bool:
 
 
 def load_result(path: Path) -> FitResult:
-    """A saved fit. Raises SpecError for no such file, another kind of file, or one of a newer version."""
+    """Loads a saved fit. Raises SpecError for a missing file, another kind of file, or a newer version."""
     data = parse_json(read_text(path, str(path)), str(path))
     version = data.get("format") if isinstance(data, dict) else None
     if isinstance(version, int) and version > RESULT_FORMAT:
-        raise SpecError(f"{path}: format {version} is newer than this program reads ({RESULT_FORMAT}); update it")
+        raise SpecError(f"{path}: format {version} is newer than this program supports ({RESULT_FORMAT}); update it")
     try:
         return FitResult.model_validate(data)
     except ValidationError as error:
         first = first_invalid(error)
-        raise SpecError(f"{path}: {first.where('file')}: {first.message}; not the result of a fit") from error
+        raise SpecError(
+            f"{path}: {first.where('file')}: {first.message}; the file is not the result of a fit"
+        ) from error

@@ -12,7 +12,7 @@ THRESHOLD = 4.0
 
 
 def huber(squares: Floats, samples: int, threshold: float = THRESHOLD) -> Floats:
-    """ρ, ρ′, ρ″ (3, m) of squared residuals, as `scipy.optimize.least_squares` takes a loss.
+    """Returns ρ, ρ′, ρ″ (3, m) of squared residuals, the form that `scipy.optimize.least_squares` expects.
 
     The first `samples` are data; the rest (priors) stay quadratic.
     """
@@ -26,5 +26,5 @@ def huber(squares: Floats, samples: int, threshold: float = THRESHOLD) -> Floats
 
 
 def influence(residual: Floats, threshold: float = THRESHOLD) -> Floats:
-    """ψ(r): the residual, outliers cut to the threshold."""
+    """Returns ψ(r): the residual, with outliers cut to the threshold."""
     return np.clip(residual, -threshold, threshold)

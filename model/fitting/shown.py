@@ -1,4 +1,4 @@
-"""Fitted parameters for people: a terminal, a page and a notebook show the same table."""
+"""Formats fitted parameters for people: terminal, page and notebook show the same table."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from model.fitting.fitted import FittedParameter, JointError
 from model.fitting.identifiability import IdentifiabilityReport
 
 WORSE = 1.5
-"""By which factor a joint's error must have grown to be doubted: a little is given away for other joints."""
+"""Factor by which a joint's error must have grown to raise a doubt; a fit may give up a little on one joint for others.
+"""
 ABOVE_NOISE = 30.0
-"""How many times the noise it must be, too."""
+"""Multiple of the noise that it must exceed, too."""
 COLUMNS = ("parameter", "value", "95 % interval", "unit", "before")
-"""What a terminal and a notebook show."""
+"""Output for a terminal or a notebook."""
 
 
 def parameter_table(parameters: Sequence[FittedParameter]) -> Table:
-    """Values with intervals where the data give one; in brackets what the model carries where they do not."""
+    """Returns values with intervals where the data give them; in brackets the model's values where they do not."""
     return Table(
         (*COLUMNS, "expected"),
         tuple(map(_row, parameters)),
-        "In brackets: the traces do not determine the number, and the model carries one of those that fit as well. "
-        "Intervals take the correlation of the residual into account.",
+        "In brackets: values that the traces do not determine; others fit as well. "
+        "Intervals allow for the correlation of the residual.",
     )
 
 
@@ -43,42 +44,43 @@ def _row(p: FittedParameter) -> tuple[Cell, ...]:
 
 
 def significant(value: float, deviation: float) -> int:
-    """Number of digits of a value that shows its deviation with two digits, at most seven."""
+    """Returns the number of digits of a value that shows its deviation with two digits, at most seven."""
     if value == 0 or deviation <= 0:
         return 3
     return max(2, min(7, 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(deviation))))
 
 
 def known_of(parameters: Sequence[FittedParameter]) -> str:
-    """How many of them the data determine, in words."""
+    """Returns in words how many of them the data determine."""
     return f"{sum(p.value is not None for p in parameters)} of {len(parameters)} parameters known"
 
 
 def doubt_of(errors: Sequence[JointError]) -> str:
-    """One line where a fit ends much farther from its records than it began, so that neither values nor intervals can
-    be relied on; empty where it does not.
+    """Returns one line if a fit ends much farther from its records than it began; its values are then unusable. Else
+    empty.
 
-    The sum of squares that a fit makes small is robust: it may fall all the same.
+    This can happen because the fit minimises a robust sum of squares, which may fall all the same.
     """
     worse = [one for one in errors if one.after > WORSE * one.before and one.after > ABOVE_NOISE * one.floor]
     if not worse:
         return ""
     joints = f"joint{'s' if len(worse) > 1 else ''} {', '.join(str(one.joint) for one in worse)}"
     return (
-        f"the fitted model is farther from the records than before ({joints}): do not use its values. Where no "
-        "controller holds the arm, a simulation soon leaves any record: shorten the records, or compare torques"
+        f"the fitted model is farther from the records than before ({joints}): do not use its values. Without a "
+        "controller that holds the arm, a simulation soon departs from any record: "
+        "shorten the records, or compare torques"
     )
 
 
 def text_of(parameters: Sequence[FittedParameter], report: IdentifiabilityReport) -> str:
-    """The table in columns of spaces, and a line for each combination that is not determined."""
+    """Returns the table in columns of spaces, and a line for each combination that is not determined."""
     return "\n".join([str(parameter_table(parameters).only(*COLUMNS)), *_undetermined(report)])
 
 
 def html_of(
     title: str, parameters: Sequence[FittedParameter], report: IdentifiabilityReport, below: Sequence[str] = ()
 ) -> str:
-    """The same for a notebook, under a title, with further lines below. Every text is escaped."""
+    """Returns the same as HTML for a notebook, under a title, with further lines below. Every text is escaped."""
     lines = "<br/>".join(map(escape, [*_undetermined(report), *below]))
     return f"<div><b>{escape(title)}</b>{parameter_table(parameters).only(*COLUMNS).html()}{lines}</div>"
 

@@ -1,4 +1,4 @@
-"""The residuals of a simulated model on recorded set points, with exact derivatives, on all cores."""
+"""Computes residuals of a simulated model on recorded set points, with exact derivatives, on all cores."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class SimulatedProblem:
     """Simulated − measured for records of one machine.
 
     Args:
-        offset: per record (m, n) residual, rad, that the model itself would leave on average; None for none.
-        memory: the last simulation without and the last with derivatives. Problems that differ in offset or readings
-            alone share it: a round begins where the last one ended, and need not simulate that again.
+        offset: per record the expected residual (m, n), rad, of a right model; None for none.
+        memory: the last simulation without and the last with derivatives. Problems that differ only in offset or
+            readings share it: a round begins where the last one ended and reuses its simulation.
     """
 
     model: Model
@@ -57,15 +57,15 @@ class SimulatedProblem:
         return [record.runs for record in self.records]
 
     def with_offset(self, offset: Sequence[Floats] | None) -> SimulatedProblem:
-        """The problem with another expected residual."""
+        """Returns the problem with another expected residual."""
         return replace(self, offset=None if offset is None else tuple(offset))
 
     def with_readings(self, readings: Sequence[Floats]) -> SimulatedProblem:
-        """The problem with other measurements (m, n) in place of the recorded ones."""
+        """Returns the problem with other measurements (m, n) in place of the recorded ones."""
         return replace(self, records=tuple(replace(r, measured=m) for r, m in zip(self.records, readings, strict=True)))
 
     def noisy_readings(self, values: Floats, rng: np.random.Generator) -> list[Floats]:
-        """Readings (m, n) of each record if the model with these values were the arm: noise drawn, readings rounded."""
+        """Returns readings (m, n) of each record, simulated with these values, drawn noise and rounded readings."""
         machine = self.model.machine
         sensors = [machine.joint(j).sensor for j in machine.modelled_joints]
         deviations = np.array([0.0 if s is None or s.noise is None else s.noise.value for s in sensors])
@@ -79,7 +79,7 @@ class SimulatedProblem:
         vectors = np.tile(vector, (count, 1))
         out = BatchRun(self.model, prepared, np.arange(count), vectors, np.array(initials), self.step).run()
         if not np.isfinite(out).all():
-            raise SpecError("a simulation with noise does not stay finite: the loop is unstable")
+            raise SpecError("a simulation with noise does not stay finite: the control loop is unstable")
         return [at_rows(out[t, OUT_READING, : len(r.inputs)], r.inputs.rows) for t, r in enumerate(self.records)]
 
     @cached_property
@@ -88,7 +88,7 @@ class SimulatedProblem:
         return [prepare(self.model, record.inputs, options) for record in self.records]
 
     def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
-        """Residuals of every record. Raises SpecError when a simulation does not stay finite."""
+        """Returns residuals of every record. Raises SpecError if a simulation does not stay finite."""
         found = []
         for t, (record, simulated) in enumerate(zip(self.records, self._simulated(values, derivatives), strict=True)):
             residual = simulated.signal - record.measured
@@ -127,7 +127,7 @@ class SimulatedProblem:
             own = [row for row, trace in enumerate(which) if trace == t]
             simulated = signal[own[0], : len(record.inputs)].real
             if not np.isfinite(simulated).all():
-                raise SpecError(f"the simulation of {record.name} does not stay finite: the loop is unstable")
+                raise SpecError(f"the simulation of {record.name} does not stay finite: the control loop is unstable")
             jacobian = None
             if derivatives:
                 jacobian = np.zeros((len(self.unknowns), *record.measured.shape))
@@ -139,7 +139,7 @@ class SimulatedProblem:
         return found
 
     def _rows(self, derivatives: bool) -> tuple[list[int], list[int]]:
-        """Record and perturbed unknown (−1: none) of every run."""
+        """Returns record and perturbed unknown (−1: none) of every run."""
         if not derivatives:
             return list(range(len(self.records))), [-1] * len(self.records)
         which, seeds = [], []
@@ -150,7 +150,7 @@ class SimulatedProblem:
         return which, seeds
 
     def _state(self, values: Floats) -> tuple[Floats, list[Floats]]:
-        """Flat vector and initial states for values of the unknowns."""
+        """Returns the flat vector and initial states for values of the unknowns."""
         vector = self.model.vector.copy()
         initials = [record.inputs.initial.copy() for record in self.records]
         for value, unknown in zip(values, self.unknowns, strict=True):

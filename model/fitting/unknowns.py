@@ -1,4 +1,4 @@
-"""What a fit may change: parameters with the start of their search, their bounds and their priors."""
+"""Unknowns of a fit: parameters with the start of their search, their bounds and their priors."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from model.units import torque_power
 
 @dataclass(frozen=True)
 class Unknown:
-    """A parameter that is to be found, and how it is searched.
+    """A parameter to fit, with its search.
 
     Args:
-        parameter: what is to be found: kind, joints, effect and part; its own value, bounds and deviation take no part.
+        parameter: its kind, joints, effect and part. The parameter's own value, bounds and deviation are ignored.
         start: where the search begins. low, high: physical bounds, ±inf for none.
-        expected, deviation: Gaussian prior; deviation None where nothing is claimed.
-        nuisance: found only so that the others are not biased by it (start posture, bend of a potentiometer).
-        trace: index of the only trace it belongs to; None for all.
-        size: natural size of a change where no deviation is claimed; None: from the starting value, or the bounds.
+        expected, deviation: Gaussian prior; deviation None for no prior.
+        nuisance: fitted only so that it does not bias the others (start posture, bend of a potentiometer).
+        trace: index of the only trace that it belongs to; None for all.
+        size: natural size of a change if there is no deviation; None: from the starting value, or the bounds.
     """
 
     parameter: Parameter
@@ -48,7 +48,7 @@ class Unknown:
 
     @property
     def as_stated(self) -> Unknown:
-        """The same with the deviation that the machine file states, where an earlier fit knows the number better."""
+        """Returns the unknown with the deviation of the machine file in place of that of an earlier fit."""
         stated = self.parameter.deviation
         if self.deviation is None or stated is None or stated <= self.deviation:
             return self
@@ -56,9 +56,10 @@ class Unknown:
 
     @property
     def within_stated(self) -> Unknown:
-        """The same, to be found within one stated deviation of what is expected; itself where none is stated.
+        """Returns the unknown with bounds at one stated deviation from the expected value; unchanged if none is stated.
 
-        A nuisance has its own: a file states the linearity of a potentiometer, of which each of its bends is a share.
+        A nuisance uses its own deviation. For example, a file states a potentiometer's linearity, and each bend's
+        deviation is a share of that.
         """
         spread = self.deviation if self.nuisance else self.as_stated.deviation
         if spread is None:
@@ -78,7 +79,7 @@ class Unknown:
 
     @property
     def kind(self) -> Kind:
-        """What sort of number it is."""
+        """Kind of the parameter."""
         return self.parameter.kind
 
     @property
@@ -105,10 +106,10 @@ class Unknown:
 
 
 def scales(unknowns: tuple[Unknown, ...]) -> Floats:
-    """(p,) natural sizes."""
+    """Returns (p,) natural sizes."""
     return np.array([u.scale for u in unknowns])
 
 
 def prior_precision(unknowns: tuple[Unknown, ...]) -> Floats:
-    """(p,) one over the prior variance; 0 where nothing is claimed."""
+    """Returns (p,) 1 / prior variance; 0 without a prior."""
     return np.array([0.0 if u.deviation is None else u.deviation**-2 for u in unknowns])

@@ -1,8 +1,8 @@
-"""Whitening of residuals by autoregression, so that correlated samples do not count as independent ones.
+"""Whitens residuals by autoregression, so that correlated samples do not count as independent.
 
-The residual of a closed loop is not white: the controller answers the sensor's noise, so slow errors are suppressed and
-fast ones are not. An autoregressive model of the residual, estimated from the residual itself, undoes that; residual
-and Jacobian are filtered alike (generalised least squares).
+The residual of a closed loop is not white: the controller reacts to the sensor's noise, so slow errors are suppressed
+and fast ones are not. An autoregressive model, estimated from the residual itself, reverses that. Residual and Jacobian
+are filtered alike (generalised least squares).
 """
 
 from __future__ import annotations
@@ -30,12 +30,11 @@ class Whitener:
 
     @property
     def order(self) -> int:
-        """Samples on which the full predictor is based."""
+        """Number of samples that the full predictor uses."""
         return len(self.predictors) - 1
 
     def whitened(self, signal: Floats) -> Floats:
-        """Filters (n, …) along its first axis. The first samples are predicted from as many as there are
-        before them."""
+        """Filters (n, …) along its first axis. The first samples are predicted from as many as precede them."""
         result = np.empty_like(signal)
         for k in range(min(self.order, len(signal))):
             past = signal[:k][::-1]
@@ -48,21 +47,22 @@ class Whitener:
         return result
 
     def coloured(self, signal: Floats) -> Floats:
-        """Filters (n, …) along its first axis the other way: independent noise of unit size becomes noise like that
-        which the predictors were fitted to, begun at rest."""
+        """Filters (n, …) along its first axis inversely, from rest: white noise of unit variance becomes noise like the
+        fitted one.
+        """
         bands = np.tile(np.append(1.0, -self.predictors[-1])[:, None], len(signal))
         return np.asarray(solve_banded((self.order, 0), bands, self.deviations[-1] * signal))
 
 
 def white(deviation: float) -> Whitener:
-    """Independent noise of one standard deviation."""
+    """Returns the whitener of independent noise of one standard deviation."""
     return Whitener((np.zeros(0),), np.array([deviation]))
 
 
 def autocovariance(runs: Sequence[Floats], lags: int) -> Floats:
-    """Pooled autocovariance (lags + 1,) of several uninterrupted runs (n,) about zero.
+    """Returns the pooled autocovariance (lags + 1,) of several uninterrupted runs (n,) about zero.
 
-    Divided by the total count at every lag, which keeps the sequence positive definite.
+    It is divided by the total count at every lag, which keeps the sequence positive definite.
     """
     total = sum(len(run) for run in runs)
     sums = np.zeros(lags + 1)
@@ -73,10 +73,10 @@ def autocovariance(runs: Sequence[Floats], lags: int) -> Floats:
 
 
 def fitted_whitener(runs: Sequence[Floats], longest: int, floor: float) -> Whitener:
-    """Autoregression of the order (up to `longest`) that Akaike's criterion chooses, by Levinson's recursion.
+    """Fits an autoregression of the order (up to `longest`) that Akaike's criterion chooses, by Levinson's recursion.
 
-    `floor` is the least standard deviation that a prediction can have: the sensor's own noise. Without it, an arm that
-    stands still would count as measured without noise.
+    `floor` is the least standard deviation of a prediction: the sensor's own noise. Without it, an arm at rest would
+    count as measured without noise.
     """
     count = sum(len(run) for run in runs)
     longest = min(longest, max(0, count // 20))

@@ -1,6 +1,6 @@
-"""Inverse dynamics along a recorded motion: the torque that it needs, less the torque that was supplied.
+"""Inverse dynamics along a recorded motion: the torque that it needs − the torque that was applied.
 
-Nothing is simulated, so it also serves a machine whose controller is unknown, and a motion that no simulation follows
-for long, such as an unstable one without a controller. In return it needs accelerations, which noise spoils: motion and
-torques are low-passed alike.
+Nothing is simulated. So it also serves a machine with an unknown controller, and a motion that no simulation follows
+for long, such as an unstable one without a controller. But it needs accelerations, which are noisy; motion and torques
+are therefore low-passed alike.
 """

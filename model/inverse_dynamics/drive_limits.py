@@ -1,4 +1,4 @@
-"""Where a recorded drive stands at a limit that no file states: what acts there may be less than what is recorded."""
+"""Finds where a recorded drive is at a limit that no file states: less may act there than is recorded."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from daq.contracts.machine import DcMotor, Machine
 from model.arrays import Floats, Mask
 
 AT_LIMIT = 1e-6
-"""Share of its largest value within which a drive stands at it."""
+"""Share of its largest value within which a drive counts as at the limit."""
 RUN = 3
-"""Samples in a row at the largest value that show a limit: a motion passes its largest value once."""
+"""Consecutive samples at the largest value that show a limit: a motion passes its largest value once."""
 JUMP = 1.5
-"""Least jump to a limit or from it, in the smallest step between two sizes of the record."""
+"""Least jump to or from a limit, in the smallest step between two values of the record."""
 SEVERAL = 10
-"""Fewest sizes of a drive that may be those of rounding; one that switches has a few, far apart."""
+"""Least number of values of a drive that may result from rounding; a switched drive has a few, far apart."""
 LATER = 2
-"""Samples by which a drive may act later than it is recorded, at most (`drive_timing`)."""
+"""Largest lag of a drive behind its record, in samples (`drive_timing`)."""
 MOST = 0.9
-"""Share of the samples beyond which a drive only switches, and is taken as it was recorded."""
+"""Share of samples at the limit above which a drive counts as switched, and is used as recorded."""
 
 
 def stands_at_limit(drive: Floats, machine: Machine) -> Mask:
-    """(r, n) where a recorded torque, force or current (r, n) is at its limit.
+    """Returns (r, n) True where a recorded torque, force or current (r, n) is at its limit.
 
-    A current loop, or whatever forms a torque, is asked for its largest value where it may not give it: the supply's
-    voltage, less the back-EMF, is not known. Of a DC motor the volts are recorded, and the file states the supply.
+    A current loop, or another source of torque, may fail to supply its largest value: the supply's voltage, minus the
+    back-EMF, is not known. For a DC motor the volts are recorded, and the file states the supply.
     """
     found = np.zeros(drive.shape, dtype=bool)
     for column, joint in enumerate(machine.modelled_joints):
@@ -43,10 +43,10 @@ def stands_at_limit(drive: Floats, machine: Machine) -> Mask:
 
 
 def at_shown_limit(drive: Floats) -> NDArray[np.bool_]:
-    """(r,) where one recorded drive (r,) is at a limit that it shows itself; nowhere where it shows none.
+    """Returns (r,) True where a recorded drive (r,) is at a limit that the record itself shows.
 
-    It shows one by standing at its largest size for several samples, and by a jump to it or from it. A drive that is
-    rounded also stands at the top of a smooth motion, and comes there step by step.
+    A limit shows as several samples at the largest value, with a jump to it or from it. A rounded drive also stays at
+    the top of a smooth motion, but reaches it step by step.
     """
     size = np.abs(drive)
     at = size >= (1 - AT_LIMIT) * size.max()
@@ -63,8 +63,10 @@ def at_shown_limit(drive: Floats) -> NDArray[np.bool_]:
 
 
 def pieces_of(at_limit: NDArray[np.bool_], longest: int) -> list[slice]:
-    """The stretches (r,) of one joint at its limit, in pieces of `longest` samples at most; each a little longer than
-    the limit, since what is asked for acts later."""
+    """Returns the stretches (r,) of one joint at its limit, in pieces of up to `longest` samples.
+
+    Each is slightly longer than the limit, since the drive acts later than it is recorded.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate(([False], at_limit, [False])).astype(int)))
     return [
         slice(first, first + longest if first + longest < end else int(end) + LATER)
@@ -74,7 +76,7 @@ def pieces_of(at_limit: NDArray[np.bool_], longest: int) -> list[slice]:
 
 
 class _Recorded(Protocol):
-    """What is read of a recorded motion."""
+    """The fields of a recorded motion that are used here."""
 
     @property
     def time(self) -> Floats: ...
@@ -86,10 +88,10 @@ class _Recorded(Protocol):
 
 @dataclass(frozen=True)
 class DrivesAtLimit:
-    """Where drives stand at limits that no file states.
+    """Drives at limits that no file states.
 
-    shares: joints and their share of the time there, of all records. unknown: joints of which some record tells
-    nothing for that reason; not_examined: those of which none does.
+    shares: joints and their share of the time there, over all records. unknown: joints whose torque is not known in
+    some record for that reason; not_examined: those for which that holds in all records.
     """
 
     shares: tuple[tuple[int, float], ...]
@@ -98,7 +100,7 @@ class DrivesAtLimit:
 
 
 def find_drives_at_limit(records: Sequence[_Recorded], joints: Sequence[int]) -> DrivesAtLimit:
-    """How much of records their drives stand at such limits; `joints` are the records' columns."""
+    """Computes how long drives are at such limits; `joints` are the records' columns."""
     weights = [float(np.ptp(r.time)) for r in records]
     shares = np.average([r.at_limit.mean(axis=0) for r in records], axis=0, weights=weights)
     unknown = np.array([r.not_known for r in records])

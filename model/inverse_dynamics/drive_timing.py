@@ -1,8 +1,8 @@
-"""How long after its sample a recorded drive acts, where no file tells: a number of the record's, of every joint.
+"""Lateness of a recorded drive: the time from its sample until it acts, a nuisance per joint.
 
-A controller holds a drive until its next sample, so the drive acts half a sample late on average; the computation
-before it and a current loop behind it take more. No record shows which of these was at work, so lateness up to two
-samples is fitted as a nuisance beside the tolerances (decision 0053), and is no effect.
+A controller holds a drive until its next sample, so the drive acts half a sample late on average. Computation before it
+and a current loop after it add to that. No record shows which of these was present. Lateness up to two samples is
+therefore fitted as a nuisance beside the tolerances (decision 0053), and is no effect.
 """
 
 from __future__ import annotations
@@ -24,12 +24,14 @@ DEVIATION = 0.5
 MOST = 2.0
 """Largest lateness that is no effect, in samples."""
 DELAY = "input_delay"
-"""The effect that is named beyond that; on its joint it takes the place of the nuisance."""
+"""The effect for larger lateness; on its joint it replaces the nuisance."""
 
 
 def timing_unknowns(model: Model) -> tuple[Unknown, ...]:
-    """The lateness of every joint's drive, but for joints whose delay the model has as an effect; none where the file
-    describes a controller, whose period is known."""
+    """Returns the lateness of every joint's drive, except joints with a delay effect in the model.
+
+    Empty if the file describes a controller, whose period is known.
+    """
     if holds_drive_between_samples(model.machine):
         return ()
     return tuple(
@@ -40,14 +42,18 @@ def timing_unknowns(model: Model) -> tuple[Unknown, ...]:
 
 
 def expected_timing(model: Model) -> dict[str, float]:
-    """What is expected of the lateness of every joint's drive, by name: no file states it, so that it is no error of a
-    model as it was given."""
+    """Returns the expected lateness of every joint's drive, by name.
+
+    No file states it, so it is no error of the given model.
+    """
     return {unknown.name: unknown.expected for unknown in timing_unknowns(model)}
 
 
 def samples_late(model: Model, values: Mapping[str, float]) -> Floats:
-    """Lateness (n,) of the joints' drives in samples, as `values` have it by name; 0 where they do not name it, and on
-    a joint whose delay the model has as an effect."""
+    """Returns the lateness (n,) of the joints' drives in samples, from `values` by name.
+
+    0 if `values` lacks it, and for a joint with a delay effect in the model.
+    """
     joints, delayed = model.machine.modelled_joints, _delayed(model)
     return np.array([0.0 if j in delayed else values.get(_lateness(j).name, 0.0) for j in joints])
 

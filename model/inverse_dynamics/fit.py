@@ -1,4 +1,4 @@
-"""Parameters from recorded torques: `daq fit --torques`. What the records determine, and the torque that is left."""
+"""Fits parameters to recorded torques (`daq fit --torques`), with verdicts and the residual torque."""
 
 from __future__ import annotations
 
@@ -43,15 +43,18 @@ from model.units import joint_unit
 CUTOFF = 12.0
 """Default cutoff of the low-pass, Hz."""
 LEAST_LEFT = 1e-4
-"""Least residual that weighs a round, as a share of the drive's torque in the first and of the first in the last: a
-record without noise leaves next to none."""
+"""Least residual used for weights: in the first round a share of the drive's torque, in the last a share of the first.
+A record without noise leaves almost none.
+"""
 LONGEST_MEMORY = 40
-"""Samples over which the whitening of residual torques looks back, at most: a low-passed residual is correlated."""
+"""Most preceding samples that the whitening of residual torques uses: a low-passed residual is correlated."""
 
 
 class TorqueError(FrozenRecord):
-    """Errors of one trace: root mean square of each joint's residual torque and of its recorded torque; `share` is
-    √(Σ residual² / Σ torque²) over all joints."""
+    """Errors of one trace: root mean square of each joint's residual torque and of its recorded torque.
+
+    `share` is √(Σ residual² / Σ torque²) over all joints.
+    """
 
     trace: str
     held_out: bool
@@ -61,8 +64,9 @@ class TorqueError(FrozenRecord):
 
 
 class TorqueFit(FrozenRecord):
-    """The result of a fit of torques. `in_sample` and `held_out` are √(Σ residual² / Σ torque²) over all joints and
-    compared samples."""
+    """Result of a fit of torques. `in_sample` and `held_out` are √(Σ residual² / Σ torque²) over all joints and
+    samples.
+    """
 
     model: Model
     parameters: tuple[FittedParameter, ...]
@@ -76,27 +80,28 @@ class TorqueFit(FrozenRecord):
     evaluations: int
     converged: bool
     at_limit: tuple[tuple[int, float], ...] = ()
-    """Joints whose drives stand at limits that the file does not state, with their share of the time there: how much
-    less acts there is found beside all else."""
+    """Joints whose drives are at limits that the file does not state, with their share of the time. The missing torque
+    is estimated as well.
+    """
     unknown_joints: tuple[int, ...] = ()
-    """Of these, joints of which a trace tells nothing for that reason."""
+    """Those of them whose torque is not known in some trace for that reason."""
     on_the_edge: tuple[str, ...] = ()
-    """With consistent inertias, links whose body came out flat or thin: the traces ask for one that cannot exist."""
+    """With consistent inertias, links with a flat or thin fitted body: the traces suggest an inconsistent one."""
     record: tuple[RecordFinding, ...] = ()
-    """What the check of the traces found, before anything was fitted."""
+    """Findings of the check of the traces before the fit."""
 
     def __repr__(self) -> str:
-        """One line; `print` shows the parameters, too."""
+        """Returns one line; `print` shows the parameters, too."""
         held_out = "" if self.held_out is None else f", held out {self.held_out:.1%}"
-        left = f"left of the torque {self.in_sample:.1%}{held_out}"
+        left = f"remaining torque {self.in_sample:.1%}{held_out}"
         return f"<TorqueFit {self.model.identity}: {known_of(self.parameters)}, {left}>"
 
     def __str__(self) -> str:
-        """The line of `repr`, the parameters as a table, what is not determined, and the verdict."""
+        """Returns the line of `repr`, the parameters as a table, what is not determined, and the verdict."""
         return "\n".join([repr(self), text_of(self.parameters, self.identifiability), *self._said])
 
     def _repr_html_(self) -> str:
-        """The same, for a notebook."""
+        """Returns the same as HTML, for a notebook."""
         return html_of(repr(self)[1:-1], self.parameters, self.identifiability, self._said)
 
     @property
@@ -125,13 +130,14 @@ def fit_torques(
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> TorqueFit:
-    """Fit the parameters that the options choose, so that the motion needs the torque that was supplied.
+    """Fits the parameters that the options select, so that the motion needs the torque that was applied.
 
-    Least squares with priors; verdicts and 95 % intervals take the correlation of the residual into account.
+    Least squares with priors; verdicts and 95 % intervals allow for the correlation of the residual.
 
     Raises:
         TraceError, SpecError: for traces or options that cannot give a result, and for an effect in the model that
-            torques cannot show (`NOT_IN_TORQUES`). CancelledError: when asked to end.
+            torques cannot show (`NOT_IN_TORQUES`).
+        CancelledError: when cancelled.
     """
     options, cancel = options or FitOptions(), cancel or Never()
     _check_effects(model)
@@ -153,11 +159,11 @@ def fit_torques(
         progress(0.9 * (1 - float(np.exp(-count / 10))), f"{count} evaluations, residual {rms:.3g} of the first")
 
     search = Search(options.robust, options.tolerance, options.most_evaluations or 60, report_search)
-    # a joint of which no record tells anything has a residual of 0, which nothing is to be divided by
+    # the residual is 0 on a joint without information in any record; avoid a division by it
     torques = np.array(_rms(np.concatenate(problem.balance.supplied_by_drive())))
     begun = np.maximum(_rms(first), LEAST_LEFT * np.where(torques > 0.0, torques, 1.0))
     found = solve(problem, [white(float(size)) for size in begun], begin, cancel, search, coordinates)
-    # again, weighed by what is left: by the residual of the given model, priors would count too much
+    # fit again, weighted by the remaining residual: with that of the given model, priors would weigh too much
     left = np.concatenate([e.residual for e in problem.evaluate(found.values, derivatives=False)])
     sizes = np.maximum(_rms(left), LEAST_LEFT * begun)
     found = solve(problem, [white(float(size)) for size in sizes], found.values, cancel, search, coordinates)
@@ -198,7 +204,7 @@ def fit_torques(
 
 
 def torque_curves(model: Model, trace: Trace, cutoff: float = CUTOFF) -> TorqueCurves:
-    """Recorded and residual torque along a trace, by a model. Raises TraceError and SpecError as `fit_torques` does."""
+    """Returns recorded and residual torque along a trace. Raises TraceError and SpecError as `fit_torques` does."""
     pieces = in_pieces(as_used([trace], model.machine))
     motions = recorded_motions(pieces, model.machine, cutoff)
     balance = TorqueBalance(model, motions)
@@ -212,25 +218,23 @@ def torque_curves(model: Model, trace: Trace, cutoff: float = CUTOFF) -> TorqueC
 
 
 def _driven_motion(model: Model, trace: Trace, cutoff: float) -> RecordedMotion:
-    """The motion of a trace. Raises TraceError where its drive is zero throughout: there is no torque to fit to."""
+    """Returns the motion of a trace. Raises TraceError if its drive is zero throughout, without torque to fit to."""
     motion = recorded_motion(trace, model.machine, cutoff)
     if not TorqueBalance(model, (motion,)).supplied_by_drive()[0].any():
-        raise TraceError(f"trace {motion.name}: its drive is 0 throughout, so it has no torque to fit to")
+        raise TraceError(f"trace {motion.name}: its drive is 0 throughout, so there is no torque to fit to")
     return motion
 
 
 def _check_effects(model: Model) -> None:
     for use in model.effects:
         if use.name in NOT_IN_TORQUES:
-            raise SpecError(
-                f"effect {use.name}: cannot take part in a fit of torques: {NOT_IN_TORQUES[use.name]}; leave it out"
-            )
+            raise SpecError(f"effect {use.name}: cannot be fitted to torques: {NOT_IN_TORQUES[use.name]}; leave it out")
 
 
 def _judge_parameters(
     problem: TorqueProblem, values: Floats, options: FitOptions
 ) -> tuple[tuple[FittedParameter, ...], IdentifiabilityReport]:
-    """Values with intervals, and what the records do not determine."""
+    """Returns values with intervals, and the report on what the records do not determine."""
     evaluations = problem.evaluate(values, derivatives=True)
     whiteners = [
         fitted_whitener([e.residual[:, j] for e in evaluations], LONGEST_MEMORY, 1e-9)
@@ -251,7 +255,7 @@ def _judge_parameters(
 
 
 def _error(model: Model, motion: RecordedMotion, *, held_out: bool) -> tuple[TorqueError, float, float]:
-    """The error of one trace, and the sums of squares of residual and torque."""
+    """Returns the error of one trace, and the sums of squares of residual and torque."""
     balance = TorqueBalance(model, (motion,))
     left, torque = balance.residual({})[0], balance.supplied_by_drive()[0]
     squares, whole = float((left**2).sum()), float((torque**2).sum())
@@ -261,7 +265,7 @@ def _error(model: Model, motion: RecordedMotion, *, held_out: bool) -> tuple[Tor
 
 
 def _verdict(model: Model, traces: Sequence[Trace], motions: Sequence[RecordedMotion], cutoff: float) -> RecordVerdict:
-    """The verdict on the records that were fitted to; the noise is that of a diagnosis."""
+    """Returns the verdict on the records that were fitted to; the noise is that of a diagnosis."""
     balance = TorqueBalance(model, tuple(motions))
     residual = np.concatenate(balance.residual({}))
     torque = _rms(np.concatenate(balance.supplied_by_drive()))

@@ -1,4 +1,4 @@
-"""Dry friction of joints that stand or turn: it takes whatever torque holds them, up to what it can."""
+"""Dry friction of joints at rest or at a reversal: it takes any torque that holds them, up to its limit."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.inverse_dynamics.smoothing import low_pass
 
 HOLDING_ROUNDS = 4
-"""Rounds in which friction of a slow joint takes up what is left below the cutoff: without any, steps of a set point
-left 2.4 times the noise on a sound rig, after two 1.8, after four 1.7."""
+"""Rounds in which friction of a slow joint takes torque that remains below the cutoff. On a healthy rig, steps of a set
+point left 2.4 times the noise without any round, 1.8 after two, and 1.7 after four.
+"""
 
 
 class RestingFriction(NamedTuple):
-    """What friction does where a joint hardly moves (k, n), N·m.
+    """Friction torque where a joint hardly moves (k, n), N·m.
 
-    sliding: its torque by the smoothed direction of motion, which the balance has counted. lowest, highest: limits of
-    the torque while the joint stands; against backward motion it is positive.
+    sliding: its torque for the smoothed direction of motion, which the balance already contains. lowest, highest:
+    limits of the torque while the joint is at rest; positive against backward motion.
     """
 
     sliding: Floats
@@ -29,13 +30,16 @@ class RestingFriction(NamedTuple):
     highest: Floats
 
     def of_joint(self, joint: int) -> RestingFriction:
-        """Of one joint (index) alone, (k, 1) each."""
+        """Returns the values of one joint (index), (k, 1) each."""
         return RestingFriction(*(part[:, joint : joint + 1] for part in self))
 
 
 def friction_at_rest(level: Floats, motion: LinkMotion, joints: Floats) -> RestingFriction:
-    """Coulomb friction of a level (k, n), and direction-dependent, Stribeck and breakaway friction, of joints
-    (n, PER_JOINT) that stand or turn. Losses of gears are not held."""
+    """Returns the friction of joints (n, PER_JOINT) at rest or at a reversal.
+
+    It includes Coulomb friction of a level (k, n), and direction-dependent, Stribeck and breakaway friction, but no
+    losses of gears.
+    """
     more, fading = joints[:, at.DIRECTION], joints[:, at.STRIBECK]
     speed = np.where(fading != 0.0, joints[:, at.STRIBECK_SPEED], 1.0)
     contact = motion.contact
@@ -50,12 +54,12 @@ def friction_at_rest(level: Floats, motion: LinkMotion, joints: Floats) -> Resti
 
 
 def subtract_held(left: Floats, friction: RestingFriction, record: RecordedMotion) -> Floats:
-    """Residual torque (k, n) with friction set-valued where a joint turns or stops for a moment: there it takes any
-    torque that holds the joint, with a mean up to its level, in place of a share that follows the speed.
+    """Subtracts from residual torque (k, n) the friction of joints at rest or at a reversal.
 
-    What it has to hold is taken as a mean over the passage. Sample by sample, friction would take the noise that is
-    within its level and leave what is beyond: rectified noise, on the side to which the joint just turned. What is then
-    left below the cutoff, as of noise that ends where the passage does, friction takes as far as its level allows.
+    There friction takes any torque that holds the joint, with a mean up to its level, in place of a share that follows
+    the speed. The mean is over the whole passage. Sample by sample, friction would take the noise within its level and
+    leave the rest: rectified noise, to the side to which the joint just turned. Friction then also takes what remains
+    below the cutoff, as far as its level allows.
     """
     if not record.turns.any():
         return left

@@ -1,4 +1,4 @@
-"""The links' own motion: a recorded one, with the errors of its sensors taken out."""
+"""Computes the links' own motion: a recorded one without the errors of its sensors."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from model.arrays import Floats
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 
 SENSOR_COLUMNS = (at.POTENTIOMETER_GAIN, at.POTENTIOMETER_OFFSET, *at.BENDS)
-"""Errors of a position sensor, in a joint's numbers."""
+"""Parameters of a joint that are errors of a position sensor."""
 MOST_STEPS = 6
-"""Newton's steps to the angle of a reading, at most."""
+"""Most Newton steps to the angle of a reading."""
 CLOSE = 1e-9
-"""Last of these steps, rad or m: far below the step of any encoder."""
+"""Size of the last step, rad or m: far below the step of any encoder."""
 LEAST_RATE = -0.8
-"""Least derivative of a sensor's error that is counted with: at −1 a reading stands still while the joint turns."""
+"""Least derivative of a sensor's error: at −1 a reading is constant while the joint turns."""
 
 
 @dataclass(frozen=True)
 class LinkMotion:
-    """The links' own motion (k, n), sensor errors taken out. contact: its direction as friction has it, in [−1, 1]."""
+    """The links' own motion (k, n), without sensor errors. contact: its direction for friction, in [−1, 1]."""
 
     position: Floats
     speed: Floats
@@ -31,7 +31,7 @@ class LinkMotion:
 
 
 def link_motion(record: RecordedMotion, joints: Floats) -> LinkMotion:
-    """The motion for which sensors with these errors would have given the readings."""
+    """Returns the motion for which sensors with these errors give the readings."""
     wrong = joints[:, list(SENSOR_COLUMNS)]
     if not wrong.any():
         return LinkMotion(record.position, record.speed, record.acceleration, record.contact)
@@ -42,17 +42,18 @@ def link_motion(record: RecordedMotion, joints: Floats) -> LinkMotion:
         if not record.own_speed[j]:
             slope[:, j] = 1.0 / (1.0 + rate)
             bent[:, j] = -curvature * slope[:, j] ** 3
-    # by the chain rule: differences on this grid would smooth accelerations as soon as any sensor has an error
+    # by the chain rule: differences on this grid would smooth accelerations if any sensor had an error
     acceleration = record.acceleration * slope + bent * record.speed**2
     return LinkMotion(position, record.speed * slope, acceleration, record.contact)
 
 
 def _read_back(reading: Floats, joint: Floats) -> tuple[Floats, Floats, Floats]:
-    """The angles (k,) of which a joint's sensor gives these readings (k,), rad or m, by Newton's steps; with the first
-    (k,) and second (k,) derivative of the sensor's error by the angle there.
+    """Returns the angles (k,), rad or m, for readings (k,) of a joint's sensor, by Newton's method.
+
+    Also returns the first (k,) and second (k,) derivative of the sensor's error by the angle there.
 
     Args:
-        joint: the numbers of the joint, as `model.layout` has them. Its sensor reads q + e(q).
+        joint: parameters of the joint, as in `model.layout`. Its sensor reads q + e(q).
     """
     angle = reading
     for _ in range(MOST_STEPS):
@@ -66,7 +67,7 @@ def _read_back(reading: Floats, joint: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _error(angle: Floats, joint: Floats) -> tuple[Floats, Floats, Floats]:
-    """The sensor's error (k,), rad or m, and its derivatives by the angle; a reading that would go backwards stands."""
+    """Returns the sensor's error (k,), rad or m, and its derivatives by the angle; a reading never runs backwards."""
     gain, offset, *bends = joint[list(SENSOR_COLUMNS)]
     place = angle - joint[at.AT_ZERO]
     error, rate = gain * (place - 0.5 * joint[at.RANGE]) + offset, np.full_like(angle, gain)

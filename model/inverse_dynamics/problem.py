@@ -1,4 +1,4 @@
-"""A fit of torques as the numerics of fitting see it: residual torques and their derivatives by the unknowns."""
+"""A fit of torques as a problem for the numerics of fitting: residual torques and their derivatives by the unknowns."""
 
 from __future__ import annotations
 
@@ -16,13 +16,15 @@ from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 
 DIFFERENCE = 1e-3
-"""Step of the finite differences, as a share of a parameter's natural size. With less, derivatives by what takes no
-part, as the mass of a link that only turns about itself, are rounding, and a fit without priors ends where it began."""
+"""Step of the finite differences, as a share of a parameter's natural size. With smaller steps, derivatives by
+parameters without influence are rounding errors (such as the mass of a link that only turns about itself). A fit
+without priors then ends where it began.
+"""
 
 
 @dataclass(frozen=True)
 class TorqueProblem:
-    """Torque that the motion needs less torque that was supplied, N·m (N), for records of one machine."""
+    """Torque that the motion needs − torque that was applied, N·m (N), for records of one machine."""
 
     model: Model
     records: tuple[RecordedMotion, ...]
@@ -40,7 +42,7 @@ class TorqueProblem:
         return [[slice(0, len(record.moving))] for record in self.records]
 
     def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
-        """Residuals of every record, with their derivatives when asked for."""
+        """Returns residuals of every record, with their derivatives on request."""
         named = {u.name: float(v) for u, v in zip(self.unknowns, values, strict=True)}
         residual = self.balance.residual(named)
         if not derivatives:

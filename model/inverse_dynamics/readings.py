@@ -1,5 +1,6 @@
-"""What a trace measures, how noisy it is, up to which frequency its accelerations can be trusted, and how much residual
-torque its noise alone causes."""
+"""Signals of a trace on an even grid: their noise, the usable bandwidth of accelerations, and the residual torque due
+to noise.
+"""
 
 from __future__ import annotations
 
@@ -23,23 +24,24 @@ from model.simulation.chain_of_model import chain_of
 CUTOFFS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)
 """Cutoffs that `choose_cutoff` tries, Hz."""
 NOISE_SHARE = 0.1
-"""Largest noise of an acceleration, as a share of its root mean square, at which a cutoff is used."""
+"""Largest noise of an acceleration, as a share of its root mean square, at which a cutoff is accepted."""
 QUIET_BAND = (0.3, 0.45)
-"""Band, as a share of the sampling rate, in which a record is taken to hold noise alone."""
+"""Band, as a share of the sampling rate, in which a record is assumed to contain only noise."""
 APART = 5.0
-"""Deviations of noise beyond which a reading has left the integral of a speed. The integral of white noise walks; the
-detrended walk's root mean square is half of its end's deviation."""
+"""Deviations of noise by which a reading must differ from the integral of a speed to count as independent of it. The
+integral of white noise walks; the detrended walk's root mean square is half of its end's deviation.
+"""
 FEWEST = 32
-"""Samples that a trace needs, for its noise to be estimated."""
+"""Samples that a trace needs to estimate its noise."""
 POSTURES = 20
 """Postures of each record over which its inertia is averaged for the noise floor."""
 
 
 @dataclass(frozen=True)
 class Readings:
-    """A trace on an even grid of its own sampling, not smoothed. speed: (k, n), None where it is not measured.
+    """A trace on an even grid of its own sampling interval, not smoothed. speed: (k, n), None if it is not measured.
 
-    name: the trace's number. called: what messages call it.
+    name: the trace's ID. called: its name in messages.
     """
 
     name: str
@@ -52,16 +54,16 @@ class Readings:
 
     @property
     def _noise_density(self) -> Floats:
-        """Noise density of the speed, or of the position where no speed is measured."""
+        """Noise density of the speed, or of the position if no speed is measured."""
         return _quiet_density(self.position if self.speed is None else self.speed, self.period)
 
     @property
     def has_own_speed(self) -> Mask:
-        """(n,) whether a joint's speed was measured by something else than its position.
+        """(n,) whether a joint's speed was measured by another sensor than its position.
 
-        Speeds that are formed of the readings have the sensor's errors of scale and bend, too. A tachometer has not:
-        the readings then leave the integral of its speed by more than its noise. A constant, a drift and a delay of
-        the speed are no such error.
+        Speeds that are computed from the readings contain the sensor's errors of scale and bend, too. A tachometer's do
+        not: the readings then differ from the integral of its speed by more than its noise. A constant, a drift and a
+        delay of the speed do not count.
         """
         none = np.zeros(self.position.shape[1], dtype=bool)
         if self.speed is None:
@@ -76,17 +78,17 @@ class Readings:
         return none
 
     def speed_noise(self, cutoff: float) -> Floats:
-        """Standard deviation (n,) of the speed's noise below a cutoff, rad/s (m/s)."""
+        """Returns the standard deviation (n,) of the speed's noise below a cutoff, rad/s (m/s)."""
         power = cutoff if self.speed is not None else (2 * np.pi) ** 2 * cutoff**3 / 3
         return np.asarray(np.sqrt(self._noise_density * power))
 
     def acceleration_noise(self, cutoff: float) -> Floats:
-        """Standard deviation (n,) of the acceleration's noise below a cutoff, rad/s² (m/s²)."""
+        """Returns the standard deviation (n,) of the acceleration's noise below a cutoff, rad/s² (m/s²)."""
         power = (2 * np.pi) ** 2 * cutoff**3 / 3 if self.speed is not None else (2 * np.pi) ** 4 * cutoff**5 / 5
         return np.asarray(np.sqrt(self._noise_density * power))
 
     def acceleration_power(self, cutoff: float) -> Floats:
-        """Root mean square (n,) of the acceleration below a cutoff, noise included."""
+        """Returns the root mean square (n,) of the acceleration below a cutoff, noise included."""
         signal = self.position if self.speed is None else self.speed
         order = 2 if self.speed is None else 1
         frequency = np.fft.rfftfreq(len(signal), self.period)
@@ -97,7 +99,7 @@ class Readings:
 
 
 def _quiet_density(signal: Floats, period: float) -> Floats:
-    """One-sided power density (n,) per Hz of the noise of a signal (k, n), from the band that holds no motion."""
+    """Returns the one-sided power density (n,) per Hz of the noise of a signal (k, n), from the band without motion."""
     rate = 1 / period
     frequency, density = welch(np.diff(signal, axis=0) / period, rate, nperseg=min(len(signal) - 1, 1024), axis=0)
     band = (frequency > QUIET_BAND[0] * rate) & (frequency < QUIET_BAND[1] * rate)
@@ -106,9 +108,9 @@ def _quiet_density(signal: Floats, period: float) -> Floats:
 
 
 def readings_of(trace: Trace, machine: Machine) -> Readings:
-    """Position, speed and drive of the modelled joints on an even grid.
+    """Returns position, speed and drive of the modelled joints on an even grid.
 
-    Where the machine's sensors measure speed, positions are its integral from the first one recorded.
+    If the machine's sensors measure speed, positions are its integral from the first one recorded.
 
     Raises TraceError for a trace without drive, of another machine or of more joints than it has, with a long gap, or
     with too few samples.
@@ -118,7 +120,9 @@ def readings_of(trace: Trace, machine: Machine) -> Readings:
     if trace.drive is None:
         raise TraceError(f"{trace.called}: has no recorded drive, without which torques cannot be compared")
     if trace.record.machine is not None and trace.record.machine.name != machine.name:
-        raise TraceError(f"{trace.called}: made on {trace.record.machine.name}, the model describes {machine.name}")
+        raise TraceError(
+            f"{trace.called}: recorded on {trace.record.machine.name}, but the model describes {machine.name}"
+        )
     if len(trace) < FEWEST:
         raise TraceError(f"{trace.called}: {len(trace)} samples; a comparison of torques needs at least {FEWEST}")
     if max(trace.joints) > len(machine.joints):
@@ -127,13 +131,13 @@ def readings_of(trace: Trace, machine: Machine) -> Readings:
     if trace.record.drive_unit not in (None, *units):
         allowed = " or ".join(dict.fromkeys(units))
         raise TraceError(
-            f"{trace.called}: the drive is in {trace.record.drive_unit}, that of {machine.name} in {allowed}"
+            f"{trace.called}: the drive is in {trace.record.drive_unit}, but that of {machine.name} in {allowed}"
         )
     columns = [trace.column(j) for j in machine.modelled_joints]
     steps = np.diff(trace.time)
     period = float(np.median(steps))
     if not is_bridged(float(steps.max()), period):
-        place = f"a gap of {steps.max():.3g} s behind {trace.time[int(steps.argmax())]:.3f} s"
+        place = f"a gap of {steps.max():.3g} s after {trace.time[int(steps.argmax())]:.3f} s"
         raise TraceError(f"{trace.called}: {place}; use a piece without any")
     time = np.arange(trace.time[0], trace.time[-1], period)
 
@@ -151,10 +155,9 @@ def readings_of(trace: Trace, machine: Machine) -> Readings:
 
 
 def choose_cutoff(traces: Sequence[Trace], machine: Machine) -> float:
-    """The highest cutoff (Hz) at which the acceleration's noise stays a small share of the acceleration, on every joint
-    that moves.
+    """Returns the highest cutoff (Hz) with little noise of acceleration on every joint that moves.
 
-    Raises SpecError when there is none: nothing moves beyond the noise of its readings.
+    Raises SpecError if there is none, because nothing moves beyond the noise of its readings.
     """
     readings = [readings_of(t, machine) for t in traces]
     found = None
@@ -169,17 +172,17 @@ def choose_cutoff(traces: Sequence[Trace], machine: Machine) -> float:
     if found is None:
         called = " and ".join(t.called for t in traces)
         raise SpecError(
-            f"{called}: no joint accelerates beyond the noise of its readings: there is nothing to explain; times are "
-            "in s, positions in rad or m"
+            f"{called}: no joint accelerates beyond the noise of its readings, so there is nothing to explain; times "
+            "must be in s, positions in rad or m"
         )
     return found
 
 
 def torque_noise(model: Model, traces: Sequence[Trace], cutoff: float) -> Floats:
-    """Standard deviation (n,), N·m or N, of a residual torque that holds only what noise of the readings makes of
-    accelerations.
+    """Returns the standard deviation (n,), N·m or N, of a residual torque due to the readings' noise in accelerations.
 
-    The recorded drive is taken as exact: its fast part is mostly real, a controller's answer to noise of the readings.
+    The recorded drive counts as exact: its fast part is mostly real, the controller's reaction to noise of the
+    readings.
     """
     chain = chain_of(model)
     squares = []

@@ -21,27 +21,29 @@ from model.inverse_dynamics.smoothing import derivative, low_pass
 Rows = NDArray[np.int64]
 
 WIDER = 3.0
-"""Cutoff of the motion's low-pass, in cutoffs of the torques. Wider, so that a torque that changes with direction is
-formed of a motion whose reversals are still sharp; the torque is then low-passed to the cutoff."""
+"""Cutoff of the motion's low-pass, as a multiple of that of the torques. It is wider so that reversals are still sharp
+when a direction-dependent torque is computed; the torque is then low-passed to the cutoff.
+"""
 GRID = 10.0
-"""Samples per period of the cutoff on which torques are formed."""
+"""Samples per period of the cutoff at which torques are computed."""
 KEPT = 3.0
 """Samples per period of the cutoff that are compared: closer ones are not independent."""
 EDGE = 2.0
-"""Periods of the cutoff at both ends that are left out, where the low-pass lacks samples on one side. What a jerk at
-the first sample leaves is 0.1 N·m after one period, on an arm whose noise is 0.005, and within noise after two."""
+"""Periods of the cutoff that are left out at both ends, where the low-pass lacks samples on one side. The influence of
+a jerk at the first sample is 0.1 N·m after one period, on an arm with noise of 0.005, and within noise after two.
+"""
 PIECE = 0.25
-"""Longest piece of a drive at an unknown limit that lacks one torque, in periods of the cutoff."""
+"""Longest piece of a drive at an unknown limit that gets one unknown torque, in periods of the cutoff."""
 LEAST_SHAPE = 1e-3
-"""Least size of such a torque's shape beside the largest that is told apart."""
+"""Least size of such a torque's shape, relative to the largest, that can be distinguished."""
 MOST_UNKNOWN = 0.4
-"""Most such pieces on a joint, as a share of its compared samples; with more, its torque is not known at all."""
+"""Most such pieces on a joint, as a share of its compared samples; with more, its torque counts as unknown."""
 SHORTEST = 1.0
 """Shortest duration of a record, s."""
 TURNING_NOISE = 2.0
 """Speed within which friction changes direction, in standard deviations of the speed's noise."""
 RESOLVED = 5.0
-"""Speed from which a joint is known to move, as a multiple of the speed within which friction changes direction."""
+"""Speed above which a joint certainly moves, as a multiple of the speed within which friction changes direction."""
 REST_NOISE = 4.0
 """Speed below which a joint may be at rest, in standard deviations of the speed's noise."""
 REST_SHARE = 0.02
@@ -56,18 +58,19 @@ class RecordedMotion:
 
     Args:
         time: (k,) s. position, speed, acceleration, drive: (k, n) in SI.
-        commanded: (r, n) the drive at the record's own samples, which no low-pass has changed. held: whether it acts
-            unchanged until the next sample.
-        contact: (k, n) direction of motion as friction has it, in [−1, 1].
+        commanded: (r, n) the drive at the record's own samples, without low-pass. held: whether it acts unchanged until
+            the next sample.
+        contact: (k, n) direction of motion for friction, in [−1, 1].
         turning: (n,) speed within which the direction changes: a few standard deviations of the speed's noise, or one
             sample.
         period, sampled: time between samples of the grid, and of the record itself, s.
         cutoff: of the torques' low-pass, Hz.
         edge, every: samples of the grid left out at both ends, and distance of the compared ones.
-        moving: (m, n) False where a joint rests: friction then takes whatever value holds it, so the torque says
-            nothing. at_limit: (r, n) where the joint moves and its drive is at a limit that the file does not state
+        moving: (m, n) False where a joint rests: friction then takes any value that holds it, so the torque is no
+            information.
+        at_limit: (r, n) where the joint moves and its drive is at a limit that the file does not state
             (`drive_limits`), so that less may act than is recorded.
-        own_speed: (n,) whether a joint's speed has a sensor of its own, without the errors of the position's.
+        own_speed: (n,) whether a joint's speed has its own sensor, without the errors of the position's.
     """
 
     name: str
@@ -90,13 +93,15 @@ class RecordedMotion:
     own_speed: Mask
 
     def compared(self, torque: Floats) -> Floats:
-        """Torques (k, …) low-passed at the cutoff, at the samples that are compared (m, …)."""
+        """Returns torques (k, …) low-passed at the cutoff, at the samples that are compared (m, …)."""
         smooth = low_pass(torque, self.cutoff, self.period)
         return np.ascontiguousarray(smooth[self.rows])
 
     def subtract_unknown(self, torque: Floats) -> Floats:
-        """Compared torques (m, n) less what a drive at a limit that no file states explains of them: there it gives
-        less than is recorded, and how much less is not known."""
+        """Returns compared torques (m, n) minus the part that a drive at a limit may have caused.
+
+        At a limit that no file states the drive gives less than is recorded, and how much less is not known.
+        """
         if not self.at_limit.any():
             return torque
         left = torque.copy()
@@ -107,19 +112,22 @@ class RecordedMotion:
 
     @property
     def not_known(self) -> Mask:
-        """(n,) joints whose drive is at such a limit for so much of the time that nothing is known of their torque."""
+        """(n,) joints whose drive is at such a limit so often that their torque counts as unknown."""
         return np.array([basis is None for basis in self._unknown_drives])
 
     @property
     def unknown_count(self) -> Rows:
-        """(n,) dimensions of a joint's compared torques that `subtract_unknown` takes away: as many fewer are known."""
+        """(n,) dimensions of a joint's compared torques that `subtract_unknown` removes; so many samples fewer are
+        known.
+        """
         sizes = zip(self._unknown_drives, self.moving.sum(axis=0), strict=True)
         return np.array([moving if basis is None else basis.shape[1] for basis, moving in sizes], dtype=np.int64)
 
     @cached_property
     def _unknown_drives(self) -> list[Floats | None]:
-        """By joint, an orthonormal basis (moving, p) of the torques of `subtract_unknown`; None where there are too
-        many pieces to know anything."""
+        """By joint, an orthonormal basis (moving, p) of the torques of `subtract_unknown`; None with too many
+        pieces.
+        """
         found: list[Floats | None] = []
         wide, longest = _wide(self.cutoff, self.sampled), max(1, round(PIECE / self.cutoff / self.sampled))
         for j, moving in enumerate(self.moving.T):
@@ -136,11 +144,15 @@ class RecordedMotion:
         return found
 
     def driven(self, late: Floats, limit: Floats, threshold: Floats) -> Floats:
-        """The drive (k, n) that acts at the grid's times, where it acts so long (n,), s, after its sample, no more than
-        ± `limit` (n,) of it gets through, and nothing of a sample within ± `threshold` (n,).
+        """Returns the drive (k, n) that acts at the grid's times.
 
-        Both act on the samples. The low-passed drive overshoots where samples jump, and a limit would cut that off.
-        Between samples of the grid by cubic splines: a straight line would take 4 % of what moves at the cutoff.
+        Args:
+            late: (n,) s from a sample until it acts.
+            limit: (n,) largest drive that acts.
+            threshold: (n,) samples within ± this have no effect.
+
+        Limit and threshold are applied to samples: the low-passed drive overshoots where samples jump, and a limit
+        would cut that off. Between samples cubic splines are used: a straight line would lose 4 % at the cutoff.
         """
         size, drive = np.abs(self.commanded), self.drive
         changed = (size.max(axis=0) > limit) | (threshold > 0)
@@ -155,15 +167,15 @@ class RecordedMotion:
         return np.stack([spline(times[:, j]) for j, spline in enumerate(splines)], axis=1)
 
     def _acting(self, samples: Floats) -> Floats:
-        """The samples (r, n) of a drive as they act, but for the half period that holding them makes it late."""
+        """Returns the samples (r, n) of a drive as they act, without the half period by which holding delays them."""
         return _as_held(samples) if self.held else samples
 
     def _on_grid(self, signal: Floats) -> Floats:
-        """The samples (k, n) on the grid of a signal (r, n) at the record's own."""
+        """Returns on the grid (k, n) a signal (r, n) at the record's own samples."""
         return signal[:: max(1, round(self.period / self.sampled))]
 
     def slower(self, share: float) -> RecordedMotion:
-        """The same motion for a comparison of torques below a share of the cutoff, at the same samples."""
+        """Returns the same motion for comparing torques below a share of the cutoff, at the same samples."""
         cutoff = share * self.cutoff
         position, speed, acceleration, drive = (
             low_pass(signal, WIDER * cutoff, self.period)
@@ -181,7 +193,7 @@ class RecordedMotion:
         )
 
     def mean_in_turn(self, torque: Floats) -> Floats:
-        """Torques (k, n), each its mean over the same passage of `turns`, at most a period of the cutoff of it."""
+        """Returns torques (k, n), each averaged over its passage in `turns`, at most over a period of the cutoff."""
         low, high = self._passages
         whole = np.concatenate([np.zeros((1, torque.shape[1]), torque.dtype), np.cumsum(torque, axis=0)])
         sums = np.take_along_axis(whole, high, axis=0) - np.take_along_axis(whole, low, axis=0)
@@ -189,7 +201,7 @@ class RecordedMotion:
 
     @cached_property
     def by_joint(self) -> tuple[RecordedMotion, ...]:
-        """The same motion, each joint's columns alone."""
+        """Returns the same motion split into joints."""
         return tuple(self._of(slice(j, j + 1)) for j in range(self.position.shape[1]))
 
     def _of(self, joints: slice) -> RecordedMotion:
@@ -200,7 +212,7 @@ class RecordedMotion:
 
     @cached_property
     def _passages(self) -> tuple[Rows, Rows]:
-        """First row, and the row after the last (k, n each), of what every sample of `turns` is averaged with."""
+        """Returns the first row, and the row after the last (k, n each), of the average for every sample of `turns`."""
         count, half = len(self.time), max(1, round(0.5 / (self.cutoff * self.period)))
         rows = np.arange(count)
         low, high = (np.empty(self.speed.shape, dtype=np.int64) for _ in range(2))
@@ -214,7 +226,7 @@ class RecordedMotion:
 
     @cached_property
     def turns(self) -> Mask:
-        """(k, n) where a joint is so slow that its smoothed speed does not tell whether it stands."""
+        """(k, n) where a joint is so slow that its smoothed speed does not show whether it rests."""
         return np.abs(self.speed) < RESOLVED * self.turning
 
     @property
@@ -224,16 +236,16 @@ class RecordedMotion:
 
 
 def recorded_motions(traces: Sequence[Trace], machine: Machine, cutoff: float) -> tuple[RecordedMotion, ...]:
-    """The motions of several traces. Raises TraceError and SpecError as `recorded_motion` does."""
+    """Returns the motions of several traces. Raises TraceError and SpecError as `recorded_motion` does."""
     return tuple(recorded_motion(trace, machine, cutoff) for trace in traces)
 
 
 def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMotion:
-    """The motion of a trace, whose torques are to be compared below `cutoff` (Hz).
+    """Returns the motion of a trace, whose torques are to be compared below `cutoff` (Hz).
 
     Raises:
         TraceError: for a trace without drive, of another machine, without motion, or too short.
-        SpecError: for a cutoff that the sampling cannot carry.
+        SpecError: for a cutoff that is too high for the sampling.
     """
     readings = readings_of(trace, machine)
     _check_length(readings, cutoff)
@@ -278,7 +290,9 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
 
 
 def turns_round(records: Sequence[RecordedMotion], machine: Machine) -> Mask:
-    """Joints (n,) that turn by more than a whole turn in any record: after a turn they are where they were."""
+    """Returns joints (n,) that turn by more than a whole turn in any record; a turn brings them back to the same
+    place.
+    """
     revolute = np.array([machine.joint(j).kind == "revolute" for j in machine.modelled_joints])
     return revolute & np.any([np.ptp(r.position, axis=0) > 2 * np.pi for r in records], axis=0)
 
@@ -289,22 +303,22 @@ def holds_drive_between_samples(machine: Machine) -> bool:
 
 
 def _wide(cutoff: float, period: float) -> float:
-    """Cutoff of the motion's low-pass, Hz, for torques below `cutoff` and samples `period` s apart."""
+    """Returns the cutoff of the motion's low-pass, Hz, for torques below `cutoff` and samples `period` s apart."""
     return min(WIDER * cutoff, 0.4 / period)
 
 
 def _as_held(drive: Floats) -> Floats:
-    """The samples (r, n) of a drive that is held between them, less what holding takes of what moves: (ωT)²/24."""
+    """Returns the samples (r, n) of a drive that is held between them, attenuated as holding does: by (ωT)²/24."""
     padded = np.concatenate([drive[:1], drive, drive[-1:]])
     return np.asarray(drive + (padded[2:] - 2 * drive + padded[:-2]) / 24)
 
 
 def _check_length(readings: Readings, cutoff: float) -> None:
-    """Raises SpecError for a cutoff that the sampling cannot carry, TraceError for a record too short for it."""
+    """Raises SpecError for a cutoff too high for the sampling, TraceError for a record too short for the cutoff."""
     highest = 0.4 / readings.period
     if not 0 < cutoff <= highest:
         raise SpecError(
-            f"cutoff {cutoff:g} Hz: {readings.called} is sampled every {readings.period:.4g} s, which carries up "
+            f"cutoff {cutoff:g} Hz: {readings.called} is sampled every {readings.period:.4g} s, which allows up "
             f"to {highest:.3g} Hz"
         )
     duration, least = float(readings.time[-1] - readings.time[0]), max(SHORTEST, 4 * EDGE / cutoff)
@@ -316,7 +330,7 @@ def _check_length(readings: Readings, cutoff: float) -> None:
 
 
 def _smooth_motion(readings: Readings, wide: float) -> tuple[Floats, Floats]:
-    """Smoothed position and speed, from whatever is measured."""
+    """Returns smoothed position and speed, from the measured one of both."""
     position = low_pass(readings.position, wide, readings.period)
     if readings.speed is None:
         return position, derivative(position, readings.period)
@@ -324,7 +338,7 @@ def _smooth_motion(readings: Readings, wide: float) -> tuple[Floats, Floats]:
 
 
 def _moving(speed: Floats, noise: Floats, period: float) -> Mask:
-    """Where joints move (k, n); a short passage through zero speed is motion."""
+    """Returns where joints move (k, n); a short passage through zero speed is motion."""
     least = np.maximum(REST_NOISE * noise, REST_SHARE * np.quantile(np.abs(speed), 0.95, axis=0))
     moving = np.abs(speed) > least
     longest = max(1, round(LEAST_REST / period))

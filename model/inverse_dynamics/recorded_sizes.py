@@ -1,7 +1,7 @@
-"""Sizes that effects may have on a machine whose file does not say how far it is driven: taken from its records.
+"""Estimates effect sizes from records, for a machine whose file does not state its largest drive.
 
-A DC motor's file states what its motor can give. A plain gain only turns a recorded number into a torque, and the same
-record may hold volts, milliamperes or newtons: sizes that follow from the unit would be another answer in every unit.
+A DC motor's file states the motor's limits. A plain gain only converts a recorded value to a torque, and the same
+record may be in volts, milliamperes or newtons. Sizes derived from the unit would differ for each.
 """
 
 from __future__ import annotations
@@ -24,13 +24,16 @@ from model.machine_model.nominal import joint_scale
 from model.machine_model.parameter import Parameter
 
 STRONGEST = 10.0
-"""Largest torque of a drive, in root mean squares of the recorded ones. Effects are expected to be as large as a few
-hundredths of the largest torque, so friction comes to a fifth of what the record's motion took."""
+"""Largest torque of a drive, in root mean squares of the recorded one. Effects are expected to reach a few hundredths
+of the largest torque, so friction becomes a fifth of the torque in the record.
+"""
 
 
 def recorded_sizes(model: Model, motions: Sequence[RecordedMotion]) -> dict[str, Parameter]:
-    """The parameters of effects on joints with a plain gain, by name, with bounds and deviations as the records have
-    them. What the machine file states of them stays."""
+    """Returns the effect parameters of joints with a plain gain, by name, with bounds and deviations from the records.
+
+    Values that the machine file states are kept.
+    """
     scales = {
         joint: _scale(model, column, motions)
         for column, joint in enumerate(model.machine.modelled_joints)
@@ -48,7 +51,7 @@ def recorded_sizes(model: Model, motions: Sequence[RecordedMotion]) -> dict[str,
 
 
 def with_recorded_sizes(unknowns: Sequence[Unknown], sizes: Mapping[str, Parameter]) -> tuple[Unknown, ...]:
-    """Unknowns of a fit whose priors are those of the records."""
+    """Returns unknowns of a fit with priors from the records."""
     return tuple(
         replace(u, deviation=sizes[u.name].deviation) if u.name in sizes and u.deviation is not None else u
         for u in unknowns
@@ -56,13 +59,13 @@ def with_recorded_sizes(unknowns: Sequence[Unknown], sizes: Mapping[str, Paramet
 
 
 def _scale(model: Model, column: int, motions: Sequence[RecordedMotion]) -> JointScale:
-    """Natural sizes of a joint whose drive is a plain gain."""
+    """Returns typical sizes of a joint whose drive is a plain gain."""
     drive = np.concatenate([m.drive[m.rows, column] for m in motions])
     return as_driven(model, column, drive, max(float(np.abs(m.speed[m.rows, column]).max()) for m in motions))
 
 
 def as_driven(model: Model, column: int, drive: Floats, speed: float) -> JointScale:
-    """The same, from its recorded drive (k,) and a speed that it reaches, rad/s (m/s)."""
+    """Returns the same, from its recorded drive (k,) and a speed that it reaches, rad/s (m/s)."""
     joint = model.machine.modelled_joints[column]
     gain = abs(float(model.vector[at.slot(column + 1, at.TORQUE_CONSTANT)]))
     volts = STRONGEST * float(np.sqrt(np.mean(drive**2)))

@@ -1,8 +1,9 @@
-"""Noise of a residual torque as repeated motion shows it: what differs where position, speed and acceleration recur.
+"""Estimates noise of a residual torque from repeated motion: its differences when position, speed and acceleration
+recur.
 
-Whatever a model lacks, a torque that follows from the motion is the same when the motion comes again. What differs is
-noise, of the drive and of everything else that no model of the motion can know. The last bit of an encoder says nothing
-of that. (A difference of nearest neighbours, as in the gamma test of Stefánsson, Končar and Jones 1997.)
+A torque that follows from the motion is the same when the motion recurs, whatever a model lacks. Differences are noise,
+of the drive and of all else that no model of the motion can know. The resolution of an encoder does not show that. (A
+difference of nearest neighbours, as in the gamma test of Stefánsson, Končar and Jones 1997.)
 """
 
 from __future__ import annotations
@@ -20,22 +21,26 @@ from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 
 LEAST_OF_TORQUE = 1e-3
-"""Least noise of a residual, as a share of the drive's torque: no gear, magnet or scale is a law to more than that. On
-a sound rig with 20 bits, gears were said to lose 0.09 % of it."""
+"""Least noise of a residual, as a share of the drive's torque: no law of a gear, magnet or scale is more exact. On a
+healthy rig with 20 bits, gears appeared to lose 0.09 % of it.
+"""
 APART = 1.0
 """Least time between two passages, s: closer samples are the same passage."""
 NEIGHBOURS = 60
-"""Neighbours among which another passage is looked for."""
+"""Number of neighbours among which another passage is searched."""
 ALIKE = 0.05
-"""Distance of two motions that count as the same, in standard deviations of position, speed and acceleration: one of
-all joints, as a root mean square. Over that distance, a torque that follows from the motion hardly changes."""
+"""Distance of two motions that count as the same, in standard deviations of position, speed and acceleration (root mean
+square over joints). Within that distance, a torque that follows from the motion hardly changes.
+"""
 FEWEST = 100
-"""Samples that must recur for their differences to be an estimate."""
+"""Number of samples that must recur for an estimate."""
 
 
 def noise_left(model: Model, traces: Sequence[Trace], balance: TorqueBalance, cutoff: float) -> Floats:
-    """Root mean square (n,), N·m or N, of the torque below a cutoff (Hz) that a right model leaves: what noise of the
-    readings makes of accelerations, what differs between repeated motions, and what digits of a record leave.
+    """Returns the root mean square (n,), N·m or N, of a right model's residual torque below a cutoff (Hz).
+
+    It includes noise of the readings in accelerations, differences between repeated motions, and rounding of the
+    record.
 
     Args:
         traces: those of the balance's records.
@@ -47,11 +52,13 @@ def noise_left(model: Model, traces: Sequence[Trace], balance: TorqueBalance, cu
 
 
 def repeated_noise(records: Sequence[RecordedMotion], residual: Sequence[Floats], round_: Mask) -> Floats:
-    """Standard deviation (n,), N·m or N, of what differs between passages of the same motion; 0 on a joint whose motion
-    does not recur. A bound from above: passages are never quite alike.
+    """Returns the standard deviation (n,), N·m or N, of differences between passages of the same motion.
+
+    It is 0 for a joint whose motion does not recur, and an upper bound, because passages are never quite alike.
 
     Args:
-        residual: (m, n) a record, at its compared samples. round_: (n,) joints that are where they were after a turn.
+        residual: (m, n) per record, at its compared samples.
+        round_: (n,) joints for which a whole turn is the same place.
     """
     joints = records[0].moving.shape[1]
     return np.array([_of_joint(records, residual, j, round_) for j in range(joints)])
@@ -77,8 +84,10 @@ def _of_joint(records: Sequence[RecordedMotion], residual: Sequence[Floats], joi
 
 
 def _state(record: RecordedMotion, round_: Mask) -> Floats:
-    """Position, speed and acceleration of all joints (m, 3 n) at the compared samples; of joints that turn `round_`,
-    cosine and sine in place of the position."""
+    """Returns position, speed and acceleration of all joints (m, 3 n) at the compared samples.
+
+    Joints that turn `round_` have cosine and sine in place of the position.
+    """
     place = record.position[record.rows]
     turned = (np.cos(place[:, round_]), np.sin(place[:, round_]), place[:, ~round_])
     return np.concatenate([*turned, record.speed[record.rows], record.acceleration[record.rows]], axis=1)

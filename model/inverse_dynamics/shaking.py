@@ -1,4 +1,4 @@
-"""Joints that shake faster than torques are compared: a loop that is unstable with its gear, or that noise drives."""
+"""Finds joints that vibrate above the cutoff of torques: a loop that is unstable with its gear, or driven by noise."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from model.arrays import Floats
 from model.inverse_dynamics.readings import QUIET_BAND, Readings, readings_of
 
 ABOVE = 3.0
-"""Least acceleration above the cutoff, as a multiple of that below it, of a joint that shakes. Steps of a stiff loop
-come to 0.6."""
+"""Least ratio of acceleration above the cutoff to that below, for a joint that vibrates. Steps of a stiff loop give
+0.6.
+"""
 BEYOND_NOISE = 3.0
-"""The same as a multiple of the acceleration's noise."""
+"""Least ratio of the same to the acceleration's noise."""
 
 
 @dataclass(frozen=True)
 class Shaking:
-    """A joint that shakes.
+    """A joint that vibrates.
 
     factor: its acceleration above the cutoff over that below. frequency: the strongest above it, Hz.
     """
@@ -33,7 +34,7 @@ class Shaking:
 
 
 def find_shaking(traces: Sequence[Trace], machine: Machine, cutoff: float) -> tuple[Shaking, ...]:
-    """The joints most of whose acceleration lies above a cutoff (Hz) in any of the traces, each where it shakes most.
+    """Returns joints with most of their acceleration above a cutoff (Hz) in any trace, each from its worst trace.
 
     Raises TraceError for traces whose torques cannot be compared (`readings_of`).
     """
@@ -46,7 +47,7 @@ def find_shaking(traces: Sequence[Trace], machine: Machine, cutoff: float) -> tu
 
 
 def _shaking_in(readings: Readings, joints: Sequence[int], cutoff: float) -> list[Shaking]:
-    highest = QUIET_BAND[0] / readings.period  # from there on a record is taken to hold noise alone
+    highest = QUIET_BAND[0] / readings.period  # above that a record is assumed to contain only noise
     if highest <= cutoff:
         return []
     noise, below = readings.acceleration_noise(highest), readings.acceleration_power(cutoff)
@@ -63,9 +64,9 @@ def _shaking_in(readings: Readings, joints: Sequence[int], cutoff: float) -> lis
 
 
 def _strongest_frequencies(readings: Readings, low: float) -> Floats:
-    """The frequency (n,), Hz, from `low` on at which each joint accelerates most."""
+    """Returns the frequency (n,), Hz, at or above `low` at which each joint accelerates most."""
     order = 2 if readings.speed is None else 1
     signal = np.diff(readings.position if readings.speed is None else readings.speed, order, axis=0)
     frequency, density = welch(signal, 1 / readings.period, nperseg=min(len(signal), 1024), axis=0)
-    inside = frequency > min(low, frequency[-2])  # the last one at least, where the bins are wide
+    inside = frequency > min(low, frequency[-2])  # at least the last one, for wide bins
     return np.asarray(frequency[inside][density[inside].argmax(axis=0)])

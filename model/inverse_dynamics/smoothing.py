@@ -1,4 +1,4 @@
-"""Smoothing of evenly sampled signals and their derivatives, without delay."""
+"""Smooths evenly sampled signals and computes their derivatives, without delay."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from model.arrays import Floats
 ORDER = 4
 """Order of the Butterworth low-pass, which runs forwards and backwards."""
 CONTINUED = 4.0
-"""Periods of the cutoff by which a signal is continued at both ends before it is low-passed."""
+"""Periods of the cutoff by which a signal is extended at both ends before it is low-passed."""
 
 
 def low_pass(signal: Floats, cutoff: float, period: float) -> Floats:
-    """Butterworth's low-pass forwards and backwards along the first axis, so without delay.
+    """Applies Butterworth's low-pass forwards and backwards along the first axis, thus without delay.
 
-    It is the gain of `scipy.signal.sosfiltfilt` at every frequency, of a signal that is continued oddly at both ends,
-    and takes a quarter of the time: a diagnosis does little else. The signal is unchanged where the sampling ends below
-    the cutoff.
+    The gain is that of `scipy.signal.sosfiltfilt` at every frequency, with odd extension at both ends, but it takes a
+    quarter of the time. This matters because a diagnosis does little else. The signal is unchanged if the Nyquist
+    frequency is below the cutoff.
 
     Args:
         signal: (k, …). cutoff: Hz. period: between samples, s.
@@ -34,7 +34,8 @@ def low_pass(signal: Floats, cutoff: float, period: float) -> Floats:
     whole = next_fast_len(count + 2 * padding, real=True)
     after = min(count - 1, whole - count - padding)
     whole = count + padding + after
-    # a line passes both ways unchanged; what is continued then ends where it begins, however far a wheel has turned
+    # the filter does not change a straight line; without it the extended signal ends where it begins, however far a
+    # wheel turned
     share = np.linspace(0.0, 1.0, count).reshape(-1, *([1] * (signal.ndim - 1)))
     line = signal[0] + (signal[-1] - signal[0]) * share
     level = signal - line
@@ -45,10 +46,10 @@ def low_pass(signal: Floats, cutoff: float, period: float) -> Floats:
 
 
 def derivative(signal: Floats, period: float) -> Floats:
-    """Derivative along the first axis of a signal (k, …) by cubic splines, in the signal's unit a second.
+    """Returns the derivative along the first axis of a signal (k, …) by cubic splines, in the signal's unit per s.
 
-    Central differences take (2πf·period)²/6 of what moves at f: 1.5 % at 12 Hz of 250 samples a second, and twice that
-    of an acceleration. Splines take the fourth power of that over 180, so a ten-thousandth.
+    Central differences lose (2πf·period)²/6 at frequency f: 1.5 % at 12 Hz with 250 samples per second, and twice that
+    for an acceleration. Splines lose the fourth power of that over 180, about a ten-thousandth.
 
     Args:
         period: between samples, s.
@@ -58,7 +59,9 @@ def derivative(signal: Floats, period: float) -> Floats:
 
 @lru_cache(maxsize=64)
 def _gain(share: float, count: int) -> Floats:
-    """Gain of both passes at the frequencies of `count` samples, for a cutoff that is this share of half their rate."""
+    """Returns the gain of both passes at the frequencies of `count` samples, for a cutoff relative to half their
+    rate.
+    """
     sections = butter(ORDER, share, output="sos")
     _, response = sosfreqz(sections, 2 * np.pi * np.arange(count // 2 + 1) / count)
     return np.asarray(np.abs(response) ** 2)

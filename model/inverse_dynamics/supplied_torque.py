@@ -1,4 +1,4 @@
-"""Torque that a motion needs, and torque of motors, friction and effects along it. Compiled."""
+"""Computes the torque that a motion needs, and that of motors, friction and effects along it. Compiled."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from model.simulation.period import extra_flags
 
 
 class DrivenMotion(NamedTuple):
-    """A motion of k samples and n joints with what acts on it, as the compiled functions read it."""
+    """A motion of k samples and n joints, with levels and loads along it, for compiled functions."""
 
     time: NDArray[Any]
     """(k,) s."""
@@ -29,7 +29,7 @@ class DrivenMotion(NamedTuple):
     speed: NDArray[Any]
     """(k, n) of the links."""
     contact: NDArray[Any]
-    """(k, n) direction of motion as friction has it, in [−1, 1]."""
+    """(k, n) direction of motion for friction, in [−1, 1]."""
     rotor_speed: NDArray[Any]
     """(k, n) of the motors, seen at the joint."""
     volts: NDArray[Any]
@@ -37,32 +37,32 @@ class DrivenMotion(NamedTuple):
     level: NDArray[Any]
     """(k, n) levels of Coulomb friction, N·m."""
     gravity: NDArray[Any]
-    """(k, n) gravity torques, N·m; read by effects of the user's own alone."""
+    """(k, n) gravity torques, N·m; only users' effects read them."""
 
 
 class JointNumbers(NamedTuple):
-    """A model's joints as the compiled functions read them."""
+    """Parameters of a model's joints for compiled functions."""
 
     joints: NDArray[Any]
     """(n, PER_JOINT) the joints' part of the model's vector."""
     flags: NDArray[Any]
     """(n,) modes of the joints."""
     own: NDArray[Any]
-    """Table of effects of the user's own."""
+    """Table of users' effects."""
 
 
 @compiled
 def friction_levels(
     chain: ChainArrays, position: NDArray[Any], joints: NDArray[Any], settings: NDArray[Any], out: NDArray[Any]
 ) -> None:
-    """Levels of Coulomb friction (k, n), N·m."""
+    """Computes levels of Coulomb friction (k, n), N·m."""
     for k in range(position.shape[0]):
         chain_levels(position[k], joints, chain, settings, out[k])
 
 
 @compiled
 def gravity_along(chain: ChainArrays, position: NDArray[Any], out: NDArray[Any]) -> None:
-    """Gravity torques (k, n), N·m."""
+    """Computes gravity torques (k, n), N·m."""
     for k in range(position.shape[0]):
         found = recursive.gravity_torques(chain, position[k])
         for j in range(position.shape[1]):
@@ -73,8 +73,13 @@ def gravity_along(chain: ChainArrays, position: NDArray[Any], out: NDArray[Any])
 def supplied_torque(
     motion: DrivenMotion, numbers: JointNumbers, motor: NDArray[Any], other: NDArray[Any], rise: NDArray[Any]
 ) -> None:
-    """Torques (k, n) on the joints: `motor` of the motors, before any loss; `other` of friction and other effects; and
-    the relative rise (k, n) of the windings' resistance."""
+    """Computes torques (k, n) on the joints.
+
+    Args:
+        motor: output, torque of the motors before any loss.
+        other: output, torque of friction and other effects.
+        rise: output, relative rise of the windings' resistance.
+    """
     joints, time = numbers.joints, motion.time
     n = joints.shape[0]
     modes = extra_flags(joints, numbers.flags)
@@ -97,11 +102,11 @@ def supplied_torque(
 def _motor_torque(
     joint: NDArray[Any], flags: int, state: NDArray[Any], volts: float, speed: float, h: float, since: float
 ) -> Any:
-    """Torque of a motor at its joint, and the relative rise of its winding's resistance; warms the winding, and
-    advances its current where that lags. since: the record's start, s.
+    """Returns the torque of a motor at its joint, and the relative rise of its winding's resistance.
 
-    The settled current of a sample is held for the interval before it, and the interval's mean current is given: of a
-    settled current that rises evenly it lags behind by the winding's time constant.
+    It also warms the winding, and advances its current if that has a time constant. since: the record's start, s. The
+    settled current of a sample is held for the interval before it, and the mean current of the interval is used. If the
+    settled current rises linearly, the mean lags it by the winding's time constant.
     """
     timed = risen(since, joint)
     if joint[at.HEATING] != 0.0:

@@ -1,4 +1,4 @@
-"""Torque that a recorded motion needs of the motors less torque that they were driven with, for any parameters."""
+"""Computes the motors' torque that a recorded motion needs − the torque that was applied, for any parameters."""
 
 from __future__ import annotations
 
@@ -32,28 +32,29 @@ from model.simulation.own_table import own_table
 NOT_IN_TORQUES = {
     "wrong_gain": "acts before the drive that is recorded",
     "lost_set_points": "acts before the drive that is recorded",
-    "stiction": "shows in the moment of breaking away, which low-passed torques do not resolve",
+    "stiction": "shows only at breakaway, which low-passed torques do not resolve",
 }
-"""Effects that low-passed torques of the recorded drive do not show, and why. All others take part."""
+"""Effects that low-passed torques of the recorded drive do not show, and why. All others are included."""
 DIFFERENCE = 1e-6
 """Step of the finite differences, as a share of a parameter's natural size: torques are smooth or piecewise linear. A
-step of a thousandth took joints that turn over a corner of their friction, each parameter over others; masses that
-cancel each other then did not, and a fit could not move along them."""
+step of a thousandth moved reversals across a corner of the friction, at other samples for each parameter. Masses that
+cancel each other then no longer did, and a fit could not move along their direction.
+"""
 CONTACT_SHARE = 0.02
-"""Torque through a transmission over which play changes sides, as a share of the torque's root mean square."""
+"""Torque through a transmission within which backlash changes sides, as a share of the torque's root mean square."""
 THRESHOLD = "amplifier_threshold"
 """The effect whose parameter makes the residual jump."""
 LEAST_KEPT = 0.05
-"""Least share of a torque that gears are taken to pass on: two losses together may exceed one."""
+"""Least share of a torque that gears transmit: two losses together may exceed one."""
 BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMATIC, at.SHAPE)
 FRICTION_COLUMNS = (at.COULOMB, at.COULOMB_ARM, at.GRAVITY_SHARE)
 
 
 @dataclass
 class TorqueBalance:
-    """Residual torques of records for one structure of model, compared samples only: one array (m, n) a record.
+    """Residual torques of records for one structure of model, at compared samples: one array (m, n) per record.
 
-    What does not depend on the parameters that changed since the last call is not computed again.
+    Parts that do not depend on the parameters that changed since the last call are not computed again.
     """
 
     model: Model
@@ -65,12 +66,12 @@ class TorqueBalance:
     """Step of the finite differences, as a share of a parameter's natural size."""
 
     def residual(self, values: Mapping[str, float]) -> list[Floats]:
-        """Torque needed of the motors less torque that they were driven with, N·m (N), low-passed, compared samples.
+        """Returns the motors' torque that the motion needs − the torque applied, N·m (N), low-passed, at compared
+        samples.
 
-        It is the drive that is predicted from the motion, and not the motion from the drive: an effect that makes the
-        drive act less would otherwise make the residual smaller by itself. For the same reason it is told as a torque
-        of the drive that the machine file states, whatever the fitted resistance, its warming, magnet and gear ratio
-        make of a volt.
+        The drive is predicted from the motion, not the motion from the drive. Otherwise an effect that weakens the
+        drive would reduce the residual by itself. For the same reason the residual is a torque of the drive as the
+        machine file states it, whatever the fitted resistance, its warming, magnet and gear ratio.
 
         values: of the model's parameters, and of `drive_timing.timing_unknowns`, by name.
         """
@@ -107,10 +108,10 @@ class TorqueBalance:
         return result
 
     def _compared(self, index: int, torque: Floats, told: Floats, friction: RestingFriction) -> Floats:
-        """What is compared (m, n) of a torque (k, n) with what friction holds taken out, told with factors (k, n).
+        """Returns (m, n) from a torque (k, n): without friction at rest, and scaled by factors `told` (k, n).
 
-        Only the joints are computed whose torque or friction is another one than in both of the last two results that
-        were not the same: a derivative by a number of one joint changes that joint.
+        It computes only joints whose torque or friction differs from both of the last two distinct results: a
+        derivative by a parameter of one joint changes only that joint.
         """
         columns = []
         for j, record in enumerate(self.records[index].by_joint):
@@ -125,20 +126,22 @@ class TorqueBalance:
         return np.concatenate(columns, axis=1)
 
     def of_model(self, model: Model) -> TorqueBalance:
-        """The balance of another model of the same machine, which shares what is kept."""
+        """Returns the balance of another model of the same machine, which shares the cache."""
         return replace(self, model=model)
 
     def told_per_torque(self, values: Mapping[str, float]) -> Floats:
-        """What `residual` tells (n,) for a unit of torque at each joint: not 1 where the motor's numbers are not the
-        machine file's."""
+        """Returns the residual (n,) per unit of torque at each joint: not 1 if the motor's parameters differ from the
+        file's.
+        """
         return self._told_per_torque(_joints_of(self._vector(values), self.model))
 
     def slope(self, values: Mapping[str, float], residual: Sequence[Floats], unknown: Unknown) -> list[Floats]:
-        """Derivative (m, n) of every record's residual by one unknown: a difference towards the inside of its bounds.
+        """Returns the derivative (m, n) of every record's residual by one unknown: a difference towards the inside of
+        its bounds.
 
-        A threshold jumps from sample to sample; its derivative is the difference over an edge about it.
+        A threshold switches from sample to sample; its derivative is the difference over a smooth edge.
 
-        residual: what `residual` gives for the same values.
+        residual: result of `residual` for the same values.
         """
         if unknown.parameter.effect == THRESHOLD and values[unknown.name] > 0:
             half = 0.5 * EDGE * values[unknown.name]
@@ -151,7 +154,9 @@ class TorqueBalance:
         return [(after - before) / step for after, before in zip(moved, residual, strict=True)]
 
     def supplied_by_drive(self) -> list[Floats]:
-        """Torque of the drive alone (m, n), as recorded, of motors at standstill: what residuals are shares of."""
+        """Returns the torque of the drive alone (m, n), as recorded, of motors at standstill; residuals are given as
+        its share.
+        """
         return [record.compared(record.drive * self._stated_gain) for record in self.records]
 
     def _told_per_torque(self, joints: Floats) -> Floats:
@@ -159,7 +164,7 @@ class TorqueBalance:
 
     @cached_property
     def _stated_gain(self) -> Floats:
-        """Torque of a motor at standstill for a unit of drive (n,), by the machine file."""
+        """Returns the torque of a motor at standstill per unit of drive (n,), from the machine file."""
         return _torque_per_volt(_joints_of(nominal_vector(self.model.machine), self.model))
 
     @cached_property
@@ -167,15 +172,15 @@ class TorqueBalance:
         return own_table(self.model, np.float64)
 
     def _vector(self, values: Mapping[str, float]) -> Floats:
-        """The model's flat vector with other values of some parameters."""
+        """Returns the model's flat vector with other values of some parameters."""
         vector = self.model.vector.copy()
         for name, value in values.items():
-            if name in self.model.by_name:  # the others are of the records
+            if name in self.model.by_name:  # the other names belong to the records
                 vector[list(self.model.parameter(name).slots)] = value
         return vector
 
     def _cached(self, what: str, key: bytes, compute: Callable[[int], Any]) -> list[Any]:
-        """One result a record, computed again only where `key` has changed since the last call."""
+        """Returns one result per record, computed again only if `key` has changed since the last call."""
         kept = self._kept.get(what)
         if kept is None or kept[0] != key:
             kept = key, [compute(i) for i in range(len(self.records))]
@@ -183,8 +188,11 @@ class TorqueBalance:
         return kept[1]
 
     def _needed(self, sensors: bytes, chain: ChainArrays, motions: Sequence[LinkMotion], index: int) -> Floats:
-        """Torque (k, n) that the links' motion needs. It is linear in the numbers of the links' masses: once it is
-        asked for a second time at one geometry, the torques of unit numbers are kept and give those of all others."""
+        """Returns the torque (k, n) that the links' motion needs.
+
+        It is linear in the links' inertial parameters. From the second call for one geometry on, torques of unit
+        parameters are kept and combined.
+        """
         key = sensors + b"".join(part.tobytes() for part in (chain.prismatic, chain.geometry, chain.gravity))
         kept = self._kept.get("units")
         if (kept is None or kept[0] != key) and self._geometry.get(index) != key:
@@ -196,10 +204,10 @@ class TorqueBalance:
         return np.asarray((numbers @ units).reshape(motions[index].position.shape))
 
     def _volts(self, index: int, vector: Floats, joints: Floats, samples: Floats) -> Floats:
-        """Volts at the motors at the grid's times, after delay, threshold and limit; `_lost_in_dead_zone` has what a
-        zone takes.
+        """Returns volts at the motors at the grid's times, after delay, threshold and limit; `_lost_in_dead_zone`
+        follows.
 
-        samples: (n,) that drives are late by.
+        samples: (n,) by which drives are late.
         """
         delays = vector[at.DELAY] + joints[:, at.EXTRA_DELAY]
         if holds_drive_between_samples(self.model.machine):
@@ -216,8 +224,9 @@ class TorqueBalance:
     def _missing(
         self, driven: kernel.DrivenMotion, acceleration: Floats, needed: Floats, joints: Floats
     ) -> tuple[Floats, Floats]:
-        """Torque needed of the motors less torque that they were driven with (k, n), and the relative rise (k, n) of
-        their windings' resistance."""
+        """Returns the motors' torque that the motion needs − the torque applied (k, n), and the relative rise (k, n) of
+        their windings' resistance.
+        """
         flags, speed, time = self.model.flags, driven.speed, driven.time
         numbers = kernel.JointNumbers(joints, flags, self._own)
         motor, other, rise = (np.empty_like(needed) for _ in range(3))
@@ -237,19 +246,19 @@ class TorqueBalance:
 
 
 def levels_along(model: Model, record: RecordedMotion) -> Floats:
-    """Levels of Coulomb friction (k, n), N·m, along a record."""
+    """Returns levels of Coulomb friction (k, n), N·m, along a record."""
     joints = _joints_of(model.vector, model)
     chain = chain_body(np.ascontiguousarray(model.vector[: at.SHARED]), joints, model.flags)
     return _levels(model, chain, record.position, joints)
 
 
 def _joints_of(vector: Floats, model: Model) -> Floats:
-    """The joints' part (n, PER_JOINT) of a model's vector."""
+    """Returns the joints' part (n, PER_JOINT) of a model's vector."""
     return np.ascontiguousarray(vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT))
 
 
 def _torque_per_volt(joints: Floats) -> Floats:
-    """Torque of a motor at standstill for a volt, or for a unit of a plain drive (n,)."""
+    """Returns the torque of a motor at standstill per volt, or per unit of a plain drive (n,)."""
     constant = joints[:, at.TORQUE_CONSTANT] * (1 - joints[:, at.FLUX_LOSS])
     return np.asarray(joints[:, at.GEAR] * constant / joints[:, at.RESISTANCE])
 
@@ -263,7 +272,7 @@ def _levels(model: Model, chain: ChainArrays, position: Floats, joints: Floats) 
 
 
 def _of_units(chain: ChainArrays, motion: LinkMotion) -> Floats:
-    """Torques (11 n, k n) that the motion needs for one of each of the links' numbers, and none of all others."""
+    """Returns torques (11 n, k n) that the motion needs for one unit of each inertial parameter, the others being 0."""
     links = len(chain.rotor_inertia)
     found = []
     for number in range(11 * links):
@@ -281,18 +290,23 @@ def _gravity(chain: ChainArrays, motion: LinkMotion) -> Floats:
 
 
 def _before_losses(asked: Floats, contact: Floats, joints: Floats) -> Floats:
-    """Torque (k, n) into gears that give `asked` (k, n): they lose a share, or take it from a link that drives."""
+    """Returns the torque (k, n) at the input of gears with output `asked` (k, n).
+
+    Gears lose a share; if the link drives the motor, the loss changes sign.
+    """
     loss, difference = joints[:, at.GEAR_LOSS], joints[:, at.GEAR_LOSS_DIRECTION]
     if not (loss.any() or difference.any()):
         return asked
     along = contact * np.sign(asked)
-    # where motion turns, contact is a mean of both directions: so is what is lost one way only
+    # at a reversal, contact is a mean of both directions, and so is a loss in one direction only
     share = loss * along + 0.5 * difference * (1 + np.sign(difference) * along)
     return np.asarray(asked / np.maximum(1 - share, LEAST_KEPT))
 
 
 def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:
-    """Torque (k, n) that the amplifier's dead zone takes away, of the sign of the volts that the motor needs."""
+    """Returns the torque (k, n) that the amplifier's dead zone removes, with the sign of the volts that the motor
+    needs.
+    """
     width = joints[:, at.DEAD_ZONE]
     if not width.any():
         return np.zeros_like(asked)
@@ -304,8 +318,10 @@ def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:
 
 
 def _twist_rate(through: Floats, joint: Floats, time: Floats) -> Floats:
-    """Rate (k,) at which rotor and link move apart for a torque through a transmission with compliance and play. A gear
-    that gives and damps follows the torque late; a contact does so far above every cutoff."""
+    """Returns the rate (k,) of the angle between rotor and link for a torque through compliance and backlash.
+
+    A flexible gear with damping follows the torque with a lag; a contact follows above every cutoff.
+    """
     period = time[1] - time[0]
     twist = joint[at.COMPLIANCE] * _follow_with_lag(
         through, joint[at.COMPLIANCE] * joint[at.TRANSMISSION_DAMPING], period
@@ -318,7 +334,7 @@ def _twist_rate(through: Floats, joint: Floats, time: Floats) -> Floats:
 
 
 def _follow_with_lag(signal: Floats, time_constant: float, period: float) -> Floats:
-    """What follows a signal (k,) with a first-order lag, exactly for one that is straight between its samples."""
+    """Applies a first-order lag to a signal (k,), exact if the signal is linear between its samples."""
     if time_constant <= 0.0:
         return signal
     kept = math.exp(-period / time_constant)

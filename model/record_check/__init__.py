@@ -1,1 +1,3 @@
-"""Whether a record is what it says: checked before anything is computed from it. `check.py` is the entrance."""
+"""Checks a record for impossible values and wrong columns before anything is computed from it; `check.py` is the
+entry.
+"""

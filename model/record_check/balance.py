@@ -1,7 +1,6 @@
-"""Torques as a witness: do drive and motion belong together as they stand, or as they would in other units?
+"""Balances torques: do drive and motion agree as recorded, or would they in other units?
 
-Whatever rubs against the motion is left free, since few files state it; what an effect of the arm adds beside that is
-small beside a wrong unit, a wrong sign, or a wrong column.
+Friction is left free, since few files state it. Other effects of an arm are small beside a wrong unit, sign or column.
 """
 
 from __future__ import annotations
@@ -30,38 +29,44 @@ NARROWEST, WIDEST = 5, 401
 NOISE_SHARE = 0.1
 """Most noise of an acceleration, as a share of its root mean square."""
 SLOWER = 3
-"""Smoothing beside the narrowest that noise allows: gears that give, and play, shake faster than a rigid arm moves."""
+"""Factor on the least smoothing that noise allows: flexible gears and backlash vibrate faster than a rigid arm
+moves.
+"""
 MOST_ROWS = 4000
-"""Samples of a record that are balanced: enough to tell halves from wholes."""
+"""Samples of a record that are balanced: enough for factors of two."""
 UNLIKE = 0.5
-"""Share of the torque (root mean squares) that is left, from which drive and motion may not belong together.
-Some rigs with hidden effects leave as much; no other way to read their records explains it."""
+"""Share of the torque (root mean squares) that remains, above which drive and motion may not agree. Some rigs with
+hidden effects leave as much, but no other unit or column explains their records.
+"""
 EXPLAINS = 0.25
-"""Share of that mean square that another unit, sign or column may leave, for it to be the reason."""
+"""Largest share of that mean square that may remain with another unit, sign or column for that to be the reason."""
 CLEAR = 5.0
-"""Deviations of an estimate from which it is clear, however its noise goes on from sample to sample."""
+"""Number of deviations at which an estimate is significant, whatever the correlation of its noise."""
 MOST_BEHIND = 1 / 8
-"""Longest delay that is estimated, in widths of the smoothing: the fastest motion that passes it turns by 1 rad in that
-time, and the straight line by which a delay is estimated is off by a sixth there."""
+"""Longest delay that is estimated, in widths of the smoothing. The fastest motion that passes it turns by 1 rad in that
+time; the linear estimate of a delay is then wrong by a sixth.
+"""
 MOST_FRICTION = 5.0
-"""Most torque that a drive gives, in torques that weight and inertia need: sound rigs have up to 4.6."""
+"""Largest ratio of the drive's torque to that of weight and inertia: healthy rigs have up to 4.6."""
 TURNED = 0.75
-"""Least share of twice the torque of gravity in what is left, from which gravity counts as turned round. A balance
-spring that carries the whole arm comes to 0.5."""
+"""Least share of twice the torque of gravity in the remaining torque for gravity to count as reversed. A balance spring
+that carries the whole arm gives 0.5.
+"""
 LEAST_REMOVED = 0.5
-"""Least share of the mean square that turning gravity round takes off."""
+"""Least share of the mean square that reversing gravity must remove."""
 LEAST_TORQUE = 0.1
-"""Least torque of gravity on any joint, as a share of the drive's, from which records tell its direction."""
+"""Least torque of gravity on any joint, as a share of the drive's, from which records show its direction."""
 OUT_OF_SCALE = 100.0
-"""Factor of what the bodies need, or its inverse, from which a drive is of another unit: mA for A make it a thousand,
-and sound rigs 0.2 to 13."""
+"""Ratio to the bodies' torque, or its inverse, above which a drive is in another unit: mA for A gives a thousand, and
+healthy rigs 0.2 to 13.
+"""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What is balanced: position and drive (k, n) of the modelled joints, and s between samples.
+    """Position and drive (k, n) of the modelled joints, and s between samples.
 
-    speed: (k, n) where sensors measure it, and position is its integral.
+    speed: (k, n) where sensors measure it; position is then its integral.
     """
 
     position: Floats
@@ -73,29 +78,30 @@ class Motion:
 
 @dataclass(frozen=True)
 class Balance:
-    """Mean squares by joint (n,): torque that is left, of the drive, that the motion needs, and the sum of those of
-    its parts, weight and inertia, which may cancel."""
+    """Mean squares by joint (n,): remaining torque, torque of the drive, torque of the motion, and the sum for the
+    motion's two parts, weight and inertia, which may cancel.
+    """
 
     left: Floats
     given: Floats
     needed: Floats
     parts: Floats
     turned: float
-    """Share of what is left that gravity takes off where it is turned round, if it is that which is left; else 0."""
+    """Share of the remaining mean square that reversing gravity removes; 0 if gravity is not the reason."""
     behind: Floats
-    """(n,) samples that the drive comes behind the motion that it makes; 0 where that is not clear, or longer than the
-    smoothing lets a delay be estimated. A drive that is
-    held until the next sample comes half of one before."""
+    """(n,) samples by which the drive lags the motion that it causes; 0 where that is not significant, or longer than
+    the smoothing can resolve. A drive that is held until the next sample leads by half of one.
+    """
 
     @property
     def shares(self) -> Floats:
-        """(n,) of the larger of both torques, the mean square that is left; 0 where there is neither."""
+        """(n,) remaining mean square as a share of the larger of both torques; 0 where there is neither."""
         whole = np.maximum(self.given, self.needed)
         return np.asarray(np.where(whole > 0.0, self.left / np.where(whole > 0.0, whole, 1.0), 0.0))
 
 
 def motion_of(trace: Trace, model: Model) -> Motion | None:
-    """The motion of a trace; None without drives, or where it has gaps too long to be bridged."""
+    """Returns the motion of a trace; None without drives, or with gaps that are too long to interpolate."""
     machine = model.machine
     if trace.drive is None or len(trace) < 2 * NARROWEST:
         return None
@@ -114,7 +120,7 @@ def motion_of(trace: Trace, model: Model) -> Motion | None:
 
 
 def balance(model: Model, motion: Motion) -> Balance | None:
-    """The balance of a motion; None where nothing of it moves beyond the noise of its readings."""
+    """Returns the balance of a motion; None if no joint moves beyond the noise of its readings."""
     width = _width(motion)
     if width is None:
         return None
@@ -132,8 +138,9 @@ def balance(model: Model, motion: Motion) -> Balance | None:
 
 @dataclass(frozen=True)
 class Factors:
-    """What the drive gives of a joint's torque, in times of what the machine file's bodies need: of all of it, of what
-    accelerates them, and of their weight; and of the motor's braking, with friction. None where it is not clear."""
+    """Ratios of the drive's torque to the torque of the machine file's bodies: to all of it, to that for acceleration,
+    and to their weight; and that of the motor's braking, with friction. None if not significant.
+    """
 
     whole: float | None = None
     inertia: float | None = None
@@ -143,8 +150,9 @@ class Factors:
 
 @dataclass(frozen=True)
 class _Torques:
-    """Torques (k, n) along a motion: given by the drive, needed without and with back-EMF, that of weight, the change
-    of the given one in a sample; speeds and positions."""
+    """Torques (k, n) along a motion: of the drive, of the motion without and with back-EMF, of weight; the change of
+    the drive's torque per sample; speeds and positions.
+    """
 
     given: Floats
     needed: Floats
@@ -176,10 +184,10 @@ def _torques(model: Model, motion: Motion, width: int) -> _Torques:
 
 
 def factors(model: Model, motion: Motion) -> list[Factors]:
-    """How many times the torques of the machine file's bodies the drive gives, by joint.
+    """Returns by joint the ratio of the drive's torque to that of the machine file's bodies.
 
-    Friction of any size, back-EMF, a spring and a constant are free: a large part of the torque may be theirs, and says
-    nothing of units.
+    Friction of any size, back-EMF, a spring and a constant are free. They may be a large part of the torque and contain
+    no information on units.
     """
     width = _width(motion)
     if width is None:
@@ -204,7 +212,7 @@ def _factors_of(torques: _Torques, joint: int, width: int) -> Factors:
 
 
 def _clear(given: Floats, parts: list[Floats], free: list[Floats], width: int) -> list[float | None]:
-    """The factor of each part in a torque (k,) beside free ones; None where it is not clear."""
+    """Returns the factor of each part of a torque (k,), with free parts fitted too; None if not significant."""
     level = [column - column.mean() for column in (*parts, *free)]
     scales = [float(np.sqrt(np.mean(column**2))) for column in level]
     if 0.0 in scales:
@@ -214,17 +222,21 @@ def _clear(given: Floats, parts: list[Floats], free: list[Floats], width: int) -
     if rank < table.shape[1]:
         return [None] * len(parts)
     spread = float(np.mean((given - given.mean() - table @ line) ** 2)) * width
-    triangle = np.linalg.inv(np.linalg.qr(table, mode="r"))  # its rows' squares are the diagonal of (AᵀA)⁻¹
+    triangle = np.linalg.inv(np.linalg.qr(table, mode="r"))  # the squared norms of its rows are the diagonal of (AᵀA)⁻¹
     deviations = np.sqrt(spread * np.sum(triangle**2, axis=1))
     return [float(line[k]) / scales[k] if line[k] > CLEAR * deviations[k] else None for k in range(len(parts))]
 
 
 def likelier(model: Model, motion: Motion, joint: int | None, ways: Sequence[str]) -> str | None:
-    """The one of `ways` (keys of WAYS) to read the columns of a joint (its place; None: of all) that explains most of a
-    balance which does not hold as recorded; None where it holds, or none explains it.
+    """Returns the key of `ways` that best explains a balance which does not hold as recorded, or None.
 
-    No joint whose drive and motion belong together as recorded may lose that: its torque depends on how the others
-    move, and times are those of all.
+    None means that the balance holds, or that none of the ways explains it. A way is rejected if a joint whose drive
+    and motion agree as recorded no longer does: its torque depends on how the others move, and all share the same
+    times.
+
+    Args:
+        joint: index of the joint whose columns are changed; None: of all.
+        ways: keys of WAYS.
     """
     found = balance(model, motion)
     if found is None:
@@ -243,9 +255,11 @@ def _total(found: Balance, joint: int | None) -> float:
 
 
 def _left_by(model: Model, changed: Motion, joint: int | None, sound: NDArray[np.bool_]) -> float:
-    """What another way to read a record leaves; infinite where nearly all of the drive would go into friction, which
-    any drive along the motion may, where friction would brake the motion as well without any drive, or where a joint
-    that was sound (n,) is not."""
+    """Returns the share that remains with a changed motion; infinite if the change is implausible.
+
+    That is so if nearly all of the drive would go into friction, which fits any drive along the motion; if friction
+    alone would explain the motion as well; or if a joint that was healthy (n,) no longer is.
+    """
     found, idle = balance(model, changed), balance(model, replace(changed, drive=np.zeros_like(changed.drive)))
     if found is None or idle is None or (found.shares[sound] > UNLIKE**2).any():
         return np.inf
@@ -294,13 +308,13 @@ WAYS: dict[str, Callable[[Motion, list[int]], Motion]] = {
     "milliseconds": _slower(1e-3),
     "position-drive": _exchanged,
 }
-"""Ways to read a record, or its machine file, otherwise than it stands."""
+"""Changes of a record, or its machine file, that may make its balance hold."""
 OF_ALL = frozenset(["milliseconds"])
-"""Ways that are of the whole record."""
+"""Those that concern the whole record."""
 
 
 def _gravity_turned(given: Floats, needed: Floats, weight: Floats) -> float:
-    """Share of the mean square that turning gravity round takes off; 0 where it is not that which is left."""
+    """Returns the share of the mean square that reversing gravity removes; 0 if gravity is not the reason."""
     sizes = np.sqrt(np.mean(given**2, axis=0))
     if not (sizes > 0.0).all():
         return 0.0
@@ -313,11 +327,12 @@ def _gravity_turned(given: Floats, needed: Floats, weight: Floats) -> float:
 
 
 def _left(torque: Floats, speed: Floats, rate: Floats, width: int) -> tuple[float, float]:
-    """Mean square of a torque (k,) that a constant, and friction of any size against the motion, leave; and the samples
-    that the drive comes behind.
+    """Returns the mean square of a torque (k,) after fitting a constant and any friction, and the samples that the
+    drive lags.
 
     Args:
-        rate: (k,) of the drive's torque, a sample. width: samples over which they are smoothed, of which one counts.
+        rate: (k,) change of the drive's torque per sample.
+        width: samples over which they are smoothed; one in as many is independent.
     """
     size = float(np.sqrt(np.mean(speed**2)))
     if size == 0.0:
@@ -337,7 +352,7 @@ def _left(torque: Floats, speed: Floats, rate: Floats, width: int) -> tuple[floa
 
 
 def _width(motion: Motion) -> int | None:
-    """The narrowest smoothing, in samples, that leaves accelerations little noise on every joint that moves."""
+    """Returns the narrowest smoothing, in samples, with little noise of acceleration on every moving joint."""
     order = 2 if motion.speed is None else 1
     source = motion.position if motion.speed is None else motion.speed
     noise = np.array([noise_of(source[:, j], motion.step[j] if order == 2 else 0.0) for j in range(source.shape[1])])

@@ -1,7 +1,7 @@
-"""The check of a record before anything is computed from it: what it says that cannot be, and where.
+"""Checks a record before anything is computed from it: which of its values are impossible, and where?
 
-Physical and statistical statements alone: a finite torque makes no jump, a controller's drive follows from its set
-point and position, drive and motion balance in the units that are stated. None knows an effect of an arm.
+It uses only physics and statistics: a finite torque makes no jump, a controller's drive follows from set point and
+position, drive and motion balance in the stated units. None of these depends on an effect of the arm.
 """
 
 from __future__ import annotations
@@ -39,30 +39,33 @@ from model.record_check.readings import (
 from model.record_check.words import at_times, number, times_of
 
 FEWEST = 3
-"""Least samples of a record that shows a motion."""
+"""Least number of samples of a record that shows a motion."""
 ON_EARTH = (9.76, 9.84)
 """Least and largest gravity on the ground, m/s²: on a mountain at the equator, and at a pole, rounded outwards."""
 Loop = Literal["closed", "open"]
 WITHIN_NOISE = 3.0
-"""Times its noise that a model may leave of a record and still explain it: spikes that alone leave more are no note."""
+"""Multiple of its noise within which a model still explains a record: spikes that leave less need no note."""
 MOST_KEPT = 100
-"""Times that a finding holds: a page need not have more."""
+"""Times in a finding: a page does not need more."""
 WILD_SHARE = 0.5
 """Distance between set point and position, as a share of the largest travel of any joint, that no controller leaves for
-half of a record, but one whose joint is on its way. A joint that is held may sag by more than its own travel."""
+half of a record, except on a joint that is still on its way. A joint that is held may sag by more than its own travel.
+"""
 ON_ITS_WAY = 0.5
-"""Share of its motion, weighed by the distance that is left, that a joint moves towards its set point rather than away,
-if it follows: set points of another zero or sign lie as often behind its motion as ahead of it."""
+"""Share of its motion, weighted by the remaining distance, that a following joint makes towards its set point rather
+than away from it. Set points with another zero or sign lie behind its motion as often as ahead of it.
+"""
 OUT_OF_REACH = 3.0
-"""Distance, in its own travels, from which even a joint on its way is not going there: set points of another unit."""
+"""Distance, in a joint's own travels, that is too long even for a joint on its way: set points in another unit."""
 
 
 def check_records(model: Model, traces: Sequence[Trace], *, torques: bool | None = None) -> tuple[RecordFinding, ...]:
-    """What is wrong with records, or with the machine file beside them, or should be known; empty where all is well.
+    """Returns the faults of records and of their machine file, and what users should know; empty if there is nothing.
 
     Args:
-        model: of the machine that made them. traces: as they were read. torques: whether torques are to be balanced, so
-            that a record may be cut at its gaps; None: as for a diagnosis, where the machine has no controller.
+        model: of the machine that made them. traces: as they were read.
+        torques: whether torques will be balanced, so that a record may be cut at its gaps; None: as for a diagnosis, if
+            the machine has no controller.
     """
     cut = isinstance(model.machine.controller, NoController) if torques is None else torques
     traces = [matched(trace, model.machine) for trace in traces]
@@ -88,8 +91,9 @@ def _on_columns(trace: Trace, model: Model) -> Iterator[RecordFinding]:
 
 
 def repaired(trace: Trace, machine: Machine) -> Trace:
-    """The trace with whole turns added behind each wrap of its encoders, and spikes replaced by what lies beside them;
-    the same trace where there are none."""
+    """Returns the trace with its encoders unwrapped and spikes replaced by neighbouring values; unchanged if there are
+    none.
+    """
     position = trace.position
     for joint in machine.modelled_joints:
         column, found = trace.column(joint), false_readings(trace, machine, joint)
@@ -103,7 +107,7 @@ def repaired(trace: Trace, machine: Machine) -> Trace:
 
 
 def as_used(traces: Sequence[Trace], machine: Machine, loop: Loop = "open") -> list[Trace]:
-    """Traces as every computation takes them: repaired, unless a controller in a simulated loop reads them itself.
+    """Returns traces in the form for all computations: repaired, unless the simulated controller reads them itself.
 
     Args:
         loop: `closed`: the machine's controller is simulated. `open`: the recorded drive is applied or balanced.
@@ -114,19 +118,19 @@ def as_used(traces: Sequence[Trace], machine: Machine, loop: Loop = "open") -> l
 
 
 def require_computable(findings: Sequence[RecordFinding]) -> None:
-    """Raises TraceError with one line for the first finding from which nothing can be computed."""
+    """Raises TraceError with one line for the first finding that rules out any computation."""
     for finding in findings:
         if finding.consequence == "fatal":
             raise TraceError(finding.line)
 
 
 def false_readings(trace: Trace, machine: Machine, joint: int) -> FalseReadings:
-    """The jumps in what a joint's sensor measures."""
+    """Returns the jumps in the readings of a joint's sensor."""
     by_speed = measures_speed(machine, joint)
     source = trace.velocity if by_speed and trace.velocity is not None else trace.position
     reading = source[:, trace.column(joint)]
     jumps = find_jumps(trace.time, reading, 0.0 if by_speed else _step(machine, joint))
-    if by_speed:  # which stops changing as soon as its drive does
+    if by_speed:  # a tachometer's reading stops changing as soon as its drive does
         return sort_jumps(reading, jumps, ())
     found = sort_jumps(reading, jumps, turns_of(machine, joint))
     told = {jump.row for _, jump in found.stuck} | {last for _, last in find_bounds(reading)}
@@ -141,7 +145,7 @@ def measures_speed(machine: Machine, joint: int) -> bool:
 
 
 def turns_of(machine: Machine, joint: int) -> tuple[float, ...]:
-    """Whole turns of a joint and of its sensor, rad (m), by which a reading may wrap."""
+    """Returns whole turns of a joint and of its sensor, rad (m), by which a reading may wrap."""
     own = machine.joint(joint)
     sensor = () if own.sensor is None or own.sensor.measures != "position" else (own.sensor.range.value,)
     return (*((2 * math.pi,) if own.kind == "revolute" else ()), *sensor)
@@ -183,8 +187,8 @@ def _on_machine(machine: Machine, traces: Sequence[Trace]) -> Iterator[RecordFin
                 joint=joint,
                 value=size,
                 unit=unit,
-                says=f"the machine file states no `sensor`: its noise is taken from the record, {number(size)} {unit}.",
-                advice=f"State `sensor` under joint {joint} to have it known.",
+                says=f"the machine file states no `sensor`: noise is estimated from the record, {number(size)} {unit}.",
+                advice=f"State `sensor` under joint {joint} if it is known.",
             )
 
 
@@ -208,7 +212,9 @@ def _short(trace: Trace) -> RecordFinding:
 
 
 def _on_bursts(trace: Trace) -> Iterator[RecordFinding]:
-    """Stamps of arrival, which move each reading by up to a burst: all else that is told by times would follow."""
+    """Finds time stamps of arrival, which shift each reading by up to a burst; other findings from times would
+    follow.
+    """
     found = find_bursts(trace.time)
     if found is not None:
         yield RecordFinding(
@@ -220,13 +226,13 @@ def _on_bursts(trace: Trace) -> Iterator[RecordFinding]:
             unit="s",
             says=f"its times come in bursts, {number(1e3 * found[0])} ms or a multiple of it apart: they are stamps of "
             "arrival at a buffer, not of measurement.",
-            advice="Stamp at the device, or set the latency timer of a USB serial adapter (FTDI: 16 ms) to 1 ms. Of "
-            f"evenly sampled rows, write their number times the period ({number(found[1])} s on average) as times.",
+            advice="Stamp at the device, or set the latency timer of a USB serial adapter (FTDI: 16 ms) to 1 ms. For "
+            f"evenly sampled rows, write row number times period ({number(found[1])} s on average) as times.",
         )
 
 
 def _on_gaps(trace: Trace, *, cut: bool) -> Iterator[RecordFinding]:
-    """cut: for a balance of torques (`in_pieces`). What is simulated runs through the whole record."""
+    """cut: for a balance of torques (`in_pieces`). Simulations run through the whole record."""
     gaps = find_gaps(trace.time)
     if not gaps:
         return
@@ -234,7 +240,11 @@ def _on_gaps(trace: Trace, *, cut: bool) -> Iterator[RecordFinding]:
     long = [gap for gap in gaps if not is_bridged(gap[1], usual)]
     shown = long or gaps
     longest = max(length for _, length in shown)
-    advice = f"For torques it is cut there, without pieces under {SHORTEST:g} s" if cut else "Use a piece without any"
+    advice = (
+        f"For torques the record is cut there; pieces under {SHORTEST:g} s are left out"
+        if cut
+        else "Use a piece without any"
+    )
     starts = [float(trace.time[row]) for row, _ in shown]
     yield RecordFinding(
         kind="gap",
@@ -247,7 +257,7 @@ def _on_gaps(trace: Trace, *, cut: bool) -> Iterator[RecordFinding]:
         unit="s",
         says=f"{times_of(len(shown), 'gap')} {at_times(starts)}, the longest of {number(longest)} s, where samples are "
         f"{number(usual)} s apart.",
-        advice=f"{advice}: what moved the joints meanwhile is not known." if long else "",
+        advice=f"{advice}: the torques and set points in between are not known." if long else "",
     )
 
 
@@ -267,7 +277,7 @@ def _on_jumps(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFind
         yield told.finding("spikes", found.spikes, says, "Look for lost bytes or a loose connector.", doubt=doubt)
     if found.others:
         says = f"its reading jumps {told.place(found.others)}, by {told.size(found.others)}."
-        advice = "Were samples cut out, did the encoder slip, or was it set to zero? Use a piece without."
+        advice = "Were samples cut out, did the encoder slip, or was it set to zero? Use a piece without this."
         yield told.finding("jump", found.others, says, advice)
     for since, jump in found.stuck:
         begin, end = float(trace.time[since]), float(trace.time[jump.row])
@@ -275,12 +285,12 @@ def _on_jumps(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFind
         if not jump.size:
             then = f", the record's {'end' if since else 'beginning'}, and moves at speed right beside"
         says = f"its reading stands still from {begin:.2f} to {end:.2f} s ({number(end - begin)} s){then}."
-        advice = "The sensor or its line was stuck: use a piece without."
+        advice = "The sensor or its cable was stuck: use a piece without this."
         yield told.finding("stuck", [replace(jump, row=since - 1)], says, advice)
 
 
 def _on_bounds(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFinding]:
-    """Readings that are cut off: at the end of a sensor's range, or of an amplifier's or a converter's."""
+    """Finds readings that are cut off at the end of a sensor's range, or of an amplifier's or a converter's."""
     source = trace.velocity if measures_speed(machine, joint) and trace.velocity is not None else trace.position
     reading = source[:, trace.column(joint)]
     bounds = find_bounds(reading)
@@ -299,9 +309,9 @@ def _on_bounds(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFin
         count=len(bounds),
         value=value,
         unit=unit,
-        says=f"its reading comes to {number(value)} {unit} at full speed and stands there, {at_times(times)}, for "
-        f"{number(longest)} s at most.",
-        advice="Is the sensor at the end of its range, or the joint at a stop? Use a piece without.",
+        says=f"its reading reaches {number(value)} {unit} at full speed and stands there, {at_times(times)}, for "
+        f"up to {number(longest)} s.",
+        advice="Is the sensor at the end of its range, or the joint at a stop? Use a piece without this.",
     )
 
 
@@ -314,22 +324,22 @@ class _Jumps:
     unit: str
 
     def times(self, jumps: Sequence[Jump]) -> list[float]:
-        """s, of the first false sample of each."""
+        """Returns the time, s, of the first false sample of each jump."""
         return [float(self.trace.time[jump.row + 1]) for jump in jumps]
 
     def place(self, jumps: Sequence[Jump]) -> str:
-        """When they are, in words."""
+        """Returns the times in words."""
         return at_times(self.times(jumps))
 
     def size(self, jumps: Sequence[Jump]) -> str:
-        """How large they are, in words."""
+        """Returns the sizes in words."""
         largest, usual = max(abs(jump.size) for jump in jumps), jumps[0].usual
-        return f"{number(largest)} {self.unit} at most, where {number(usual)} {self.unit} can be noise or motion"
+        return f"up to {number(largest)} {self.unit}, where {number(usual)} {self.unit} can be noise or motion"
 
     def finding(
         self, kind: FindingKind, jumps: Sequence[Jump], says: str, advice: str, *, doubt: bool = True
     ) -> RecordFinding:
-        """The finding of jumps of one kind."""
+        """Returns the finding of jumps of one kind."""
         return RecordFinding(
             kind=kind,
             consequence="doubt" if doubt else "note",
@@ -346,12 +356,12 @@ class _Jumps:
 
 
 def _on_units(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
-    """Set points and positions in different units: they differ by a factor or an offset throughout.
+    """Finds set points and positions in different units: they differ by a factor or an offset throughout.
 
-    What counts is the travel of the record's motion, whatever an encoder's count is.
+    They are compared with the travel of the record's motion, whatever the size of an encoder's count.
     """
     if trace.set_point is None or not np.ptp(trace.set_point, axis=0).any():
-        return  # nothing is asked for, so nothing says how far it should have gone
+        return  # without moving set points nothing states how far it should have gone
     kinds = {j: machine.joint(j).kind for j in machine.modelled_joints}
     signals = (trace.set_point, trace.position)
     travels = {j: max(float(np.ptp(s[:, trace.column(j)])) for s in signals) for j in kinds}
@@ -382,7 +392,9 @@ def _on_units(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
 
 
 def _approach(position: Floats, way: Floats) -> float:
-    """How much of a motion is towards the set point rather than away from it, from −1 to 1. way: (k,) what is left."""
+    """Returns how much of a motion is towards the set point rather than away, from −1 to 1. way: (k,) remaining
+    distance.
+    """
     work = way[:-1] * np.diff(position)
     whole = float(np.abs(work).sum())
     return float(work.sum()) / whole if whole > 0.0 else 0.0

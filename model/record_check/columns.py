@@ -1,4 +1,4 @@
-"""Units, signs, columns and times of a record, by two witnesses: the controller's law, and the balance of torques."""
+"""Checks units, signs, columns and times of a record by the controller's law and by the balance of torques."""
 
 from __future__ import annotations
 
@@ -30,29 +30,30 @@ from model.record_check.law import Reading as ColumnReading
 from model.record_check.words import CHECK_COLUMNS, number, times_of
 
 FACTOR_OF_UNIT = 1.2
-"""Ratio within which a factor is that of another unit: gains and motors are hardly off by more."""
+"""Ratio within which a factor counts as that of another unit: gains and motors hardly differ by more."""
 FACTOR_OF_GAIN = 3.0
-"""Most by which gains are off; a drive further from what they make is in another unit, or they are."""
+"""Largest factor by which gains may be wrong; beyond it the drive or the gains are in another unit."""
 OTHER_PERIOD = 0.05
-"""Relative distance between the interval of samples and the controller's period, from which they differ."""
+"""Relative difference between sampling interval and control period that is reported."""
 BEHIND = 0.25
-"""Samples by which a drive comes behind its motion, from which it is said: half of one is how it is formed."""
+"""Lag of a drive behind its motion, in samples, that is reported: half of one follows from how it is computed."""
 LEADS = 1.5
-"""Samples by which a position leads its set point, from which one stands for the other: none moves before it is
-asked."""
+"""Lead of a position over its set point, in samples, at which they count as exchanged: no joint moves before its set
+point.
+"""
 FOLLOWS = 0.3
-"""Least correlation of set point less position with the speed, for a lead to be told."""
+"""Least correlation of set point − position with the speed for a lead to be estimated."""
 
 
 UNITS = {"N": {"lbf": 4.448, "kgf": 9.807}, "N·m": {"lbf·in": 0.113, "kgf·cm": 0.09807, "N·cm": 0.01}}
-"""Other units of a drive, in those that it may be stated in."""
+"""Other units of a drive, in the units that a file may state."""
 THOUSANDS = {"thousandths of its unit (mA for A)": 1e-3, "thousands of its unit": 1e3}
 RATIOS = (1e3, 3.0, 2.0, 1.5, 0.5)
-"""Times as long as they were that are looked for: ms, and clocks or periods of another speed."""
+"""Factors of wrong times that are tried: ms, and clocks or periods of another speed."""
 
 
 def column_findings(trace: Trace, model: Model) -> tuple[RecordFinding, ...]:
-    """What is said of a record's columns and times; empty where they are as the machine file has them."""
+    """Returns findings on a record's columns and times; empty if they match the machine file."""
     return tuple(_Witnesses(trace, model).findings())
 
 
@@ -80,15 +81,15 @@ class _Witnesses:
         if time is None or time.consequence == "note":
             yield from self._by_balance(motion, told, holds=holds)
 
-    # ---- the drive that is not there
+    # ---- drives that are missing
 
     def _without_drive(self, joint: int, motion: Motion | None) -> RecordFinding | None:
-        """A drive that is 0 throughout, although the controller or the motion needs one."""
+        """Finds a drive that is 0 throughout, although the controller or the motion needs one."""
         if self.trace.drive is None or self.trace.drive[:, self.trace.column(joint)].any():
             return None
         if self._asked_of_controller(joint) or self._needs_drive(joint, motion):
             return self._doubt("drive-zero", joint, "its drive is 0 throughout, although it is driven.", CHECK_COLUMNS)
-        says = "its drive is 0 throughout: it is taken to swing by itself."
+        says = "its drive is 0 throughout: the joint is assumed to swing freely."
         return self._doubt("drive-zero", joint, says, CHECK_COLUMNS, sure=False)
 
     def _asked_of_controller(self, joint: int) -> bool:
@@ -100,8 +101,7 @@ class _Witnesses:
         return formed is not None and bool(np.ptp(trace.set_point[:, column])) and bool(formed.any())
 
     def _needs_drive(self, joint: int, motion: Motion | None) -> bool:
-        """Whether the motion needs a torque that is not a small part of what carries and accelerates it: a joint that
-        only swings needs none."""
+        """Whether the motion needs a torque that is a large part of weight and inertia; free swinging needs none."""
         found = None if motion is None else balance(self.model, motion)
         if found is None:
             return False
@@ -117,30 +117,33 @@ class _Witnesses:
             says = f"its {in_degrees} are in degrees: the controller's drive then follows from them."
             return self._doubt("position-unit", joint, says, "Convert them to rad.", value=1 / DEGREE, allowed=1.0)
         if reading.swapped or (factor < 0.0 and self._drives_motion(joint, motion)):
-            says = "position and set point are exchanged: the controller drives the other way round."
+            says = "position and set point are exchanged: the controller would drive away from its set point."
             return self._doubt("columns-swapped", joint, says, CHECK_COLUMNS)
         if factor < 0.0:
-            says = "its drive has the other sign: it goes against what the controller's gains make."
+            says = "its drive has the wrong sign: it is opposite to that of the controller's gains."
             advice = "Check the sign of the drive, and of the gains."
             return self._doubt("drive-sign", joint, says, advice, value=factor, allowed=1.0)
         return self._by_size(joint, fit)
 
     def _by_size(self, joint: int, fit: LawFit) -> RecordFinding | None:
-        """A drive of the right sign that is not what the gains make, or not at once."""
+        """Finds a drive of the right sign that differs in size or time from that of the gains."""
         if not 1 / FACTOR_OF_GAIN < fit.factor < FACTOR_OF_GAIN:
-            return self._scale(joint, fit.factor, "what the controller's gains make of set point and position")
+            return self._scale(
+                joint, fit.factor, "the drive that the controller's gains give for set point and position"
+            )
         late = fit.reading.late
         if late:
             way, other, seen = ("low", "up", "before") if late > 0 else ("high", "down", "after")
             rows = times_of(abs(late), "row")
-            says = f"its drive stands {rows} too {way}: it follows from set point and position {rows} {seen}."
+            says = f"its drive is {rows} too {way} in the file: it follows from set point and position {rows} {seen}."
             advice = f"Move the drive {other} by {rows}."
             return self._doubt("drive-late", joint, says, advice, value=float(late), allowed=0.0)
         return None
 
     def _drives_motion(self, joint: int, motion: Motion | None) -> bool:
-        """Whether the drive makes the motion as it stands: then its sign is right, and the set point, which moves as
-        the position does, stands for it."""
+        """Whether the drive causes the motion as recorded. Its sign is then right, and set point and position are
+        exchanged.
+        """
         found = None if motion is None else balance(self.model, motion)
         if found is None:
             return self._leads(joint)
@@ -176,7 +179,9 @@ class _Witnesses:
         ratio = usual / expected if expected > 0.0 else 1.0
         if abs(ratio - 1.0) < OTHER_PERIOD:
             return None
-        says = f"samples are {number(usual)} s apart, where {number(expected)} s are stated: {number(ratio)} times."
+        says = (
+            f"samples are {number(usual)} s apart, but {number(expected)} s are stated: {number(ratio)} times as long."
+        )
         joints = self.model.machine.modelled_joints
         whole = trace.tick is not None or _near(ratio, 1e3) or _near(ratio, 1e-3)
         sure = whole or (holds and any(time_matters(trace, self.model.machine, j, ratio) for j in joints))
@@ -221,19 +226,21 @@ class _Witnesses:
                     )  # fmt: skip
 
     def _behind(self, motion: Motion) -> Iterator[RecordFinding]:
-        """Drives that come after the motion that they make, which no delay of an arm does."""
+        """Finds drives that lag the motion that they cause, which no delay of an arm explains."""
         found = balance(self.model, motion)
         for place, joint in enumerate(self.model.machine.modelled_joints):
             late = 0.0 if found is None else float(found.behind[place])
             if late > BEHIND:
-                says = f"its drive comes {number(late)} samples after the motion that it makes: it stands too low."
+                says = f"its drive lags the motion that it causes by {number(late)} samples: it is too low in the file."
                 rows = times_of(math.ceil(late - BEHIND), "row")
-                advice = f"Move the drive up by {rows}, if each row is read at one moment."
+                advice = f"Move the drive up by {rows}, if all values of a row are read at the same time."
                 yield self._doubt("drive-late", joint, says, advice, value=late, allowed=BEHIND, sure=False)
 
     def _other_units(self, motion: Motion) -> list[RecordFinding]:
-        """Drives or times of another unit, or a clock's of another speed, told by the torques of the bodies: friction
-        may take nearly all of the drive. A load that nobody stated would do the same as a slow clock."""
+        """Finds drives or times in another unit, and clocks of another speed, by the torques of the bodies.
+
+        Friction may take nearly all of the drive. An unstated load would look like a slow clock.
+        """
         joints = self.model.machine.modelled_joints
         found = factors(self.model, motion)
         known = [one for one in found if one.inertia is not None]
@@ -248,12 +255,12 @@ class _Witnesses:
             return list(self._out_of_scale(motion, found))
         value = min(near, key=lambda way: near[way])
         if isinstance(value, str):
-            says = f"drive and motion belong together if the drive is in {value}."
+            says = f"drive and motion agree if the drive is in {value}."
             return [self._doubt("drive-scale", None, says, "Check the unit of the drive.")]
-        says = "drive and motion ask for another inertia than the machine file's: of a load, or times are false."
+        says = "drive and motion need another inertia than the machine file's: there is a load, or times are wrong."
         unit = ", as in ms" if value == 1e3 else ""
-        advice = f"Are times {value:.3g} times as long as they were{unit}? They are in s."
-        # A drive that was converted once too often is as large as one that moves a load: it is asked about, no more.
+        advice = f"Should times be {value:.3g} times as long{unit}? They must be in s."
+        # A drive that was converted once too often looks like one that moves a load, so the user is only asked.
         twice = [other for other, size in others.items() if _apart(known, Factors(*[size] * 4)) is not None]
         advice += f" Or was the drive converted as if it were in {twice[0]}?" if twice else ""
         return [self._doubt("time-scale", None, says, advice, value=value, allowed=1.0, sure=bool(unit))]
@@ -263,7 +270,9 @@ class _Witnesses:
         for place, joint in enumerate(self.model.machine.modelled_joints):
             factor = found[place].whole
             if balanced is not None and balanced.needed[place] > OUT_OF_SCALE**2 * balanced.given[place] > 0.0:
-                factor = math.sqrt(balanced.given[place] / balanced.needed[place])  # friction takes no less
+                factor = math.sqrt(
+                    balanced.given[place] / balanced.needed[place]
+                )  # friction could only increase the ratio
             if factor is not None and not 1 / OUT_OF_SCALE < factor < OUT_OF_SCALE:
                 yield self._scale(joint, factor, "the torque that the recorded motion needs")
 
@@ -274,8 +283,8 @@ class _Witnesses:
     def _gravity(self, removed: float) -> RecordFinding:
         gravity = ", ".join(f"{g:.4g}" for g in self.model.machine.gravity)
         says = (
-            f"drive and motion say that gravity, stated as [{gravity}] m/s², points the other way: turned round, it "
-            f"takes {removed:.0%} off what is left."
+            f"drive and motion show that gravity, stated as [{gravity}] m/s², points the other way: reversed, it "
+            f"removes {removed:.0%} of the remaining torque's mean square."
         )
         advice = "Check `gravity`, the posture in which positions are 0, their direction, and the sign of the drive."
         return self._doubt("gravity-reversed", None, says, advice, value=removed, allowed=LEAST_REMOVED)
@@ -313,34 +322,37 @@ class _Witnesses:
 
 
 _WAY_WORDS: dict[str, tuple[FindingKind, str, str]] = {
-    "degrees": ("position-unit", "drive and motion belong together if positions are in degrees.", "Convert to rad."),
+    "degrees": ("position-unit", "drive and motion agree if positions are in degrees.", "Convert to rad."),
     "thousandths": (
         "drive-scale",
-        "drive and motion belong together if the drive is in thousandths of its unit (mA for A).",
+        "drive and motion agree if the drive is in thousandths of its unit (mA for A).",
         "Check the unit of the drive.",
     ),
     "thousands": (
         "drive-scale",
-        "drive and motion belong together if the drive is in thousands of its unit.",
+        "drive and motion agree if the drive is in thousands of its unit.",
         "Check the unit of the drive.",
     ),
     "drive-sign": (
         "drive-sign",
-        "drive and motion belong together if the drive has the other sign.",
+        "drive and motion agree if the drive has the other sign.",
         "Check the sign of the drive, the direction of positions, and `gear_ratio`.",
     ),
-    "milliseconds": ("time-scale", "drive and motion belong together if times are in ms.", "Convert times to s."),
+    "milliseconds": ("time-scale", "drive and motion agree if times are in ms.", "Convert times to s."),
     "position-drive": (
         "columns-swapped",
-        "drive and motion belong together if position and drive are exchanged.",
+        "drive and motion agree if position and drive are exchanged.",
         CHECK_COLUMNS,
     ),
 }
 
 
 def _apart(found: Sequence[Factors], expected: Factors) -> float | None:
-    """How far factors are from those of another unit, as a logarithm; None where they are not near, or not known. The
-    motor's braking counts beside them: friction that nobody stated may add to it."""
+    """Returns the distance of factors from those of another unit, as a logarithm; None if they are not near, or not
+    known.
+
+    The motor's braking is included as an upper limit: unstated friction may add to it.
+    """
     pairs = [
         (value, other)
         for one in found

@@ -1,6 +1,6 @@
-"""False values of drives and set points: spikes that lie far beyond all other values.
+"""Finds false values of drives and set points: spikes that lie far outside all other values.
 
-A drive may jump, rest and be limited, which no reading of a joint does: none of these alone is a fault.
+Unlike a joint's reading, a drive may jump, rest and be limited; none of these alone is a fault.
 """
 
 from __future__ import annotations
@@ -18,16 +18,18 @@ from model.record_check.readings import find_jumps, sort_jumps
 from model.record_check.words import at_times, number, times_of
 
 BEYOND = 2.0
-"""Range of all other values, in which a spike lies outside of them: a controller's kick at a step is of its size."""
+"""Distance of a spike from all other values, in their range: a controller's kick at a step reaches once that range."""
 
 
 def drive_findings(trace: Trace, model: Model) -> Iterator[RecordFinding]:
-    """Doubts about values of drives and set points."""
+    """Yields doubts about values of drives and set points."""
     for joint in model.machine.modelled_joints:
         column = trace.column(joint)
         law = best_fit(fits_of(trace, model.machine, joint))
         formed = None if law is None else formed_drive(trace, model.machine, joint, law.reading)
-        if trace.set_point is not None and law is None:  # a drive that follows says that every set point was real
+        if (
+            trace.set_point is not None and law is None
+        ):  # a drive that follows its set points shows that all of them were real
             yield from _spikes(trace, joint, "set point", trace.set_point[:, column], None)
         if trace.drive is not None:
             kicks = None if formed is None or law is None else law.factor * formed
@@ -35,7 +37,7 @@ def drive_findings(trace: Trace, model: Model) -> Iterator[RecordFinding]:
 
 
 def _spikes(trace: Trace, joint: int, name: str, signal: Floats, made: Floats | None) -> Iterator[RecordFinding]:
-    """made: what the controller makes of set point and position, kicks at steps among them."""
+    """made: the controller's output for set point and position, with its kicks at steps."""
     spikes = sort_jumps(signal, find_jumps(trace.time, signal, 0.0), ()).spikes
     rows = np.zeros(len(signal), dtype=bool)
     for spike in spikes:
@@ -58,7 +60,7 @@ def _spikes(trace: Trace, joint: int, name: str, signal: Floats, made: Floats | 
         count=len(far),
         value=max(abs(spike.size) for spike in far),
         allowed=high - low,
-        says=f"{times_of(len(far), 'spike')} of its {name} {at_times(times)}, beyond {number(low)} to {number(high)}, "
-        "between which all others lie.",
+        says=f"{times_of(len(far), 'spike')} of its {name} {at_times(times)}, outside {number(low)} to {number(high)}, "
+        "which contains all other values.",
         advice="Look for lost bytes or a loose connector.",
     )

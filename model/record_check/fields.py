@@ -1,4 +1,4 @@
-"""What records hold, field by field, what that means for an answer, and what they and the machine file lack."""
+"""Reports the fields of records, their meaning for an answer, and gaps of records and machine file."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from model.record_check.readings import find_gaps, noise_of
 from model.record_check.words import number, times_of
 
 FEW_LEVELS = 16
-"""Different values of a signal up to which it is called coarse: four bits."""
-HARDLY = 20.0
-"""Travel of a joint, in its noise or in steps of its sensor, below which nothing of it is determined."""
+"""Number of different values up to which a signal counts as coarse: four bits."""
+LEAST_TRAVEL = 20.0
+"""Travel of a joint, in its noise or in steps of its sensor, below which it determines nothing."""
 UNEVEN = 0.2
 """Spread of the times between rows (middle 80 %), as a share of the usual one, from which they are uneven."""
 REPEATED = 0.1
-"""Share of rows that repeat the row before, from which a record is slower than its times say."""
+"""Share of rows that repeat the previous row from which a record is slower than its times suggest."""
 Weight = Literal["fine", "known", "lacking"]
-"""fine: nothing to say. known: an answer is less sharp for it. lacking: an answer needs it."""
+"""fine: in order. known: an answer is less precise. lacking: an answer needs it."""
 
 
 class FieldReport(FrozenRecord):
-    """One field of a record, or of the machine file where `record` is empty.
+    """One field of a record, or of the machine file if `record` is empty.
 
     Args:
-        joint: from 1, with its name; None: of all. there: what it holds. means: for the answer; empty where all is
-            well.
+        joint: from 1, with its name; None: of all. there: content of the field.
+        means: consequence for the answer; empty if there is none.
     """
 
     record: str = ""
@@ -46,14 +46,14 @@ class FieldReport(FrozenRecord):
 
     @property
     def place(self) -> str:
-        """The joint as a table shows it."""
+        """Returns the joint for a table."""
         return "" if self.joint is None else f"{self.joint} {self.name}".strip()
 
 
 def field_reports(model: Model, traces: Sequence[Trace]) -> tuple[FieldReport, ...]:
-    """Every field of records and machine file that an answer uses, records first.
+    """Returns every field of records and machine file that an answer uses, records first.
 
-    Raises TraceError where the names of joints are not the machine's.
+    Raises TraceError if the names of joints are not the machine's.
     """
     machine = model.machine
     found: list[FieldReport] = []
@@ -70,15 +70,15 @@ class _Record:
         self._joints = [joint for joint in machine.modelled_joints if joint in trace.joints]
 
     def reports(self) -> Iterator[FieldReport]:
-        """One report a field, those of times first."""
+        """Yields one report per field, times first."""
         if len(self._trace) < 3:
             yield self._of("time", None, times_of(len(self._trace), "row"), "Nothing can be computed.", "lacking")
             return
         yield self._time()
         for joint in self._machine.modelled_joints:
             if joint not in self._trace.joints:
-                means = "The model moves this joint: choose its column."
-                yield self._of("position", joint, "not there", means, "lacking")
+                means = "The model moves this joint: select its column."
+                yield self._of("position", joint, "missing", means, "lacking")
         yield from self._repeated()
         for joint in self._joints:
             yield self._position(joint)
@@ -111,7 +111,7 @@ class _Record:
         begin, end = np.flatnonzero(moving)[[0, -1]] if moving.any() else (0, 0)
         inside = same[begin : end + 1]
         if moving.any() and float(np.mean(inside)) > REPEATED:
-            says = f"{np.mean(inside):.0%} of the rows repeat the row before"
+            says = f"{np.mean(inside):.0%} of the rows repeat the previous row"
             means = "The source is slower than the record: keep a row only where it changes."
             yield self._of("rows", None, says, means, "known")
 
@@ -123,11 +123,11 @@ class _Record:
         turns = int(np.count_nonzero(np.diff(np.sign(_moves(reading, 3.0 * noise + step)))))
         there = f"{number(float(reading.min()))} to {number(float(reading.max()))} {unit}, "
         there += f"steps of {number(step)} {unit}, {times_of(turns, 'reversal')}"
-        if travel < HARDLY * max(noise, step):
+        if travel < LEAST_TRAVEL * max(noise, step):
             means = "It hardly moves: its inertia and friction stay as the machine file states them."
             return self._of("position", joint, there, means, "known")
         if turns == 0:
-            means = "It moves one way only: friction, an offset and weight look alike."
+            means = "It moves in one direction only: friction, an offset and weight look alike."
             return self._of("position", joint, there, means, "known")
         return self._of("position", joint, there)
 
@@ -135,18 +135,18 @@ class _Record:
         if self._trace.velocity is None:
             sensor = self._machine.joint(joint).sensor
             if sensor is not None and sensor.measures == "velocity":
-                return self._of("velocity", joint, "not there", "The machine file's sensor measures it.", "lacking")
-            return self._of("velocity", joint, "not there; formed from positions")
+                return self._of("velocity", joint, "missing", "The machine file's sensor measures it.", "lacking")
+            return self._of("velocity", joint, "missing; computed from positions")
         return self._levels("velocity", joint, self._trace.velocity, self._machine.joint(joint).units.position + "/s")
 
     def _set_point(self, joint: int) -> FieldReport:
         has_loop = not isinstance(self._machine.controller, NoController)
         if self._trace.set_point is None:
             if not has_loop:
-                return self._of("set point", joint, "not there; the drive moves the model")
+                return self._of("set point", joint, "missing; the drive moves the model")
             means = "The controller cannot be simulated; torques are compared."
             lacks: Weight = "lacking" if self._trace.drive is None else "known"
-            return self._of("set point", joint, "not there", means, lacks)
+            return self._of("set point", joint, "missing", means, lacks)
         asked = self._trace.set_point[:, self._trace.column(joint)]
         unit = self._machine.joint(joint).units.position
         return self._of("set point", joint, f"{number(float(asked.min()))} to {number(float(asked.max()))} {unit}")
@@ -156,16 +156,16 @@ class _Record:
         if drive is None:
             if self._trace.set_point is None or isinstance(self._machine.controller, NoController):
                 means = f"Without it nothing can be computed: record it, in {' or '.join(units)}."
-                return self._of("drive", joint, "not there", means, "lacking")
-            means = "Set points alone tell less: friction and loads show only in what the loop leaves."
-            return self._of("drive", joint, "not there", means, "known")
+                return self._of("drive", joint, "missing", means, "lacking")
+            means = "Set points alone show less: friction and loads appear only in the tracking error."
+            return self._of("drive", joint, "missing", means, "known")
         stated = self._trace.record.drive_unit
         if stated is not None and stated not in units:
             means = f"The machine file's drive is in {' or '.join(units)}."
             return self._of("drive", joint, f"in {stated}", means, "lacking")
         if stated is None and self._trace.record.source == "imported":
-            means = f"Its unit is taken for {units[0]}: state drive_unit."
-            return self._levels("drive", joint, drive, "of no stated unit", means)
+            means = f"Its unit is assumed to be {units[0]}: state drive_unit."
+            return self._levels("drive", joint, drive, "without a stated unit", means)
         return self._levels("drive", joint, drive, stated or "V")
 
     def _levels(self, field: str, joint: int, signal: Floats, unit: str, means: str = "") -> FieldReport:
@@ -173,15 +173,15 @@ class _Record:
         count = len(np.unique(values))
         there = f"{number(float(values.min()))} to {number(float(values.max()))} {unit}"
         if count == 1:
-            return self._of(field, joint, f"{there}, constant", "It says nothing.", "known")
+            return self._of(field, joint, f"{there}, constant", "It contains no information.", "known")
         if count <= FEW_LEVELS:
             there = f"{there}, only {count} different values"
-            means = means or "Small torques and frictions drown in its steps."
+            means = means or "Small torques and frictions are lost in its steps."
         return self._of(field, joint, there, means, "known" if means else "fine")
 
 
 def _moves(reading: Floats, least: float) -> Floats:
-    """The steps between the turning points of a reading, without motions smaller than `least`."""
+    """Returns the steps between the turning points of a reading, without motions smaller than `least`."""
     points = [float(reading[0])]
     for value in reading.tolist():
         if len(points) > 1 and (value - points[-1]) * (points[-1] - points[-2]) > 0.0:
@@ -192,13 +192,13 @@ def _moves(reading: Floats, least: float) -> Floats:
 
 
 def _step_of(reading: Floats) -> float:
-    """The smallest change of a reading; 0 where it never changes."""
+    """Returns the smallest change of a reading; 0 if it never changes."""
     moved = np.abs(np.diff(reading))
     return float(moved[moved > 0.0].min(initial=np.inf)) if moved.any() else 0.0
 
 
 def _on_machine(machine: Machine) -> Iterator[FieldReport]:
-    """What a machine file leaves open."""
+    """Yields what the machine file does not state."""
     for number_, joint in ((j, machine.joint(j)) for j in machine.modelled_joints):
         if joint.sensor is None:
             yield FieldReport(
@@ -206,8 +206,8 @@ def _on_machine(machine: Machine) -> Iterator[FieldReport]:
                 name=joint.name,
                 field="sensor",
                 there="not stated",
-                means="Its noise is taken from the record.",
+                means="Its noise is estimated from the record.",
                 weight="known",
             )
     if isinstance(machine.controller, NoController):
-        yield FieldReport(field="controller", there="none", means="Torques are compared, no loop is simulated.")
+        yield FieldReport(field="controller", there="none", means="Torques are compared; no control loop is simulated.")

@@ -1,4 +1,4 @@
-"""What a check of a record found, as data with its words."""
+"""Findings of the check of a record, as data with words."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 from daq.contracts.frozen import FrozenRecord
 
 Consequence = Literal["fatal", "doubt", "note"]
-"""fatal: nothing can be computed. doubt: an answer would be of the record's fault. note: to be known."""
+"""fatal: nothing can be computed. doubt: the answer may be due to a fault of the record. note: for information."""
 FindingKind = Literal[
     "bursts",
     "columns-swapped",
@@ -33,13 +33,13 @@ FindingKind = Literal[
 
 
 class RecordFinding(FrozenRecord):
-    """One thing that a record, or the machine file beside it, says and that cannot be, or should be known.
+    """One impossible or noteworthy value of a record, or of its machine file.
 
     Args:
-        record: what the record is called; empty where the finding is of the machine file. joint: from 1; None: of all.
-        times: s of the record's own clock, the first of `count`. value, allowed: as measured, and the most (or the
-            value) that was expected, in `unit`.
-        says, advice: a sentence each.
+        record: name of the record; empty if the finding concerns the machine file. joint: from 1; None: all.
+        times: s of the record's own clock, the first of `count`.
+        value, allowed: measured value, and the largest (or the) expected one, in `unit`.
+        says, advice: one sentence each.
     """
 
     kind: FindingKind
@@ -56,7 +56,7 @@ class RecordFinding(FrozenRecord):
 
     @property
     def line(self) -> str:
-        """The finding as one line, with its place."""
+        """Returns the finding as one line, with its place."""
         place = "" if self.joint is None else f"joint {self.joint}: "
         record = f"{self.record}: " if self.record else ""
         advice = f" {self.advice}" if self.advice else ""
@@ -64,18 +64,18 @@ class RecordFinding(FrozenRecord):
 
 
 def doubts_in(findings: Iterable[RecordFinding]) -> tuple[RecordFinding, ...]:
-    """The findings for which an answer would be of the record's fault."""
+    """Returns the findings due to which an answer may show a fault of the record."""
     return tuple(f for f in findings if f.consequence != "note")
 
 
 def doubts_headline(findings: Sequence[RecordFinding]) -> str:
-    """The gravest doubt, and how many there are beside it; empty where nothing is doubted. A clause."""
+    """Returns the most serious doubt and the number of others, as a clause; empty without doubts."""
     doubts = lines_of(doubts_in(findings))
     more = "" if len(doubts) < 2 else f" ({len(doubts) - 1} more)"
     return f"{doubts[0].rstrip('.')}{more}" if doubts else ""
 
 
 def lines_of(findings: Sequence[RecordFinding]) -> list[str]:
-    """The findings as lines, the gravest first."""
+    """Returns the findings as lines, the most serious first."""
     order = {"fatal": 0, "doubt": 1, "note": 2}
     return [f.line for f in sorted(findings, key=lambda f: order[f.consequence])]

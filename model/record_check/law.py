@@ -1,6 +1,6 @@
-"""The controller's own law as a witness: which columns, units and times make the recorded drive what it must be.
+"""Compares the recorded drive with the controller's law: with which columns, units and times does the law hold?
 
-The drive follows from set point and position alone, whatever the arm does. So no hidden effect of the arm is told here.
+The drive follows from set point and position alone, whatever the arm does. So this does not detect effects of the arm.
 """
 
 from __future__ import annotations
@@ -17,26 +17,27 @@ from model.arrays import Floats
 from model.drives.controller import INTEGRAL_SHARE
 
 HOLDS = 0.1
-"""Most that a law may leave of the drive's variation (root mean squares) to hold: rounding and lost samples leave less,
-and no other law comes so near."""
+"""Largest remaining share of the drive's variation (root mean squares) with which a law holds. Rounding and lost
+samples leave less, and no other law comes so near.
+"""
 BETTER = 0.2
-"""Most that another reading of the columns may leave, as a share of what they leave as recorded, to be believed."""
+"""Largest remainder with other columns, as a share of that with the recorded ones, for them to be accepted."""
 AT_LIMIT = 0.98
-"""Share of the largest drive from which it may be cut off."""
+"""Share of the largest drive from which it may be limited."""
 SEVERAL = 3
-"""Samples at the largest drive that show a limit."""
+"""Number of samples at the largest drive that show a limit."""
 MOST_ROWS = 3
-"""Rows by which the drive's column may have slipped against the others, up or down, to be looked for."""
+"""Rows, up or down, by which the drive's column may have slipped against the others."""
 DEGREE = math.pi / 180.0
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A way to read the columns of one joint.
+    """A hypothesis on the columns of one joint.
 
     Args:
-        position, set_point: what stands in these columns. late: samples that the drive stands too low in the file;
-            below 0 too high.
+        position, set_point: true content of these columns.
+        late: samples by which the drive is too low in the file; below 0 too high.
         swapped: whether position and set point are exchanged. turned: those of both that are in degrees.
     """
 
@@ -49,7 +50,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class LawFit:
-    """How the drive follows from columns: `left` of its variation, and `factor` times what the gains say."""
+    """Fit of the drive to columns: `left` of its variation remains; it is `factor` times that of the gains."""
 
     reading: Reading
     factor: float
@@ -57,8 +58,10 @@ class LawFit:
 
 
 def fits_of(trace: Trace, machine: Machine, joint: int) -> list[LawFit]:
-    """How a joint's drive follows from each way to read its columns, as recorded first; empty where the machine file
-    describes no controller, or the record lacks what it needs."""
+    """Fits a joint's drive to each hypothesis on its columns, as recorded first.
+
+    Empty if the machine file describes no controller, or the record lacks an input of it.
+    """
     if isinstance(machine.controller, NoController) or trace.set_point is None or trace.drive is None:
         return []
     column = trace.column(joint)
@@ -78,7 +81,7 @@ def fits_of(trace: Trace, machine: Machine, joint: int) -> list[LawFit]:
 
 
 def best_fit(fits: list[LawFit]) -> LawFit | None:
-    """The fit of columns as recorded where it holds well enough; one that is far better; None where none holds."""
+    """Returns the fit as recorded if it holds well enough, else a much better one, else None."""
     if not fits:
         return None
     recorded = fits[0]
@@ -89,8 +92,10 @@ def best_fit(fits: list[LawFit]) -> LawFit | None:
 
 
 def time_matters(trace: Trace, machine: Machine, joint: int, ratio: float) -> bool:
-    """Whether the law, which holds with the file's period a sample, does not hold with that period `ratio` times as
-    long: then the samples are one period apart, whatever the times say."""
+    """Whether the law holds at the file's control period but not at `ratio` times that period.
+
+    If so, the samples are one period apart, whatever their times state.
+    """
     column = trace.column(joint)
     assert trace.set_point is not None
     assert trace.drive is not None
@@ -103,8 +108,11 @@ def time_matters(trace: Trace, machine: Machine, joint: int, ratio: float) -> bo
 
 
 def formed_drive(trace: Trace, machine: Machine, joint: int, reading: Reading, stretched: float = 1.0) -> Floats | None:
-    """The drive (k,) that the machine file's gains make of columns, without limits and rounding, but for a constant;
-    None where the file lacks the sensor that its law counts by. stretched: factor of the control period."""
+    """Returns the drive (k,) that the machine file's gains compute from columns, without limits, rounding and a
+    constant.
+
+    None if the file lacks the sensor whose counts the law uses. stretched: factor of the control period.
+    """
     controller = machine.controller
     error = reading.set_point - reading.position
     if isinstance(controller, SampledPid):
@@ -129,7 +137,7 @@ def formed_drive(trace: Trace, machine: Machine, joint: int, reading: Reading, s
 def _ways(position: Floats, asked: Floats, *, slides: bool) -> Iterator[Reading]:
     yield Reading(position, asked)
     yield from (Reading(position, asked, late=late) for late in range(-MOST_ROWS, MOST_ROWS + 1) if late)
-    yield Reading(asked, position, swapped=True)  # of a cascade; a PID's drive has the other sign, as in the first
+    yield Reading(asked, position, swapped=True)  # for a cascade; a PID's drive has the other sign, as in the first
     if not slides:
         yield Reading(position * DEGREE, asked, turned="positions")
         yield Reading(position, asked * DEGREE, turned="set points")
@@ -141,11 +149,11 @@ def _pid(error: Floats, gains: tuple[float, float, float], period: float) -> Flo
 
 
 def _fit(reading: Reading, formed: Floats, drive: Floats) -> LawFit:
-    """The drive as a factor times what is formed, beside what integrators held in the beginning."""
+    """Fits the drive as a factor times the computed one, plus the unknown initial state of integrators."""
     size = np.abs(drive)
     limited = size >= AT_LIMIT * size.max()
     free = ~limited if int(limited.sum()) >= SEVERAL else np.ones(len(drive), dtype=bool)
-    free[0] = False  # what the controller differentiated there is not in the record
+    free[0] = False  # the controller's derivative there needs a sample before the record
     if int(free.sum()) < 4 * SEVERAL or not np.ptp(formed[free]):
         return LawFit(reading, 0.0, 1.0)
     columns = np.column_stack([formed[free], np.ones(int(free.sum()))])

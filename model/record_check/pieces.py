@@ -1,4 +1,4 @@
-"""A record cut at its gaps, for what needs only a short while of motion at once: a balance of torques."""
+"""Cuts a record at its gaps, for methods that need only a short motion at a time: a balance of torques."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from daq.contracts.trace import Trace
 from model.record_check.readings import find_gaps, is_bridged
 
 SHORTEST = 8.0
-"""Shortest duration of a piece, s: torques below 1 Hz, the lowest cutoff that is chosen, can be formed of it."""
+"""Shortest duration of a piece, s: it is enough for torques below 1 Hz, the lowest cutoff that is chosen."""
 
 
 def in_pieces(traces: Sequence[Trace]) -> list[Trace]:
-    """The traces, each cut at every gap too long to be bridged: what moved the joints meanwhile is not known.
+    """Returns the traces, each cut at every gap that is too long to interpolate.
 
-    Pieces keep the identity of their trace. Those shorter than `SHORTEST` are left out; where all are, the whole trace
-    stays, so that whoever reads it refuses it.
+    Pieces keep the identity of their trace. Those shorter than `SHORTEST` are left out. If all are, the whole trace
+    stays, so that its user rejects it.
     """
     return [piece for trace in traces for piece in _pieces(trace)]
 

@@ -1,7 +1,7 @@
-"""Jumps, spikes, stuck readings and gaps: what the readings of one joint do that no joint can.
+"""Finds jumps, spikes, stuck readings and gaps: changes of a reading that no joint can make.
 
-A torque is finite, so a speed changes little from one sample to the next. A reading is false where the speed of one
-interval lies outside the speeds of both its neighbours by more than the record's own noise and accelerations make.
+A torque is finite, so a speed changes little from one sample to the next. A reading is false if the speed of one
+interval differs from the speeds of both neighbours by more than the record's own noise and accelerations explain.
 """
 
 from __future__ import annotations
@@ -17,36 +17,39 @@ from daq.contracts.machine import Sensor
 from model.arrays import Floats
 
 TAIL = 0.2
-"""Share of a record's intervals from which the tail of its noise is told: half of them may be false."""
+"""Share of a record's intervals from which the tail of its noise is estimated: half of them may be false."""
 FALSE_DOUBTS = 1e-6
-"""Records in which noise alone may raise a doubt: its tail is taken for an exponential one."""
+"""Number of records of which noise alone may put one in doubt; its tail is assumed to be exponential."""
 ISOLATED = 7
 """Intervals of a running median, which a spike of up to three samples does not move."""
 KINK = 2.0
-"""Most that a speed may peak in one interval, in the largest change from one interval to the next: a torque that
-turns round in the middle of it gives half of that."""
+"""Largest peak of a speed in one interval, relative to the largest change from one interval to the next. A torque that
+reverses in the middle of it gives half of that.
+"""
 LEAST_COUNTS = 4.0
 """Least false step, in steps of the sensor: rounding alone makes two."""
 EARLY_OR_LATE = 1.0
-"""Intervals by which a bus, or the clock of a stamp, may shift one reading: what a joint moves meanwhile is no jump."""
+"""Intervals by which a bus, or the clock of a stamp, may shift one reading; a joint's motion meanwhile is no jump."""
 RETURNS = 3
 """Samples within which a spike returns."""
 STUCK = 5
-"""Least samples with the same reading before a jump, for a reading that was stuck."""
+"""Least number of samples with the same reading before a jump that show a stuck reading."""
 ENTRY = 3
-"""Intervals before a bound, in each of which a reading that is cut off there moves on."""
+"""Intervals before a limit; the reading must move on in each of them to count as cut off there."""
 EVEN = 2.0
-"""Largest beside least speed in these, of a joint that they do not bring to rest: an even torque makes it 7/3."""
+"""Largest ratio of speeds in these for a joint that is not braking: a constant torque makes it 7/3."""
 MISSING = 2.5
 """Interval, in usual ones, from which at least one sample is missing, however uneven the stamps are."""
 BURST = 0.25
-"""Most of the mean interval that lies between the stamps of one burst: no sampler is so uneven."""
+"""Largest distance between stamps of one burst, in mean intervals: no sampler is so uneven."""
 ON_GRID = 0.1
-"""Most that bursts are apart beside whole times of one interval, in that interval."""
+"""Largest deviation of bursts from multiples of one interval, in that interval."""
 MOST_OFF_GRID = 0.05
-"""Share of bursts that may be further off: stamps of a busy computer."""
+"""Share of bursts that may deviate more: stamps of a busy computer."""
 BRIDGED = (10.0, 0.05)
-"""Longest gap that is bridged: so many intervals, and so many seconds more; a joint goes on as it did."""
+"""Longest gap that is interpolated: so many intervals, and so many seconds more; the joint's motion goes on as
+before.
+"""
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,9 @@ class Jump:
     """A false step of a reading.
 
     Args:
-        row: the sample before it. size: of the step, less what the joint moved meanwhile. usual: the most that the
-            record's own noise and accelerations explain. back: of a spike, its last sample.
+        row: the sample before it. size: of the step, minus the joint's motion meanwhile.
+        usual: the largest step that the record's own noise and accelerations explain. back: of a spike, its last
+            sample.
     """
 
     row: int
@@ -66,8 +70,11 @@ class Jump:
 
 @dataclass(frozen=True)
 class FalseReadings:
-    """The jumps of a reading, sorted: wraps by one turn; spikes, pairs of jumps there and back; stuck, jumps after
-    readings that did not change, with the row since which (of size 0 where no jump ends them); others."""
+    """The jumps of a reading, sorted.
+
+    wraps: by one turn. spikes: pairs of jumps, there and back. stuck: jumps after constant readings, with the first row
+    of these (of size 0 if no jump ends them). others: all else.
+    """
 
     wraps: tuple[Jump, ...]
     spikes: tuple[Jump, ...]
@@ -76,10 +83,10 @@ class FalseReadings:
 
 
 def find_jumps(time: Floats, reading: Floats, step: float) -> list[Jump]:
-    """False steps of a reading (k,).
+    """Finds false steps of a reading (k,).
 
     Args:
-        time: (k,) s. step: of the sensor, in the reading's unit; 0 where it is not known.
+        time: (k,) s. step: of the sensor, in the reading's unit; 0 if it is not known.
     """
     if len(reading) < 4 * ISOLATED:
         return []
@@ -104,8 +111,10 @@ def find_jumps(time: Floats, reading: Floats, step: float) -> list[Jump]:
 
 
 def _most_of_noise(outside: Floats, rounding: float) -> float:
-    """The most that noise makes of these (k,), whose tail is taken for an exponential one. A rounded value stands for
-    any within its step: the steps alone have no tail."""
+    """Returns the largest value that noise explains among these (k,), with an exponential tail.
+
+    A rounded value may be any within its step: the steps alone have no tail.
+    """
     spreading = np.random.default_rng(0).uniform(-0.5, 0.5, len(outside))
     spread = np.sort(outside + rounding * spreading)
     tail = spread[-max(1, round(TAIL * len(spread))) :]
@@ -114,7 +123,7 @@ def _most_of_noise(outside: Floats, rounding: float) -> float:
 
 
 def sort_jumps(reading: Floats, jumps: Sequence[Jump], turns: Sequence[float]) -> FalseReadings:
-    """Jumps by what makes them. turns: whole turns of the joint, or of its sensor, in the reading's unit."""
+    """Sorts jumps by cause. turns: whole turns of the joint, or of its sensor, in the reading's unit."""
     wraps = [j for j in jumps if _wrapped(j, turns)]
     left = [j for j in jumps if not _wrapped(j, turns) and abs(j.size) > j.usual]
     spikes: list[Jump] = []
@@ -132,22 +141,25 @@ def sort_jumps(reading: Floats, jumps: Sequence[Jump], turns: Sequence[float]) -
             stuck.append((since, left[k]))
         elif _stays(reading, left[k]):
             others.append(left[k])
-        else:  # the way back hides in the noise
+        else:  # the jump back is hidden in the noise
             spikes.append(replace(left[k], back=left[k].row + 1))
         k += 1
     return FalseReadings(tuple(wraps), tuple(spikes), tuple(stuck), tuple(others))
 
 
 def unwrapped(reading: Floats, wraps: Sequence[Jump], turns: Sequence[float]) -> Floats:
-    """The reading (k,) with a whole turn added behind each wrap."""
+    """Returns the reading (k,) with a whole turn added after each wrap."""
     turned = np.zeros(len(reading))
     turned[[jump.row + 1 for jump in wraps]] = [_wrapped(jump, turns) for jump in wraps]
     return np.asarray(reading - np.cumsum(turned))
 
 
 def find_bounds(reading: Floats) -> list[tuple[int, int]]:
-    """First and last row of each stretch in which a reading stands at its largest or its smallest value, that it comes
-    to at full speed: a torque needs longer to stop a joint than from one sample to the next."""
+    """Finds the first and last row of each stretch at the largest or smallest value that a reading reaches at full
+    speed.
+
+    A torque needs more than one sample to stop a joint.
+    """
     rates = np.diff(reading)
     usual = float(np.sqrt(np.mean(rates**2)))
     found = []
@@ -161,8 +173,10 @@ def find_bounds(reading: Floats) -> list[tuple[int, int]]:
 
 
 def find_dead(reading: Floats, step: float) -> list[tuple[int, Jump]]:
-    """A position that stands still from the record's beginning, or up to its end, and that moves right beside: as stuck
-    ones, without a jump. step: of the sensor, in the reading's unit; 0 where it is not known."""
+    """Finds a position that is constant from the beginning or to the end of the record and moves right beside that.
+
+    It returns them as stuck readings without a jump. step: of the sensor, in the reading's unit; 0 if it is not known.
+    """
     rates, last = np.diff(reading), len(reading) - 1
     until, since = last - _unchanged_since(reading[::-1], last), _unchanged_since(reading, last)
     found = []
@@ -174,8 +188,10 @@ def find_dead(reading: Floats, step: float) -> list[tuple[int, Jump]]:
 
 
 def _stops_at_once(rates: Floats, row: int, step: float) -> bool:
-    """Whether a reading with these steps (k - 1,) comes to `row` at a speed that no torque of this record has stopped
-    from one sample to the next, and does not slow down before."""
+    """Whether a reading with these steps (k - 1,) reaches `row` too fast for any torque of this record to stop it.
+
+    It must not slow down before.
+    """
     speeds = np.abs(before := rates[max(0, row - 1 - ENTRY) : max(0, row - 1)])  # the last step may be cut short
     elsewhere = rates[: max(0, row - ISOLATED)]
     if int(np.count_nonzero(elsewhere)) < 4 * ISOLATED or abs(float(np.sign(before).sum())) < ENTRY:
@@ -185,15 +201,17 @@ def _stops_at_once(rates: Floats, row: int, step: float) -> bool:
 
 
 def find_bursts(time: Floats) -> tuple[float, float] | None:
-    """The interval (s) after which a buffer is emptied, and the mean interval of samples, where stamps are those of
-    arrival: several at once, and bursts on a grid. None where they are not."""
+    """Returns the interval (s) at which a buffer is emptied, and the mean sampling interval, if stamps are of arrival.
+
+    They are if several are equal and bursts lie on a grid; else None.
+    """
     intervals = np.diff(time)
     mean = float(intervals[intervals <= np.quantile(intervals, 0.99)].mean())
     begins = intervals > BURST * mean
     if int((~begins).sum()) < max(STUCK, 0.01 * len(intervals)) or int(begins.sum()) < 2 * STUCK:
         return None
     between = np.diff(time[1:][begins])
-    # whole times of one interval: of the shortest between bursts, or a half or a third of it
+    # multiples of one interval: of the shortest between bursts, or a half or a third of it
     shortest = float(np.quantile(between, MOST_OFF_GRID))
     near = between[between < 1.5 * shortest]
     for parts in (1, 2, 3):
@@ -205,39 +223,41 @@ def find_bursts(time: Floats) -> tuple[float, float] | None:
 
 
 def find_gaps(time: Floats) -> list[tuple[int, float]]:
-    """Row before each gap, and its length in s: at least one sample is missing there."""
+    """Returns the row before each gap, and its length in s: at least one sample is missing there."""
     intervals = np.diff(time)
     usual = float(np.median(intervals))
     return [(int(row), float(intervals[row])) for row in np.flatnonzero(intervals > MISSING * usual)]
 
 
 def is_bridged(gap: float, usual: float) -> bool:
-    """Whether a gap (s) is short beside motion; usual: interval between samples, s."""
+    """Whether a gap (s) is short compared with motion; usual: interval between samples, s."""
     return gap <= BRIDGED[0] * usual + BRIDGED[1]
 
 
 def sensor_deviation(sensor: Sensor) -> float:
-    """Standard deviation (rad, m) of one reading: √(1/12 + noise²) counts."""
+    """Returns the standard deviation (rad, m) of one reading: √(1/12 + noise²) counts."""
     noise = 0.0 if sensor.noise is None else sensor.noise.value
     return float(np.sqrt(1.0 / 12.0 + noise**2)) * sensor.range.value / 2**sensor.bits
 
 
 def noise_of(reading: Floats, step: float = 0.0) -> float:
-    """Standard deviation of a reading's noise and rounding, from its second differences, which false readings hardly
-    move. step: of the sensor."""
+    """Returns the standard deviation of a reading's noise and rounding, from its second differences.
+
+    False readings hardly influence them. step: of the sensor.
+    """
     second = np.diff(reading, 2)
     spread = 1.4826 * float(np.median(np.abs(second - np.median(second)))) / np.sqrt(6.0)
     return max(spread, step / np.sqrt(12.0))
 
 
 def _wrapped(jump: Jump, turns: Sequence[float]) -> float:
-    """The turn by which a reading wraps there, with its sign; 0 where noise and acceleration leave more beside it."""
+    """Returns the signed turn by which a reading wraps there; 0 if the rest exceeds noise and acceleration."""
     nearest = min(turns, key=lambda turn: abs(abs(jump.size) - turn), default=math.inf)
     return math.copysign(nearest, jump.size) if abs(abs(jump.size) - nearest) <= jump.usual else 0.0
 
 
 def _returns(jumps: Sequence[Jump], first: int) -> int | None:
-    """The jump that brings the reading back, where there is one soon."""
+    """Returns the index of the jump that brings the reading back, if there is one soon."""
     total = 0.0
     for k in range(first, len(jumps)):
         if jumps[k].row > jumps[first].row + RETURNS:
@@ -249,7 +269,7 @@ def _returns(jumps: Sequence[Jump], first: int) -> int | None:
 
 
 def _stays(reading: Floats, jump: Jump) -> bool:
-    """Whether the reading stays where a jump has brought it, but for its motion."""
+    """Whether the reading stays at the value after a jump, apart from its motion."""
     row, around = jump.row, 2 * RETURNS
     before, after = reading[max(0, row + 1 - around) : row + 1], reading[row + 1 : row + 1 + around]
     moved = float(reading[row + 1] - reading[row]) - jump.size
@@ -258,6 +278,6 @@ def _stays(reading: Floats, jump: Jump) -> bool:
 
 
 def _unchanged_since(reading: Floats, row: int) -> int:
-    """The first of the samples with the reading of `row` that come right before it."""
+    """Returns the first of the consecutive samples up to `row` with the same reading."""
     changed = np.flatnonzero(reading[: row + 1] != reading[row])
     return int(changed[-1]) + 1 if len(changed) else 0

@@ -1,7 +1,7 @@
-"""What noise alone leaves of records: the model takes the arm's place, and its readings have noise and are rounded.
+"""Estimates the residual of a right model due to noise alone: the model simulates records with noise and rounding.
 
-Noise goes round a closed loop: what a right model leaves is more than the noise of a reading. Fits, validations and
-comparisons all mean this by "noise".
+Noise enters the control loop, so a right model leaves more than the noise of a reading. Fits, validations and
+comparisons all use this as "noise".
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ FEWEST, MOST = 6, 20
 SECONDS = 200.0
 """Total length of motion (s) of a record's replicas: in a short record friction changes sign only a few times."""
 LEAST_MOTION = 3.0
-"""Motion, in noises of a reading, from which more than that motion may be left of a record."""
+"""Motion, in noises of a reading, above which more than that motion may remain of a record."""
 SEED = 1991
 
 
 def noise_left(model: Model, traces: Sequence[Trace], loop: Loop = "closed") -> Floats:
-    """Root mean square (n,) of each joint's position residual if the model is right, rad (m), over all samples.
+    """Returns the root mean square (n,) of each joint's position residual for a right model, rad (m), over all samples.
 
-    It is at least the noise of a reading, which is all of it where the model cannot be simulated along the records.
+    It is at least the noise of a reading, and equals it if the model cannot be simulated along the records.
 
     Args:
         loop: how the model is compared with the records.
@@ -49,14 +49,16 @@ def noise_left(model: Model, traces: Sequence[Trace], loop: Loop = "closed") -> 
 
 
 def motion_there(machine: Machine, joint: int, traces: Sequence[Trace]) -> float | None:
-    """Root mean square of a joint's measured motion about its mean, rad (m); None where that is hardly more than noise
-    of the readings."""
+    """Returns the root mean square of a joint's measured motion about its mean, rad (m).
+
+    None if that hardly exceeds the noise of readings.
+    """
     there = float(np.concatenate([trace.position[:, trace.column(joint)] for trace in traces]).std())
     return there if there > LEAST_MOTION * reading_noise(machine, joint, traces) else None
 
 
 def made_by(model: Model, trace: Trace, rng: np.random.Generator, loop: Loop = "closed") -> Trace:
-    """The record that the model would have made: in closed loop if there are set points, else from the drive."""
+    """Simulates a record of the model: in closed loop if there are set points, else from the drive."""
     machine = model.machine
     closed = loop == "closed" and trace.set_point is not None and not isinstance(machine.controller, NoController)
     sensors = [machine.joint(j).sensor for j in machine.modelled_joints]
@@ -74,7 +76,7 @@ def made_by(model: Model, trace: Trace, rng: np.random.Generator, loop: Loop = "
 
 
 def reading_noise(machine: Machine, joint: int, traces: Sequence[Trace]) -> float:
-    """Standard deviation of a reading, as its sensor states it; else as the records show it."""
+    """Returns the standard deviation of a reading, as its sensor states it; else as the records show it."""
     sensor = machine.joint(joint).sensor
     if sensor is not None and sensor.measures == "position":
         return sensor_deviation(sensor)

@@ -1,4 +1,4 @@
-"""What a finding says, and what to do: one sentence each."""
+"""Words for findings."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from collections.abc import Sequence
 
 CHECK_COLUMNS = "Check which column is which, and the units beside them."
 MOST_TIMES = 10
-"""Times that a finding lists; it counts the others."""
+"""Number of times that a finding lists; it counts the others."""
 
 
 def at_times(times: Sequence[float]) -> str:
-    """`at 1.23 s`, or the first few of many."""
+    """Returns `at 1.23 s`, or the first few of many."""
     shown = [f"{time:.2f}" for time in times[:MOST_TIMES]]
     more = len(times) - len(shown)
     return f"at {', '.join(shown)} s" + (f" and {more} more" if more else "")
 
 
 def times_of(count: int, what: str) -> str:
-    """`1 wrap`, `3 wraps`."""
+    """Returns `1 wrap`, `3 wraps`."""
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def number(value: float) -> str:
-    """A measured value for a sentence."""
+    """Formats a measured value for a sentence."""
     return f"{value:.3g}"

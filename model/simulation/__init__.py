@@ -1,1 +1,1 @@
-"""Motion of a model: in closed loop from recorded set points, and in open loop from recorded drive."""
+"""Simulates a model: in closed loop from recorded set points, or in open loop from recorded drive."""

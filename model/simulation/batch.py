@@ -1,4 +1,4 @@
-"""A batch of runs of one model: chooses the compiled run that it needs, and runs it on all cores."""
+"""Runs a batch of simulations of one model: chooses the compiled function and uses all cores."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from model.simulation.prepared import Prepared
 from model.simulation.run_arrays import RecordArrays, RunArrays
 
 CHUNKS_A_CORE = 4
-"""Pieces per core into which a batch is cut, so that all cores are busy to the end although runs differ in length."""
+"""Pieces per core into which a batch is cut. Runs differ in length; small pieces keep all cores busy to the end."""
 
 
 @dataclass(frozen=True)
 class BatchRun:
-    """Runs of one model: run r takes `prepared[which[r]]`, row r of `vectors` and row r of `initials`.
+    """Runs of one model: run r uses `prepared[which[r]]`, row r of `vectors` and row r of `initials`.
 
     Args:
         vectors: (r, layout size) flat vectors, real or dual (complex128). initials: (r, n, 2), of the same kind.
-        step: longest step of integration, s.
+        step: longest integration step, s.
         general: use the recursive dynamics even where there is a closed form.
     """
 
@@ -50,10 +50,11 @@ class BatchRun:
     general: bool = False
 
     def run(self, cores: int | None = None) -> Array:
-        """Outputs (r, OUTPUTS, k, n) of all runs, in the order of `model.simulation.period`; k is that of the longest
-        record, and rows beyond the end of a shorter one are zero. Not finite where a run diverged.
+        """Returns outputs (r, OUTPUTS, k, n) of all runs, in the order of `model.simulation.period`.
 
-        Threads share the work, because compiled code releases Python's lock. Results do not depend on their number.
+        k is that of the longest record; rows beyond the end of a shorter one are zero. Values are not finite where a
+        run diverged. Threads share the work, because compiled code releases Python's lock. Results do not depend on
+        `cores`.
         """
         compiled = _compiled_run(self.model, self.general)
         records, runs = self._records(), self._runs()
@@ -85,7 +86,7 @@ class BatchRun:
         )
 
     def _runs(self) -> RunArrays:
-        from model.simulation.own_table import own_table  # here: its tools of numba take a while to import
+        from model.simulation.own_table import own_table  # imported here because numba's tools are slow to import
 
         shares = self.vectors[:, : at.SHARED].copy()
         shares[:, at.PERIOD] = np.array([p.period for p in self.prepared])[self.which]
@@ -101,20 +102,20 @@ class BatchRun:
 
 
 def seed(parameter: Parameter, vector: Array, initial: Array) -> None:
-    """Gives the parameter its dual part in the vector and initial state of a run that is to be differentiated by it."""
+    """Sets the parameter's dual part in the vector and initial state of a run that is differentiated by it."""
     vector[list(parameter.slots)] += 1j * DUAL_STEP
     if parameter.initial is not None:
         initial[parameter.initial] += 1j * DUAL_STEP
 
 
 def available_cores() -> int:
-    """Cores that this process may use."""
+    """Returns the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _compiled_run(model: Model, general: bool) -> Callable[..., None]:
-    """The closed form where the machine is the waist-shoulder-elbow arm of rods, else the recursive form."""
-    from model.simulation import kernel  # here: it takes a while to import
+    """Returns the closed form for the waist-shoulder-elbow arm of rods, else the recursive form."""
+    from model.simulation import kernel  # imported here because it is slow to import
 
     if general or not is_rod_arm(model.machine):
         return kernel.run_chain
@@ -123,19 +124,20 @@ def _compiled_run(model: Model, general: bool) -> Callable[..., None]:
 
 
 def _make_ready(compiled: Callable[..., None], records: RecordArrays, runs: RunArrays, out: Array) -> None:
-    """Compiles a run for numbers of this kind, or loads it from disk: once, not in every thread and process."""
+    """Compiles a run for numbers of this kind, or loads it from disk, once for all threads and processes."""
     name = (compiled.__name__, out.dtype)
     if name not in _ready:
         announcement = install_listener("numba:compile", _Announcement(compiled))
         with one_process_at_a_time(compiled.__module__), announcement, _without_garbage_collection():
-            compiled(0, 0, records, runs, out)  # no run
+            compiled(0, 0, records, runs, out)  # empty range of runs
         _ready.add(name)
 
 
 @contextmanager
 def _without_garbage_collection() -> Iterator[None]:
-    """The compiler makes millions of objects that live until it is done: a sixth of its time goes into looking for
-    garbage among them."""
+    """Pauses garbage collection: the compiler's millions of objects live until it ends, and searching them takes a
+    sixth of its time.
+    """
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -146,30 +148,30 @@ def _without_garbage_collection() -> Iterator[None]:
 
 
 _announced: list[str] = []
-"""The compiled run that this process has announced; the compilation of others gets no line."""
+"""The compiled run that this process announces. Functions that it calls are compiled without a line."""
 _ready: set[tuple[str, np.dtype[Any]]] = set()
-"""Compiled runs, and the kind of their numbers, that this process has compiled or loaded."""
+"""Compiled runs, with their kind of numbers, that this process has compiled or loaded."""
 
 
 class _Announcement(Listener):
-    """Says that a run is being compiled, and nothing where its machine code is found on disk."""
+    """Prints a line when a run is compiled; prints nothing when its machine code is found on disk."""
 
     def __init__(self, run: Callable[..., None]) -> None:
         self._run = run
 
     def on_start(self, event: Any) -> None:
-        """A line when the run itself is compiled, none for what it calls."""
+        """Prints the line for the run itself, not for the functions that it calls."""
         if event.data["dispatcher"] is self._run and not _announced:
             _announced.append(self._run.__name__)
-            sys.stderr.write("Compiling the simulation for this machine, once: some 20 s\n")
+            sys.stderr.write("Compiling the simulation for this machine, once (about 20 s)\n")
             sys.stderr.flush()
 
     def on_end(self, event: Any) -> None:
-        """Nothing to say."""
+        """Does nothing; numba requires the method."""
 
 
 def _padded(arrays: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Arrays (k, n) of different k as one (t, longest, n)."""
+    """Stacks arrays (k, n) of different k into (t, longest, n)."""
     if len(arrays) == 1:
         return arrays[0][None]
     padded = np.zeros((len(arrays), max(len(a) for a in arrays), arrays[0].shape[1]))

@@ -1,4 +1,4 @@
-"""From a model's parameters to what the equations of motion read. Compiled, in real or dual numbers."""
+"""Computes the inputs of the equations of motion from a model's parameters. Compiled, in real or dual numbers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from model.kinematics.chain import ChainArrays
 
 @internal
 def gravity(shared: NDArray[Any]) -> Any:
-    """Gravity (3) in the axes of a base that is turned about its x axis, then about its y axis."""
+    """Returns gravity (3) in the axes of a base that is turned about its x axis, then about its y axis."""
     sx, cx = sin_cos(shared[at.TILT_X])
     sy, cy = sin_cos(shared[at.TILT_Y])
     x, y, z = shared[at.GRAVITY_X], shared[at.GRAVITY_Y], shared[at.GRAVITY_Z]
@@ -28,7 +28,7 @@ def gravity(shared: NDArray[Any]) -> Any:
 
 @internal
 def reflected_rotor(joint: NDArray[Any], flags: int) -> Any:
-    """n²J of a rotor that turns with its joint, kg·m²; zero where the transmission gives."""
+    """Returns n²J of a rotor that turns with its joint, kg·m²; zero where the transmission is flexible."""
     if flags & at.HAS_FLEXIBILITY:
         return 0.0 * joint[at.ROTOR_INERTIA]
     return joint[at.ROTOR_INERTIA] * joint[at.GEAR] * joint[at.GEAR]
@@ -36,9 +36,9 @@ def reflected_rotor(joint: NDArray[Any], flags: int) -> Any:
 
 @compiled
 def rod_arm_body(shared: NDArray[Any], joints: NDArray[Any], flags: NDArray[Any]) -> Any:
-    """Effective parameters (22) of the waist-shoulder-elbow arm of rods, then m2 g and the weight of link 3 with load.
+    """Returns effective parameters (22) of the arm of rods, then m2 g and the weight of link 3 with load.
 
-    Rotors that move apart from their links (`flags`) are left out.
+    Rotors that move relative to their links (`flags`) are left out.
     """
     x, y, z = gravity(shared)
     rods = np.zeros(rod_arm.SIZE, dtype=joints.dtype)
@@ -65,7 +65,7 @@ def rod_arm_body(shared: NDArray[Any], joints: NDArray[Any], flags: NDArray[Any]
 
 @compiled
 def chain_body(shared: NDArray[Any], joints: NDArray[Any], flags: NDArray[Any]) -> ChainArrays:
-    """The machine as a general chain, load and payload at the origin of the last frame."""
+    """Returns the machine as a general chain, load and payload at the origin of the last frame."""
     n = joints.shape[0]
     prismatic = np.empty(n, dtype=np.bool_)
     geometry = np.empty((n, 4), dtype=joints.dtype)
@@ -86,7 +86,7 @@ def chain_body(shared: NDArray[Any], joints: NDArray[Any], flags: NDArray[Any]) 
 
 @internal
 def _fill_link(inertial: NDArray[Any], joint: NDArray[Any]) -> None:
-    """Mass, first moments and xx xy xz yy yz zz of a link about the origin of its own frame."""
+    """Fills in mass, first moments and xx xy xz yy yz zz of a link about the origin of its own frame."""
     mass = joint[at.MASS] + joint[at.MASS_ADDED]
     x, y, z = joint[at.CENTRE_X] + joint[at.SHIFT], joint[at.CENTRE_Y], joint[at.CENTRE_Z]
     xx, yy, zz = joint[at.INERTIA_XX], joint[at.INERTIA_YY], joint[at.INERTIA_ZZ]

@@ -1,4 +1,4 @@
-"""A model's bodies as a general chain, and gravity along a motion."""
+"""Converts a model's bodies to a general chain, and computes gravity torques along a motion."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from model.simulation.bodies import chain_body
 
 
 def chain_of(model: Model, vector: NDArray[Any] | None = None) -> ChainArrays:
-    """The model's bodies as a general chain, load and payload included, always with exact inertias."""
+    """Returns the model's bodies as a general chain, load and payload included, always with exact inertias."""
     numbers = model.vector if vector is None else vector
     joints = np.ascontiguousarray(numbers[at.SHARED :].reshape(model.joint_count, at.PER_JOINT))
     return chain_body(np.ascontiguousarray(numbers[: at.SHARED]), joints, np.zeros(model.joint_count, dtype=np.int64))
 
 
 def gravity_loads(model: Model, position: Floats) -> Floats:
-    """Gravity torques (k, n), N·m or N, at joint positions (k, n)."""
+    """Returns gravity torques (k, n), N·m or N, at joint positions (k, n)."""
     return np.asarray(recursive.gravity_along(chain_of(model), np.ascontiguousarray(position)))

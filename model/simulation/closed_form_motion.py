@@ -1,4 +1,4 @@
-"""Motion of the waist-shoulder-elbow arm over a stretch of constant drive: RK4 over its closed form. Compiled."""
+"""Integrates the waist-shoulder-elbow arm over a time with constant drive: RK4 on its closed form. Compiled."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from model.simulation.run_arrays import Arm
 
 @inlined
 def friction_levels(theta_2: Any, theta_3: Any, arms: Any, plain: Any, weight_2: Any, weight_3: Any) -> Any:
-    """Levels of Coulomb friction (N·m) of the three joints, (7.32) to (7.34) in magnitude plus a constant each.
+    """Returns Coulomb friction levels (N·m) of the three joints: magnitudes of (7.32) to (7.34), plus a constant each.
 
     `weight_2` is m2 g, `weight_3` that of link 3 with its load.
     """
@@ -49,7 +49,7 @@ def friction_levels(theta_2: Any, theta_3: Any, arms: Any, plain: Any, weight_2:
 def advance(  # noqa: PLR0915 (a step in registers: three joints written out, nothing allocated)
     state: Array, volts: Array, start: complex, duration: complex, steps: int, arm: Arm
 ) -> None:
-    """Advance the state (3, STATE) by `duration` s in equal steps at constant motor volts; rigid transmissions.
+    """Advances the state (3, STATE) by `duration` s in equal steps at constant motor volts; rigid transmissions.
 
     The arm's body holds the effective parameters (22), then m2 g and the weight of link 3 with its load.
     """
@@ -89,7 +89,7 @@ def advance(  # noqa: PLR0915 (a step in registers: three joints written out, no
     z1, z2, z3 = state[0, DEFLECTION], state[1, DEFLECTION], state[2, DEFLECTION]
     l1, l2, l3 = 0.0 * q1, 0.0 * q1, 0.0 * q1
     for step in range(steps):
-        a1, a2, a3 = 0.0 * q1, 0.0 * q1, 0.0 * q1  # accelerations of the stage before
+        a1, a2, a3 = 0.0 * q1, 0.0 * q1, 0.0 * q1  # accelerations of the previous stage
         u1, u2, u3 = v1, v2, v3  # speeds of the stage
         dq1, dq2, dq3 = 0.0 * q1, 0.0 * q1, 0.0 * q1  # displacements of the stage
         qs1, qs2, qs3 = 0.0 * q1, 0.0 * q1, 0.0 * q1  # weighted sums of speeds and accelerations

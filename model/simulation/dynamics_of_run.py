@@ -1,6 +1,6 @@
-"""The two kinds of dynamics behind one face: bodies, accelerations, friction levels, gravity. Compiled."""
+"""One interface to both kinds of dynamics: bodies, accelerations, friction levels, gravity. Compiled."""
 
-# ruff: noqa: ARG001 (what an implementation does not need is part of the face all of them share)
+# ruff: noqa: ARG001 (all implementations share an interface, and some need only part of it)
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible
 def rod_arm_accelerations(
     q: NDArray[Any], v: NDArray[Any], torque: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], a: NDArray[Any]
 ) -> None:
-    """Closed form, tilted base included."""
+    """Computes accelerations from the closed form, tilted base included."""
     theta_1, theta_2, theta_3 = q[0] + joints[0, at.THETA], q[1] + joints[1, at.THETA], q[2] + joints[2, at.THETA]
     t1, t2, t3 = torque[0], torque[1], torque[2]
     if body[lumped.GRAVITY_X] != 0.0 or body[lumped.GRAVITY_Y] != 0.0:
@@ -39,14 +39,14 @@ def rod_arm_accelerations(
 
 @borrowing
 def _add_shares(joints: NDArray[Any], gravity: NDArray[Any], out: NDArray[Any]) -> None:
-    """Adds to the levels `out` each joint's share of its gravity torque, N·m."""
+    """Adds each joint's share of its gravity torque to the levels `out`, N·m."""
     for j in range(joints.shape[0]):
         out[j] += joints[j, at.GRAVITY_SHARE] * magnitude(gravity[j])
 
 
 @compiled
 def rod_arm_gravity(q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any]) -> NDArray[Any]:
-    """Gravity torques (3), N·m."""
+    """Returns gravity torques (3), N·m."""
     result = np.empty_like(q)
     result[0], result[1], result[2] = three_joint.gravity_torques(
         q[0] + joints[0, at.THETA], q[1] + joints[1, at.THETA], q[2] + joints[2, at.THETA], body
@@ -58,7 +58,7 @@ def rod_arm_gravity(q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any]) -
 def rod_arm_levels(
     q: NDArray[Any], joints: NDArray[Any], body: NDArray[Any], _settings: NDArray[Any], out: NDArray[Any]
 ) -> None:
-    """(7.32) to (7.34) from the closed form's parameters, and shares of the gravity torques."""
+    """Computes (7.32) to (7.34) from the closed form's parameters, and adds shares of the gravity torques."""
     _published_levels(q, joints, body[lumped.SIZE], body[lumped.SIZE + 1], out)
     if rubs_under_gravity(joints):
         g1, g2, g3 = three_joint.gravity_torques(
@@ -73,7 +73,7 @@ def rod_arm_levels(
 def chain_accelerations(
     q: NDArray[Any], v: NDArray[Any], torque: NDArray[Any], _joints: NDArray[Any], body: ChainArrays, a: NDArray[Any]
 ) -> None:
-    """Recursive Newton-Euler for any chain."""
+    """Computes accelerations by recursive Newton-Euler, for any chain."""
     found = recursive.forward_dynamics(body, q, v, torque)
     for j in range(q.shape[0]):
         a[j] = found[j]
@@ -81,14 +81,14 @@ def chain_accelerations(
 
 @internal
 def _pressing_levels(q: NDArray[Any], joints: NDArray[Any], body: ChainArrays, out: NDArray[Any]) -> None:
-    """An arm times the weight across each axis, and a constant."""
+    """Computes levels as a friction arm times the weight across each axis, plus a constant."""
     n = joints.shape[0]
     x, y, z = body.gravity[0], body.gravity[1], body.gravity[2]
     beyond = 0.0 * x
     for j in range(n):
         beyond += body.inertial[j, 0]
     for j in range(n):
-        across = np.sqrt(x * x + y * y + 1e-30)  # gravity across the axis of joint j, in the frame before it
+        across = np.sqrt(x * x + y * y + 1e-30)  # gravity across the axis of joint j, in the preceding frame
         out[j] = joints[j, at.COULOMB] + joints[j, at.COULOMB_ARM] * beyond * across
         beyond -= body.inertial[j, 0]
         theta = body.geometry[j, 0] + (0.0 * q[j] if body.prismatic[j] else q[j])
@@ -102,8 +102,10 @@ def _pressing_levels(q: NDArray[Any], joints: NDArray[Any], body: ChainArrays, o
 def chain_levels(
     q: NDArray[Any], joints: NDArray[Any], body: ChainArrays, settings: NDArray[Any], out: NDArray[Any]
 ) -> None:
-    """Levels of Coulomb friction, N·m: (7.32) to (7.34) where set, else an arm times the weight across each axis; and
-    shares of the gravity torques."""
+    """Computes levels of Coulomb friction, N·m, plus shares of the gravity torques.
+
+    They are (7.32) to (7.34) where set, else a friction arm times the weight across each axis.
+    """
     if settings[at.PUBLISHED_LOADS] != 0:
         _published_levels(
             q, joints, -body.gravity[2] * body.inertial[1, 0], -body.gravity[2] * body.inertial[2, 0], out
@@ -116,7 +118,7 @@ def chain_levels(
 
 @compiled
 def chain_gravity(q: NDArray[Any], _joints: NDArray[Any], body: ChainArrays) -> NDArray[Any]:
-    """Gravity torques (n,), N·m or N."""
+    """Returns gravity torques (n,), N·m or N."""
     return recursive.gravity_torques(body, q)
 
 
@@ -135,7 +137,7 @@ def _of(kind: Any, *tags: type) -> bool:
 
 
 def body_of(kind: Any, shared: Any, joints: Any, flags: Any) -> Any:
-    """What the equations of motion read, from the parameters."""
+    """Returns the inputs of the equations of motion, from the parameters."""
     return uncompiled(_body_of, kind, shared, joints, flags)
 
 
@@ -155,7 +157,7 @@ def _body_of(kind: Any, shared: Any, joints: Any, flags: Any) -> Any:
 
 
 def accelerate(kind: Any, q: Any, v: Any, torque: Any, joints: Any, body: Any, a: Any) -> Any:
-    """Fills `a` with accelerations for joint torques."""
+    """Fills `a` with the accelerations that the joint torques cause."""
     return uncompiled(_accelerate, kind, q, v, torque, joints, body, a)
 
 
@@ -195,7 +197,7 @@ def _friction_levels_of(kind: Any, q: Any, joints: Any, body: Any, settings: Any
 
 
 def gravity_of(kind: Any, q: Any, joints: Any, body: Any) -> Any:
-    """Gravity torques, N·m."""
+    """Returns gravity torques, N·m."""
     return uncompiled(_gravity_of, kind, q, joints, body)
 
 

@@ -1,7 +1,7 @@
-"""Motion of the waist-shoulder-elbow arm over a stretch of constant drive where a transmission gives or has play: RK4.
+"""Integrates the waist-shoulder-elbow arm with flexible transmissions or backlash at constant drive: RK4. Compiled.
 
-The same steps as `general_motion`, with the closed form called by name: so all of it is compiled into one function that
-counts no references to its arrays, which took longer than the arithmetic. Compiled.
+The steps are those of `general_motion`, but the closed form is called by name. All of it is thus compiled into one
+function without reference counts of its arrays; they took longer than the arithmetic.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from model.simulation.run_arrays import Arm
 
 @borrowing
 def advance(state: Array, volts: Array, start: complex, duration: complex, steps: int, arm: Arm, work: Array) -> None:
-    """Advance the state (3, STATE) by `duration` s in equal steps at constant motor volts, without a user's effects.
+    """Advances the state (3, STATE) by `duration` s in equal steps at constant motor volts, without users' effects.
 
     `work` (WORK, 3) is overwritten.
     """

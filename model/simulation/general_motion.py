@@ -1,7 +1,7 @@
-"""Motion over a stretch of constant drive for any dynamics, joints whose transmission gives included: RK4. Compiled.
+"""Integrates any dynamics over a time with constant drive, flexible transmissions included: RK4. Compiled.
 
-A joint with a flexible transmission has a rotor of its own: the motor, its viscous friction and its inertia act on the
-rotor; the link feels what the transmission carries, and friction, and everything from outside.
+A joint with a flexible transmission has its own rotor. The motor, its viscous friction and its inertia act on the
+rotor. The transmission's torque, joint friction and external torques act on the link.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ WORK = 14
 def advance(
     kind: Any, state: Array, volts: Array, start: complex, duration: complex, steps: int, arm: Arm, work: Array
 ) -> None:
-    """Advance the state (n, STATE) by `duration` s in equal steps at constant motor volts.
+    """Advances the state (n, STATE) by `duration` s in equal steps at constant motor volts.
 
     `kind` is a tag that chooses the dynamics; `work` (WORK, n) is overwritten.
     """
@@ -72,7 +72,7 @@ def advance(
 def form_torques(
     state: Array, work: Array, volts: Array, now: complex, h: complex, stage: int, joints: Array, flags: Array
 ) -> None:
-    """Torques on the links but for those of the user's effects and of the motors, which stand in a row of their own."""
+    """Computes torques on the links, except those of users' effects and of the motors, which have a row each."""
     for j in range(joints.shape[0]):
         joint, moved = joints[j], work[Q, j] - state[j, POSITION]
         z = deflection(state[j, DEFLECTION], moved, 1.0 / joint[at.PRESLIDING], joint[at.PRESLIDING_SHAPE])
@@ -96,14 +96,14 @@ def form_torques(
 
 @borrowing
 def add_motors(work: Array) -> None:
-    """The motors' torques, or what gears transmit of them, to those on the links."""
+    """Adds the motors' torques, or what the gears transmit of them, to the torques on the links."""
     for j in range(work.shape[1]):
         work[TORQUE, j] += work[MOTOR, j]
 
 
 @borrowing
 def end_joints(state: Array, work: Array, volts: Array, h: complex, joints: Array, flags: Array) -> None:
-    """What a step of `h` s leaves behind beside positions and speeds."""
+    """Updates the states other than position and speed after a step of `h` s."""
     for j in range(joints.shape[0]):
         if flags[j] != 0:
             gives = flags[j] & at.HAS_FLEXIBILITY != 0
@@ -114,7 +114,7 @@ def end_joints(state: Array, work: Array, volts: Array, h: complex, joints: Arra
 
 @borrowing
 def begin(state: Array, work: Array) -> None:
-    """A step begins: stage values are those of the state, accelerations and sums are zero."""
+    """Begins a step: sets stage values to the state, accelerations and sums to zero."""
     for j in range(state.shape[0]):
         work[V, j], work[W, j] = state[j, SPEED], state[j, ROTOR_SPEED]
         work[A, j], work[B, j] = 0.0 * state[j, SPEED], 0.0 * state[j, SPEED]
@@ -124,7 +124,7 @@ def begin(state: Array, work: Array) -> None:
 
 @borrowing
 def to_stage(state: Array, work: Array, reach: complex) -> None:
-    """Stage values from the state and the rates of the stage before."""
+    """Computes stage values from the state and the rates of the previous stage."""
     for j in range(state.shape[0]):
         work[Q, j] = state[j, POSITION] + reach * work[V, j]
         work[M, j] = state[j, ROTOR_POSITION] + reach * work[W, j]
@@ -134,7 +134,7 @@ def to_stage(state: Array, work: Array, reach: complex) -> None:
 
 @borrowing
 def add_stage(work: Array, weight: float) -> None:
-    """The stage's rates, weighted, into the sums."""
+    """Adds the stage's weighted rates to the sums."""
     for j in range(work.shape[1]):
         work[SUM_V, j] += weight * work[V, j]
         work[SUM_A, j] += weight * work[A, j]
@@ -144,7 +144,7 @@ def add_stage(work: Array, weight: float) -> None:
 
 @borrowing
 def end_step(state: Array, work: Array, sixth: complex, joints: Array) -> None:
-    """The state after the step."""
+    """Computes the state after the step."""
     for j in range(state.shape[0]):
         moved = sixth * work[SUM_V, j]
         softness, shape = 1.0 / joints[j, at.PRESLIDING], joints[j, at.PRESLIDING_SHAPE]

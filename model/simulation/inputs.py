@@ -1,4 +1,4 @@
-"""What drives a simulation, period by period, from a recorded trace."""
+"""Prepares the inputs of a simulation, per control period, from a recorded trace."""
 
 from __future__ import annotations
 
@@ -17,31 +17,32 @@ from model.drives import controller as pid
 from model.simulation.start_speed import speed_at_start
 
 REST_COUNTS = 2.0
-"""Largest difference, in counts of the sensor, of readings that count as one posture before the first new set point."""
+"""Largest difference, in sensor counts, of readings that count as one posture before the first new set point."""
 REST_PERIODS = 25
 """Most readings that are averaged to the posture at rest."""
 NEIGHBOURS = 1.5
-"""Largest distance, in periods, of samples without a gap between them."""
+"""Largest distance, in periods, between samples without a gap."""
 MOST_SAMPLES = 0.8
-"""Least share of periods with a sample at which a record counts as made period by period."""
+"""Least share of periods with a sample at which a record counts as sampled in every period."""
 NEARLY = 1e-6
 """Distance, in periods, that counts as rounding."""
 LARGEST_ANGLE = 20.0
-"""Largest plausible angle, rad; more than three turns of a joint are taken for degrees."""
+"""Largest plausible angle, rad; more than three turns of a joint are assumed to be degrees."""
 
 
 @dataclass(frozen=True)
 class RunInputs:
-    """Everything that a run takes from a record, on the grid of control periods.
+    """Everything that a run uses of a record, on the grid of control periods.
 
     Args:
-        joints: numbers of the joints, from 1, all that the model moves.
+        joints: joints that the model moves, numbered from 1.
         period: s. time: (k,) s, of the record's clock.
         set_points: (k, n) rad, held where the record has gaps. drive: (k, n) motor volts, for a run in open loop.
         initial: (n, 2) position (rad) and speed (rad/s). first_drive: (n,) commanded volts before the first period.
         readings: (k, n) rad, NaN where the record has a gap.
         rows: (m,) position of each sample on the grid. gains: (n, GAINS).
-        has_set_points, has_drive: whether the record has them; what it lacks is held at the reading, or at zero.
+        has_set_points, has_drive: whether the record has them. Missing set points are held at the reading; missing
+            drive is zero.
     """
 
     joints: tuple[int, ...]
@@ -64,22 +65,20 @@ class RunInputs:
 
     @property
     def drive_of_every_period(self) -> bool:
-        """Whether the record holds the drive of each control period: one sample a period, but for a few that are
-        missing."""
+        """Whether the record holds the drive of each control period: one sample per period, with few missing."""
         whole = bool(np.all(self.rows == np.round(self.rows)))
         return self.has_drive and whole and len(self.rows) > MOST_SAMPLES * len(self)
 
 
 def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
-    """Inputs of a run that repeats a trace.
+    """Returns the inputs of a run that repeats a trace.
 
-    The arm starts at rest at the posture measured before the first new set point (at the first reading, and with
-    the measured speed, where the trace has one), with the drive of the first sample. Where nothing but the recorded
-    drive moves the model and no speed was measured, a motion that the record begins in is taken from its first
-    readings.
+    The arm starts at rest at the posture measured before the first new set point (at the first reading, with the
+    measured speed, where the trace has one). Its first drive is that of the first sample. If only the recorded drive
+    moves the model and no speed was measured, the initial speed is estimated from the first readings.
 
     Raises:
-        TraceError: for fewer than three samples, a joint that is missing, angles that look like degrees, or neither
+        TraceError: for fewer than three samples, a missing joint, angles that look like degrees, or neither
             set points (with a controller) nor drive.
     """
     joints = machine.modelled_joints
@@ -94,9 +93,9 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     count = int(np.ceil(rows[-1] - 1e-6)) + 1
     controlled = not isinstance(machine.controller, NoController)
     if controlled and trace.set_point is None and trace.drive is None:
-        raise TraceError(f"{trace.called}: has neither set points nor drive: nothing moves the model")
+        raise TraceError(f"{trace.called}: has neither set points nor drive, so nothing moves the model")
     if not controlled and trace.drive is None:
-        raise TraceError(f"{trace.called}: has no drive, and {machine.name} has no controller to form one")
+        raise TraceError(f"{trace.called}: has no drive, and {machine.name} has no controller that could compute it")
     wanted = measured if trace.set_point is None else trace.set_point[:, columns]
     set_points = _held(wanted, _taken_from(trace, rows), count)
     drive = _held(np.zeros_like(measured) if trace.drive is None else trace.drive[:, columns], rows, count)
@@ -104,7 +103,7 @@ def inputs_of(trace: Trace, machine: Machine) -> RunInputs:
     initial[:, 0] = _rest_posture(trace, measured, set_points[0], machine)
     if trace.velocity is not None:
         initial[:, 0], initial[:, 1] = measured[0], trace.velocity[0, columns]
-    elif not controlled or trace.set_point is None:  # nothing brings it back to the motion that it began in
+    elif not controlled or trace.set_point is None:  # no feedback brings it back to the record
         initial[:, 1] = speed_at_start(trace, machine)
     return RunInputs(
         joints,
@@ -128,10 +127,10 @@ def _check_unit(trace: Trace, measured: Floats, machine: Machine) -> None:
     for k, joint in enumerate(machine.modelled_joints):
         largest = float(np.abs(measured[:, k]).max())
         sensor = machine.joint(joint).sensor
-        reads_angles = sensor is not None and sensor.measures == "position"  # a tachometer's shaft may turn for ever
+        reads_angles = sensor is not None and sensor.measures == "position"  # a tachometer's shaft may turn endlessly
         if machine.joint(joint).kind == "revolute" and reads_angles and largest > LARGEST_ANGLE:
             raise TraceError(
-                f"{trace.called}: joint {joint} reaches {largest:.4g} rad; degrees? "
+                f"{trace.called}: joint {joint} reaches {largest:.4g} rad; are these degrees? "
                 f"angles must be in rad, up to {LARGEST_ANGLE:g}"
             )
 
@@ -145,7 +144,7 @@ def _period(trace: Trace, machine: Machine) -> float:
 
 
 def _rows(trace: Trace, period: float) -> Floats:
-    """Where each sample lies on the grid of periods: whole numbers when the record was made tick by tick."""
+    """Returns each sample's position on the grid of periods: whole numbers when every period was sampled."""
     if trace.tick is not None:
         return np.asarray(trace.tick - trace.tick[0], dtype=np.float64)
     rows = (trace.time - trace.time[0]) / period
@@ -154,9 +153,11 @@ def _rows(trace: Trace, period: float) -> Floats:
 
 
 def _taken_from(trace: Trace, rows: Floats) -> Floats:
-    """From which period on each recorded set point was used: as the record tells, which can only be after the sample
-    before. Where it does not tell, the host of a slow line has written the next set point right after a sampled period,
-    so it was taken in all of the periods up to the next sample."""
+    """Returns the period from which each recorded set point was used.
+
+    The record may state it; it can only be after the previous sample. Otherwise, the host of a slow line wrote the next
+    set point right after a sampled period, so it was used in all periods up to the next sample.
+    """
     if trace.tick is None:
         return rows
     assumed = rows - (trace.record.every - 1)
@@ -167,14 +168,13 @@ def _taken_from(trace: Trace, rows: Floats) -> Floats:
 
 
 def _held(samples: Floats, rows: Floats, count: int) -> Floats:
-    """Samples on the grid, each held until the next one."""
+    """Returns samples on the grid, each held until the next one."""
     last = np.searchsorted(rows, np.arange(count) + 1e-6, side="right") - 1
     return np.ascontiguousarray(samples[np.clip(last, 0, len(samples) - 1)])
 
 
 def readings_on_grid(measured: Floats, rows: Floats, count: int) -> Floats:
-    """Readings (k, n) at whole periods: those of the samples there, or between two that are next to each other; NaN
-    where a sample is missing."""
+    """Returns readings (k, n) at whole periods, interpolated between adjacent samples; NaN where one is missing."""
     grid = np.arange(float(count))
     after = np.clip(np.searchsorted(rows, grid - NEARLY), 1, len(rows) - 1)
     left, right = rows[after - 1], rows[after]
@@ -186,7 +186,7 @@ def readings_on_grid(measured: Floats, rows: Floats, count: int) -> Floats:
 
 
 def _rest_posture(trace: Trace, measured: Floats, first: Floats, machine: Machine) -> Floats:
-    """Mean reading before the set points first change, as long as the arm keeps still."""
+    """Returns the mean reading before the set points first change, as long as the arm stands still."""
     still = np.ones(len(trace), dtype=bool)
     if trace.set_point is not None:
         columns = [trace.column(j) for j in machine.modelled_joints]
@@ -200,7 +200,7 @@ def _rest_posture(trace: Trace, measured: Floats, first: Floats, machine: Machin
 
 
 def gains_of(machine: Machine, own: Mapping[int, Gain] | None) -> Floats:
-    """Gains (n, GAINS) of the modelled joints: a record's own, by joint, where it has them, else the machine's."""
+    """Returns gains (n, GAINS) of the modelled joints: those of the record where it has them, else the machine's."""
     gains = np.zeros((len(machine.modelled_joints), pid.GAINS))
     controller = machine.controller
     if isinstance(controller, NoController):

@@ -1,9 +1,9 @@
-"""Torques on one joint beside the rigid-body ones: motor, friction, and what the effects add. Compiled.
+"""Torques on one joint other than rigid-body ones: motor, friction, and effects. Compiled.
 
-Friction that opposes motion is carried by z in [−1, 1], the deflection of an elastic, perfectly plastic contact: it
-follows the joint's displacement over the presliding distance and is clamped (Prandtl), or comes to its end the slower
-the nearer it is (Dahl), or anything between. The torque is z times the level of friction, so a joint at rest holds a
-load without creeping, no step is stiff near zero speed, and the derivative exists on both sides of every corner.
+Friction is described by z in [−1, 1], the deflection of an elastic, perfectly plastic contact. z follows the joint's
+displacement over the presliding distance. It is clamped at ±1 (Prandtl), approaches ±1 asymptotically (Dahl), or
+anything between. The torque is z times the level of friction. So a joint at rest holds a load without creeping, no step
+is stiff near zero speed, and the derivative exists on both sides of every corner.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from model.dynamics.compilation import borrowing, inlined
 from model.dynamics.dual import sin_cos
 
 RESTICK_SPEED = 1e-3
-"""rad/s (m/s): a sliding joint slower than this sticks again."""
+"""A sliding joint that is slower than this (rad/s, m/s) sticks again."""
 
 SMALL_TURNS = 0.05
-"""Time constants of a winding in a step, below which its exponential is taken from a series."""
+"""Ratio of a step to a winding's time constant below which its exponential is computed from a series."""
 
 TWO_PI = 2.0 * np.pi
 
@@ -34,10 +34,10 @@ STATE = 8
 
 @inlined
 def deflection(z: Any, displacement: Any, softness: Any, shape: Any) -> Any:
-    """z after a displacement x of one sign s: dz/dx = (1 − shape s z) · softness, clamped.
+    """Returns z after a displacement x of one sign s: dz/dx = (1 − shape s z) · softness, clamped.
 
-    `softness` is one over the presliding distance; `shape` is 0 for Prandtl's law and 1 for Dahl's. The exponential of
-    the solution is one over its series to the third power: never negative, and a law of friction as good as another.
+    `softness` is 1 / presliding distance; `shape` is 0 for Prandtl's law and 1 for Dahl's. The solution's exponential
+    is replaced by 1 / (its series to the third power). That is never negative and is an equally good law of friction.
     """
     if shape == 0.0:
         return clamped(z + displacement * softness, 1.0 + 0.0 * z)
@@ -51,7 +51,7 @@ def deflection(z: Any, displacement: Any, softness: Any, shape: Any) -> Any:
 
 @borrowing
 def rubs_under_gravity(joints: Array) -> bool:
-    """Whether the friction of any joint goes with its gravity torque."""
+    """Whether the friction of any joint depends on its gravity torque."""
     found = False
     for j in range(joints.shape[0]):
         found = found or joints[j, at.GRAVITY_SHARE] != 0.0
@@ -60,27 +60,30 @@ def rubs_under_gravity(joints: Array) -> bool:
 
 @inlined
 def motor_gain(joint: Array, rise: Any) -> Any:
-    """Joint torque a volt (N·m/V), n K_T / R, for a winding warmed by `rise`."""
+    """Returns joint torque per volt (N·m/V), n K_T / R, for a winding warmed by `rise`."""
     return joint[at.GEAR] * torque_constant(joint) / (joint[at.RESISTANCE] * (1.0 + rise))
 
 
 @inlined
 def motor_damping(joint: Array, rise: Any) -> Any:
-    """Joint torque a rad/s (N·m·s/rad): back-EMF through the winding, and viscous friction (7.30)."""
+    """Returns joint torque per rad/s (N·m·s/rad): back-EMF through the winding, and viscous friction (7.30)."""
     electrical = torque_constant(joint) * back_emf_constant(joint) / (joint[at.RESISTANCE] * (1.0 + rise))
     return joint[at.GEAR] * joint[at.GEAR] * (electrical + joint[at.VISCOUS])
 
 
 @inlined
 def steady_current(joint: Array, rise: Any, volts: Any, speed: Any) -> Any:
-    """Current once it has settled, A; `speed` is the joint's, on the motor's side of the transmission."""
+    """Returns the steady-state current, A; `speed` is the joint's, on the motor's side of the transmission."""
     return (volts - back_emf_constant(joint) * joint[at.GEAR] * speed) / (joint[at.RESISTANCE] * (1.0 + rise))
 
 
 @inlined
 def winding_functions(x: Any) -> Any:
-    """φ1, φ2 and φ3 of −x, as exponential integrators name them: φ1 is the mean of e^(−xs) over 0 ≤ s ≤ 1, φ2 its mean
-    of weight 1 − s, and φ3 that of (1 − s)²/2. A series where differences would lose their digits."""
+    """Returns φ1, φ2 and φ3 of −x, the functions of exponential integrators.
+
+    φ1 is the mean of e^(−xs) over 0 ≤ s ≤ 1, φ2 the mean weighted by 1 − s, and φ3 that weighted by (1 − s)²/2. A
+    series replaces them for small x, where differences would cancel.
+    """
     if x.real < SMALL_TURNS:
         third = 1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0 - x / 5040.0)))
         second = 0.5 - x * third
@@ -92,11 +95,11 @@ def winding_functions(x: Any) -> Any:
 
 @inlined
 def stage_current(joint: Array, rise: Any, current: Any, volts: Any, begun: Any, speed: Any, stage: int, h: Any) -> Any:
-    """Current at a stage (0 to 3) of a step of RK4, such that the step gets the impulse, and the way, of the exact one.
+    """Returns the current at a stage (0 to 3) of an RK4 step, so that the step's impulse and displacement are exact.
 
-    The current's excess over the settled one, e, follows ė = −R/L e − d(settled)/dt. The stages' weights 1, 2, 2, 1 are
-    given values that have the first two moments of its exact solution for the speed's mean change since the step began
-    (at `begun`), whatever L/R is beside the step; for a short step they are the solution's own values.
+    The current's excess e over its steady state follows ė = −R/L e − d(steady state)/dt. The stages, of weights 1, 2,
+    2, 1, get values with the first two moments of the exact solution for the mean change of speed since the step began
+    (at `begun`). This holds for any ratio of L/R to the step; in a short step the values are those of the solution.
     """
     turns = joint[at.RESISTANCE] * (1.0 + rise) / joint[at.INDUCTANCE] * h
     first, second, third = winding_functions(turns)
@@ -113,7 +116,7 @@ def stage_current(joint: Array, rise: Any, current: Any, volts: Any, begun: Any,
 
 @inlined
 def current_after(joint: Array, rise: Any, current: Any, volts: Any, begun: Any, speed: Any, h: Any) -> Any:
-    """Current after a step of h s in which the speed changed evenly from `begun` to `speed`: exact for that."""
+    """Returns the current after a step of h s; exact if the speed changes linearly from `begun` to `speed`."""
     turns = joint[at.RESISTANCE] * (1.0 + rise) / joint[at.INDUCTANCE] * h
     first, _, _ = winding_functions(turns)
     before = steady_current(joint, rise, volts, begun)
@@ -125,10 +128,10 @@ def current_after(joint: Array, rise: Any, current: Any, volts: Any, begun: Any,
 def extra_torque(
     joint: Array, flags: int, time: complex, q: complex, speed: complex, z: complex, stuck: complex, through: complex
 ) -> Any:
-    """Torque on the joint from effects that most models leave out, N·m; zero at their null values.
+    """Returns the joint torque of effects that most models lack, N·m; zero at their null values.
 
-    `stuck` is 1 where the joint sticks, else 0; `through` is what the gear transmits, seen at the joint: the motor's
-    torque less what its own side's viscous friction takes.
+    `stuck` is 1 where the joint sticks, else 0. `through` is the torque that the gear transmits, at the joint: the
+    motor's torque minus the viscous friction on the motor's side.
     """
     torque = 0.0 * (q + time + joint[at.COULOMB])
     if flags & at.HAS_STICTION:
@@ -172,8 +175,10 @@ def special_torque(
     state: Array,
     volts: Any,
 ) -> Any:
-    """What inductance and added torques add to a joint's torque at a stage of a step of `h` s, which began with the
-    rotor's speed at `begun`."""
+    """Returns the torque of inductance and added torques at a stage of a step of `h` s.
+
+    `begun` is the rotor's speed at the beginning of the step.
+    """
     steady = steady_current(joint, state[RISE], volts, rotor_speed)
     current = steady
     if flags & at.HAS_INDUCTANCE:
@@ -195,9 +200,9 @@ def after_step(
     volts: complex,
     h: complex,
 ) -> None:
-    """What a step leaves behind beside position and speed: current, and whether the joint sticks.
+    """Updates current and sticking after a step.
 
-    `rotor_speed` is that at its end, `change` by how much it rose in the step.
+    `rotor_speed` is the speed at its end, `change` the increase during the step.
     """
     if flags & at.HAS_INDUCTANCE:
         begun = rotor_speed - change
@@ -208,9 +213,9 @@ def after_step(
 
 @borrowing
 def still_stuck(joint: Array, level: complex, speed: complex, z: Array, stuck: Array) -> None:
-    """Breaks away when the contact is stretched to its end; sticks again when motion stops or turns.
+    """Breaks away when the contact is fully stretched; sticks again when motion stops or reverses.
 
-    Sticking again keeps the torque: the contact takes up the smaller deflection that carries it.
+    The torque does not jump when it sticks: the contact takes the smaller deflection that carries it.
     """
     if stuck[0].real > 0.5:
         if magnitude(z[0]).real >= 1.0:
@@ -224,12 +229,14 @@ def still_stuck(joint: Array, level: complex, speed: complex, z: Array, stuck: A
 
 @inlined
 def transmitted(joint: Array, twist: Any, twist_rate: Any) -> Any:
-    """Torque through a transmission that gives and has play, N·m, for rotor less link angle (rad at the joint)."""
+    """Returns the torque of a transmission with compliance and backlash, N·m. `twist`: rotor − link angle, rad at the
+    joint.
+    """
     stretched = outside(twist, 0.5 * joint[at.GAP])
     if stretched.real == 0.0:
         return 0.0 * (twist + twist_rate)
     torque = (
         stretched / (joint[at.COMPLIANCE] + joint[at.CONTACT_COMPLIANCE]) + joint[at.TRANSMISSION_DAMPING] * twist_rate
     )
-    # damping must not pull parts together that have left contact
+    # damping must not pull parts together that have separated
     return torque if torque.real * stretched.real > 0.0 else 0.0 * torque

@@ -1,11 +1,11 @@
-"""The compiled run of a whole record, and its entries: the closed form, its flexible form, and any chain.
+"""The compiled simulation of a whole record. Entries: the closed form, its flexible form, and any chain.
 
-One module-level kernel holds every effect of the library. Effects that only add a term are off at their null value;
-those that add state have a flag. Real numbers for a simulation, dual numbers (complex128) for exact sensitivities.
-Every entry does the runs first ≤ i < last of a batch and fills `out` (r, OUTPUTS, k, n).
+One module-level kernel contains every effect of the library. Effects that only add a term are off at their null value;
+those that add state have a flag. Real numbers give a simulation, dual numbers (complex128) exact sensitivities. Every
+entry runs first ≤ i < last of a batch and fills `out` (r, OUTPUTS, k, n).
 """
 
-# ruff: noqa: ARG001 (what an implementation does not need is part of the face all of them share)
+# ruff: noqa: ARG001 (all implementations share an interface, and some need only part of it)
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible
 
 
 def advance_of(kind: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, arm: Any, work: Any) -> None:
-    """Advances `state` over a stretch of constant motor volts."""
+    """Advances `state` over a time with constant motor volts."""
     uncompiled(_advance_of, kind, state, volts, start, duration, steps, arm, work)
 
 
@@ -137,7 +137,7 @@ def batch(kind: Any, first: int, last: int, records: RecordArrays, runs: RunArra
 
 @internal
 def at_rest(state: Array, initial: Array, volts: Array, weights: Array, arm: Arm, work: Array) -> None:
-    """Initial state: friction carries at rest what gravity and motor leave over, as far as it can."""
+    """Computes the initial state: friction balances gravity and motor torque at rest, as far as it can."""
     joints, flags = arm.joints, arm.flags
     for j in range(joints.shape[0]):
         state[j, POSITION], state[j, SPEED] = initial[j, 0], initial[j, 1]
@@ -158,17 +158,17 @@ def at_rest(state: Array, initial: Array, volts: Array, weights: Array, arm: Arm
 
 @entry
 def run_closed_form(first: int, last: int, records: RecordArrays, runs: RunArrays, out: Array) -> None:
-    """The waist-shoulder-elbow arm of rods with rigid transmissions."""
+    """Runs the waist-shoulder-elbow arm of rods with rigid transmissions."""
     batch(ClosedForm(0), first, last, records, runs, out)
 
 
 @entry
 def run_flexible(first: int, last: int, records: RecordArrays, runs: RunArrays, out: Array) -> None:
-    """The same arm where a transmission gives or has play."""
+    """Runs the same arm with a flexible transmission or backlash."""
     batch(Flexible(0), first, last, records, runs, out)
 
 
 @entry
 def run_chain(first: int, last: int, records: RecordArrays, runs: RunArrays, out: Array) -> None:
-    """Any machine."""
+    """Runs any machine."""
     batch(AnyChain(0), first, last, records, runs, out)

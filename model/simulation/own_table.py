@@ -1,4 +1,4 @@
-"""The user's own effects: compiled once per process, checked, and passed to the run as a table of addresses."""
+"""Compiles users' effects once per process, checks them, and passes them to the run as a table of addresses."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from model.effects.library import effect
 from model.effects.own import ARGUMENTS
 from model.machine_model.model import Model
 
-# numba's tools for compiled code have no types of their own that hold here
+# numba's tools for compiled code have no usable types
 pointer_to: Any = types.CPointer
 carray: Any = vars(numba)["carray"]
 to_fixed_tuple: Any = ndarray.to_fixed_tuple
@@ -32,7 +32,7 @@ MOTION = len(ARGUMENTS)
 
 TRIALS = 40
 AGREEING = 0.85
-"""Least share of trials in which derivatives must be right; a few may fall on a corner."""
+"""Least share of trials in which derivatives must be right; a few trials may hit a corner."""
 STEP = 1e-6
 TOLERANCE = 1e-4
 SPANS = (2.0, 3.0, 20.0, 20.0, 5.0)
@@ -40,9 +40,9 @@ SPANS = (2.0, 3.0, 20.0, 20.0, 5.0)
 
 
 def own_table(model: Model, dtype: Any) -> NDArray[np.int64]:
-    """(n, e, 2) of the model's effects of the user's own, for runs in real or in dual numbers.
+    """Returns a table (n, e, 2) of the model's user effects, for runs in real or in dual numbers.
 
-    Raises SpecError when a torque cannot be compiled, is not zero at its null value, or has wrong derivatives.
+    Raises SpecError if a torque cannot be compiled, is not zero at its null value, or has wrong derivatives.
     """
     columns = model.own_columns
     table = np.zeros((model.joint_count, len(columns), 2), dtype=np.int64)
@@ -56,7 +56,7 @@ def own_table(model: Model, dtype: Any) -> NDArray[np.int64]:
 
 @cache
 def _checked(kind: Effect) -> tuple[int, int]:
-    """Addresses of an effect's torque in real and in dual numbers."""
+    """Returns the addresses of an effect's torque in real and in dual numbers."""
     assert kind.torque is not None
     real, dual = (
         _compiled(kind, number, dtype)
@@ -67,7 +67,7 @@ def _checked(kind: Effect) -> tuple[int, int]:
 
 
 _kept: list[Any] = []
-"""Compiled torques: their addresses must stay good as long as the process runs."""
+"""Compiled torques; kept so that their addresses stay valid as long as the process runs."""
 
 
 def _compiled(kind: Effect, number: Any, dtype: Any) -> Any:
@@ -101,7 +101,7 @@ def _compiled(kind: Effect, number: Any, dtype: Any) -> Any:
 
 
 def _check_values(kind: Effect, real: Any, dual: Any) -> None:
-    """Refuses a torque that acts at its null value, or whose dual parts are not its derivatives."""
+    """Rejects a torque that is not zero at its null value, or whose dual parts are not its derivatives."""
     rng = np.random.default_rng(1)
     names = (*ARGUMENTS, *(p.name for p in kind.parameters))
     wrong = np.zeros(len(names))
@@ -118,16 +118,16 @@ def _check_values(kind: Effect, real: Any, dual: Any) -> None:
             exact = _value(dual, seeded)
             if not np.isclose(exact.real, _value(real, point), rtol=1e-9, atol=1e-12):
                 raise SpecError(
-                    f"effect {kind.name}: its torque differs in real and in dual numbers; is it a function "
-                    "of its arguments alone?"
+                    f"effect {kind.name}: its torque differs in real and in dual numbers; does it depend "
+                    "on its arguments alone?"
                 )
             wrong[k] += not np.isclose(exact.imag / DUAL_STEP, slope, rtol=TOLERANCE, atol=TOLERANCE)
         _check_null(kind, real, point)
     for k, name in enumerate(names):
         if wrong[k] > (1 - AGREEING) * TRIALS:
             raise SpecError(
-                f"effect {kind.name}: the derivative of its torque by {name} does not come out right in dual numbers; "
-                "take magnitude, sign, larger, smaller and clamped of model.effects.own_math for abs, min and max"
+                f"effect {kind.name}: the derivative of its torque by {name} is wrong in dual numbers; "
+                "use magnitude, sign, larger, smaller and clamped of model.effects.own_math for abs, min and max"
             )
 
 
@@ -137,11 +137,13 @@ def _check_null(kind: Effect, real: Any, point: NDArray[np.float64]) -> None:
         if isinstance(p.null, float | int):
             still[MOTION + k] = p.null
     if (left := _value(real, still)) != 0.0:
-        raise SpecError(f"effect {kind.name}: gives {left:.3g} N·m where its parameters are at null, not 0")
+        raise SpecError(
+            f"effect {kind.name}: its torque is {left:.3g} N·m where its parameters are at null; it must be 0"
+        )
 
 
 def _trial(kind: Effect, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Arguments of a trial: motion at random, parameters about their starting values."""
+    """Returns the arguments of a trial: random motion, parameters near their starting values."""
     motion = rng.uniform(-1.0, 1.0, MOTION) * np.array(SPANS)
     motion[-1] = abs(motion[-1])
     values = []

@@ -1,7 +1,7 @@
-"""Torques of effects of the user's own, as the compiled run calls them: by address.
+"""Calls the torques of users' effects from the compiled run, by address.
 
-An address is a number, so the run itself stays the one that is cached on disk, whatever effects it calls. Nothing of
-the library of effects is imported here, so that an edit there compiles no run again.
+An address is a number, so the run that is cached on disk is the same for all effects. This module imports nothing of
+the library of effects; otherwise each edit of the library would compile the runs again.
 """
 
 from __future__ import annotations
@@ -18,20 +18,21 @@ from numpy.typing import NDArray
 from model import layout as at
 from model.dynamics.compilation import internal
 
-# numba's tools for compiled code have no types of their own that hold here
+# numba's tools for compiled code have no usable types
 cgutils: Any = builders
 make_array: Any = arrayobj.make_array
 
 ADDRESS, BEYOND = range(2)
-"""Columns of a table of own effects: address of the compiled torque (0: not on this joint), and its first parameter's
-place among the columns for own effects."""
+"""Columns of a table of own effects: address of the compiled torque (0: not on this joint), and the index of its first
+parameter among the columns for own effects.
+"""
 
 
 @internal
 def own_torque(
     own: NDArray[np.int64], joint: NDArray[Any], q: Any, speed: Any, volts: Any, load: Any, time: Any
 ) -> Any:
-    """Torque (N·m) of a joint's effects of the user's own; `own` is that joint's table (e, 2)."""
+    """Returns the torque (N·m) of a joint's user effects; `own` is that joint's table (e, 2)."""
     torque = 0.0 * (q + joint[0])
     for e in range(own.shape[0]):
         if own[e, ADDRESS] != 0:
@@ -43,7 +44,7 @@ def own_torque(
 
 @intrinsic
 def _call(_typing: Any, address: Any, motion: Any, parameters: Any) -> Any:
-    """The torque at an address for a tuple of MOTION numbers and an array of parameters, all of one type."""
+    """Calls the torque at an address with a tuple of MOTION numbers and an array of parameters, all of one type."""
     number = motion.dtype
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:

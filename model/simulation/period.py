@@ -1,4 +1,4 @@
-"""One control period: sample, form the drive, and let it act when its delay has passed. Compiled."""
+"""Simulates the board in one control period: sample, compute the drive, apply it after its delay. Compiled."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from model.simulation.joint_torques import POSITION, RISE, ROTOR_POSITION, ROTOR
 from model.simulation.run_arrays import Arm, RecordRow
 
 QUEUE = 16
-"""Number of commands kept: the drive may act up to 14 periods late."""
+"""Number of commands kept: the drive may be delayed by up to 14 periods."""
 
 EXTRA_TORQUES = (
     at.STRIBECK,
@@ -44,17 +44,17 @@ EXTRA_TORQUES = (
 )
 """Columns of a joint that add a torque unless they are zero."""
 
-# What a run gives a period and joint.
+# Outputs of a run per period and joint.
 OUT_POSITION, OUT_SPEED, OUT_READING, OUT_ERROR, OUT_POWER, OUT_DRIVE = range(6)
 OUTPUTS = 6
 
 
 @borrowing
 def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Array, out: Array) -> Any:
-    """Reading, error and power of joint index j in period k, written to `out`; returns the commanded motor volts.
+    """Returns the commanded motor volts of joint index j in period k; writes reading, error and power to `out`.
 
-    The controller reads `following` of the way from the model's reading to the recorded one, where there is one. Where
-    the recorded drive is the input, the controller forms no drive but a correction of it (`corrected`).
+    The controller reads a value between the model's reading (`following` = 0) and the recorded one (1), where there is
+    one. Where the recorded drive is the input, the controller computes only a correction of it (`corrected`).
     """
     joint, period, set_points = arm.joints[j], arm.shared[at.PERIOD], record.set_points
     kind, quantise = record.settings[at.CONTROLLER], record.settings[at.QUANTISE] == at.ALL_ROUNDED
@@ -88,7 +88,7 @@ def sample(k: int, j: int, state: Array, record: RecordRow, arm: Arm, memory: Ar
             drive = scale * cascade(acting, speed, period, record.gains[j], memory[j])
             drive = given_out(drive, acting, period, record.gains[j], joint, rounds, memory[j])
             memory[j, LAST_READING] = read
-        else:  # at.NO_CONTROLLER: the recorded drive moves the model; `prepare` refuses controllers that have no kind
+        else:  # at.NO_CONTROLLER: the recorded drive moves the model; `prepare` rejects controllers of unknown kind
             drive = record.recorded[k, j] + 0.0 * error
         power = drive / joint[at.VOLTS_PER_COUNT]
     if record.settings[at.DRIVE_RECORDED] != 0:
@@ -116,8 +116,10 @@ def corrected(
     memory: Array,
     drive: complex,
 ) -> Any:
-    """The recorded drive, and what the controller without rounding, limits or wrong gain makes of the distance (counts)
-    by which the recorded reading is ahead of the simulated one. Where the sample is missing: `drive`, the model's own.
+    """Returns the recorded drive plus a controller's correction; the model's own `drive` where the sample is missing.
+
+    The correction is the controller's output for the distance (counts) from simulated to recorded reading, without
+    rounding, limits or wrong gain.
     """
     if np.isnan(apart.real):
         return drive
@@ -138,9 +140,10 @@ def corrected(
 
 @internal
 def switching_times(shared: Array, joints: Array, order: Array, times: Array) -> Any:
-    """When in a period each joint's drive changes (`times`, s), in which order, and whole periods of delay per joint.
+    """Computes when in a period each joint's drive changes (`times`, s), in which order, and whole periods of delay.
 
-    Times are compared by their real parts; equal ones keep the joints' order: dual parts then give exact derivatives.
+    Times are compared by their real parts, and equal ones keep the joints' order; dual parts then give exact
+    derivatives.
     """
     n = joints.shape[0]
     periods = np.zeros(n, dtype=np.int64)
@@ -159,18 +162,18 @@ def switching_times(shared: Array, joints: Array, order: Array, times: Array) ->
 
 @borrowing
 def step_count(duration: complex, step: float) -> int:
-    """Equal steps of at most `step` s in a stretch of time; at least one."""
+    """Returns the number of equal steps of at most `step` s in a time; at least one."""
     return max(1, int(np.ceil(duration.real / step - 1e-9)))
 
 
-# What a stretch of constant volts begins with, of each motor.
+# State of each motor at the beginning of a time with constant volts.
 BEGUN_POSITION, BEGUN_SPEED, BEGUN_RISE = range(3)
 BEGUN = 3
 
 
 @borrowing
 def warms(joints: Array) -> bool:
-    """Whether any winding warms: then each step of integration has its own resistance, and the steps stay the same."""
+    """Whether any winding warms. Each interval of constant volts then has its own resistance, with the same steps."""
     found = False
     for j in range(joints.shape[0]):
         found = found or joints[j, at.HEATING] != 0.0 or joints[j, at.TIMED_RISE] != 0.0
@@ -181,8 +184,10 @@ def warms(joints: Array) -> bool:
 def begin_stretch(
     state: Array, volts: Array, start: complex, duration: complex, joints: Array, flags: Array, begun: Array
 ) -> None:
-    """Remembers in `begun` (BEGUN, n) where each motor is; gives windings the resistance of the middle of the stretch,
-    which begins `start` s after the run. Between stretches RISE is what the current has done, without what time does.
+    """Stores in `begun` (BEGUN, n) the state of each motor, and sets the windings' resistance.
+
+    The resistance is that of the middle of the interval, which begins `start` s after the run. Between intervals RISE
+    holds only the rise that the current causes, not the one over time.
     """
     for j in range(joints.shape[0]):
         by_time = joints[j, at.TIMED_RISE] != 0.0
@@ -202,7 +207,7 @@ def begin_stretch(
 
 @borrowing
 def end_stretch(state: Array, volts: Array, duration: complex, joints: Array, flags: Array, begun: Array) -> None:
-    """Resistance of each winding after the stretch, from the motion that it had."""
+    """Computes the resistance of each winding after an interval, from its motion."""
     for j in range(joints.shape[0]):
         if joints[j, at.HEATING] != 0.0:
             gives = flags[j] & at.HAS_FLEXIBILITY != 0
@@ -216,7 +221,7 @@ def end_stretch(state: Array, volts: Array, duration: complex, joints: Array, fl
 
 @internal
 def extra_flags(joints: Array, flags: Array) -> Array:
-    """The joints' mode flags with the bit of every added torque that is not at its null value."""
+    """Returns the joints' mode flags, with the bit of every added torque that is not at its null value."""
     result = np.empty(flags.shape[0], dtype=np.int64)
     for j in range(joints.shape[0]):
         result[j] = flags[j]

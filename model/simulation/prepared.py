@@ -1,4 +1,4 @@
-"""What a simulation is asked for, and a record in the units that compiled code reads."""
+"""Options of a simulation, and a record in the units that compiled code reads."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ from model.simulation.inputs import RunInputs
 POSTURE_UNITS = 1000
 """Number of posture units over the range of a sensor, as the board counts them."""
 NEARLY_WHOLE = 1e-3
-"""Distance of a set point from a whole count, in counts, that a record's digits explain."""
+"""Distance of a set point from a whole count, in counts, that rounding in the record explains."""
 NO_ACCIDENT = 20
-"""Number of different set points of one joint that are not all whole counts by accident."""
+"""Number of different set points of one joint above which whole counts cannot be a coincidence."""
 LONGEST_STEP = 1e-3
-"""Longest step of integration, s: readings are right to some 0.005 counts, contacts apart (docs/modelling.md)."""
+"""Longest integration step, s. Readings are then accurate to about 0.005 counts, except in contacts
+(docs/modelling.md).
+"""
 
 
 @dataclass(frozen=True)
@@ -32,15 +34,15 @@ class Options:
 
     Args:
         loop: `closed`: the model's controller follows the recorded set points; `open`: the recorded drive is applied.
-        quantise: round readings and power as the board does. Without, both are left as they are.
-        step: longest step of integration, s.
+        quantise: round readings and power as the board does. If False, neither is rounded.
+        step: longest integration step, s.
         noise: (k, n) added to the readings before rounding, in counts of the sensor; None for none.
-        following: share of the difference between recorded and simulated reading that the simulated controller is
-            given, where a reading was recorded. At 0 it reads the model alone: an output error in closed loop. At 1 it
-            reads the record, noise and all: the recorded drive moves the model, and nothing brings it back.
-        recorded_drive: in closed loop, the recorded drive is the input, and the controller, without rounding, limits
-            or a wrong gain, adds what it makes of 1 − `following` of the distance between recorded and simulated
-            reading. Where a sample is missing the controller forms the drive.
+        following: the simulated controller reads a value between the simulated (0) and the recorded reading (1). 0: an
+            output error in closed loop. 1: the controller reads the record with its noise; the recorded motion thus
+            drives the model, and no feedback corrects its error.
+        recorded_drive: in closed loop, the recorded drive is the input. The controller, without rounding, limits or a
+            wrong gain, adds its output for 1 − `following` of the distance between recorded and simulated reading.
+            Where a sample is missing the controller computes the drive.
         initial: (n, 2) position (rad) and speed (rad/s) at the start; None: as estimated from the record.
         general: use the recursive dynamics even where there is a closed form.
     """
@@ -71,20 +73,22 @@ class Prepared:
     period: float
 
     def with_setting(self, setting: int, value: int) -> Prepared:
-        """The record with another whole number of its settings (`model.layout`)."""
+        """Returns the record with one of its integer settings changed (`model.layout`)."""
         settings = self.settings.copy()
         settings[setting] = value
         return replace(self, settings=settings)
 
 
 def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
-    """Inputs of a run as compiled code reads them.
+    """Converts the inputs of a run to the form that compiled code reads.
 
-    Raises TraceError when the record lacks what moves the model in this loop, SpecError for other joints or noise.
+    Raises TraceError if the record lacks the input of this loop, SpecError for other joints or noise of another shape.
     """
     machine = model.machine
     if inputs.joints != machine.modelled_joints:
-        raise SpecError(f"inputs are for joints {inputs.joints}, the model moves joints {machine.modelled_joints}")
+        raise SpecError(
+            f"the inputs are for joints {inputs.joints}, but the model moves joints {machine.modelled_joints}"
+        )
     settings = np.zeros(at.SETTINGS, dtype=np.int64)
     controller = machine.controller
     if options.loop == "closed" and not isinstance(controller, NoController) and not inputs.has_set_points:
@@ -104,12 +108,12 @@ def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
         raise SpecError(f"controller {controller.kind!r} cannot be simulated")
     if options.recorded_drive and settings[at.CONTROLLER] != at.NO_CONTROLLER:
         if not inputs.has_drive:
-            raise TraceError(f"trace {inputs.name}: has no drive, which is to be the input")
+            raise TraceError(f"trace {inputs.name}: has no drive, which `recorded_drive` needs as input")
         settings[at.DRIVE_RECORDED] = 1
     noise = inputs.noise if options.noise is None else np.ascontiguousarray(options.noise)
     initial = inputs.initial if options.initial is None else np.ascontiguousarray(options.initial)
     if noise.shape != set_points.shape:
-        raise SpecError(f"noise has shape {noise.shape}; {set_points.shape} is needed")
+        raise SpecError(f"noise has shape {noise.shape}; it must be {set_points.shape}")
     return Prepared(
         set_points=set_points,
         recorded=inputs.drive,
@@ -125,7 +129,7 @@ def prepare(model: Model, inputs: RunInputs, options: Options) -> Prepared:
 
 
 def _rounded(controller: SampledPid, joints: tuple[int, ...], set_points: Floats) -> Floats:
-    """Set points as a sampled controller takes them."""
+    """Returns set points as a sampled controller reads them."""
     found = set_points.copy()
     for column, joint in enumerate(joints):
         resolution = of_joint(controller.set_point_resolution, joint)
@@ -135,7 +139,7 @@ def _rounded(controller: SampledPid, joints: tuple[int, ...], set_points: Floats
 
 
 def _whole_counts(model: Model, set_points: Floats) -> Floats | None:
-    """Set points in ADC counts, if all of them are whole ones and a joint has so many that it is no accident."""
+    """Returns set points in ADC counts if all are whole and a joint has too many for a coincidence, else None."""
     counts = np.empty_like(set_points)
     for k, joint in enumerate(model.machine.modelled_joints):
         if model.machine.joint(joint).sensor is None:
@@ -149,9 +153,9 @@ def _whole_counts(model: Model, set_points: Floats) -> Floats | None:
 
 
 def _counts(model: Model, set_points: Floats) -> Floats:
-    """Set points in ADC counts as the board takes them: rounded to posture units, then to counts (half up).
+    """Returns set points in ADC counts as the board uses them: rounded to posture units, then to counts (half up).
 
-    Those of a record that are whole counts already are what the board has worked with: it takes no posture units then.
+    Set points that are already whole counts are kept: the board then receives no posture units.
     """
     own_counts = _whole_counts(model, set_points)
     if own_counts is not None:

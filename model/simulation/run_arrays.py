@@ -1,4 +1,4 @@
-"""What a compiled run reads: named tuples of arrays, which compiled code takes as they are."""
+"""Inputs of a compiled run: named tuples of arrays, which compiled code accepts directly."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from model.dynamics.compilation import internal
 
 
 class RecordArrays(NamedTuple):
-    """What moves the runs: one row a record, the periods of shorter ones padded."""
+    """Inputs that move the runs: one row per record, shorter ones padded."""
 
     lengths: Array
     """(t,) periods of each record."""
     set_points: Array
     """(t, k, n) counts for the board's PID, else rad."""
     recorded: Array
-    """(t, k, n) motor volts, where nothing controls."""
+    """(t, k, n) motor volts, for machines without a controller."""
     noise: Array
     """(t, k, n) added to the readings before rounding."""
     readings: Array
     """(t, k, n) rad as recorded, NaN where there is none."""
     following: Array
-    """(t,) share of the difference to the recorded reading that the controller is given (`Options`)."""
+    """(t,) position of the controller's reading between simulated (0) and recorded (1) reading (`Options`)."""
     first_drive: Array
     """(t, n) commanded volts before the record."""
     gains: Array
     """(t, n, GAINS) of the controllers."""
     settings: Array
-    """(t, SETTINGS) whole numbers (`model.layout`)."""
+    """(t, SETTINGS) integer settings (`model.layout`)."""
 
 
 class RecordRow(NamedTuple):
-    """One record of `RecordArrays`, (k, n) and so on."""
+    """One record of `RecordArrays`: the same arrays without their first dimension."""
 
     set_points: Array
     recorded: Array
@@ -45,22 +45,22 @@ class RecordRow(NamedTuple):
 
 
 class RunArrays(NamedTuple):
-    """The runs: one row a run, but for what all of them share."""
+    """The runs: one row per run, except for arrays that all runs share."""
 
     which: Array
     """(r,) record of each run."""
     initial: Array
     """(r, n, 2) position and speed."""
     shares: Array
-    """(r, SHARED) numbers of the whole machine."""
+    """(r, SHARED) parameters of the whole machine."""
     parts: Array
-    """(r, n, PER_JOINT) numbers of the joints."""
+    """(r, n, PER_JOINT) parameters of the joints."""
     flags: Array
     """(n,) bits of the state-changing effects of every joint, for all runs."""
     own: Array
     """(n, e, 2) the user's own effects (`model.simulation.own_torque`), for all runs."""
     step: float
-    """Longest step of integration, s, for all runs."""
+    """Longest integration step, s, for all runs."""
 
 
 class Arm(NamedTuple):
@@ -69,7 +69,7 @@ class Arm(NamedTuple):
     shared: Array
     joints: Array
     body: Any
-    """What the equations of motion read: an array for the closed form, a chain for the recursive form."""
+    """Inputs of the equations of motion: an array for the closed form, a chain for the recursive form."""
     flags: Array
     settings: Array
     own: Array
@@ -77,7 +77,7 @@ class Arm(NamedTuple):
 
 @internal
 def record_row(records: RecordArrays, t: int) -> RecordRow:
-    """Record number t, from 0."""
+    """Returns record t, counted from 0."""
     return RecordRow(
         records.set_points[t],
         records.recorded[t],

@@ -1,4 +1,4 @@
-"""Simulations of a model, one run or many, and exact derivatives of a run."""
+"""Simulates a model, one run or many, with exact derivatives on request."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from model.simulation.prepared import Options, prepare
 
 @dataclass(frozen=True, eq=False)
 class Simulation(WithArrays):
-    """Motion of a model, one row a control period, one column a joint.
+    """Motion of a model, one row per control period, one column per joint.
 
-    time (k,) s; position (k, n) rad, the joint's own angle; velocity rad/s; reading rad, what the model's sensor shows;
-    error rad, set point − what the controller read; drive, motor volts commanded (before dead zone and supply limit);
-    power, DAC counts; rows (m,) where the samples of the record lie on this grid.
+    time (k,) s; position (k, n) rad, the joint's true angle; velocity rad/s; reading rad, of the model's sensor; error
+    rad, set point − reading of the controller; drive, commanded motor volts (before dead zone and supply limit); power,
+    DAC counts; rows (m,) positions of the record's samples on this grid.
     """
 
     joints: tuple[int, ...]
@@ -42,17 +42,17 @@ class Simulation(WithArrays):
     rows: Floats
 
     def __repr__(self) -> str:
-        """One line, for notebooks."""
+        """Returns one line, for notebooks."""
         joints = ", ".join(map(str, self.joints))
         return f"<Simulation: {len(self.time)} periods to {self.time[-1]:.1f} s, joints {joints}>"
 
     def at_samples(self, signal: Floats) -> Floats:
-        """A signal (k, …) at the samples of the record, (m, …): picked, or interpolated between periods."""
+        """Returns a signal (k, …) at the samples of the record, (m, …); interpolated between periods where needed."""
         return at_rows(signal, self.rows)
 
 
 def at_rows(signal: Floats, rows: Floats) -> Floats:
-    """A signal at fractional rows, linearly interpolated."""
+    """Returns a signal at fractional rows, linearly interpolated."""
     low = np.floor(rows).astype(np.int64)
     share = rows - low
     if not share.any():
@@ -63,9 +63,9 @@ def at_rows(signal: Floats, rows: Floats) -> Floats:
 
 
 def simulate(model: Model, trace: Trace | RunInputs, options: Options | None = None) -> Simulation:
-    """The model's answer to the set points (or the drive) of a trace.
+    """Returns the model's response to the set points (or the drive) of a trace.
 
-    Raises TraceError for a trace that cannot be simulated, SpecError when the motion does not stay finite.
+    Raises TraceError for a trace that cannot be simulated, SpecError if the motion does not stay finite.
     """
     options = options or Options()
     inputs = inputs_of(trace, model.machine) if isinstance(trace, Trace) else trace
@@ -86,20 +86,22 @@ class Sensitivities:
     jacobian: Floats
 
     def of(self, output: int) -> Floats:
-        """Derivatives (p, k, n) of one output, by its index in `model.simulation.period`."""
+        """Returns derivatives (p, k, n) of one output, by its index in `model.simulation.period`."""
         return self.jacobian[:, output]
 
     @property
     def reading(self) -> Floats:
-        """Derivatives (p, k, n) of what the controller reads, rad a unit of each parameter."""
+        """Returns derivatives (p, k, n) of the controller's reading, rad per unit of each parameter."""
         return self.jacobian[:, OUT_READING]
 
 
 def sensitivities(
     model: Model, trace: Trace | RunInputs, parameters: Sequence[Parameter], options: Options | None = None
 ) -> Sensitivities:
-    """Exact derivatives of a run by parameters of the model or of its initial state, in dual numbers and without
-    rounding. Raises as `simulate` does."""
+    """Returns a run with exact derivatives by parameters of the model or its initial state, without rounding.
+
+    Dual numbers carry the derivatives. Raises as `simulate` does.
+    """
     options = replace(options or Options(), quantise=False)
     inputs = inputs_of(trace, model.machine) if isinstance(trace, Trace) else trace
     prepared = prepare(model, inputs, options)
@@ -117,7 +119,7 @@ def sensitivities(
 def simulate_many(
     model: Model, traces: Sequence[Trace | RunInputs], vectors: NDArray[Any], options: Options | None = None
 ) -> list[NDArray[Any]]:
-    """Every trace with every parameter set, on all cores.
+    """Simulates every trace with every parameter set, on all cores.
 
     Args:
         vectors: (p, layout size) flat vectors, such as `parameter_vectors` makes; real, or dual numbers (complex128).
@@ -137,7 +139,7 @@ def simulate_many(
 
 
 def parameter_vectors(model: Model, names: Sequence[str], values: NDArray[Any]) -> NDArray[Any]:
-    """Flat vectors (p, size) with the named parameters at `values` (p, len(names)), real or dual."""
+    """Returns flat vectors (p, size) with the named parameters at `values` (p, len(names)), real or dual."""
     values = np.atleast_2d(values)
     vectors = np.tile(model.vector.astype(values.dtype), (len(values), 1))
     for column, name in enumerate(names):
@@ -147,7 +149,9 @@ def parameter_vectors(model: Model, names: Sequence[str], values: NDArray[Any]) 
 
 def _check_finite(out: Floats, inputs: RunInputs) -> None:
     if not np.isfinite(out).all():
-        raise SpecError(f"the simulation of {inputs.name or 'the record'} does not stay finite: the loop is unstable")
+        raise SpecError(
+            f"the simulation of {inputs.name or 'the record'} does not stay finite: the control loop is unstable"
+        )
 
 
 def _simulation(inputs: RunInputs, out: Floats) -> Simulation:

@@ -1,7 +1,7 @@
-"""What a run is made of, chosen when it is compiled: by the type of a tag, so that compiled code can be cached.
+"""Chooses the parts of a run at compile time by the type of a tag, so that compiled code can be cached.
 
-numba caches nothing that is given a function as an argument. Tags are named tuples without meaning but their type; the
-functions here have one implementation a type.
+numba cannot cache a function that takes functions as arguments. Tags are named tuples that matter only by their type;
+each function here has one implementation per type.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class ClosedForm(NamedTuple):
 
 
 class Flexible(NamedTuple):
-    """The same arm where a transmission gives or has play."""
+    """The same arm with a flexible transmission or backlash."""
 
     tag: int
 
@@ -33,17 +33,19 @@ class AnyChain(NamedTuple):
 
 
 class _Type(NamedTuple):
-    """The type of a tag, as numba shows it to what chooses an implementation."""
+    """Type of a tag, as numba passes it to the function that chooses an implementation."""
 
     instance_class: type
 
 
 def uncompiled(choose: Callable[..., Any], kind: Any, *arguments: Any) -> Any:
-    """Does in Python what an overload would have compiled for a tag: for NUMBA_DISABLE_JIT=1, under which a run can be
-    stepped through, and a fault in it is tried without the compiler."""
+    """Runs in Python the implementation that numba would compile for a tag.
+
+    Used with NUMBA_DISABLE_JIT=1, to step through a run or to find a fault without the compiler.
+    """
     return choose(_Type(type(kind)), *arguments)(kind, *arguments)
 
 
 def entry(function: Callable[..., Any]) -> Any:
-    """Compile an entry from Python: cached on disk, and other threads run beside it."""
+    """Compiles a function that Python calls. It is cached on disk and releases Python's lock."""
     return compiled(function, nogil=True)

@@ -1,4 +1,4 @@
-"""The speed at which a record begins, from its first readings."""
+"""Estimates the speed at which a record begins, from its first readings."""
 
 from __future__ import annotations
 
@@ -9,27 +9,26 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 
 LEAST_TIME = 0.05
-"""Least length (s) of the record's beginning whose readings tell the speed."""
+"""Least length (s) of the record's beginning from which the speed is estimated."""
 LEAST_READINGS = 12
-"""Least number of readings there: a parabola through six of them is still told from noise."""
+"""Least number of readings there: a parabola through six can still be distinguished from noise."""
 SURE = 6.0
-"""By how many of its standard errors a speed must differ from zero."""
+"""Number of standard errors by which a speed must differ from zero."""
 SHARE = 0.1
-"""Least share of a joint's largest speed in the record that counts as motion at its beginning."""
+"""Least share of a joint's largest speed in the record that counts as motion at the beginning."""
 AGREEMENT = 0.3
-"""Largest relative difference of the speeds that the beginning and its first half tell. From rest, the first half
-tells a much smaller one, whatever the force that sets the arm in motion."""
+"""Largest relative difference between the speeds estimated from the beginning and from its first half. When a joint
+starts from rest, its first half gives a much lower speed, whatever force sets the arm in motion.
+"""
 COUNTS = 4.0
-"""Least travel of the beginning, in counts of the sensor."""
+"""Least displacement over the beginning, in counts of the sensor."""
 
 
 def speed_at_start(trace: Trace, machine: Machine) -> Floats:
-    """Speeds (n,), rad/s (m/s), of the modelled joints at the first sample.
+    """Returns speeds (n,), rad/s (m/s), of the modelled joints at the first sample; 0 for joints that begin at rest.
 
-    They are 0 for joints that begin at rest as far as readings tell.
-
-    A parabola is fitted by least squares to the first readings; its slope at the first sample counts where it is
-    significant, a good part of the joint's largest speed, and the same from the first half of the readings.
+    A least-squares parabola is fitted to the first readings. Its slope at the first sample counts as speed if it is
+    significant, a large share of the joint's largest speed, and similar in the first half of the readings.
     """
     return np.array([_speed(trace, machine, joint) for joint in machine.modelled_joints])
 
@@ -53,7 +52,7 @@ def _speed(trace: Trace, machine: Machine, joint: int) -> float:
 
 
 def _slope(time: Floats, reading: Floats) -> tuple[float, float]:
-    """Slope at the first time of a least-squares parabola, and its standard error from the residual."""
+    """Returns the slope of a least-squares parabola at the first time, and its standard error from the residual."""
     span = time[-1]
     design = np.vander(time / span, 3, increasing=True)
     found, *_ = np.linalg.lstsq(design, reading - reading[0], rcond=None)

@@ -1,1 +1,1 @@
-"""Validation by distortion (chapter 4): how far parameters would have to move to explain what a model misses."""
+"""Validation by distortion (chapter 4): how far must parameters change to explain a model's error?"""

@@ -1,7 +1,7 @@
-"""Accelerations that a model expects along a measured motion, and their exact parameter derivatives.
+"""Computes accelerations that a model expects along a measured motion, with exact parameter derivatives.
 
-The right-hand side of the equations of motion, f of (4.1), evaluated at the measured state and the recorded drive. With
-positions as outputs C·J_a of (4.19) is zero, since rates of position contain no parameters; accelerations contain them.
+This is the right-hand side of the equations of motion, f of (4.1), at the measured state and the recorded drive. With
+positions as outputs C·J_a of (4.19) is zero, because rates of position contain no parameters. Accelerations do.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from model.validation.differentiation import smoothed
 class MeasuredMotion:
     """A motion on a grid of control periods, smoothed: time (k,) s; position, speed, friction (k, n).
 
-    `friction` is the contact's deflection in [−1, 1] that goes with the motion; `drive` (k, n) the recorded commanded
-    volts, not smoothed; `width` the smoothing in samples.
+    `friction` is the contact's deflection in [−1, 1] for this motion; `drive` (k, n) the recorded commanded volts, not
+    smoothed; `width` the smoothing in samples.
     """
 
     time: Floats
@@ -58,7 +58,7 @@ class _Signals(NamedTuple):
 
 
 class _Numbers(NamedTuple):
-    """A model for compiled code: its parameters, real or dual, what it has and how it is computed."""
+    """A model for compiled code: its parameters, real or dual, its mode flags, and the kind of its dynamics."""
 
     vector: NDArray[Any]
     flags: NDArray[Any]
@@ -67,13 +67,13 @@ class _Numbers(NamedTuple):
 
 
 def expected_accelerations(model: Model, motion: MeasuredMotion, names: Sequence[str]) -> tuple[Floats, Floats]:
-    """Accelerations f (k, n) and their derivatives (p, k, n) with respect to the named parameters.
+    """Returns accelerations f (k, n) and their derivatives (p, k, n) by the named parameters.
 
     Raises:
         SpecError: for a model with a flexible transmission, whose rotor is not measured, or an unknown parameter.
     """
     if (model.flags & at.HAS_FLEXIBILITY).any():
-        raise SpecError("the time-domain form needs rigid transmissions: a rotor's own motion is not measured")
+        raise SpecError("the time-domain form needs rigid transmissions, because a rotor's own motion is not measured")
     plain = _accelerations(model, motion, model.vector.astype(np.complex128)).real
     derivatives = np.zeros((len(names), *plain.shape))
     for row, name in enumerate(names):
@@ -84,7 +84,7 @@ def expected_accelerations(model: Model, motion: MeasuredMotion, names: Sequence
 
 
 def speed_answers(model: Model, motion: MeasuredMotion) -> Floats:
-    """How strongly accelerations answer to speeds (n, n), 1/s: rms of ∂f_i/∂q̇_j along the motion."""
+    """Returns the sensitivity of accelerations to speeds (n, n), 1/s: rms of ∂f_i/∂q̇_j along the motion."""
     n = model.joint_count
     answers = np.empty((n, n))
     for j in range(n):
@@ -112,9 +112,9 @@ def _accelerations(model: Model, motion: MeasuredMotion, vector: NDArray[Any]) -
 
 
 def averaged_volts(drive: Floats, period: float, vector: NDArray[Any]) -> NDArray[Any]:
-    """Motor volts (k, n) averaged over ±period about each sample with triangular weights, real or dual.
+    """Returns motor volts (k, n) averaged over ±period about each sample with triangular weights, real or dual.
 
-    The drive computed in period k acts from its delay on until the next one does.
+    The drive computed in period k acts, after its delay, until the next drive acts.
     """
     joints = vector[at.SHARED :].reshape(drive.shape[1], at.PER_JOINT)
     volts = np.empty(drive.shape, dtype=vector.dtype)
@@ -131,7 +131,7 @@ def averaged_volts(drive: Floats, period: float, vector: NDArray[Any]) -> NDArra
 
 
 def _weight_below(s: Any, period: float) -> Any:
-    """Share of the triangular weights over ±period that lies before s."""
+    """Returns the share of the triangular weights over ±period that lies before s."""
     if s.real <= -period:
         return 0.0 * s
     if s.real >= period:

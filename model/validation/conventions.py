@@ -1,4 +1,4 @@
-"""Re-evaluates distortions in another convention of τ′. The changes that double the error do not depend on it."""
+"""Re-evaluates distortions with another convention of τ′. The changes that double the error do not depend on it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from model.validation.expected_deviation import Convention, expected_deviation
 
 
 def in_convention(found: Fidelity, model: Model, convention: Convention) -> Fidelity:
-    """`found` with τ′, λ² and Σλ² of another convention, without simulating again."""
+    """Returns `found` with τ′, λ² and Σλ² of another convention, without simulating again."""
     parameters = []
     for one in found.parameters:
         expected, basis = expected_deviation(model.parameter(one.name), convention)

@@ -1,4 +1,4 @@
-"""The criterion of fidelity (4.63, 4.88 to 4.93): σ, λ² and their sum. Pure arithmetic and its typed result."""
+"""The fidelity criterion (4.63, 4.88 to 4.93): σ, λ² and their sum. Pure arithmetic and its typed result."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ DAMPING_RATIO = 0.5
 
 
 class ParameterDistortion(FrozenRecord):
-    """How one parameter alone would have to vary to explain the residual.
+    """Variation of one parameter alone that would explain the residual.
 
-    `change_down` and `change_up` (magnitudes, in `unit`) double the total mean squared error; None where no change
-    within the bounds does. `required` is σ, the standard deviation that would explain the residual; None for an
-    insensitive parameter, whose σ is very large. `expected` is τ′, `contribution` is λ² = τ′²/σ².
+    `change_down` and `change_up` (magnitudes, in `unit`) double the total mean squared error; None if no change within
+    the bounds does. `required` is σ, the standard deviation that would explain the residual; None for an insensitive
+    parameter, whose σ is very large. `expected` is τ′, `contribution` is λ² = τ′²/σ².
     """
 
     name: str
@@ -40,7 +40,7 @@ class ParameterDistortion(FrozenRecord):
 
 
 class Curve(FrozenRecord):
-    """Mean squared error (rad², None where a run diverged) against one parameter's value, the others held."""
+    """Mean squared error (rad², None where a run diverged) against one parameter's value; all others are held."""
 
     name: str
     unit: str
@@ -49,11 +49,11 @@ class Curve(FrozenRecord):
 
 
 class Fidelity(FrozenRecord):
-    """The transfer-function form of the distortion method for one model and its traces.
+    """Result of the transfer-function form of the distortion method, for one model and its traces.
 
-    `outputs` are the joints whose errors count, `error_by_joint` their mean squared errors (rad²), `error` the sum.
-    Expected deviations of the parameters explain what is left when `sum_of_contributions` (Σλ²) is at least 1.
-    `verdict`: whether there is more left than noise; None in results of older versions.
+    `outputs` are the joints whose errors count, `error_by_joint` their mean squared errors (rad²), `error` the sum. If
+    `sum_of_contributions` (Σλ²) is at least 1, expected deviations of the parameters explain the error. `verdict`:
+    whether the error exceeds noise; None in results of older versions.
     """
 
     shown: ClassVar[tuple[str, ...]] = ("model", "traces", "sum_of_contributions", "said")
@@ -65,29 +65,27 @@ class Fidelity(FrozenRecord):
     error: float
     error_by_joint: tuple[float, ...]
     noise_by_joint: tuple[float, ...] = ()
-    """Root mean square error (rad, m) that a right model would leave; empty in results of older versions."""
+    """Root mean square error (rad, m) of a right model; empty in results of older versions."""
     parameters: tuple[ParameterDistortion, ...]
     sum_of_contributions: float
     curves: tuple[Curve, ...] = ()
     notes: tuple[str, ...] = ()
     verdict: RecordVerdict | None = None
     record: tuple[RecordFinding, ...] = ()
-    """What the check of the traces found, before anything was computed."""
+    """Findings of the check of the traces, before the computation."""
 
     @property
     def said(self) -> str:
-        """The verdict in words, and what expected deviations of the parameters make of what is left."""
+        """Returns the verdict in words, and whether expected deviations of the parameters explain the error."""
         total = f"Σλ² = {self.sum_of_contributions:.3g}"
         if self.explains and self.verdict is not None and not self.verdict.explains:
             share = (
-                f"{total}: its numbers alone, as far off as expected, could leave as much; so could a missing effect."
+                f"{total}: parameters as far off as expected could alone cause this much; so could a missing effect."
             )
         elif self.explains:
-            share = f"{total}: deviations of its numbers as large as expected account for what is left (1 or more)."
+            share = f"{total}: parameters as far off as expected explain this error (1 or more)."
         else:
-            share = (
-                f"{total}: deviations of its numbers as large as expected do not account for what is left (below 1)."
-            )
+            share = f"{total}: parameters as far off as expected do not explain this error (below 1)."
         return share if self.verdict is None else f"{self.verdict.text} {share}"
 
     @property
@@ -96,12 +94,12 @@ class Fidelity(FrozenRecord):
         return self.sum_of_contributions >= 1.0
 
     def parameter(self, name: str) -> ParameterDistortion:
-        """The parameter of that name. Raises KeyError."""
+        """Returns the parameter of that name. Raises KeyError."""
         return {p.name: p for p in self.parameters}[name]
 
 
 def required_deviation(doubling_change: float, damping_ratio: float = DAMPING_RATIO) -> float:
-    """σ from α_d: σ² = 4ζ(ζ+1)/(2ζ+1) · α_d², that is 1.5 α_d² at ζ = 0.5 (4.63, 4.88).
+    """Returns σ from α_d: σ² = 4ζ(ζ+1)/(2ζ+1) · α_d², that is 1.5 α_d² at ζ = 0.5 (4.63, 4.88).
 
     Raises SpecError for a damping ratio that is not positive.
     """
@@ -111,5 +109,5 @@ def required_deviation(doubling_change: float, damping_ratio: float = DAMPING_RA
 
 
 def contribution(required: float | None, expected: float) -> float:
-    """λ² = τ′²/σ² (4.92); zero for an insensitive parameter."""
+    """Returns λ² = τ′²/σ² (4.92); zero for an insensitive parameter."""
     return 0.0 if required is None else (expected / required) ** 2

@@ -1,8 +1,8 @@
-"""Speeds and accelerations from sampled positions, with known noise and without a bias from smoothing.
+"""Computes speeds and accelerations from sampled positions, with known noise and without smoothing bias.
 
-A second difference of samples T apart is exactly the acceleration averaged over ±T with triangular weights. What is
-compared with it is averaged with the same weights, and both are smoothed with the same kernel: smoothing then removes
-detail and noise, but adds no error of its own.
+A second difference of samples T apart is exactly the acceleration averaged over ±T with triangular weights. The model's
+acceleration is averaged with the same weights, and both are smoothed with the same kernel. Smoothing then removes
+detail and noise, but adds no error.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ TRUNCATION = 4.0
 
 
 def kernel(width: float) -> Floats:
-    """Gaussian weights of odd number with sum 1; `width` is their standard deviation in samples."""
+    """Returns an odd number of Gaussian weights with sum 1; `width` is their standard deviation in samples."""
     reach = max(1, int(np.ceil(TRUNCATION * width)))
     weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
     return np.asarray(weights / weights.sum())
 
 
 def smoothed(signal: Floats, width: float) -> Floats:
-    """Columns of a signal (k, n), real or complex, smoothed; beyond its ends the signal is taken as constant."""
+    """Smooths columns of a signal (k, n), real or complex; beyond its ends the signal counts as constant."""
     weights = kernel(width)
     reach = len(weights) // 2
     padded = np.concatenate((np.repeat(signal[:1], reach, axis=0), signal, np.repeat(signal[-1:], reach, axis=0)))
@@ -36,14 +36,14 @@ def smoothed(signal: Floats, width: float) -> Floats:
 
 
 def accelerations(position: Floats, period: float) -> Floats:
-    """Second differences (k, n) of samples, zero at both ends: accelerations averaged over ±period."""
+    """Returns second differences (k, n) of samples, zero at both ends: accelerations averaged over ±period."""
     result = np.zeros_like(position)
     result[1:-1] = (position[2:] - 2 * position[1:-1] + position[:-2]) / period**2
     return result
 
 
 def speeds(position: Floats, period: float) -> Floats:
-    """Speeds (k, n) averaged over ±period with the same triangular weights, zero at both ends.
+    """Returns speeds (k, n) averaged over ±period with the same triangular weights, zero at both ends.
 
     A central difference averages with equal weights; a third difference corrects them to triangular ones.
     """
@@ -63,7 +63,7 @@ class NoiseGain:
 
 
 def noise_gain(width: float, period: float) -> NoiseGain:
-    """The noise that differentiation with this smoothing lets through."""
+    """Returns the noise of derivatives with this smoothing."""
     weights = np.pad(kernel(width), 4)[:, None]
     return NoiseGain(
         float(np.sqrt((speeds(weights, period) ** 2).sum())),
@@ -72,12 +72,13 @@ def noise_gain(width: float, period: float) -> NoiseGain:
 
 
 def chosen_width(position: Floats, deviation: Floats, period: float, share: float) -> float:
-    """The least smoothing (samples) with which noise is below `share` of every moving joint's acceleration, in rms.
+    """Returns the least smoothing (samples) with which noise is below `share` of every moving joint's acceleration, in
+    rms.
 
     Args:
         position: (k, n). deviation: (n,) standard deviation of the position's noise.
 
-    Raises SpecError when no joint moves.
+    Raises SpecError if no joint moves.
     """
     for width in WIDTHS:
         signal = accelerations(smoothed(position, width), period)
@@ -87,5 +88,5 @@ def chosen_width(position: Floats, deviation: Floats, period: float, share: floa
         if moving.any() and (noise[moving] <= share * np.sqrt(power[moving])).all():
             return width
     if not moving.any():
-        raise SpecError("no joint accelerates beyond the noise of its readings: there is nothing to explain")
+        raise SpecError("no joint accelerates beyond the noise of its readings, so there is nothing to explain")
     return WIDTHS[-1]

@@ -1,4 +1,4 @@
-"""The changes of single parameters that double an error: 2p root searches in lockstep, so that runs can be batched."""
+"""Finds the changes of single parameters that double an error: 2p root searches in lockstep, to run in batches."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ GROWTH = 2.0
 TOLERANCE = 1e-3
 """Relative accuracy of a doubling change."""
 LONGEST_SEARCH = 60
-"""Most rounds of a search, those of widening included."""
+"""Most rounds of a search, including those that widen it."""
 
 
 @dataclass
 class Search:
-    """One parameter in one direction; changes are magnitudes.
+    """Search for one parameter in one direction; changes are magnitudes.
 
-    `inside` is the largest change known not to double the error, `outside` the smallest known to; their levels are
-    √(E/E₀ − 1) − 1, which is linear in the change where E is a parabola. `slope` is E/E₀ near zero change.
+    `inside` is the largest change known not to double the error, `outside` the smallest known to double it. Their
+    levels are √(E/E₀ − 1) − 1, which is linear in the change where E is a parabola. `slope` is E/E₀ near zero change.
     """
 
     parameter: int
@@ -45,11 +45,11 @@ class Search:
 
     @property
     def change(self) -> float | None:
-        """The change that doubles the error; None when none within the limit does."""
+        """Returns the change that doubles the error; None if none within the limit does."""
         return self.outside
 
     def take(self, ratio: float) -> None:
-        """Take in the error ratio E/E₀ at `trial`, and choose the next trial."""
+        """Processes the error ratio E/E₀ at `trial`, and chooses the next trial."""
         level = math.inf if not math.isfinite(ratio) else math.copysign(math.sqrt(abs(ratio - 1)), ratio - 1) - 1
         if math.isfinite(ratio):
             self.lowest = min(self.lowest, ratio)
@@ -67,7 +67,7 @@ class Search:
         self.trial = self._between()
 
     def _between(self) -> float:
-        """The next trial: by false position, or the middle after the same end moved twice."""
+        """Returns the next trial: by false position, or the middle after the same end has moved twice."""
         assert self.outside is not None
         width = self.outside - self.inside
         stuck = len(self.last_sides) >= 2 and self.last_sides[-1] == self.last_sides[-2]
@@ -75,16 +75,16 @@ class Search:
             self.last_sides.clear()
             return self.inside + 0.5 * width
         share = -self.inside_level / (self.outside_level - self.inside_level)
-        # a little beyond the estimate, so that the bracket closes from both ends
+        # slightly beyond the estimate, so that the bracket closes from both ends
         share += 0.25 * TOLERANCE * (1 if self.outside_level > -self.inside_level else -1)
         return self.inside + width * min(0.999, max(0.001, share))
 
 
 @dataclass(frozen=True)
 class Doubling:
-    """Changes (magnitudes) that double the error, downwards and upwards; None where no change within the bounds does.
+    """Changes (magnitudes) that double the error, downwards and upwards; None if no change within the bounds does.
 
-    `lowest` is the smallest E/E₀ met on the way: clearly below one means that the point was no minimum.
+    `lowest` is the smallest E/E₀ found on the way. Clearly below one, it shows that the starting point was no minimum.
     """
 
     down: float | None
@@ -93,7 +93,7 @@ class Doubling:
 
     @property
     def mean(self) -> float | None:
-        """α_d: the mean of both changes (4.63), the only one where the other does not exist, or None."""
+        """α_d: the mean of both changes (4.63), or the only one, or None."""
         known = [c for c in (self.down, self.up) if c is not None]
         return sum(known) / len(known) if known else None
 
@@ -107,15 +107,15 @@ def doubling_changes(
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> tuple[float, list[Doubling]]:
-    """The error at `best`, and for each of its p parameters the changes that double it.
+    """Returns the error at `best`, and for each of its p parameters the changes that double it.
 
     Args:
         errors: of many parameter sets at once.
-        best: (p,) the fitted parameters. low, high: (p,) finite bounds, within which changes are sought.
-        first: (p,) positive changes to begin with; any size works, a good guess saves runs.
+        best: (p,) the fitted parameters. low, high: (p,) finite bounds for the changed values.
+        first: (p,) positive first changes; any size works, but a good guess saves runs.
 
     Raises:
-        SpecError: for bounds that do not hold `best`, or an error at it that is not positive and finite.
+        SpecError: for bounds that exclude `best`, or an error there that is not positive and finite.
         CancelledError: when cancelled.
     """
     cancel = cancel or Never()

@@ -1,4 +1,4 @@
-"""How far a parameter may be expected to lie from its value (τ′ of section 7.2.2)."""
+"""Expected deviations of parameters from their values (τ′ of section 7.2.2)."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ MASS_SHARE = 0.10
 """Expected standard deviation of a mass, as a share of its value."""
 
 Convention = Literal["source", "three_sigma"]
-"""Gaussian parameters: `source` is τ′ = â/(3√2), with which the published sums come out; `three_sigma` is â/3."""
+"""For Gaussian parameters: `source` is τ′ = â/(3√2), which reproduces the published sums; `three_sigma` is â/3."""
 
 Basis = Literal["length", "mass", "gaussian", "stated"]
-"""Where τ′ comes from; `stated` is the deviation written in the machine file or the effect."""
+"""Basis of τ′; `stated` is the deviation written in the machine file or the effect."""
 
 
 def gaussian_share(convention: Convention) -> float:
-    """τ′/â of a parameter that must be positive: zero lies three standard deviations away.
+    """Returns τ′/â of a parameter that must be positive: zero lies three standard deviations away.
 
-    The source takes the three as the argument of erf, not as a deviate of the normal density, hence the √2.
+    The source uses the three as the argument of erf, not as a deviate of the normal density, hence the √2.
     """
     return 1 / (3 * math.sqrt(2)) if convention == "source" else 1 / 3
 
 
 def deviation_share(basis: Basis, convention: Convention) -> float:
-    """τ′/â of a length, a mass or a Gaussian parameter."""
+    """Returns τ′/â of a length, a mass or a Gaussian parameter."""
     return {"length": LENGTH_SHARE, "mass": MASS_SHARE}.get(basis, gaussian_share(convention))
 
 
 def basis_of(parameter: Parameter) -> Basis:
-    """Which rule gives a model parameter's expected deviation."""
+    """Returns the rule for a model parameter's expected deviation."""
     if parameter.effect is None and parameter.unit == "kg":
         return "mass"
     if parameter.kind is Kind.GEOMETRY:
@@ -45,10 +45,10 @@ def basis_of(parameter: Parameter) -> Basis:
 
 
 def expected_deviation(parameter: Parameter, convention: Convention) -> tuple[float, Basis]:
-    """τ′ of a model parameter and the rule that gives it.
+    """Returns τ′ of a model parameter and its rule.
 
     Raises:
-        SpecError: for a parameter that may be zero or negative and states no deviation of its own.
+        SpecError: for a parameter that may be zero or negative and has no stated deviation.
     """
     basis = basis_of(parameter)
     if basis != "stated":

@@ -1,4 +1,4 @@
-"""Validation by distortion in its transfer-function form (section 4.4): does Σλ² reach 1?"""
+"""Validates by distortion in its transfer-function form (section 4.4): does Σλ² reach 1?"""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from model.validation.squared_error import SquaredError, squared_error
 SEARCH_DEVIATIONS = 50.0
 """Largest change that is tried, in expected deviations; a parameter that needs more adds less than 0.0003 to Σλ²."""
 CURVE_REACH = 1.5
-"""Reach of an error curve to either side, in doubling changes (in expected deviations where no change doubles)."""
+"""Extent of an error curve to either side, in doubling changes (in expected deviations where no change doubles)."""
 MINIMUM_TOLERANCE = 0.98
-"""Share of the error at the given parameters; a smaller error elsewhere shows that they are not the minimum."""
+"""Share of the error at the given parameters. A smaller error elsewhere shows that they are not the minimum."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +63,11 @@ def validate_by_distortion(
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> Fidelity:
-    """How far each of the named parameters alone would have to vary to explain what the model misses.
+    """Computes how far each named parameter alone would have to vary to explain the model's error.
 
     Args:
-        model: fitted to the traces: the method takes its error as the least. names: the parameters that were fitted.
+        model: fitted to the traces; the method assumes that its error is the least.
+        names: the parameters that were fitted.
         outputs: joints whose errors count; all modelled ones by default, one for the single-variable case (4.4.1).
         curve_points: points of each doubled-error curve (figures 4.4, 7.8); 0 for none.
         options: of the simulation.
@@ -127,7 +128,7 @@ def _varied(parameters: tuple[Parameter, ...]) -> _Varied:
     reach = SEARCH_DEVIATIONS * expected
     low = np.maximum([p.low for p in parameters], value - reach)
     high = np.minimum([p.high for p in parameters], value + reach)
-    # a length, a mass or a resistance of exactly zero is no machine
+    # a length, a mass or a resistance of exactly zero is impossible
     positive = (low == 0) & (value > 0)
     return _Varied(parameters, value, expected, np.where(positive, 1e-6 * value, low), high)
 
@@ -153,12 +154,16 @@ def _notes(parameters: Sequence[Parameter], doublings: Sequence[Doubling]) -> li
     notes = []
     for p, d in zip(parameters, doublings, strict=True):
         if d.lowest < MINIMUM_TOLERANCE:
-            notes.append(f"{p.name}: the error falls to {d.lowest:.3g} of its value; the model is not at its minimum")
+            notes.append(
+                f"{p.name}: the error falls to {d.lowest:.3g} of its value, so the model is not at its minimum"
+            )
         if d.down is None and d.up is None:
             notes.append(f"{p.name}: insensitive: no change within its bounds doubles the error")
         elif d.down is None or d.up is None:
             side = "downwards" if d.down is None else "upwards"
-            notes.append(f"{p.name}: no change {side} within its bounds doubles the error; the other one counts alone")
+            notes.append(
+                f"{p.name}: no change {side} within its bounds doubles the error; only the other direction counts"
+            )
     return notes
 
 

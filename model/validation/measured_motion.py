@@ -1,4 +1,4 @@
-"""The motion that a trace shows: positions on the grid of control periods, smoothed, with speeds and their noise."""
+"""The motion in a trace: positions on the grid of control periods, smoothed, with speeds and their noise."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from model.validation import differentiation as d
 from model.validation.acceleration_model import MeasuredMotion, speed_answers
 
 NOISE_SHARE = 0.05
-"""Largest noise of an acceleration, as a share of the acceleration; the smoothing is chosen by it."""
+"""Largest noise of an acceleration, as a share of the acceleration; determines the smoothing."""
 MOVING = 4.0
 """Speed above which a joint counts as moving, in standard deviations of the speed's noise."""
 FINE = 8
-"""Points per control period at which friction's change of direction is looked for."""
+"""Points per control period at which friction's change of direction is located."""
 SHORTEST = 12
 """Least number of samples of a trace."""
 
@@ -31,7 +31,7 @@ SHORTEST = 12
 class SmoothedMotion:
     """The smoothed motion of a trace.
 
-    acceleration: (k, n) rad/s², with the motion's smoothing. usable: (k, n) where a joint moves and no sample is
+    acceleration: (k, n) rad/s², with the motion's smoothing. usable: (k, n) True where a joint moves and no sample is
     missing.
     """
 
@@ -42,17 +42,17 @@ class SmoothedMotion:
 
 @dataclass(frozen=True)
 class SmoothedTrace(SmoothedMotion):
-    """A trace as the time-domain form uses it.
+    """A trace for the time-domain form.
 
-    noise: (n,) standard deviation of measured − expected acceleration that comes from noise and rounding of the
-    readings: through second differences, and through the speeds, on which the expected one depends.
+    noise: (n,) standard deviation of measured − expected acceleration due to noise and rounding of the readings. They
+    enter by second differences, and by the speeds in the expected acceleration.
     """
 
     noise: Floats
 
 
 def smooth(model: Model, trace: Trace, smoothing: float | None = None) -> SmoothedTrace:
-    """A trace with its smoothed motion, and what noise of the readings does to the accelerations.
+    """Returns a trace with its smoothed motion, and the resulting noise of its accelerations.
 
     Raises as `smooth_motion` does.
     """
@@ -65,7 +65,10 @@ def smooth(model: Model, trace: Trace, smoothing: float | None = None) -> Smooth
 
 
 def smooth_motion(model: Model, trace: Trace, smoothing: float | None = None) -> SmoothedMotion:
-    """The smoothed motion of a trace; `smoothing`: standard deviation of the kernel in s, by default chosen from noise.
+    """Returns the smoothed motion of a trace.
+
+    Args:
+        smoothing: standard deviation of the kernel in s; by default chosen from noise.
 
     Raises:
         TraceError: for a trace without recorded drive, or too short.
@@ -98,7 +101,7 @@ def smooth_motion(model: Model, trace: Trace, smoothing: float | None = None) ->
 
 
 def position_noise(model: Model) -> Floats:
-    """Standard deviation (n,) of a reading, rad: rounding to counts and the sensor's own noise."""
+    """Returns the standard deviation (n,) of a reading, rad: rounding to counts and the sensor's own noise."""
     deviations = []
     for number in model.machine.modelled_joints:
         sensor = model.machine.joint(number).sensor
@@ -112,9 +115,9 @@ def position_noise(model: Model) -> Floats:
 
 
 def _friction_deflection(model: Model, measured: Floats) -> Floats:
-    """Deflection of the friction contact (k, n) that follows the motion from rest, averaged as accelerations are.
+    """Returns the deflection of the friction contact (k, n) along the motion, from rest, averaged as accelerations are.
 
-    Motion between samples is interpolated: friction changes sign within a period, and its moment matters.
+    Motion between samples is interpolated, because friction changes sign within a period, and the time matters.
     """
     presliding = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)[:, at.PRESLIDING]
     count = len(measured)
@@ -129,12 +132,12 @@ def _friction_deflection(model: Model, measured: Floats) -> Floats:
 
 @compiled
 def _follow(moves: Floats, contact: Floats) -> None:
-    """Prandtl's contact: each row is the one before, moved on within ±1."""
+    """Applies Prandtl's contact: each row is the previous one plus its displacement, limited to ±1."""
     for k in range(moves.shape[0]):
         for j in range(moves.shape[1]):
             contact[k + 1, j] = min(max(contact[k, j] + moves[k, j], -1.0), 1.0)
 
 
 def _spread(mask: Mask, reach: int) -> Mask:
-    """True within `reach` samples of any True, also in a mask that is shorter than that."""
+    """Returns True within `reach` samples of any True, also for a mask that is shorter than that."""
     return np.asarray(np.convolve(mask, np.ones(2 * reach + 1))[reach : reach + len(mask)] > 0.5)

@@ -1,4 +1,4 @@
-"""Which parameters of a model a validation varies."""
+"""Selects the parameters that a validation varies."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from model.machine_model.model import Model
 
 
 def names_to_validate(model: Model, patterns: Sequence[str] | None = None) -> tuple[str, ...]:
-    """Names that match the patterns; without patterns the fitted parameters, or else all with an expected deviation.
+    """Returns names that match the patterns; without patterns fitted parameters, or else all with an expected
+    deviation.
 
-    Raises SpecError for a pattern that matches nothing, or when nothing is left.
+    Raises SpecError for a pattern that matches nothing, or an empty selection.
     """
     names = [p.name for p in model.parameters]
     if patterns is not None:

@@ -1,10 +1,14 @@
-"""The noise floor of the time-domain form: the residual (rad/s²) that remains for records made by the model itself.
+"""Noise floor of the time-domain form: the residual (rad/s²) of records that the model itself makes.
 
-Three causes add up, and only the first follows from a formula. (1) Noise and rounding of the readings are amplified by
-differentiation and by the model's dependence on speed (`measured_motion.smooth`). (2) Between two samples the drive
-steps and the speed differs from what the samples show. (3) Where a motion turns, friction changes sign, and one count
-of noise decides when. The model therefore takes the arm's place: it repeats the record's set points with noise drawn
-anew and readings rounded, and the same differentiation is applied to the result.
+It has three causes, and only the first follows from a formula.
+
+1. Differentiation and the model's dependence on speed amplify noise and rounding of the readings
+  (`measured_motion.smooth`).
+2. Between two samples the drive steps and the speed differs from that of the samples.
+3. At a reversal friction changes sign, and one count of noise changes the time.
+
+The model therefore simulates the record's set points with drawn noise and rounded readings. The same differentiation is
+applied to the result.
 """
 
 from __future__ import annotations
@@ -26,10 +30,10 @@ SECONDS = 400.0
 
 
 def noise_floor(model: Model, trace: Trace, smoothed: SmoothedTrace) -> tuple[Floats, bool]:
-    """Root mean square (n,) of each joint's acceleration residual if the model is right, rad/s² (m/s²).
+    """Returns the root mean square (n,) of each joint's acceleration residual for a right model, rad/s² (m/s²).
 
-    It is the median over simulated records. Also returned is whether they could be simulated. If not, and on a joint
-    that does not move in them, the floor is the readings' noise alone, as `smoothed` has it.
+    It is the median over simulated records. The second value is whether they could be simulated. If not, and for joints
+    that do not move in them, the floor is only the noise of the readings, as in `smoothed`.
     """
     smoothing = smoothed.motion.width * smoothed.motion.period
     rng = np.random.default_rng(SEED)

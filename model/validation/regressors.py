@@ -1,4 +1,4 @@
-"""Quantities that a variation may depend on (a joint's position, speed, load and so on), and how strongly it does."""
+"""Quantities on which a variation may depend (a joint's position, speed, load and so on), and their correlations."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FEWEST = 6
 
 
 def regressors(model: Model, smoothed: SmoothedTrace) -> dict[str, Floats]:
-    """Every regressor (k, n) of the modelled joints along a motion."""
+    """Returns every regressor (samples, joints) of the modelled joints along a motion."""
     motion = smoothed.motion
     return {
         "position": motion.position,
@@ -33,9 +33,14 @@ def regressors(model: Model, smoothed: SmoothedTrace) -> dict[str, Floats]:
 def correlations(
     signal: Floats, present: NDArray[np.bool_], known: dict[str, Floats], joints: list[int], width: float
 ) -> tuple[Correlation, ...]:
-    """Correlations of a signal (k,) with the regressors of some joints (indices from 0), strongest first.
+    """Returns correlations of a signal (samples,) with the regressors of some joints, strongest first.
 
-    Smoothing over `width` samples makes neighbours alike; samples are counted as independent every 2√π·width.
+    Args:
+        present: (samples,) where the signal is defined.
+        known: regressors by name, (samples, joints).
+        joints: indices from 0.
+        width: the signal was smoothed by a Gaussian of this standard deviation in samples; one sample in 2√π·width
+            counts as independent.
     """
     count = present.sum() / max(1.0, 2 * np.sqrt(np.pi) * width)
     if count < FEWEST:
@@ -52,7 +57,7 @@ def correlations(
 def _pearson(x: Floats, y: Floats) -> float | None:
     x, y = x - x.mean(), y - y.mean()
     size = float(np.sqrt((x**2).sum() * (y**2).sum()))
-    # a constant regressor (one direction only, one posture) is correlated with nothing
+    # a constant regressor (one direction only, one posture) has no correlation
     if size <= 1e-9 * len(x) * max(1e-300, float(np.abs(x).max() * np.abs(y).max())):
         return None
     return float((x * y).sum() / size)

@@ -1,4 +1,4 @@
-"""Mean squared errors of many parameter sets against traces."""
+"""Computes mean squared errors of many parameter sets against traces."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SquaredError:
     options: Options
 
     def by_joint(self, values: Floats) -> Floats:
-        """(m, len(outputs)) rad² for parameter values (m, p); inf where a run diverged."""
+        """Returns (m, len(outputs)) rad² for parameter values (m, p); inf where a run diverged."""
         inputs = [inputs_of(t, self.model.machine) for t in self.traces]
         vectors = parameter_vectors(self.model, self.names, values)
         sums, samples = np.zeros((len(vectors), len(self.outputs))), 0
@@ -46,14 +46,14 @@ class SquaredError:
         return np.where(np.isfinite(sums), sums / samples, np.inf)
 
     def total(self, values: Floats) -> Floats:
-        """(m,) rad², summed over the outputs."""
+        """Returns (m,) rad², summed over the outputs."""
         return np.asarray(self.by_joint(values).sum(axis=1))
 
 
 def squared_error(
     model: Model, traces: Sequence[Trace], names: Sequence[str], outputs: Sequence[int] | None, options: Options | None
 ) -> SquaredError:
-    """The error function of a model on traces; all modelled joints count unless `outputs` names some.
+    """Returns the error function of a model on traces; `outputs` selects joints, by default all modelled ones.
 
     Raises SpecError for an unknown parameter or joint, or no trace.
     """
@@ -64,5 +64,7 @@ def squared_error(
     chosen = tuple(outputs) if outputs is not None else model.machine.modelled_joints
     for joint in chosen:
         if joint not in model.machine.modelled_joints:
-            raise SpecError(f"output joint {joint}: modelled are joints {list(model.machine.modelled_joints)}")
+            raise SpecError(
+                f"output joint {joint}: not modelled; modelled joints are {list(model.machine.modelled_joints)}"
+            )
     return SquaredError(model, tuple(traces), tuple(names), chosen, options or Options())

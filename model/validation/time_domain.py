@@ -1,4 +1,4 @@
-"""Validation by distortion in its time-domain form (section 4.3): what must move, when, and against what."""
+"""Validates by distortion in its time-domain form (section 4.3): which parameters must vary, when, and with what?"""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from model.validation.regressors import correlations, regressors
 from model.validation.variation import JointResidual, TimeDomain, Variation
 
 SIGNIFICANT = 2.0
-"""A variation counts as real beyond this many standard deviations of its noise."""
+"""A variation counts as significant above this many standard deviations of its noise."""
 READINGS_ALONE = "the noise floor is that of the readings alone: the model cannot be simulated along this record"
 
 
@@ -41,7 +41,7 @@ class _Equations:
 
 @dataclass(frozen=True)
 class _Solution:
-    """alpha, noise (k, p); active (k, p) where a moving joint shows the parameter."""
+    """alpha, noise (k, p); active (k, p): where a joint that the parameter acts on moves."""
 
     alpha: Floats
     noise: Floats
@@ -49,19 +49,19 @@ class _Solution:
 
 
 def vary_in_time(model: Model, trace: Trace, names: Sequence[str]) -> TimeDomain:
-    """How the named parameters would have to vary with time for the model to explain a trace.
+    """Computes how the named parameters would have to vary with time for the model to explain a trace.
 
-    At each sample J_a α = q̈ − f is solved for the least α in units of expected deviations, regularised by noise
-    (a Bayes estimate: α ~ N(0, τ′²), and the noise floor of `noise_floor`). Rounding of the drive, motion
-    between samples and the delay are accounted for; a rotor's current, heat and sensors' errors are not varied.
+    At each sample J_a α = q̈ − f is solved for the least α in units of expected deviations, regularised by noise (a
+    Bayes estimate: α ~ N(0, τ′²), and the noise floor of `noise_floor`). The estimate accounts for rounding of the
+    drive, motion between samples and the delay. It does not vary a rotor's current, heat or sensor errors.
 
     Raises:
-        TraceError: for a trace without drive, or too short. SpecError: for an unknown parameter, no motion, or a
-            flexible transmission.
+        TraceError: for a trace without drive, or too short.
+        SpecError: for an unknown parameter, no motion, or a flexible transmission.
     """
     if not names:
         raise SpecError("no parameters: name at least one")
-    (trace,) = as_used([trace], model.machine)  # no controller is simulated along the measured motion
+    (trace,) = as_used([trace], model.machine)  # along the measured motion no controller is simulated
     smoothed = smooth(model, trace)
     floor, simulated = noise_floor(model, trace, smoothed)
     smoothed = replace(smoothed, noise=floor)
@@ -90,7 +90,7 @@ def _equations(model: Model, smoothed: SmoothedTrace, names: tuple[str, ...]) ->
 
 
 def _solve(given: _Equations) -> _Solution:
-    """α = S Jᵀ (J S Jᵀ + R)⁻¹ r at every sample, with S = τ′² and R the noise; its noise through the same gain."""
+    """Returns α = S Jᵀ (J S Jᵀ + R)⁻¹ r at every sample, with S = τ′² and R the noise, and the noise of α."""
     smoothed, deviations = given.smoothed, given.deviations
     scaled = given.jacobian * deviations
     noise = np.diag(smoothed.noise**2)
@@ -126,7 +126,9 @@ def _variation(given: _Equations, solution: _Solution, k: int, known: dict[str, 
 
 
 def _alone(given: _Equations, k: int) -> tuple[float, float]:
-    """Shares of the residual's energy, less noise, that one parameter explains: as a constant, and varying."""
+    """Returns the shares of the residual's energy, without noise, that one parameter explains: if constant, and if
+    varying.
+    """
     noise = given.smoothed.noise
     r, j = given.residual / noise, given.jacobian[:, :, k] / noise
     energy = float((r**2).sum()) - float(given.smoothed.usable.sum())
@@ -159,8 +161,8 @@ def _optional(values: Floats, present: Mask) -> tuple[float | None, ...]:
 def _notes(given: _Equations, solution: _Solution, *, simulated: bool) -> list[str]:
     notes = [] if simulated else [READINGS_ALONE]
     absent = [name for k, name in enumerate(given.names) if not solution.active[:, k].any()]
-    notes += [f"{name}: does not act on the accelerations of this record" for name in absent]
+    notes += [f"{name}: does not influence the accelerations of this record" for name in absent]
     parameters, joints = len(given.names), given.residual.shape[1]
     if parameters > joints:
-        notes.append(f"{parameters} parameters for {joints} accelerations a sample: α is the least in units of τ′")
+        notes.append(f"{parameters} parameters for {joints} accelerations per sample: α is the least in units of τ′")
     return notes

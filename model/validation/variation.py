@@ -1,4 +1,4 @@
-"""The results of validation in the time domain, as data; a module that only shows them need not load the compiler."""
+"""Results of validation in the time domain, as data; code that only displays them need not load the compiler."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ class Correlation(FrozenRecord):
 
     @property
     def significant(self) -> bool:
-        """Whether it is beyond three standard deviations of the correlation of independent signals."""
+        """Whether it exceeds three standard deviations of the correlation of independent signals."""
         return abs(self.value) > 3 * self.noise
 
 
 class Variation(FrozenRecord):
-    """α(t) of one parameter, where all parameters together vary as little as explains the motion.
+    """α(t) of one parameter, when all parameters together vary as little as explains the motion.
 
-    `values` and `noise` (the standard deviation that the noise floor gives α) are in `unit` at the result's
-    times; None where no joint that the parameter acts on moves. `deviation` is the rms of α (4.23), corrected for
-    noise, `expected` is τ′, `mean` is what a constant change would be. `significant` is the share of times at which
-    α lies beyond noise. `alone_constant` and `alone_varying` are the shares of the residual's energy (beyond noise)
-    that this parameter explains by itself, as a constant and as a function of time.
+    `values` and `noise` (standard deviation of α due to the noise floor) are in `unit` at the result's times; None
+    where no joint that the parameter acts on moves. `deviation` is the rms of α (4.23), corrected for noise; `expected`
+    is τ′; `mean` is the constant change. `significant` is the share of times at which α exceeds noise. `alone_constant`
+    and `alone_varying` are the shares of the residual's energy (above noise) that this parameter explains alone, as a
+    constant and as a function of time.
     """
 
     name: str
@@ -53,9 +53,9 @@ class Variation(FrozenRecord):
 
 
 class JointResidual(FrozenRecord):
-    """Measured − expected acceleration of a joint (rad/s²; None where it does not move) and what it depends on.
+    """Measured − expected acceleration of a joint (rad/s²; None where it does not move) and its correlations.
 
-    `noise` is its noise floor: the root mean square that is left of records which the model itself has made.
+    `noise` is its noise floor: the root mean square residual of records that the model itself makes.
     """
 
     joint: int
@@ -66,12 +66,14 @@ class JointResidual(FrozenRecord):
 
     @property
     def in_floors(self) -> float:
-        """Root mean square of the residual over the noise floor: about 1 where the model is right."""
+        """Root mean square of the residual over the noise floor: about 1 for a right model."""
         return self.rms / self.noise
 
 
 class TimeDomain(FrozenRecord):
-    """The time-domain form for one model and one trace. `smoothing` is the kernel's standard deviation in s."""
+    """Result of the time-domain form for one model and one trace. `smoothing` is the kernel's standard deviation in
+    s.
+    """
 
     model: str
     trace: str
@@ -84,5 +86,5 @@ class TimeDomain(FrozenRecord):
     notes: tuple[str, ...] = ()
 
     def parameter(self, name: str) -> Variation:
-        """The variation of a parameter. Raises KeyError."""
+        """Returns the variation of a parameter. Raises KeyError."""
         return {p.name: p for p in self.parameters}[name]

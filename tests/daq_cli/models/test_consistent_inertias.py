@@ -74,5 +74,5 @@ def test_a_body_that_cannot_exist_and_half_a_choice_are_refused_in_one_line(
         daq(*words, "--parameters", parameters).complains(2, *says)
         assert not (tmp_path / "no.json").exists()
 
-    refused(machine(tmp_path, 0.02), "link1.mass", "link1: 0.8 kg", "0.0005, 0.006, 0.02", "no body that can exist")
-    refused(machine(tmp_path, 0.006), "link1.inertia_zz", "link1.inertia_zz", "free", "link1.inertia_xx")
+    refused(machine(tmp_path, 0.02), "link1.mass", "link1: 0.8 kg", "0.0005, 0.006, 0.02", "is not physically consistent")
+    refused(machine(tmp_path, 0.006), "link1.inertia_zz", "link1.inertia_zz", "fit", "link1.inertia_xx")

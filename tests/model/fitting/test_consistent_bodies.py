@@ -120,26 +120,26 @@ def test_bounds_of_a_mass_hold_and_those_of_moments_are_refused() -> None:
         assert 0.9 <= found.values(x)[0] <= 1.5
     bounded = of_body(*SOUND, zz=", low = 0.0, high = 0.2")
     assert refused(bounded, *ALL) == (
-        "link1.inertia_zz: bounds 0 to 0.2 kg·m²: with consistent inertias a moment has none but those of its body; "
-        "take them out, or state an expected deviation"
+        "link1.inertia_zz: bounds 0 to 0.2 kg·m²: with consistent inertias a moment cannot have bounds; "
+        "remove them, or state an expected deviation"
     )
     of(bounded, "link1.mass")
 
 
 def test_what_cannot_be_is_refused_in_one_line() -> None:
     assert refused(of_body(0.002, 0.002, 0.01, 0, 0, 0), "link1.centre_x") == (
-        "link1: 1.2 kg with the principal moments 0.002, 0.002, 0.01 kg·m² is no body that can exist (mass above 0, no "
-        "moment above the sum of the others): consistent inertias start from one that can"
+        "link1: 1.2 kg with the principal moments 0.002, 0.002, 0.01 kg·m² is not physically consistent (mass above 0, no "
+        "moment above the sum of the others); consistent inertias must start from a consistent body"
     )
     assert "start from a mass and moments above 0" in refused(of_body(0, 0, 0, 0, 0, 0), *ALL)
     assert "start from a mass and moments above 0" in refused(of_body(*SOUND, mass=0.0), *ALL)
     assert refused(of_body(*SOUND), "link1.inertia_zz", "link1.inertia_xy") == (
         "link1.inertia_zz, link1.inertia_xy: with consistent inertias xx, yy and zz of a body are fitted together: "
-        "free link1.inertia_xx and link1.inertia_yy as well, or hold link1.inertia_*"
+        "fit link1.inertia_xx and link1.inertia_yy as well, or hold link1.inertia_*"
     )
     assert "nelder_mead" in refused(of_body(*SOUND), *ALL, method="nelder_mead")
     tied = of_body(*SOUND).tied("link1.round", ("link1.inertia_xx", "link1.inertia_yy"))
-    assert "link1.round: stands for several numbers at once" in refused(tied, "link1.round", "link1.inertia_zz")
+    assert "link1.round: sets several parameters at once" in refused(tied, "link1.round", "link1.inertia_zz")
 
 
 def test_a_plate_and_a_point_may_be_stated() -> None:
@@ -193,7 +193,7 @@ def test_a_fit_of_motion_finds_a_body_that_can_exist() -> None:
     assert least_share(held.model) > 0
     assert held.model.parameter("link1.inertia_zz").value == pytest.approx(0.081, rel=0.03)
     assert held.errors[0].after < 1.02 * plain.errors[0].after
-    with pytest.raises(SpecError, match="takes no fit with consistent inertias"):
+    with pytest.raises(SpecError, match="not possible for a fit with consistent inertias"):
         profile(held, [swing], "link1.inertia_zz")
 
 

@@ -134,7 +134,7 @@ def test_progress_says_what_is_done_and_how_much_of_it() -> None:
     rounds = [(round(f, 6), t) for f, t in told if t.startswith("round")]
     assert rounds == [(round(0.5 + 0.4 * k / 3, 6), f"round {k + 1}: noise and whitening") for k in range(len(rounds))]
     assert told[-2:] == [(0.95, "intervals and identifiability"), (1.0, "done")]
-    assert (found.converged, found.message, len(rounds)) == (True, "no value moves any more", 1)
+    assert (found.converged, found.message, len(rounds)) == (True, "values have converged", 1)
 
 
 class After:

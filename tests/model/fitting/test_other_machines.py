@@ -96,7 +96,7 @@ def test_the_signal_that_is_compared_is_what_all_sensors_measure_unless_it_is_na
     assert signal_of(two_joints(TACHOMETER)) == "velocity"
     assert signal_of(two_joints(TACHOMETER, "")) == "velocity", "one has none"
     assert signal_of(two_joints(TACHOMETER), signal="position") == "position"
-    with pytest.raises(SpecError, match="some joints measure position and some velocity: say with `signal` which"):
+    with pytest.raises(SpecError, match="some joints measure position and some velocity: state with `signal` which"):
         signal_of(two_joints(TACHOMETER, angle))
     assert signal_of(two_joints(TACHOMETER, angle), signal="velocity") == "velocity"
 
@@ -144,7 +144,7 @@ def resolution_of(problem: SimulatedProblem) -> float:
 
 def test_a_model_that_does_not_stay_finite_is_told_with_its_record() -> None:
     problem = problem_of()
-    with pytest.raises(SpecError, match="the simulation of made does not stay finite: the loop is unstable"):
+    with pytest.raises(SpecError, match="the simulation of made does not stay finite: the control loop is unstable"):
         problem.evaluate(np.array([-1e6]), derivatives=False)
 
 

@@ -176,7 +176,7 @@ def test_a_machine_s_traces_are_its_own() -> None:
     made = record_of(list(range(100)))
     own = replace(made, record=made.record.model_copy(update={"machine": machine()}))
     assert records_of([own], machine(), "position")[0].name == "made"
-    with pytest.raises(TraceError, match="trace made: made on ma2000, the model describes bench"):
+    with pytest.raises(TraceError, match="trace made: recorded on ma2000, but the model describes bench"):
         records_of([own], machine().model_copy(update={"name": "bench"}), "position")
 
 

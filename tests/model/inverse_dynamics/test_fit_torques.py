@@ -123,7 +123,7 @@ def test_the_torque_of_the_drive_is_in_newton_metres() -> None:
 
 @pytest.mark.parametrize("name", sorted(NOT_IN_TORQUES))
 def test_effects_that_torques_cannot_show_are_refused_by_name(name: str) -> None:
-    with pytest.raises(SpecError, match=f"effect {name}: cannot take part in a fit of torques: .*; leave it out"):
+    with pytest.raises(SpecError, match=f"effect {name}: cannot be fitted to torques: .*; leave it out"):
         fit_torques(rod().with_effect(name, (1,)), [swinging(1)], [], OPTIONS)
 
 

@@ -294,7 +294,7 @@ def test_a_record_of_every_second_period_without_a_sensor_has_a_noise(tmp_path: 
     assert "states no `sensor`" in note.line
     assert note.joint == 1
     torn = [replace(record, runs=(slice(0, 2),)) for record in records]
-    with pytest.raises(TraceError, match="noise of joint 1 is not known; state its `sensor`"):
+    with pytest.raises(TraceError, match="noise of joint 1 cannot be estimated; state its `sensor`"):
         noise_floor(torn, unstated, "position")
 
 

@@ -72,7 +72,7 @@ def test_a_run_that_has_to_be_compiled_is_announced_once(
     monkeypatch.setattr(batch, "_announced", [])
     found = runs(3).run(cores=1)
     assert found[:, 0, 0, 0].tolist() == [1.0, 2.0, 3.0]
-    assert capsys.readouterr().err == "Compiling the simulation for this machine, once: some 20 s\n"
+    assert capsys.readouterr().err == "Compiling the simulation for this machine, once (about 20 s)\n"
     runs(3).run(cores=1)
     assert capsys.readouterr().err == ""
 

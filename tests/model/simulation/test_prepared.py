@@ -116,7 +116,7 @@ def test_options_reach_the_record(quantise: bool) -> None:
 
 def test_inputs_of_other_joints_are_refused() -> None:
     inputs = replace(inputs_of(still(), MA2000), joints=(1, 2))
-    with pytest.raises(SpecError, match=r"inputs are for joints \(1, 2\), the model moves joints \(1, 2, 3\)"):
+    with pytest.raises(SpecError, match=r"inputs are for joints \(1, 2\), but the model moves joints \(1, 2, 3\)"):
         prepare(base_model(MA2000), inputs, Options())
 
 
@@ -191,7 +191,7 @@ def test_a_carriage_and_a_shaft_without_a_sensor_may_go_further() -> None:
 
 
 def test_without_drive_a_machine_without_a_controller_cannot_move() -> None:
-    with pytest.raises(TraceError, match="has no drive, and pendulum has no controller to form one"):
+    with pytest.raises(TraceError, match="has no drive, and pendulum has no controller that could compute it"):
         inputs_of(trace_of(np.zeros((60, 1)), 0.01), pendulum())
 
 

@@ -81,7 +81,7 @@ def test_a_parameter_that_does_not_act_on_accelerations_is_noted(model: Model) -
     name = next(p.name for p in offset.parameters if p.effect == "potentiometer_offset")
     result = vary_in_time(offset, swinging_trace(model, 2.0), (name, VISCOUS_2))
     assert result.parameter(name).alone_varying == 0.0
-    assert any(name in note and "does not act" in note for note in result.notes)
+    assert any(name in note and "does not influence" in note for note in result.notes)
 
 
 def test_traces_that_cannot_be_used_are_named(model: Model) -> None:

@@ -124,7 +124,7 @@ class Asked(Observation):
 
     def tangents(self, tried: Calibration, which: Sequence[int] | None = None) -> Floats:
         self.names.extend(tried.unknowns[k].name for k in which or ())
-        raise SpecError("the simulation does not stay finite: the loop is unstable")
+        raise SpecError("the simulation does not stay finite: the control loop is unstable")
 
 
 def test_a_polished_fit_gets_new_derivatives_by_all_numbers_that_act_on_its_joints() -> None:

@@ -14,7 +14,7 @@ from model.discrepancy.selection.diagnose import _fit_tolerances, _given_point
 from model.discrepancy.thresholds import FEEDBACK_SHARE
 from tests.model.fitting import imagined
 
-UNSTABLE = "the simulation does not stay finite: the loop is unstable"
+UNSTABLE = "the simulation does not stay finite: the control loop is unstable"
 
 
 @dataclass(frozen=True)
