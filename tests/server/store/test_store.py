@@ -1,6 +1,6 @@
-"""The database: catalogue and cursors do what they say."""
+"""The database: catalogue and cursors do what they say, each robot's rows its own."""
 
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -17,11 +17,10 @@ from server.store.address import address_of
 from server.store.engine import Store, StoreError
 from server.store.experiments import ExperimentStore
 from server.store.lock import sqlite_file
+from server.store.models import ModelStore, NewModel
 from server.store.pages import Cursor
 from server.store.traces import TraceSearch, TraceStore
-from tests.server.store.rows import new_trace
-
-NOW = datetime(2026, 1, 1, tzinfo=UTC)
+from tests.server.store.rows import NOW, new_trace
 
 
 def test_nobody_else_may_read_the_database(sqlite_store: Store, tmp_path: Path) -> None:
@@ -213,3 +212,31 @@ def test_a_trace_with_long_notes_is_kept(store: Store) -> None:
     notes = "".join(chr(33 + number * 7919 % 90) for number in range(20_000))  # no two parts are alike: nothing to pack
     traces.insert(new_trace(1, notes=notes))
     assert traces.get("ma2000", f"{1:012x}").notes == notes
+
+
+def new_model(robot: str) -> NewModel:
+    return NewModel("m1", robot, f"of {robot}", "m1.json", NOW, "anna", None, None, ("000000000001",))
+
+
+def test_the_same_model_belongs_to_each_robot_and_its_file_to_the_last(store: Store) -> None:
+    models = ModelStore(store)
+    assert models.insert(new_model("left"), lambda: None)
+    assert models.insert(new_model("right"), lambda: None)
+    assert not models.insert(new_model("right"), lambda: None)
+    assert (models.get("left", "m1").name, models.get("right", "m1").name) == ("of left", "of right")
+    deleted: list[str] = []
+    models.remove("left", "m1", deleted.append)
+    assert deleted == []
+    assert models.get("right", "m1").traces == ("000000000001",)
+    models.remove("right", "m1", deleted.append)
+    assert deleted == ["m1.json"]
+
+
+def test_files_of_one_robot_are_not_missing_in_the_folder_of_another(store: Store) -> None:
+    traces = TraceStore(store)
+    traces.insert(new_trace(1, robot="left"))
+    traces.insert(new_trace(2, robot="right"))
+    assert traces.files("left") == {"1.mcap"}
+    traces.mark_missing("left", {"1.mcap", "2.mcap"}, missing=True)
+    assert traces.get("left", f"{1:012x}").missing
+    assert not traces.get("right", f"{2:012x}").missing
