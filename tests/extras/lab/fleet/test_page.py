@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.server.fleet_service import FleetService, fleet_service
+from tests.server.fleet_service import FleetService, two_arms
 from tests.server.other_user import other_users_command_line
 
 pytestmark = pytest.mark.slow
@@ -26,13 +26,8 @@ PROGRAMS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetService]:
-    ports = {name: f"mock://?pty=1&lock_step=1&seed={seed}" for seed, name in enumerate(("left", "right"), start=5)}
-    with fleet_service(tmp_path_factory.mktemp("page"), ports) as service:
-        for name in ports:
-            service.post(f"robots/{name}/connect")
+    with two_arms(tmp_path_factory.mktemp("page"), seed=5) as service:
         yield service
-        for name in ports:
-            service.post(f"robots/{name}/disconnect")
 
 
 @pytest.mark.parametrize("line", LINES)
