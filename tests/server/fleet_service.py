@@ -1,8 +1,8 @@
 """A real service with several mocks, for tests."""
 
 import subprocess
-from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +42,9 @@ class FleetService:
 
 
 @contextmanager
-def fleet_service(folder: Path, ports: Mapping[str, str]) -> Iterator[FleetService]:
-    """A service with a robot at each of `ports`, by name, each connected; everything that it writes lies in `folder`."""
+def two_arms(folder: Path, seed: int) -> Iterator[FleetService]:
+    """A service with two connected mocks, `left` and `right`; everything that it writes lies in `folder`."""
+    ports = {name: f"mock://?pty=1&lock_step=1&seed={seed + n}" for n, name in enumerate(("left", "right"))}
     tables = "".join(f'[robots.{name}]\nport = "{port}"\n' for name, port in ports.items())
     (folder / "daq.toml").write_text(f"{tables}[server]\nconnect_at_start = false\n", "utf-8")
     with serving(folder, "serve", "--port", "0") as (process, url):
@@ -54,9 +55,3 @@ def fleet_service(folder: Path, ports: Mapping[str, str]) -> Iterator[FleetServi
             yield service
             for name in ports:
                 service.post(f"robots/{name}/disconnect")
-
-
-def two_arms(folder: Path, seed: int) -> AbstractContextManager[FleetService]:
-    """A service with two mocks, `left` and `right`."""
-    ports = {name: f"mock://?pty=1&lock_step=1&seed={seed + n}" for n, name in enumerate(("left", "right"))}
-    return fleet_service(folder, ports)

@@ -1,4 +1,4 @@
-"""Teaching in the service, without a robot: when a command was said, what is left of a lead, and no motion after a stop."""
+"""Teaching in the service, without a robot: when a command was said, what is left of a lead, no motion after a stop."""
 
 import threading
 from collections.abc import Iterator
