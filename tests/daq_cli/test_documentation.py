@@ -1,9 +1,10 @@
-"""docs/command-line.md shows every command there is, no other, with options that exist; and every exit code."""
+"""docs/command-line.md shows every command there is, no other; what docs/your-robot.md types can be typed."""
 
 import importlib
 import pkgutil
 import re
 import shlex
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,12 @@ import pytest
 import typer.main
 
 import daq
+from daq.config.settings import RobotSettings
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
+from daq.link.dialects import dialect_of
 from daq_cli.app.subcommands import subcommands
+from tests.daq_cli.invoke import CommandLine
 
 PAGE = Path(__file__).parents[2].joinpath("docs", "command-line.md").read_text("utf-8")
 SHOWN = [shlex.split(text) for text in re.findall(r"^- .*: `daq ([^`]+)`$", PAGE, re.MULTILINE)]
@@ -75,3 +79,40 @@ def test_every_exit_code_is_explained() -> None:
     explained = {int(code) for code in re.findall(r"^\| (\d+) \|", PAGE, re.MULTILINE)}
     used = exit_codes_of_errors() | {code for code in vars(exit_codes).values() if isinstance(code, int)}
     assert explained == used
+
+
+# ---- docs/your-robot.md: what it types can be typed, and its settings are settings
+
+
+ROOT = Path(__file__).parents[2]
+YOUR_ROBOT = (ROOT / "docs" / "your-robot.md").read_text("utf-8")
+LINES = re.findall(r"^\$ daq (.*)$", YOUR_ROBOT, re.MULTILINE)
+(SETTINGS,) = re.findall(r"```toml\n(\[robot\]\n.*?)```", YOUR_ROBOT, re.DOTALL)
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_what_the_page_types_can_be_typed(line: str) -> None:
+    words = shlex.split(line)
+    name = command_of(words)
+    if name != ("mock",):
+        with COMMANDS[name].make_context(" ".join(name), words[len(name) :], resilient_parsing=False) as context:
+            assert context.command is COMMANDS[name]
+
+
+def test_the_page_s_settings_name_a_machine_and_a_dialect_that_exist() -> None:
+    settings = RobotSettings.model_validate(tomllib.loads(SETTINGS.replace("$PWD", "/home"))["robot"])
+    assert (ROOT / settings.machine).is_file()
+    assert dialect_of(str(settings.port)).scale.joints == 2
+
+
+def test_the_check_of_the_page_s_settings_speaks_of_its_dialect_and_of_no_memory_map(
+    daq: CommandLine, tmp_path: Path
+) -> None:
+    settings = SETTINGS.replace("examples/", f"{ROOT}/examples/").replace("$PWD", str(tmp_path))
+    (tmp_path / "daq.toml").write_text(settings)
+    said = daq("--config", tmp_path / "daq.toml", "config", "check")
+    assert said.code == 0, said.err
+    assert "dialect:       dynamixel" in said.out
+    assert "memory map:" not in said.out
+    (tmp_path / "daq.toml").write_text(settings.replace("dynamixel", "nobodys"))
+    daq("--config", tmp_path / "daq.toml", "config", "check").complains(2, "dialect 'nobodys' is unknown")
