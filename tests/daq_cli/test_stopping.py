@@ -135,18 +135,12 @@ def test_an_experiment_that_still_runs_after_its_cancel_is_stopped(cancel: Calla
         assert stopped.wait(60)
 
 
-def test_a_key_cancels_a_waiting_experiment_and_stops_no_other() -> None:
-    robot: Any = Robot(state("cancelled"))
+@pytest.mark.parametrize("cancel", [state("cancelled"), raising(refused(404))], ids=["it waited", "it has ended"])
+def test_what_a_key_cancels_before_it_runs_or_after_it_has_run_stops_no_other(cancel: Callable[[], object]) -> None:
+    robot: Any = Robot(cancel)
     with patient_companion(robot) as keys:
         keys.press()
     assert (robot.stops, len(robot.patience)) == (0, 1)
-
-
-def test_an_experiment_that_has_ended_is_not_stopped() -> None:
-    robot: Any = Robot(raising(refused(404)))
-    with patient_companion(robot) as keys:
-        keys.press()
-    assert robot.stops == 0
 
 
 def test_the_third_key_leaves_and_the_stop_is_sent_all_the_same() -> None:

@@ -52,12 +52,16 @@ def wait_for(mock: MockProcess, name: str, value: object, periods: int = 0) -> N
 
 
 @STOPS
-def test_ctrl_c_ends_a_jog_with_the_exit_code_of_a_stop(
-    daq: CommandLine, mock: MockProcess, port: str, stop: Stop
+@pytest.mark.parametrize(
+    ("words", "shown", "keys"), [(["jog"], b"joint 1 ", RIGHT), (["program", "wait.json"], b"instruction 1 of 1", b"")]
+)
+def test_a_stop_ends_a_jog_and_a_program_with_its_exit_code(
+    daq: CommandLine, mock: MockProcess, port: str, stop: Stop, words: list[str], shown: bytes, keys: bytes
 ) -> None:
-    with at_a_terminal(["--port", port, "teach", "jog"]) as person:
-        person.until(b"joint 1 ")
-        person.type(RIGHT)
+    Path("wait.json").write_text(json.dumps({"name": "wait", "instructions": [{"kind": "wait", "duration": 3600}]}))
+    with at_a_terminal(["--port", port, "teach", *words]) as person:
+        person.until(shown)
+        person.type(keys)
         stop(person, daq)
         code = person.end()
     frozen = ask(mock, "state")["frozen"]
@@ -112,20 +116,6 @@ def test_a_lead_that_enter_ends_gives_the_gains_back(mock: MockProcess, port: st
         assert person.end() == 0, person.seen
     assert ask(mock, "state")["gains"] == before
     assert Path("path.json").is_file()
-
-
-@STOPS
-def test_ctrl_c_ends_a_program_with_the_exit_code_of_a_stop(
-    daq: CommandLine, mock: MockProcess, port: str, stop: Stop
-) -> None:
-    Path("wait.json").write_text(json.dumps({"name": "wait", "instructions": [{"kind": "wait", "duration": 3600}]}))
-    with at_a_terminal(["--port", port, "teach", "program", "wait.json"]) as person:
-        person.until(b"instruction 1 of 1")
-        stop(person, daq)
-        code = person.end()
-    daq("--port", port, "reset")
-    assert code == 6, person.seen
-    assert len(STOPPED.findall(person.seen)) == 1, person.seen
 
 
 @pytest.mark.parametrize("speed", ["90", "0", "-5"])

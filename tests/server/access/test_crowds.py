@@ -248,44 +248,29 @@ def test_a_question_waits_while_others_are_worked_out_and_no_longer_than_their_a
 
 
 @pytest.mark.parametrize(
-    "scope",
+    ("scope", "takes_a_turn"),
     [
-        {"method": "POST", "path": "/api/v1/robots/ma2000/stop"},
-        {"method": "PUT", "path": "/api/v1/robots/ma2000/control"},
-        {"path": f"{LIST}/a", "query": b"wait=30"},
-        {"path": "/api/v1/robots/ma2000/jobs/a", "query": b"x=y&w%61it=0.5"},
-        {"path": "/readyz"},  # anybody asks it, and it waits for the database
-        {"path": "/api/v1/robots/ma2000/gains"},
+        ({"method": "POST", "path": "/api/v1/robots/ma2000/stop"}, False),
+        ({"method": "PUT", "path": "/api/v1/robots/ma2000/control"}, False),
+        ({"path": f"{LIST}/a", "query": b"wait=30"}, False),
+        ({"path": "/api/v1/robots/ma2000/jobs/a", "query": b"x=y&w%61it=0.5"}, False),
+        ({"path": "/readyz"}, False),  # anybody asks it, and it waits for the database
+        ({"path": "/api/v1/robots/ma2000/gains"}, False),
+        ({"query": b"wait=30"}, True),  # these only look as if they waited
+        ({"query": b"x=wait=30"}, True),
+        ({"path": f"{LIST}/a", "query": b"wait=0"}, True),
+        ({"path": f"{LIST}/a", "query": b"x=wait=30"}, True),
+        ({"path": f"{LIST}/a", "query": b"wait=long"}, True),
+        ({"path": "/api/v1/robots/ma2000/traces/a", "query": b"wait=30"}, True),
     ],
 )
-def test_what_is_no_plain_question_waits_for_none(scope: dict[str, Any]) -> None:
+def test_what_is_no_plain_question_waits_for_none(scope: dict[str, Any], takes_a_turn: bool) -> None:
     async def ask() -> None:
         turns = Turns()
         for _ in range(AT_ONCE):
-            await _takes(turns)
+            assert (await _takes(turns, **scope if takes_a_turn else {})).done()
         for _ in range(2 * AT_ONCE):
-            assert (await _takes(turns, **scope)).done()
-
-    asyncio.run(ask())
-
-
-@pytest.mark.parametrize(
-    "scope",
-    [
-        {"query": b"wait=30"},
-        {"query": b"x=wait=30"},
-        {"path": f"{LIST}/a", "query": b"wait=0"},
-        {"path": f"{LIST}/a", "query": b"x=wait=30"},
-        {"path": f"{LIST}/a", "query": b"wait=long"},
-        {"path": "/api/v1/robots/ma2000/traces/a", "query": b"wait=30"},
-    ],
-)
-def test_what_only_looks_as_if_it_waits_takes_a_turn(scope: dict[str, Any]) -> None:
-    async def ask() -> None:
-        turns = Turns()
-        for _ in range(AT_ONCE):
-            assert (await _takes(turns, **scope)).done()
-        assert not (await _takes(turns, **scope)).done()
+            assert (await _takes(turns, **scope)).done() is not takes_a_turn
 
     asyncio.run(ask())
 

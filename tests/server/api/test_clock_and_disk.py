@@ -14,7 +14,6 @@ from typing import Any, NoReturn
 
 import httpx
 import pytest
-from sqlalchemy import event
 from sqlalchemy.exc import OperationalError
 
 from server.api import upload
@@ -22,7 +21,6 @@ from server.api.upload import Uploads
 from server.bounded.messages import Order
 from server.catalogue.catalogue import Catalogue
 from server.services import KEPT_FOR, Readiness
-from server.store.engine import Store
 from server.store.waiting_events import EventStore
 from tests.server.clocks import HandClock
 from tests.server.inside import WrongClock, service_inside
@@ -189,23 +187,7 @@ def test_a_look_into_the_folder_while_a_trace_is_uploaded_takes_nothing_away(
     assert api.get(f"traces/{answer.json()['id']}/data.mcap").status_code == 200
 
 
-def test_a_clock_that_leaps_ahead_makes_no_run_of_those_that_it_leaves_out(
-    api: httpx.Client, clock: WrongClock
-) -> None:
-    api.post("queue/pause")
-    schedule = api.post("schedules", json={"spec": SHORT, "every": 3600}).json()["id"]
-    until(api, f"experiments?schedule={schedule}", lambda listed: listed["items"])
-    before = datetime.fromisoformat(api.get(f"schedules/{schedule}").json()["next"])
-    clock.ahead = timedelta(days=3650)
-    api.post("queue/pause")  # which wakes the queue
-    later = until(api, f"schedules/{schedule}", lambda one: datetime.fromisoformat(one["next"]) != before)
-    now = datetime.fromisoformat(later["next"])
-    assert timedelta(0) < now - clock.utc() <= timedelta(hours=1)
-    assert (now - before) % timedelta(hours=1) == timedelta(0)
-    assert len(_listed(api, f"experiments?schedule={schedule}")) == 1
-    assert api.post("control", json={}).json()["remaining"] > 0
-
-
+# ---- what the service says about itself then, and to whom
 # ---- what the service says about itself then, and to whom
 
 
@@ -253,20 +235,6 @@ def test_readiness_is_looked_at_once_for_all_who_ask_and_again_after_a_second() 
         assert (await readiness.check(look))["looks"] == "2"
 
     asyncio.run(ask())
-
-
-def test_a_database_that_can_be_read_and_not_written_is_noticed(tmp_path: Path) -> None:
-    path = tmp_path / "service.sqlite"
-    store = Store(f"sqlite:///{path}")
-    event.listen(store.engine, "connect", lambda connection, _: connection.execute("PRAGMA busy_timeout=1"))
-    store.migrate()
-    store.require_writable()
-    other = sqlite3.connect(path, isolation_level=None)
-    other.execute("BEGIN IMMEDIATE")
-    with pytest.raises(OperationalError, match="locked"):
-        store.require_writable()
-    other.close()
-    store.close()
 
 
 def test_a_folder_of_traces_that_is_away_is_told_and_takes_no_experiment(api: httpx.Client, tmp_path: Path) -> None:

@@ -97,15 +97,7 @@ def test_a_motion_beyond_the_limits_is_refused_before_it_is_queued(service: Serv
     assert service.robot.get("/queue").json()["queued"] == 0
 
 
-def test_a_stop_while_nothing_waits_pauses_the_queue_until_it_is_resumed(service: Service) -> None:
-    assert service.robot.post("/stop").json()["confirmed"]
-    service.until_paused()
-    assert reset(service.robot).status_code == 200
-    service.until_arm("idle")
-    queue = service.robot.get("/queue").json()
-    assert (queue["paused"], queue["reason"][:22]) == (True, "local requested a stop")
-
-
+# ---- presets that run as they are, and the rules of a specification
 # ---- presets that run as they are, and the rules of a specification
 
 

@@ -171,14 +171,11 @@ def test_a_disk_is_told_from_the_share_that_the_configuration_states(tmp_path: P
     assert disk_warnings(tmp_path, (1 + used) / 2) == []
 
 
-def test_a_disk_that_is_not_mounted_is_told_by_others(tmp_path: Path) -> None:
-    assert disk_warnings(tmp_path / "not there", 0.5) == []
-    with pytest.raises(ProblemError, match="the folder of traces"):
-        free_room(tmp_path / "not there")
-
-
-def test_a_folder_that_is_not_there_is_told_and_hides_no_other(tmp_path: Path) -> None:
+def test_a_disk_or_a_folder_that_is_not_there_is_told_and_hides_no_other(tmp_path: Path) -> None:
     away = tmp_path / "not there"
+    assert disk_warnings(away, 0.5) == []
+    with pytest.raises(ProblemError, match="the folder of traces"):
+        free_room(away)
     assert room_of([tmp_path, away]).size == room_of([tmp_path]).size > 0
     assert room_of([tmp_path, away]).free > 0
     assert room_of([away]) == (0, 0)

@@ -36,28 +36,19 @@ def two_robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Serv
     made.close()
 
 
-@pytest.fixture
-def services(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Services]:
-    """Two robots, not connected."""
-    with two_robots(tmp_path, monkeypatch) as made:
-        yield made
-
-
-def test_a_folder_that_is_away_hides_neither_the_port_of_the_stop_nor_the_other_disk(
-    services: Services, tmp_path: Path
+def test_a_disk_is_told_once_and_one_that_is_away_hides_neither_the_port_of_the_stop_nor_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    both = get_system(services, LOCAL)
-    (tmp_path / "right").rmdir()
-    found = get_system(services, LOCAL)
+    with two_robots(tmp_path, monkeypatch) as services:
+        (line,) = services.warnings()
+        assert line.startswith("left, right: the disk of the traces is ")
+        both = get_system(services, LOCAL)
+        (tmp_path / "right").rmdir()
+        found = get_system(services, LOCAL)
     assert found.stop_port == 8301
     assert found.storage.traces_free > 0
     assert found.storage.traces_size == both.storage.traces_size  # one disk, which counts once
     assert any(line.startswith(f"right: the folder of traces, {tmp_path / 'right'}: ") for line in found.warnings)
-
-
-def test_the_disk_of_a_robots_own_folder_is_told_once_with_the_robots_names(services: Services) -> None:
-    (line,) = services.warnings()
-    assert line.startswith("left, right: the disk of the traces is ")
 
 
 class Broken(Part):

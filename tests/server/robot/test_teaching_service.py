@@ -22,6 +22,7 @@ from tests.server.clocks import HandClock
 
 JOG = {2: 0.1}
 PATH = {"joints": [1], "times": [0.0, 0.02], "positions": [[0.0], [0.1]]}
+STEP = Program(name="step", machine="ma2000", instructions=(Relative(angles={1: 0.1}),))
 
 
 class Asked(Robot):
@@ -70,12 +71,13 @@ def test_a_command_that_was_held_up_begins_nothing(robot: Asked, teaching: Teach
     assert (robot.orders, teaching.status().activity) == ([], "none")
 
 
-def test_a_step_is_asked_for_as_one(robot: Asked, teaching: TeachingService) -> None:
-    program = Program(name="step", machine="ma2000", instructions=(Relative(angles={1: 0.1}),))
-    teaching.perform(Word(robot.clock.monotonic()), program, "step")
-    assert robot.orders == [
-        RunProgram(number=0, asked=robot.clock.monotonic(), program=program.model_dump(mode="json"), activity="step")
-    ]
+def test_a_step_is_asked_for_as_one_with_the_moment_at_which_it_was_said(
+    robot: Asked, teaching: TeachingService
+) -> None:
+    said = robot.clock.monotonic()
+    robot.clock.turn(4.0)  # type: ignore[attr-defined]
+    teaching.perform(Word(said), STEP, "step")
+    assert robot.orders == [RunProgram(number=0, asked=said, program=STEP.model_dump(mode="json"), activity="step")]
 
 
 def test_nothing_begins_once_the_control_has_lapsed_while_a_jog_came_to_its_end(
@@ -88,12 +90,11 @@ def test_nothing_begins_once_the_control_has_lapsed_while_a_jog_came_to_its_end(
         if lapsed:
             raise conflict("control-lost", "you lost control of the robot", "take control again")
 
-    program = Program(name="step", machine="ma2000", instructions=(Relative(angles={1: 0.1}),))
     refused: list[ProblemError] = []
 
     def perform() -> None:
         try:
-            teaching.perform(Word(robot.clock.monotonic(), require), program)
+            teaching.perform(Word(robot.clock.monotonic(), require), STEP)
         except ProblemError as problem:
             refused.append(problem)
 
@@ -106,13 +107,6 @@ def test_nothing_begins_once_the_control_has_lapsed_while_a_jog_came_to_its_end(
     waiting.join()
     assert [problem.kind for problem in refused] == ["control-lost"]
     assert not any(isinstance(order, RunProgram) for order in robot.orders)
-
-
-def test_a_program_goes_on_with_the_moment_at_which_it_was_asked_for(robot: Asked, teaching: TeachingService) -> None:
-    said = robot.clock.monotonic()
-    robot.clock.turn(4.0)  # type: ignore[attr-defined]
-    teaching.perform(Word(said), Program(name="p", machine="ma2000", instructions=(Relative(angles={1: 0.1}),)))
-    assert robot.orders[0].asked == said
 
 
 def test_a_lead_without_a_path_does_not_have_that_of_the_one_before(robot: Asked, teaching: TeachingService) -> None:
