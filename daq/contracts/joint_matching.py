@@ -41,7 +41,7 @@ def _with_joints(trace: Trace, columns: list[int], numbers: tuple[int, ...]) -> 
 def other_joints(
     called: str, numbers: Sequence[int], names: Sequence[str], machine: str, machine_joints: Sequence[str]
 ) -> TraceError:
-    """Returns the error for joints that are not the machine's, with advice. `machine_joints`: the machine's joint names."""
+    """Returns the error for joints that are not the machine's, with advice."""
     own = ", ".join(f"{number} {name}" for number, name in zip(numbers, names, strict=True))
     advice = f"with --joints and its own names for {', '.join(machine_joints)}, in this order"
     line = f"its joints are {own}, those of {machine} {', '.join(machine_joints)}"

@@ -14,18 +14,18 @@ if TYPE_CHECKING:
 DOCS = Path(__file__).parents[1]
 BLOCK = re.compile(r"^[ ]*```(python|console)\n(.*?)^[ ]*```$", re.DOTALL | re.MULTILINE)
 RUN: Mapping[tuple[str, str], str] = {
-    ("any-arm.md", "python"): "tests/extras/formats/command_line/test_any_arm_page.py",
-    ("audit.md", "console"): "tests/extras/lab/audit/test_page.py",
-    ("batches.md", "console"): "tests/extras/lab/batches/test_batches_page.py",
-    ("batches.md", "python"): "tests/extras/lab/batches/test_batches_page.py",
+    ("any-arm.md", "python"): "tests/extras/formats/command_line/test_pages.py",
+    ("audit.md", "console"): "tests/extras/lab/audit/test_requests.py",
+    ("batches.md", "console"): "tests/extras/lab/batches/test_cluster.py",
+    ("batches.md", "python"): "tests/extras/lab/batches/test_cluster.py",
     ("feedforward.md", "python"): "tests/extras/motion/test_command.py",
-    ("fleet.md", "console"): "tests/extras/lab/fleet/test_page.py",
-    ("fleet.md", "python"): "tests/extras/lab/fleet/test_page.py",
+    ("fleet.md", "console"): "tests/extras/lab/fleet/test_several_arms.py",
+    ("fleet.md", "python"): "tests/extras/lab/fleet/test_several_arms.py",
     ("index.md", "python"): "tests/repository/test_snippets.py",
     ("notifications.md", "console"): "tests/extras/lab/notifications/test_service.py",
     ("own-effect.md", "python"): "tests/model/effects/test_own_effect.py",
     ("python.md", "python"): "tests/ma2000/test_public_interface.py",
-    ("robots-from-urdf.md", "python"): "tests/extras/formats/command_line/test_robot_page.py",
+    ("robots-from-urdf.md", "python"): "tests/extras/formats/command_line/test_pages.py",
     ("service.md", "console"): "tests/server/api/test_guide.py",
     ("service.md", "python"): "tests/server/api/test_guide.py",
     ("traces.md", "python"): "tests/repository/test_snippets.py",
@@ -33,7 +33,7 @@ RUN: Mapping[tuple[str, str], str] = {
 """The test that runs a page's blocks of a language."""
 NOT_RUN: Mapping[tuple[str, str], str] = {
     ("archive.md", "console"): "needs a store; tests/extras/lab/archive/test_service.py gives the same commands",
-    ("thesis.md", "python"): "takes minutes; tests/extras/thesis/test_page.py makes the same calls",
+    ("thesis.md", "python"): "takes minutes; tests/extras/thesis/test_reproduction.py makes the same calls",
 }
 """Why a page's blocks of a language are not run. That what they import exists is checked all the same."""
 

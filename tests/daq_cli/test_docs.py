@@ -18,15 +18,13 @@ def index(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return site / "index.html"
 
 
-def test_it_opens_the_first_page(daq: CommandLine, index: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_opens_the_first_page_or_prints_where_it_is(
+    daq: CommandLine, index: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     index.write_text("<!doctype html>")
     opened: list[str] = []
     monkeypatch.setattr(webbrowser, "open", lambda url: not opened.append(url))
     assert (daq("docs").code, opened) == (0, [f"file://{str(index).replace(' ', '%20')}"])
-
-
-def test_it_prints_where_it_is(daq: CommandLine, index: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    index.write_text("<!doctype html>")
     said = daq("docs", "--path")
     assert (said.code, said.out, said.err) == (0, f"{index}\n", "")
     monkeypatch.setattr(webbrowser, "open", lambda _url: False)

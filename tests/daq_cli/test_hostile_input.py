@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -179,25 +178,25 @@ def test_a_database_that_cannot_be_used_is_refused(daq: CommandLine, database: s
     assert "secret" not in said.err
 
 
-def test_the_configuration_shown_is_a_configuration(daq: CommandLine) -> None:
-    Path("daq.toml").write_text(
-        'operator = "A \\"B\\" \\u007f é\\\\"\n[robot]\nname = "arm-2"\n[robot.limits]\nreach = 1e16\n'
-        "joints = [{ low = -1.0, high = 1 }, {}, {}, {}, {}, { speed = 0.5 }]\n"
-        '[traces]\nfolder = "a b/c"\n[server]\nport = 0\nunattended = true\nnames = ["a.lab", "b.lab"]\n'
-    )
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        (
+            'operator = "A \\"B\\" \\u007f é\\\\"\n[robot]\nname = "arm-2"\n[robot.limits]\nreach = 1e16\n'
+            "joints = [{ low = -1.0, high = 1 }, {}, {}, {}, {}, { speed = 0.5 }]\n"
+            '[traces]\nfolder = "a b/c"\n[server]\nport = 0\nunattended = true\nnames = ["a.lab", "b.lab"]\n'
+        ),
+    ],
+    ids=["the defaults", "what is said"],
+)
+def test_the_configuration_shown_is_a_configuration(daq: CommandLine, text: str) -> None:
+    Path("daq.toml").write_text(text)
     said = daq("config", "show")
     assert said.code == 0
     Path("again.toml").write_text(said.out)
     assert load_settings(Path("again.toml"))[0] == load_settings()[0]
     assert "# port is not set" in said.out.split("[robot]")[1].split("[")[0]
-
-
-def test_the_defaults_shown_are_a_configuration(daq: CommandLine) -> None:
-    said = daq("config", "show")
-    tomllib.loads(said.out)
-    defaults = load_settings()[0]
-    Path("again.toml").write_text(said.out)
-    assert load_settings(Path("again.toml"))[0] == defaults
 
 
 def test_a_service_at_an_invalid_port_does_not_start() -> None:

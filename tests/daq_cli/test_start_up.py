@@ -1,14 +1,20 @@
 """`daq --help` starts fast because it loads little; which modules it loads is tested, not how long that takes."""
 
 import json
+import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
 
 import pytest
 
+from daq.contracts.effects import effect_names
+from daq.contracts.experiment import parse_joints
 from daq.plugins import Group
+from daq.trajectories.presets import PRESETS
+from daq_cli.app import completion
 from daq_cli.app.subcommands import subcommands
 from tests.daq_cli.invoke import CommandLine
 
@@ -27,21 +33,29 @@ print(json.dumps(sorted({{name.partition(".")[0] for name in sys.modules}})), fi
 """
 
 
-def loaded(*words: str) -> set[str]:
-    run = subprocess.run(
-        [sys.executable, "-c", PROGRAM.format(words=list(words))], check=True, capture_output=True, timeout=60
-    )
+def begun(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """The command, ended; the last line of its errors names the packages that it has loaded."""
+    command = [sys.executable, "-c", PROGRAM.format(words=list(words))]
+    return subprocess.run(command, env=os.environ | environment, check=True, capture_output=True, text=True, timeout=60)
+
+
+def loaded(run: subprocess.CompletedProcess[str]) -> set[str]:
     return set(json.loads(run.stderr.splitlines()[-1]))
 
 
-@pytest.mark.parametrize("words", [["--help"], []], ids=["help", "nothing"])
-def test_help_loads_no_library_that_only_commands_need(words: list[str]) -> None:
-    assert loaded(*words) & NOT_FOR_HELP == set()
-
-
-def test_a_stop_loads_no_more_than_it_needs() -> None:
-    """It must be quick: no numbers, no traces, no colours."""
-    assert loaded("stop") & {"numpy", "mcap", "rich", "serial", "scipy", "matplotlib"} == set()
+@pytest.mark.parametrize(
+    ("words", "not_needed"),
+    [
+        (("--help",), NOT_FOR_HELP),
+        ((), NOT_FOR_HELP),
+        (("--version",), {"typer", "click", "pydantic", "numpy"}),
+        (("stop",), {"numpy", "mcap", "rich", "serial", "scipy", "matplotlib"}),
+    ],
+    ids=["help", "nothing", "version", "stop"],
+)
+def test_no_library_is_loaded_that_only_other_commands_need(words: tuple[str, ...], not_needed: set[str]) -> None:
+    """A stop must be quick: no numbers, no traces, no colours."""
+    assert loaded(begun(*words)) & not_needed == set()
 
 
 def test_a_stop_is_asked_for_before_the_command_line_is_loaded() -> None:
@@ -81,10 +95,6 @@ def test_a_stop_is_sent_or_said_not_to_be_whatever_hides_a_package(tmp_path: Pat
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_the_version_is_told_without_the_packages_of_the_command_line() -> None:
-    assert loaded("--version") & {"typer", "click", "pydantic", "numpy"} == set()
-
-
 def test_the_help_lists_every_command_once_below_a_heading_with_its_whole_line(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -95,3 +105,43 @@ def test_the_help_lists_every_command_once_below_a_heading_with_its_whole_line(
     assert places == sorted(places)
     for command in every:
         assert said.count(f"{command.name} {command.line}") == 1, command.name
+
+
+# ---- what the tab key offers, without loading what computes
+
+
+HEAVY = {"numpy", "scipy", "numba", "matplotlib", "mcap", "sqlalchemy", "fastapi", "mujoco", "pydantic_settings"}
+
+
+def test_every_preset_joint_and_effect_is_offered() -> None:
+    assert tuple(PRESETS) == completion.PRESETS
+    assert completion.presets("diagnostic-") == [f"diagnostic-{letter}" for letter in "abcde"]
+    assert completion.effects("") == list(effect_names())
+    assert completion.effects("backlash,coulomb") == ["backlash,coulomb_friction"]
+    assert all(parse_joints(text) for text in completion.JOINTS)
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("daq run preset held", ["held-out"]),
+        ("daq run ramp --joints 2", ["2", "2-3"]),
+        ("daq fit --effects backlash,visc", ["backlash,viscous_friction"]),
+        ("daq traces show kept/", ["kept/1_ramp.mcap", "kept/2_ramp.mcap"]),
+        ("daq traces show l", ["last"]),
+    ],
+)
+def test_completion_loads_no_heavy_library(words: str, offered: list[str]) -> None:
+    Path("kept").mkdir()
+    for number in (1, 2):
+        Path(f"kept/{number}_ramp.mcap").touch()
+    Path("daq.toml").write_text('[traces]\nfolder = "kept"\n')
+    asked = {"_DAQ_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
+    run = begun(**asked)
+    assert sorted(run.stdout.split()) == offered
+    assert loaded(run) & HEAVY == set()
+
+
+def test_the_version_is_that_of_the_package(daq: CommandLine) -> None:
+    said = daq("--version")
+    assert (said.code, said.out) == (0, f"daq {version('ma2000-daq')}\n")

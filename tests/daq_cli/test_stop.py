@@ -1,12 +1,10 @@
 """`daq stop`, whatever it finds: it says what became of it, and never says more than it knows."""
 
 import json
-import os
-import pty
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import pytest
@@ -15,7 +13,7 @@ import serial
 from daq.owner import client
 from daq.owner.stop_socket import StopAnswer, StopSocket, stop_listener
 from daq.transport.mock_process import MockProcess
-from tests.daq_cli.board import ask
+from tests.daq_cli.board import ask, silent_port
 from tests.daq_cli.invoke import CommandLine
 
 OVERTAKEN = """
@@ -75,30 +73,19 @@ def test_the_configured_robot_is_stopped_beside_those_that_run(daq: CommandLine,
     daq("reset")
 
 
-def test_a_stop_at_a_port_in_use_is_reported_as_not_delivered(daq: CommandLine) -> None:
-    master, slave = pty.openpty()
-    try:
-        with serial.Serial(os.ttyname(slave), exclusive=True):
-            said = daq("--port", f"serial://{os.ttyname(slave)}", "stop")
-    finally:
-        os.close(master)
-        os.close(slave)
+@pytest.mark.parametrize(
+    ("in_use", "told"),
+    [(True, ("NOT DELIVERED", "in use by another program")), (False, ("stop sent, NOT CONFIRMED",))],
+    ids=["in use", "a silent board"],
+)
+def test_a_stop_at_a_port_that_answers_nothing_is_not_said_to_be_confirmed(
+    daq: CommandLine, in_use: bool, told: tuple[str, ...]
+) -> None:
+    with silent_port() as name, serial.Serial(name, exclusive=True) if in_use else nullcontext():
+        said = daq("--port", f"serial://{name}", "stop")
     assert said.code == 3
-    assert "NOT DELIVERED" in said.out
-    assert "in use by another program" in said.out
-    assert "emergency stop" in said.out
-
-
-def test_a_stop_at_a_silent_board_is_reported_as_not_confirmed(daq: CommandLine) -> None:
-    master, slave = pty.openpty()
-    try:
-        said = daq("--port", f"serial://{os.ttyname(slave)}", "stop")
-    finally:
-        os.close(master)
-        os.close(slave)
-    assert said.code == 3
-    assert "stop sent, NOT CONFIRMED" in said.out
-    assert "emergency stop" in said.out
+    for words in (*told, "emergency stop"):
+        assert words in said.out
 
 
 def test_a_broken_configuration_is_reported_and_prevents_no_stop(daq: CommandLine) -> None:

@@ -1,12 +1,15 @@
 """What cannot be is refused in one line that says what, where and what is allowed; nothing moves, nothing is lost."""
 
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+import serial
 
 from daq.transport.mock_process import MockProcess
-from tests.daq_cli.board import held
+from tests.daq_cli.board import held, silent_port
 from tests.daq_cli.invoke import CommandLine
 
 
@@ -81,31 +84,20 @@ def test_a_folder_that_cannot_be_written_to_moves_nothing(daq: CommandLine, mock
     assert held(mock) == before
 
 
-def test_a_port_that_does_not_exist_is_reported(daq: CommandLine) -> None:
-    daq("--port", "serial:///dev/nowhere", "run", "ramp").complains(3, "/dev/nowhere does not exist", "daq ports")
-
-
-def test_a_tcp_port_without_a_listener_is_reported(daq: CommandLine) -> None:
+@contextmanager
+def refused_connection() -> Iterator[str]:
+    """The address of a port at which nothing listens."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
-        number = free.getsockname()[1]
-        daq("--port", f"tcp://127.0.0.1:{number}", "run", "ramp").complains(3, f"nothing listens at 127.0.0.1:{number}")
+        yield f"127.0.0.1:{free.getsockname()[1]}"
 
 
-def test_a_port_in_use_is_reported(daq: CommandLine) -> None:
-    import os
-    import pty
-
-    import serial
-
-    master, slave = pty.openpty()
-    name = os.ttyname(slave)
-    try:
-        with serial.Serial(name, exclusive=True):
-            daq("--port", f"serial://{name}", "run", "ramp").complains(3, name, "in use by another program")
-    finally:
-        os.close(master)
-        os.close(slave)
+def test_a_port_that_cannot_be_opened_is_reported(daq: CommandLine) -> None:
+    daq("--port", "serial:///dev/nowhere", "run", "ramp").complains(3, "/dev/nowhere does not exist", "daq ports")
+    with refused_connection() as address:
+        daq("--port", f"tcp://{address}", "run", "ramp").complains(3, f"nothing listens at {address}")
+    with silent_port() as name, serial.Serial(name, exclusive=True):
+        daq("--port", f"serial://{name}", "run", "ramp").complains(3, name, "in use by another program")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""An arm at a port: state, runs, stop."""
+"""An arm at a port: state, runs, stop; a service of a program's own, on a mock alone, which ends with its block."""
 
 import math
 from pathlib import Path
@@ -65,3 +65,22 @@ def test_an_interrupt_stops_the_arm_and_names_the_trace(tmp_path: Path) -> None:
     (file,) = tmp_path.glob("*.mcap")
     assert stopped.value.__notes__ == [f"the arm was stopped; recorded until then: {file}"]
     assert ma2000.read_trace(file).record.outcome in ("stopped", "interrupted", "complete")
+
+
+# ---- a service of a program's own
+
+
+def test_a_port_that_is_no_mock_is_refused_before_anything_starts(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="runs on mock:// alone; for an arm, use `daq serve`"):
+        ma2000.LocalService(tmp_path / "lab", "serial:///dev/ttyUSB0")
+    assert not (tmp_path / "lab").exists()
+
+
+@pytest.mark.slow
+def test_a_local_service_answers_within_its_block_and_is_gone_after_it(tmp_path: Path) -> None:
+    with ma2000.LocalService(tmp_path / "lab") as service, ma2000.Client(service.url) as client:
+        assert [one.robot for one in client.robots()] == ["ma2000"]
+        assert service.url in repr(service)
+    assert "ended" in repr(service)
+    with ma2000.Client(service.url) as client, pytest.raises(ma2000.DaqError):
+        client.robots(within=1.0)

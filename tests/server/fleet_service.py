@@ -1,8 +1,7 @@
 """A real service with several mocks, for tests."""
 
-import os
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import httpx
 
 from daq.contracts.service.experiments import ENDS
-from tests.server.service import DAQ, END_WITHIN, START_WITHIN
+from tests.server.service import START_WITHIN, serving
 
 
 class FleetService:
@@ -43,28 +42,16 @@ class FleetService:
 
 
 @contextmanager
-def fleet_service(folder: Path, ports: Mapping[str, str]) -> Iterator[FleetService]:
-    """A service with a robot at each of `ports`, by name; everything that it writes lies in `folder`."""
+def two_arms(folder: Path, seed: int) -> Iterator[FleetService]:
+    """A service with two connected mocks, `left` and `right`; everything that it writes lies in `folder`."""
+    ports = {name: f"mock://?pty=1&lock_step=1&seed={seed + n}" for n, name in enumerate(("left", "right"))}
     tables = "".join(f'[robots.{name}]\nport = "{port}"\n' for name, port in ports.items())
     (folder / "daq.toml").write_text(f"{tables}[server]\nconnect_at_start = false\n", "utf-8")
-    environment = {key: value for key, value in os.environ.items() if not key.startswith("DAQ_")}
-    environment |= {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}
-    process = subprocess.Popen(
-        [*DAQ, "serve", "--port", "0"], cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=None
-    )
-    try:
-        assert process.stdout is not None
-        url = process.stdout.readline().decode().strip()
-        assert url, f"the service did not start: exit code {process.wait()}"
+    with serving(folder, "serve", "--port", "0") as (process, url):
         service = FleetService(process, url, folder)
         with service.client:
+            for name in ports:  # here, so that no mock is left running by a test
+                service.post(f"robots/{name}/connect")
             yield service
-    finally:
-        process.terminate()
-        try:
-            process.wait(END_WITHIN)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        if process.stdout is not None:
-            process.stdout.close()
+            for name in ports:
+                service.post(f"robots/{name}/disconnect")

@@ -89,36 +89,19 @@ class Service:
 
 
 @contextmanager
-def running_service(
-    folder: Path,
-    port: str = MOCK,
-    *options: str,
-    headers: dict[str, str] | None = None,
-    program: Sequence[str] = DAQ,
-    log: BinaryIO | None = None,
-) -> Iterator[Service]:
-    """A service whose database, traces and stop sockets lie in `folder`; `program` stands for `daq`, `log` is where its
-    log goes."""
+def serving(
+    folder: Path, *words: str, program: Sequence[str] = DAQ, log: BinaryIO | None = None
+) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+    """`daq … serve` in a process of its own, and its address. All that it writes lies in `folder`; `program` stands for
+    `daq`, `log` is where its log goes."""
     environment = {key: value for key, value in os.environ.items() if not key.startswith("DAQ_")}
     environment |= {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}
-    process = subprocess.Popen(
-        [*program, "--port", port, "serve", "--port", "0", *options],
-        cwd=folder,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=log,
-    )
+    process = subprocess.Popen([*program, *words], cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=log)
     try:
         assert process.stdout is not None
         url = process.stdout.readline().decode().strip()
         assert url, f"the service did not start: exit code {process.wait()}"
-        with (
-            httpx.Client(base_url=f"{url}/api/v1", timeout=START_WITHIN, headers=headers) as client,
-            httpx.Client(base_url=f"{url}/api/v1/robots/ma2000", timeout=START_WITHIN, headers=headers) as robot,
-        ):
-            yield Service(process, url, folder, client, robot)
-            if process.poll() is None:
-                robot.post("/disconnect")  # waits longer for the owner of the port than the end of the service does
+        yield process, url
     finally:
         process.terminate()
         try:
@@ -128,3 +111,24 @@ def running_service(
             process.wait()
         if process.stdout is not None:
             process.stdout.close()
+
+
+@contextmanager
+def running_service(
+    folder: Path,
+    port: str = MOCK,
+    *options: str,
+    headers: dict[str, str] | None = None,
+    program: Sequence[str] = DAQ,
+    log: BinaryIO | None = None,
+) -> Iterator[Service]:
+    """A service of one robot; the rest as `serving` has it."""
+    words = ("--port", port, "serve", "--port", "0", *options)
+    with (
+        serving(folder, *words, program=program, log=log) as (process, url),
+        httpx.Client(base_url=f"{url}/api/v1", timeout=START_WITHIN, headers=headers) as client,
+        httpx.Client(base_url=f"{url}/api/v1/robots/ma2000", timeout=START_WITHIN, headers=headers) as robot,
+    ):
+        yield Service(process, url, folder, client, robot)
+        if process.poll() is None:
+            robot.post("/disconnect")  # waits longer for the owner of the port than the end of the service does

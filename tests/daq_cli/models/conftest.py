@@ -1,10 +1,12 @@
 """The command line of models: the same empty folder as for every other command, and traces of pretended rigs."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from model.arrays import Floats
 from tests.daq_cli.conftest import daq, empty_folder
 
 __all__ = ["daq", "empty_folder"]
@@ -28,4 +30,27 @@ def write_csv(path: Path, count: int = 200, joints: int = 1, scale: float = 1.0,
     for t, value in zip(time, wanted, strict=True):
         lines.append(",".join([f"{t:.6f}", *([f"{value:.9f}", f"{value:.9f}", "0.5"] * joints)]))
     path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def swing_csv(
+    path: Path,
+    torque: Callable[[Floats, Floats, Floats], Floats],
+    seed: int = 0,
+    count: int = 1200,
+    limit: float | None = None,
+) -> Path:
+    """A record of an axis whose angle is a sum of sines, with the drive (V, each 0.5 N·m) that it needs.
+
+    torque: of angle, speed and acceleration; limit: where the drive (V) is cut off, the motion is not.
+    """
+    time = 0.005 * np.arange(count)
+    angle = 0.4 * np.sin(np.array([[2.1], [3.7], [6.0]]) * time + seed + np.arange(3)[:, None]).sum(axis=0)
+    speed = np.gradient(angle, 0.005)
+    needed = torque(angle, speed, np.gradient(speed, 0.005))
+    drive = np.interp(time + 0.0035, time, needed) / 0.5  # it acts after 1 ms and is held for 5 ms
+    if limit is not None:
+        drive = np.clip(drive, -limit, limit)
+    rows = np.column_stack([time, angle, angle, drive])
+    np.savetxt(path, rows, delimiter=",", header="time,set_point_1,position_1,drive_1", comments="", fmt="%.9g")
     return path

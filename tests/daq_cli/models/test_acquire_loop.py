@@ -45,22 +45,8 @@ def ramp(made: dict[str, Path], daq: CommandLine, tmp_path_factory: pytest.TempP
 def test_an_experiment_that_is_asked_for_is_run_within_the_budget_and_used(
     daq: CommandLine, ramp: Path, tmp_path: Path
 ) -> None:
-    said = daq(
-        "--port",
-        PORT,
-        "diagnose",
-        ramp,
-        "--acquire",
-        "--budget",
-        "12",
-        "--effects",
-        "coulomb",
-        "--joints",
-        "2",
-        "--folder",
-        tmp_path,
-        "--json",
-    )
+    asked = ("--acquire", "--budget", 12, "--effects", "coulomb", "--joints", 2, "--folder", tmp_path, "--json")
+    said = daq("--port", PORT, "diagnose", ramp, *asked)
     assert said.code == 0, said.err
     found = Diagnosis.model_validate(json.loads(said.out))
     assert len(found.acquired) == 1
@@ -149,12 +135,6 @@ def test_a_stopped_run_ends_the_loop_and_is_not_used(ramp: Path) -> None:
     assert len(ended.traces) == len(answers.given) == 1
 
 
-def test_another_machine_than_the_configured_one_is_refused(ramp: Path) -> None:
-    machine = load_machine("ma2000").model_copy(update={"name": "bench"})
-    with pytest.raises(SpecError, match="bench, the configured robot is ma2000"):
-        diagnose_and_acquire(Arm(ramp), machine, [read_trace(ramp)], None, 60.0, ConsentPrompt(False), Answers(3.0))
-
-
 def test_experiments_stay_within_the_limits_of_the_configured_machine(ramp: Path) -> None:
     """The limits were tightened after the trace was recorded: its own no longer hold."""
     Path("daq.toml").write_text("[robot.limits]\nreach = 0.01\n")
@@ -166,15 +146,19 @@ def test_experiments_stay_within_the_limits_of_the_configured_machine(ramp: Path
             plan(ExperimentSpec())
 
 
-def test_another_sensor_than_the_traces_is_refused(ramp: Path) -> None:
+def test_another_machine_or_sensor_than_that_of_the_traces_is_refused(ramp: Path) -> None:
     shipped = load_machine("ma2000")
     sensor = shipped.joint(2).sensor
     assert sensor is not None
     zero = sensor.at_zero.model_copy(update={"value": sensor.at_zero.value + 0.01})
     joint = shipped.joint(2).model_copy(update={"sensor": sensor.model_copy(update={"at_zero": zero})})
-    machine = shipped.model_copy(update={"joints": (shipped.joint(1), joint, *shipped.joints[2:])})
-    with pytest.raises(SpecError, match="another sensor than in the traces on joint 2;"):
-        diagnose_and_acquire(Arm(ramp), machine, [read_trace(ramp)], None, 60.0, ConsentPrompt(False), Answers(3.0))
+    for changes, said in (
+        ({"name": "bench"}, "bench, the configured robot is ma2000"),
+        ({"joints": (shipped.joint(1), joint, *shipped.joints[2:])}, "another sensor than in the traces on joint 2;"),
+    ):
+        machine, consent = shipped.model_copy(update=changes), ConsentPrompt(False)
+        with pytest.raises(SpecError, match=said):
+            diagnose_and_acquire(Arm(ramp), machine, [read_trace(ramp)], None, 60.0, consent, Answers(3.0))
 
 
 @pytest.mark.parametrize(("outcome", "code"), [("complete", 0), ("stopped", 6), ("fault", 5), ("interrupted", 5)])

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from daq_cli.models.diagnosis_text import WIDTH, answer_text
+from daq_cli.models.diagnosis_text import WIDTH, answer_text, candidates_lines
 from daq_cli.robot.experiment import read_spec
-from model.discrepancy.diagnosis import Diagnosis, DifferencePlace, Suspicion
+from model.discrepancy.diagnosis import Candidate, Diagnosis, DifferencePlace, Step, Suspicion
 from model.discrepancy.explanation.answer_words import with_sentences
 from model.discrepancy.explanation.notes import on_stated_numbers
 from model.discrepancy.grounds import Note
@@ -16,6 +16,7 @@ from model.fitting.unknowns import Unknown
 from model.machine_model.parameter import Kind, Parameter
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import write_csv
+from tests.model.discrepancy import steps
 from tests.model.discrepancy.answers import an_answer
 
 
@@ -109,11 +110,14 @@ def test_an_unknown_effect_is_told_by_its_summary_once(answer: Diagnosis) -> Non
     assert f"left {found.summary}" in " ".join(after_steps.split())
 
 
-def test_what_is_left_beside_a_named_effect_is_said(answer: Diagnosis) -> None:
-    shape = answer.remaining[0]
+def test_what_is_left_beside_a_named_effect_and_a_step_not_taken_are_said(answer: Diagnosis) -> None:
+    shape, step = answer.remaining[0], answer.steps[0]
     assert "left     A torque at joint" in answer_text(answer)
     unclear = answer.model_copy(update={"remaining": (shape.model_copy(update={"explained": 0.08}),)})
     assert "left     No clear shape: the best" in answer_text(unclear)
+    refused = step.model_copy(update={"adopted": False, "rejected_because": "the held-out error rises"})
+    text = answer_text(answer.model_copy(update={"steps": (refused,)}))
+    assert "not taken into the model: the held-out error rises" in text
 
 
 def test_a_separation_is_told_once_and_only_where_there_is_one(answer: Diagnosis) -> None:
@@ -121,9 +125,8 @@ def test_a_separation_is_told_once_and_only_where_there_is_one(answer: Diagnosis
     assert asked is not None
 
     def told(**changes: object) -> str:
-        return " ".join(
-            answer_text(answer.model_copy(update={"next_experiment": asked.model_copy(update=changes)})).split()
-        )
+        changed = answer.model_copy(update={"next_experiment": asked.model_copy(update=changes)})
+        return " ".join(answer_text(changed).split())
 
     assert told().count("6.4 standard deviations") == 1
     place = DifferencePlace(joint=2, phase="creep", share=0.7, other_joint=False)
@@ -132,20 +135,13 @@ def test_a_separation_is_told_once_and_only_where_there_is_one(answer: Diagnosis
     assert "It would tell" not in told(separates=(), predicted_separation=0.0)
 
 
-def test_no_more_than_all_of_the_variance_is_gone(answer: Diagnosis) -> None:
-    def told(share: float) -> str:
-        step = answer.steps[0].model_copy(update={"excess_removed_holdout": share})
-        return answer_text(answer.model_copy(update={"steps": (step,)}))
-
-    assert "all of the held-out variance beyond noise is gone" in told(1.002)
-    assert "the held-out variance beyond noise has grown by 5.0 %" in told(-0.05)
-
-
-def test_a_step_not_taken_says_so(answer: Diagnosis) -> None:
-    step = answer.steps[0].model_copy(update={"adopted": False, "rejected_because": "the held-out error rises"})
-    assert "not taken into the model: the held-out error rises" in answer_text(
-        answer.model_copy(update={"steps": (step,)})
-    )
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [(1.002, "all of the held-out variance beyond noise is gone"), (-0.05, "beyond noise has grown by 5.0 %")],
+)
+def test_no_more_than_all_of_the_variance_is_gone(answer: Diagnosis, share: float, said: str) -> None:
+    step = answer.steps[0].model_copy(update={"excess_removed_holdout": share})
+    assert said in answer_text(answer.model_copy(update={"steps": (step,)}))
 
 
 def test_json_is_the_answer_and_files_are_written(
@@ -163,27 +159,9 @@ def test_json_is_the_answer_and_files_are_written(
     monkeypatch.setattr("model.comparison.compare.compare", lambda *_: None)
     monkeypatch.setattr("model.reports.diagnosis_pictures.drawn", lambda *_: "<svg></svg>")
     first, second = write_csv(tmp_path / "first.csv"), write_csv(tmp_path / "second.csv")
-    said = daq(
-        "diagnose",
-        first,
-        "--holdout",
-        second,
-        "--model",
-        single_axis,
-        "--effects",
-        "backlash,coulomb",
-        "--joints",
-        "1",
-        "--most",
-        "2",
-        "--json",
-        "--out",
-        tmp_path / "new.json",
-        "--report",
-        tmp_path / "page.html",
-        "--next",
-        tmp_path / "asked.json",
-    )
+    files = {"--out": tmp_path / "new.json", "--report": tmp_path / "page.html", "--next": tmp_path / "asked.json"}
+    options = ("--effects", "backlash,coulomb", "--joints", 1, "--most", 2, "--json", *sum(files.items(), ()))
+    said = daq("diagnose", first, "--holdout", second, "--model", single_axis, *options)
     assert said.code == 0, said.err
     assert answer.next_experiment is not None
     assert read_spec(tmp_path / "asked.json") == answer.next_experiment.spec
@@ -246,3 +224,50 @@ def test_what_cannot_be_answered_is_one_line(
 ) -> None:
     first = write_csv(tmp_path / "first.csv")
     daq("diagnose", *[first if w == "FIRST" else w for w in words], "--model", single_axis).complains(2, told)
+
+
+# ---- candidates in a terminal: what fits have shown, the named one always among them; below it what probes promise
+
+
+def fitted(effect: str, evidence: float) -> Candidate:
+    return Candidate(effect=effect, joints=(1,), evidence=evidence, misfit=1.0, refitted=True)
+
+
+def probed(effect: str, evidence: float) -> Candidate:
+    return Candidate(effect=effect, joints=(1,), evidence=evidence)
+
+
+def step(effect: str, *candidates: Candidate) -> Step:
+    return steps.step(effect, candidates=candidates)
+
+
+def test_probes_stand_below_what_was_fitted_however_much_they_promise() -> None:
+    lines = candidates_lines(
+        step("backlash", *(probed(f"p{k}", 9000.0 - k) for k in range(6)), fitted("backlash", 50.0))
+    )
+    assert [line.split()[-1] for line in lines] == ["evidence", "1.00", "fitted)", "1", "1", "more"]
+    assert "backlash on joint 1" in lines[1]
+    assert lines[2] == "promised by probes alone (not fitted)"
+    assert lines[-1].split() == ["and", "4", "more"]
+
+
+def test_the_named_one_is_listed_wherever_it_stands() -> None:
+    others = [fitted(f"f{k}", 100.0 - k) for k in range(7)]
+    lines = candidates_lines(step("backlash", *others, fitted("backlash", 5.0)))
+    assert "backlash on joint 1" in lines[-2]
+    assert len(lines) == 8
+    group = step("f0", *others).model_copy(update={"effect": None, "group": (others[0], others[6])})
+    assert "f6" in candidates_lines(group)[-2]
+
+
+def test_what_an_earlier_step_has_fitted_and_refused_is_no_promise() -> None:
+    earlier = step("ripple", fitted("ripple", 90.0))
+    now = step("backlash", fitted("backlash", 50.0), probed("ripple", 9000.0))
+    assert not any("ripple" in line for line in candidates_lines(now, [earlier]))
+    assert any("ripple" in line for line in candidates_lines(now))
+
+
+def test_a_probe_that_promises_nothing_is_only_counted() -> None:
+    lines = candidates_lines(step("backlash", fitted("backlash", 50.0), probed("ripple", -2.0)))
+    assert lines[2:] == ["            and 1 more"]
+    assert candidates_lines(step("lost_set_points")) == [], "nothing was tried"

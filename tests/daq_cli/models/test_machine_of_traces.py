@@ -1,5 +1,6 @@
 """The machine that traces were made on: one, whatever it is called; its limits may have changed meanwhile."""
 
+import re
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,10 @@ from tests.daq_cli.models.conftest import ROOT
 MA2000 = load_machine("ma2000")
 
 
-def trace(machine: Machine | None) -> Trace:
-    return Trace(record(machine=machine), (1,), np.arange(3.0), np.zeros((3, 1)))
-
-
-def unnamed(*joints: int) -> Trace:
-    """A trace of these joints that names no machine."""
-    return Trace(record(machine=None), joints, np.arange(3.0), np.zeros((3, len(joints))))
+def trace(machine: Machine | None, *joints: int) -> Trace:
+    """A trace of these joints, of joint 1 where none is named."""
+    own = joints or (1,)
+    return Trace(record(machine=machine), own, np.arange(3.0), np.zeros((3, len(own))))
 
 
 def second_link(**changes: Any) -> Machine:
@@ -43,27 +41,25 @@ def test_different_machines_of_one_name_are_refused_with_the_differing_field() -
 
 def test_machines_that_differ_only_in_words_are_the_same() -> None:
     other = second_link(source="weighed").model_copy(update={"title": "the arm", "limits": Limits(reach=0.5)})
-    assert machine_of([trace(MA2000), unnamed(1, 2, 3), trace(other)], LocalRobot(Invocation())) == other
+    assert machine_of([trace(MA2000), trace(None, 1, 2, 3), trace(other)], LocalRobot(Invocation())) == other
 
 
-def test_traces_without_a_machine_are_taken_for_the_configured_one_with_a_remark(
+def test_a_trace_without_a_machine_is_of_the_configured_one_with_a_remark_or_needs_a_model(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert machine_of([unnamed(1, 2, 3)], LocalRobot(Invocation()), ["bench.csv"]) == MA2000
+    assert machine_of([trace(None, 1, 2, 3)], LocalRobot(Invocation()), ["bench.csv"]) == MA2000
     assert "bench.csv: no machine is named there: taken for the configured ma2000" in capsys.readouterr().err
-
-
-def test_a_trace_without_a_machine_that_lacks_joints_needs_a_model() -> None:
     with pytest.raises(SpecError, match=r"^bench\.csv: names no machine, and has no joint 2 or 3 of ma2000.*--model"):
-        machine_of([unnamed(1)], LocalRobot(Invocation()), ["bench.csv"])
+        machine_of([trace(None, 1)], LocalRobot(Invocation()), ["bench.csv"])
 
 
 def test_a_trace_of_another_machine_is_refused_with_its_file_name() -> None:
     bench = load_machine(str(ROOT / "examples" / "motor_bench.toml"))
-    with pytest.raises(SpecError, match=r"^axis\.csv: has no velocity, which the sensors of motor-bench measure"):
-        check_made_for(bench, [unnamed(1)], ["axis.csv"])
-    with pytest.raises(SpecError, match=r"^axis\.csv: has no joint 2 or 3, which the model of ma2000 moves; it has 1$"):
-        check_made_for(MA2000, [unnamed(1)], ["axis.csv"])
-    with pytest.raises(SpecError, match=r"^arm\.mcap: was made on ma2000, the model describes motor-bench"):
-        check_made_for(bench, [trace(MA2000)], ["arm.mcap"])
-    check_made_for(MA2000, [unnamed(1, 2, 3)], ["arm.csv"])
+    for machine, one, file, said in (
+        (bench, trace(None, 1), "axis.csv", "has no velocity, which the sensors of motor-bench measure"),
+        (MA2000, trace(None, 1), "axis.csv", "has no joint 2 or 3, which the model of ma2000 moves; it has 1$"),
+        (bench, trace(MA2000), "arm.mcap", "was made on ma2000, the model describes motor-bench"),
+    ):
+        with pytest.raises(SpecError, match=f"^{re.escape(file)}: {said}"):
+            check_made_for(machine, [one], [file])
+    check_made_for(MA2000, [trace(None, 1, 2, 3)], ["arm.csv"])

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from tests.daq_cli.hostile import FILES, hostile_file, refuses
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import SINGLE_AXIS, write_csv
 
@@ -86,15 +87,70 @@ def test_wrong_options_are_refused_before_a_trace_is_read(daq: CommandLine, word
     refused(daq, *words.split(), says=says)
 
 
-def test_a_comparison_needs_two_models(daq: CommandLine, tmp_path: Path) -> None:
-    refused(daq, "compare", SINGLE_AXIS, write_csv(tmp_path / "good.csv"), says=("1 model named", "at least two"))
+@pytest.mark.parametrize(
+    ("words", "joints", "says"),
+    [
+        (("compare", SINGLE_AXIS), 1, ("1 model named", "at least two")),
+        (("compare", SINGLE_AXIS, "ma2000"), 3, ("cannot be compared", "[1, 2, 3]")),
+        (("simulate", SINGLE_AXIS, "--report", "page.txt"), 1, ("page.txt", ".html")),
+    ],
+    ids=["one model", "models of different joints", "a report that is not HTML"],
+)
+def test_what_cannot_be_compared_or_reported_is_refused(
+    daq: CommandLine, tmp_path: Path, words: tuple[object, ...], joints: int, says: tuple[str, ...]
+) -> None:
+    refused(daq, *words, write_csv(tmp_path / "good.csv", joints=joints), says=says)
 
 
-def test_models_of_different_joints_are_not_compared(daq: CommandLine, tmp_path: Path) -> None:
-    trace = write_csv(tmp_path / "good.csv", joints=3)
-    refused(daq, "compare", SINGLE_AXIS, "ma2000", trace, says=("cannot be compared", "[1, 2, 3]"))
+# ---- every file and number, given what nobody means
 
 
-def test_a_report_that_is_not_html_is_refused(daq: CommandLine, tmp_path: Path) -> None:
-    trace = write_csv(tmp_path / "good.csv")
-    daq("simulate", SINGLE_AXIS, trace, "--report", "page.txt").complains(2, "page.txt", ".html")
+READERS = {
+    "validate {} good.csv": ".json",
+    "simulate {} good.csv": ".toml",
+    "compare {} single.toml good.csv": ".json",
+    "diagnose good.csv --model {}": ".json",
+    "fit good.csv --machine {} -o out.json": ".toml",
+    "simulate single.toml good.csv --effect-file {}": ".py",
+    "design ma2000 --judge {}": ".json",
+}
+
+
+@pytest.fixture(autouse=True)
+def rig(empty_folder: Path) -> None:
+    """A trace and the machine that it is of."""
+    write_csv(empty_folder / "good.csv")
+    Path("single.toml").write_text(SINGLE_AXIS.read_text("utf-8"))
+
+
+@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("words", READERS)
+def test_a_hostile_file_is_refused_in_one_line(daq: CommandLine, words: str, kind: str) -> None:
+    refuses(daq(*words.format(hostile_file(kind, READERS[words])).split()))
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-1", "1e400", "0", "x", "9" * 6000])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "validate single.toml good.csv --damping-ratio={}",
+        "diagnose good.csv --model single.toml --load={}",
+        "design single.toml --duration={}",
+        "diagnose good.csv --acquire --budget={}",
+        "design single.toml --experiments={}",
+        "fit good.csv --machine single.toml -o out.json --starts={}",
+        "validate single.toml good.csv --joint={}",
+        "fit good.csv --machine single.toml -o out.json --bound=link1.mass={}:{}",
+        "blind --folder t --seeds=1 --executor={}",
+        "blind --folder t --seeds=1 --cases={}",
+    ],
+)
+def test_a_number_without_meaning_is_refused_in_one_line(daq: CommandLine, words: str, value: str) -> None:
+    if "--load" in words and value == "0":
+        return
+    refuses(daq(*words.format(value, value).split()))
+
+
+def test_configured_limits_of_traces_hold_for_a_csv(daq: CommandLine) -> None:
+    Path("daq.toml").write_text("[traces.limits]\nrecords = 20\n")
+    daq("simulate", "single.toml", "good.csv").complains(2, "good.csv", "traces.limits.records")

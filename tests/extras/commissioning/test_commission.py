@@ -66,7 +66,7 @@ def test_a_byte_of_which_nothing_is_proved_is_not_written() -> None:
 
 def test_a_step_is_kept_at_once_and_not_done_again(daq: CommandLine, tmp_path: Path) -> None:
     daq("config", "copy", "memory-map", "-o", tmp_path / "memory_map.toml")
-    skipped = [word for name in SKIPPED for word in ("--skip", name)]
+    skipped = [word for step in STEPS[1:] for word in ("--skip", step.name)]
     said = daq("--port", MOCK, "commission", "--folder", tmp_path, *skipped)
     assert said.code == 0
     record = tomllib.loads((tmp_path / "commissioning.toml").read_text("utf-8"))["step"]
@@ -82,27 +82,17 @@ def test_a_step_is_kept_at_once_and_not_done_again(daq: CommandLine, tmp_path: P
     assert again["line"]["done"] == done
 
 
-SKIPPED = (
-    "memory",
-    "bridge",
-    "potentiometers",
-    "end_stops",
-    "emergency_stop",
-    "stop",
-    "period",
-    "delay",
-    "gain",
-    "first_ramp",
-    "ramp",
-    "model",
-)
-
-
 @pytest.mark.parametrize(
     ("options", "says"),
-    [(("--only", "dance"), "step 'dance': there are line, memory"), (("--folder", "nowhere"), "make it first")],
+    [
+        (("--only", "dance"), "step 'dance': there are line, memory"),
+        (("--folder", "nowhere"), "make it first"),
+        (("--skip", "memory"), "--skip memory"),  # nothing relies on an assumed memory map
+        (("--only", "model"), "first do ramp"),
+        (("--only", "line", "--skip", "line"), "nothing would be done"),
+    ],
 )
-def test_a_step_or_folder_that_is_not_there_is_one_line(daq: CommandLine, options: tuple[str, ...], says: str) -> None:
+def test_what_cannot_be_done_is_one_line(daq: CommandLine, options: tuple[str, ...], says: str) -> None:
     daq("--port", MOCK, "commission", *options).complains(2, says)
 
 
@@ -183,14 +173,19 @@ def operator(lines: list[str]) -> TerminalOperator:
     return TerminalOperator(lambda: next(answers, ""))
 
 
-def test_a_person_begins_skips_or_ends_each_task() -> None:
+def test_a_person_begins_skips_or_ends_each_task_and_nothing_but_enter_s_and_q_is_an_answer() -> None:
     person = operator(["\n", "s\n", "q\n"])
     assert person.begin(Task("rest"))
     assert not person.begin(Task("lead", joint=2))
     with pytest.raises(typer.Abort):
         person.begin(Task("switch_off_and_on"))
-    with pytest.raises(typer.Abort):  # the input has ended
-        operator([]).begin(Task("rest"))
+    for lines in ([], ["what?\n", "q\n"]):  # the input has ended
+        with pytest.raises(typer.Abort):
+            operator(lines).begin(Task("rest"))
+    person = operator(["no\n", "\n", "no\n", "\n"])
+    assert person.begin(Task("switch_off_and_on"))
+    assert not person.finished(), "no is not: it is finished"
+    assert person.finished()
 
 
 def test_leaving_while_the_emergency_stop_is_pressed_says_so_and_a_resume_begins_with_the_safe_release(
@@ -237,21 +232,20 @@ def test_a_controller_that_was_not_seen_without_supply_is_to_be_switched_off_aga
         assert hand.tasks == ["switch_off_and_on"] * 3
 
 
-def test_a_step_at_the_arm_is_asked_for_even_with_yes() -> None:
-    assert operator(["\n"]).may_begin(at_the_arm=True, yes=True)
-    assert not operator(["s\n"]).may_begin(at_the_arm=True, yes=True)
-    with pytest.raises(typer.Abort):
-        operator(["q\n"]).may_begin(at_the_arm=True, yes=True)
-    with pytest.raises(typer.Abort):
-        operator([]).may_begin(at_the_arm=True, yes=True)
+@pytest.mark.parametrize(("lines", "begins"), [(["\n"], True), (["banana\n", "\n"], True), (["s\n"], False)])
+def test_a_step_at_the_arm_is_asked_for_even_with_yes(lines: list[str], begins: bool) -> None:
+    assert operator(lines).may_begin(at_the_arm=True, yes=True) is begins
+    for leaves in (["q\n"], []):
+        with pytest.raises(typer.Abort):
+            operator(leaves).may_begin(at_the_arm=True, yes=True)
     assert {one.name for one in STEPS if not one.at_the_arm} == {"line", "bridge", "period", "model"}
 
 
 def test_the_steps_that_move_need_the_bridge_and_go_when_it_is_done_again(tmp_path: Path) -> None:
     record = Record.of(tmp_path)
     moving = {"stop", "delay", "gain", "first_ramp", "ramp"}
-    for name in SKIPPED:
-        record.keep(name, {"skipped": True})
+    for step in STEPS[1:]:
+        record.keep(step.name, {"skipped": True})
     assert all("bridge" in lacking(step_named(name), record) for name in moving)
     record.keep("bridge", {})
     record.keep("period", {})
@@ -270,11 +264,9 @@ def test_a_result_of_another_memory_map_is_done_again(daq: CommandLine, tmp_path
     options = [word for step in STEPS for word in ("--skip", step.name)]
     assert "To be done again" in daq("--port", MOCK, "commission", "--folder", tmp_path, *options).err
     assert Record.of(tmp_path).steps["bridge"]["skipped"]
-    daq("--port", MOCK, "commission", "--only", "line", "--skip", "line").complains(2, "nothing would be done")
 
 
 def test_what_is_missing_or_damaged_is_one_line(daq: CommandLine, tmp_path: Path) -> None:
-    daq("--port", MOCK, "commission", "--folder", tmp_path, "--only", "model").complains(2, "first do ramp")
     record = Record.of(tmp_path)
     record.keep("potentiometers", {"joint_1": {"direction": 1}})
     with pytest.raises(SpecError, match="joint_1"):
@@ -287,19 +279,10 @@ def test_what_is_missing_or_damaged_is_one_line(daq: CommandLine, tmp_path: Path
             acceptance_sheet(record)
 
 
-def test_a_period_that_a_busy_computer_blurs_is_not_known() -> None:
+def test_a_period_that_a_busy_computer_blurs_is_not_known_and_a_dead_memory_not_alive() -> None:
     assert Periods(20.0, 0.01, 5.0).problem == ""
     assert "scatter of 69.2 ms" in Periods(19.679, 0.13, 69.2).problem
-
-
-def test_a_dead_memory_is_not_alive() -> None:
-    assert not is_alive(bytes(128))
-    assert not is_alive(b"\xff" * 128)
-    assert is_alive(bytes(range(128)))
-
-
-def test_an_assumed_memory_map_is_relied_on_by_nothing(daq: CommandLine, tmp_path: Path) -> None:
-    daq("--port", MOCK, "commission", "--folder", tmp_path, "--skip", "memory").complains(2, "--skip memory")
+    assert [is_alive(data) for data in (bytes(128), b"\xff" * 128, bytes(range(128)))] == [False, False, True]
 
 
 def test_lines_of_a_script_that_come_together_are_all_read() -> None:
@@ -317,20 +300,11 @@ def test_lines_of_a_script_that_come_together_are_all_read() -> None:
     os.close(reading)
 
 
-def test_only_enter_s_and_q_are_answers() -> None:
-    assert operator(["banana\n", "\n"]).may_begin(at_the_arm=True, yes=True)
-    person = operator(["no\n", "\n", "no\n", "\n"])
-    assert person.begin(Task("switch_off_and_on"))
-    assert not person.finished(), "no is not: it is finished"
-    assert person.finished()
-    with pytest.raises(typer.Abort):
-        operator(["what?\n", "q\n"]).begin(Task("rest"))
-
-
 def test_an_angle_that_no_joint_has_is_asked_for_again_and_one_can_be_taken_back() -> None:
-    person, waits = operator(["500\n", "50\n", "b\n"]), list[float]()
-    assert person.read_angle(1, 1, waits.append) == 50
-    assert person.read_angle(1, 2, waits.append) == "taken back"
+    lines = ["500\n", "50\n", "b\n", "ninety\n", "90.5\n", "\n"]
+    person, waits = operator(lines), list[float]()
+    answers = [person.read_angle(1, number, waits.append) for number in range(1, 5)]
+    assert answers == [50, "taken back", 90.5, None]
 
 
 def test_a_step_that_fails_leaves_the_results_that_there_were(daq: CommandLine, tmp_path: Path) -> None:
@@ -374,12 +348,6 @@ def test_addresses_found_assumed_and_filled_in_by_hand_are_told_apart() -> None:
     assert [len(told["power"][kind]) for kind in ("found", "assumed", "by hand")] == [5, 0, 1]
     assert told["gripper"]["assumed"] == ["FC72"]
     assert told["process_outputs"]["by hand"] == ["FC71"]
-
-
-def test_an_angle_that_is_no_number_is_asked_for_again() -> None:
-    person, waits = operator(["ninety\n", "90.5\n", "\n"]), list[float]()
-    assert person.read_angle(1, 1, waits.append) == 90.5
-    assert person.read_angle(1, 2, waits.append) is None
 
 
 def test_every_task_that_takes_the_drives_power_says_that_the_arm_may_sink() -> None:

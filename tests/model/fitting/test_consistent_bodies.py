@@ -128,8 +128,8 @@ def test_bounds_of_a_mass_hold_and_those_of_moments_are_refused() -> None:
 
 def test_what_cannot_be_is_refused_in_one_line() -> None:
     assert refused(of_body(0.002, 0.002, 0.01, 0, 0, 0), "link1.centre_x") == (
-        "link1: 1.2 kg with the principal moments 0.002, 0.002, 0.01 kg·m² is not physically consistent (mass above 0, no "
-        "moment above the sum of the others); consistent inertias must start from a consistent body"
+        "link1: 1.2 kg with the principal moments 0.002, 0.002, 0.01 kg·m² is not physically consistent (mass above 0, "
+        "no moment above the sum of the others); consistent inertias must start from a consistent body"
     )
     assert "start from a mass and moments above 0" in refused(of_body(0, 0, 0, 0, 0, 0), *ALL)
     assert "start from a mass and moments above 0" in refused(of_body(*SOUND, mass=0.0), *ALL)

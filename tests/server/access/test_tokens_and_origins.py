@@ -1,6 +1,7 @@
 """Who gets in, and what browsers may not do behind a person's back."""
 
 import asyncio
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 
@@ -22,21 +23,42 @@ from server.access.origin import is_from_elsewhere, is_known_name, is_loopback, 
 from server.access.tickets import GOOD_FOR, MOST, Tickets
 from server.access.tokens import REMEMBERED_FOR, UNKNOWN_FOR, KnownTokens, TokenStore, digest_of
 from server.database_errors import DamagedError
+from server.store.engine import Store
 from server.store.tables import TokenRow
 from tests.daq_cli.invoke import CommandLine
+from tests.server.access.people import kind_of
 from tests.server.clocks import HandClock
 from tests.server.migrated import migrated_store
 from tests.server.service import Service, running_service
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "127.8.8.8", "::1", "[::1]", "localhost"])
-def test_this_computers_own_addresses(host: str) -> None:
-    assert is_loopback(host)
+@pytest.fixture
+def clock() -> HandClock:
+    """Of whoever reads tokens."""
+    return HandClock()
 
 
-@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.5", "example.org", "127.0.0.1.example.org", ""])
-def test_addresses_that_others_reach(host: str) -> None:
-    assert not is_loopback(host)
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    """A database without tokens."""
+    made = migrated_store(tmp_path / "service.sqlite")
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def tokens(store: Store) -> TokenStore:
+    """Those in it."""
+    return TokenStore(store)
+
+
+@pytest.mark.parametrize(
+    ("host", "here"),
+    [(host, True) for host in ("127.0.0.1", "127.8.8.8", "::1", "[::1]", "localhost")]
+    + [(host, False) for host in ("0.0.0.0", "::", "192.168.1.5", "example.org", "127.0.0.1.example.org", "")],
+)
+def test_which_addresses_are_this_computers_own(host: str, here: bool) -> None:
+    assert is_loopback(host) is here
 
 
 @pytest.mark.parametrize(
@@ -133,8 +155,7 @@ def test_one_callers_requests_are_not_counted_against_another() -> None:
     assert buckets.take("anna", "b", 0.0) == 0
 
 
-def test_a_ticket_is_good_once_and_for_a_moment() -> None:
-    clock = HandClock()
+def test_a_ticket_is_good_once_and_for_a_moment(clock: HandClock) -> None:
     tickets, anna = Tickets(clock), Caller("anna", "viewer")
     ticket = tickets.give(anna).ticket
     assert tickets.take(ticket) == anna
@@ -149,10 +170,9 @@ def test_a_ticket_is_good_once_and_for_a_moment() -> None:
     assert tickets.take(kept) == anna
 
 
-def test_a_token_is_kept_as_its_hash_and_a_revoked_one_opens_nothing(tmp_path: Path) -> None:
-    clock = HandClock()
-    store = migrated_store(tmp_path / "service.sqlite")
-    tokens = TokenStore(store)
+def test_a_token_is_kept_as_its_hash_and_a_revoked_one_opens_nothing(
+    clock: HandClock, store: Store, tokens: TokenStore
+) -> None:
     token = tokens.add("anna", "operator", clock.utc())
     with store.reading() as session:
         row = session.query(TokenRow).one()
@@ -166,13 +186,10 @@ def test_a_token_is_kept_as_its_hash_and_a_revoked_one_opens_nothing(tmp_path: P
     clock.turn(REMEMBERED_FOR)
     assert known.remembered(token) == (False, None)
     assert known.look_up(token) is None
-    store.close()
 
 
-def test_whoever_tries_tokens_has_the_database_asked_once(tmp_path: Path) -> None:
-    clock, store, asked = HandClock(), migrated_store(tmp_path / "service.sqlite"), []
-    tokens = TokenStore(store)
-    known = KnownTokens(tokens, clock)
+def test_whoever_tries_tokens_has_the_database_asked_once(clock: HandClock, store: Store, tokens: TokenStore) -> None:
+    known, asked = KnownTokens(tokens, clock), []
     listen(store.engine, "before_cursor_execute", lambda *told: asked.append(told[2]))
     for number in range(50):
         found, _ = known.remembered(f"daq_{number}")
@@ -181,12 +198,11 @@ def test_whoever_tries_tokens_has_the_database_asked_once(tmp_path: Path) -> Non
     token = tokens.add("anna", "operator", clock.utc())
     clock.turn(UNKNOWN_FOR)
     assert known.look_up(token) == Caller("anna", "operator")
-    store.close()
 
 
-def test_who_was_known_still_is_while_the_database_cannot_be_read(tmp_path: Path) -> None:
-    clock, store = HandClock(), migrated_store(tmp_path / "service.sqlite")
-    tokens = TokenStore(store)
+def test_who_was_known_still_is_while_the_database_cannot_be_read(
+    clock: HandClock, store: Store, tokens: TokenStore
+) -> None:
     token = tokens.add("anna", "operator", clock.utc())
     known, late = KnownTokens(tokens, clock), KnownTokens(tokens, clock)
     assert known.look_up(token) == Caller("anna", "operator")
@@ -196,18 +212,14 @@ def test_who_was_known_still_is_while_the_database_cannot_be_read(tmp_path: Path
     assert known.look_up(token) == Caller("anna", "operator")
     with pytest.raises(SQLAlchemyError):
         late.look_up(token)
-    store.close()
 
 
-def test_a_moment_that_is_damaged_keeps_nobody_out(tmp_path: Path) -> None:
-    clock, store = HandClock(), migrated_store(tmp_path / "service.sqlite")
-    tokens = TokenStore(store)
+def test_a_moment_that_is_damaged_keeps_nobody_out(clock: HandClock, store: Store, tokens: TokenStore) -> None:
     token = tokens.add("anna", "operator", clock.utc())
     tokens.add("bert", "viewer", clock.utc())
     with store.writing() as session:
         session.execute(text("UPDATE tokens SET created = 'noon'"))
     assert KnownTokens(tokens, clock).look_up(token) == Caller("anna", "operator")
-    store.close()
 
 
 class _Damaged(TokenStore):
@@ -221,8 +233,7 @@ class _Damaged(TokenStore):
         return super().callers(now)
 
 
-def test_tokens_that_are_damaged_keep_out_nobody_who_was_known(tmp_path: Path) -> None:
-    clock, store = HandClock(), migrated_store(tmp_path / "service.sqlite")
+def test_tokens_that_are_damaged_keep_out_nobody_who_was_known(clock: HandClock, store: Store) -> None:
     tokens = _Damaged(store)
     token = tokens.add("anna", "operator", clock.utc())
     known, sent = KnownTokens(tokens, clock), []
@@ -259,12 +270,12 @@ def test_tokens_that_are_damaged_keep_out_nobody_who_was_known(tmp_path: Path) -
     assert asyncio.run(asked("websocket")) == "websocket.accept"
     clock.turn(REMEMBERED_FOR)
     assert asyncio.run(known.still_let_in(Caller("anna", "operator", digest_of(token))))
-    store.close()
 
 
-def test_a_ticket_of_a_revoked_token_and_who_watches_with_one_are_sent_away(tmp_path: Path) -> None:
-    clock, store = HandClock(), migrated_store(tmp_path / "service.sqlite")
-    tokens, tickets = TokenStore(store), Tickets(clock)
+def test_a_ticket_of_a_revoked_token_and_who_watches_with_one_are_sent_away(
+    clock: HandClock, tokens: TokenStore
+) -> None:
+    tickets = Tickets(clock)
     token = tokens.add("anna", "operator", clock.utc())
     gate = Gate(KnownTokens(tokens, clock), tickets, open_on_loopback=False, look_every=0.001)
     sent, ended = [], []
@@ -299,7 +310,6 @@ def test_a_ticket_of_a_revoked_token_and_who_watches_with_one_are_sent_away(tmp_
     (ticket,) = tickets._given
     opened({}, f"ticket={ticket}")
     assert sent[2:] == [("websocket.close", NOT_ALLOWED)]
-    store.close()
 
 
 # ---- through a real service
@@ -313,41 +323,36 @@ def test_every_answer_tells_browsers_what_they_may_not_do(service: Service) -> N
         assert len(answer.headers["X-Request-Id"]) == 16
 
 
-def test_a_page_of_another_origin_cannot_stop_or_start_anything(service: Service) -> None:
+def test_a_request_from_elsewhere_or_too_large_changes_nothing(service: Service) -> None:
     for path in ("/stop", "/experiments", "/queue/pause"):
         answer = service.robot.post(path, json={}, headers={"Origin": "http://attacker.example"})
-        assert (answer.status_code, answer.json()["type"]) == (403, "/api/v1/problems#other-origin")
+        assert kind_of(answer) == (403, "other-origin")
+    named = service.client.get("/robots", headers={"Host": "attacker.example"})
+    assert kind_of(named) == (403, "unknown-name")
+    large = service.robot.post("/experiments", content=b"x" * (17 << 20), headers={"Content-Type": "application/json"})
+    assert kind_of(large) == (413, "too-large")
     assert service.robot.get("/queue").json()["queued"] == 0
 
 
-def test_a_page_of_another_origin_cannot_watch(service: Service) -> None:
-    url = f"{service.url.replace('http', 'ws', 1)}/api/v1/robots/ma2000/live"
-    with pytest.raises((InvalidStatus, ConnectionClosed)), connect(url, origin="http://attacker.example") as socket:  # type: ignore[arg-type]
-        socket.recv(30)
-
-
-def test_a_name_that_points_here_is_not_enough(service: Service) -> None:
-    answer = service.client.get("/robots", headers={"Host": "attacker.example"})
-    assert (answer.status_code, answer.json()["type"]) == (403, "/api/v1/problems#unknown-name")
-
-
-def test_a_body_that_is_too_large_is_not_read(service: Service) -> None:
-    answer = service.robot.post("/experiments", content=b"x" * (17 << 20), headers={"Content-Type": "application/json"})
-    assert (answer.status_code, answer.json()["type"]) == (413, "/api/v1/problems#too-large")
-
-
-def test_others_are_not_let_in_without_tokens(here: CommandLine, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("server.logs.begin", lambda: None)  # the logs of this process are the tests' own
-    refused = here("serve", "--host", "0.0.0.0", "--port", "0")
-    refused.complains(2, "make one with `daq token add NAME --role operator`")
-
-
-def test_a_service_behind_a_proxy_does_not_start_without_tokens(
-    here: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("configured", "words", "said"),
+    [
+        ("", ("--host", "0.0.0.0"), "make one with `daq token add NAME --role operator`"),
+        ('[server]\ntokens = "always"\n', (), 'server.tokens is "always", and there is no token'),
+    ],
+    ids=["at every address", "behind a proxy"],
+)
+def test_a_service_for_others_does_not_start_without_tokens(
+    here: CommandLine,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    configured: str,
+    words: tuple[str, ...],
+    said: str,
 ) -> None:
-    monkeypatch.setattr("server.logs.begin", lambda: None)
-    (tmp_path / "daq.toml").write_text('[server]\ntokens = "always"\n')
-    here("serve", "--port", "0").complains(2, 'server.tokens is "always", and there is no token')
+    monkeypatch.setattr("server.logs.begin", lambda: None)  # the logs of this process are the tests' own
+    (tmp_path / "daq.toml").write_text(configured)
+    here("serve", *words, "--port", "0").complains(2, said)
 
 
 def _token(here: CommandLine, name: str, role: str) -> str:

@@ -1,6 +1,5 @@
 """How the page's files reach a browser."""
 
-import asyncio
 import gzip
 import json
 from pathlib import Path
@@ -11,6 +10,7 @@ from fastapi import FastAPI
 
 import hatch_build
 from server.page import FOLDER, NOT_BUILT, Page, is_built
+from tests.server.test_site import asked
 
 LATER_ON_LIVE = ("Arm3d", "scene")
 """Parts that the Live page loads by itself once it is there."""
@@ -35,13 +35,7 @@ def get(folder: Path, path: str, **headers: str) -> httpx.Response:
     """The answer of a server of the page in `folder`."""
     app = FastAPI(docs_url=None)  # the page has its own
     app.routes.append(Page(folder))
-
-    async def asked() -> httpx.Response:
-        transport = httpx.ASGITransport(app)
-        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
-            return await client.get(path, headers={name.replace("_", "-"): value for name, value in headers.items()})
-
-    return asyncio.run(asked())
+    return asked(app, path, **{name.replace("_", "-"): value for name, value in headers.items()})
 
 
 def test_the_page_is_asked_for_again_and_its_parts_are_kept_for_ever(folder: Path) -> None:

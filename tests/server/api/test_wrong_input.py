@@ -1,46 +1,41 @@
-"""Wrong input is refused with the field named, before anything moves; what does not exist is a 404."""
+"""Wrong input is refused with its field named, before anything moves, and is no fault; what is not there is a 404."""
 
+import base64
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
+from daq.contracts.service.experiments import ExperimentRequest
+from server.access.limits import MOST_FIELDS
 from tests.server.service import Service
 
 NOBODY = "000000000000"
 
 
 @pytest.mark.parametrize(
-    ("spec", "field"),
-    [
-        ({"trajectory": {"kind": "spiral"}}, "spec.trajectory"),
-        ({"trajectory": {"kind": "ramp", "amplitude": "far"}}, "spec.trajectory.ramp.amplitude"),
-        ({"trajectory": {"kind": "ramp", "duration": 0}}, "spec.trajectory.ramp.duration"),
-        ({"trajectory": {"kind": "ramp", "speed": 1}}, "spec.trajectory.ramp.speed"),
-        ({"joints": [1, 1]}, "spec"),
-        ({"joints": []}, "spec.joints"),
-        ({"joints": [7]}, "spec.joints.0"),
-        ({"gains": {"1": [21, 0, 0]}}, "spec.gains.1.0"),
-        ({"gains": {"1": [1, 0]}}, "spec.gains.1.2"),
-        ({"repeats": 0}, "spec.repeats"),
-        ({"name": "../../etc/passwd"}, "spec.name"),
-        ({"name": "a; rm -rf /"}, "spec.name"),
-        ({"notes": "x" * 10001}, "spec.notes"),
-        ({"command": "ls"}, "spec.command"),
-        ("ramp", "spec"),
-    ],
-)
-def test_a_malformed_experiment_is_refused_with_its_field(service: Service, spec: Any, field: str) -> None:
-    answer = service.robot.post("/experiments", json={"spec": spec})
-    assert answer.status_code == 422, answer.text
-    problem = answer.json()
-    assert field in [one["field"] for one in problem["fields"]], problem
-    assert problem["advice"]
-    assert service.robot.get("/queue").json()["queued"] == 0
-
-
-@pytest.mark.parametrize(
     ("body", "field"),
     [
+        *[
+            ({"spec": spec}, field)
+            for spec, field in (
+                ({"trajectory": {"kind": "spiral"}}, "spec.trajectory"),
+                ({"trajectory": {"kind": "ramp", "amplitude": "far"}}, "spec.trajectory.ramp.amplitude"),
+                ({"trajectory": {"kind": "ramp", "duration": 0}}, "spec.trajectory.ramp.duration"),
+                ({"trajectory": {"kind": "ramp", "speed": 1}}, "spec.trajectory.ramp.speed"),
+                ({"joints": [1, 1]}, "spec"),
+                ({"joints": []}, "spec.joints"),
+                ({"joints": [7]}, "spec.joints.0"),
+                ({"gains": {"1": [21, 0, 0]}}, "spec.gains.1.0"),
+                ({"gains": {"1": [1, 0]}}, "spec.gains.1.2"),
+                ({"repeats": 0}, "spec.repeats"),
+                ({"name": "../../etc/passwd"}, "spec.name"),
+                ({"name": "a; rm -rf /"}, "spec.name"),
+                ({"notes": "x" * 10001}, "spec.notes"),
+                ({"command": "ls"}, "spec.command"),
+                ("ramp", "spec"),
+            )
+        ],
         ({"at": "2026-01-01T00:00:00"}, "at"),
         ({"at": "tomorrow"}, "at"),
         ({"priority": 1000}, "priority"),
@@ -48,10 +43,13 @@ def test_a_malformed_experiment_is_refused_with_its_field(service: Service, spec
         ({"when": "now"}, "when"),
     ],
 )
-def test_a_malformed_request_is_refused_with_its_field(service: Service, body: dict[str, Any], field: str) -> None:
+def test_a_malformed_experiment_is_refused_with_its_field(service: Service, body: dict[str, Any], field: str) -> None:
     answer = service.robot.post("/experiments", json=body)
-    assert answer.status_code == 422
-    assert field in [one["field"] for one in answer.json()["fields"]]
+    assert answer.status_code == 422, answer.text
+    problem = answer.json()
+    assert field in [one["field"] for one in problem["fields"]], problem
+    assert problem["advice"]
+    assert service.robot.get("/queue").json()["queued"] == 0
 
 
 @pytest.mark.parametrize("body", [b"", b"{", b"[]", b"null", b"\xff\xfe", b'{"spec": {"repeats": 1e999}}'])
@@ -110,11 +108,8 @@ def test_what_does_not_exist_is_not_found(service: Service, method: str, path: s
     body = {"priority": 1} if method == "PATCH" else None
     answer = service.robot.request(method, path, json=body)
     assert (answer.status_code, answer.json()["type"]) == (404, "/api/v1/problems#not-found"), answer.text
-
-
-def test_a_robot_that_does_not_exist_is_not_found(service: Service) -> None:
-    answer = service.client.get("/robots/other/queue")
-    assert (answer.status_code, answer.json()["detail"]) == (404, "there is no robot 'other'")
+    other = service.client.get("/robots/other/queue")
+    assert (other.status_code, other.json()["detail"]) == (404, "there is no robot 'other'")
 
 
 def test_a_trace_from_elsewhere_is_read_before_it_is_taken_in(service: Service) -> None:
@@ -146,3 +141,112 @@ def test_health_and_system_tell_how_it_is(service: Service) -> None:
     assert checks.items() >= {"database": "", "room": "", "traces": "", "robot ma2000": ""}.items()
     assert not any(checks.values())
     assert service.client.get("/system").json()["storage"]["database"] == "sqlite"
+
+
+# ---- input that fits its type and yet nothing can be done with
+
+
+NO_MOMENTS = ["9999-12-31T23:59:59-12:00", "0001-01-01T00:00:00+12:00"]
+"""Of time zones; in UTC there are none such."""
+
+
+@pytest.mark.parametrize("moment", NO_MOMENTS)
+@pytest.mark.parametrize(
+    ("method", "path", "field"),
+    [
+        ("POST", "/experiments", "at"),
+        ("POST", "/schedules", "starts"),
+        ("GET", "/traces", "since"),
+        ("GET", "/traces", "until"),
+    ],
+)
+def test_a_moment_that_utc_does_not_have_is_refused(
+    service: Service, method: str, path: str, field: str, moment: str
+) -> None:
+    body = ({"every": 3600} if path == "/schedules" else {}) | {field: moment}
+    answer = service.robot.request(method, path, **{"params" if method == "GET" else "json": body})  # type: ignore[arg-type]
+    assert (answer.status_code, [one["field"] for one in answer.json()["fields"]]) == (422, [field]), answer.text
+    assert method == "GET" or "years 1 to 9999" in answer.json()["detail"]
+
+
+def _cursor(text: str) -> str:
+    return base64.urlsafe_b64encode(text.encode()).decode()
+
+
+@pytest.mark.parametrize("path", ["/traces", "/models", "/experiments", "/events", "/jobs", "/schedules"])
+@pytest.mark.parametrize(
+    "cursor",
+    [_cursor('[1e18, "x"]'), _cursor('[-1e18, "x"]'), _cursor('[1, "\\ud800"]'), _cursor("[1"), _cursor("1"), "é", ""],
+)
+def test_a_cursor_that_no_list_gave_out_is_refused(service: Service, path: str, cursor: str) -> None:
+    answer = service.robot.get(path, params={"cursor": cursor})
+    assert (answer.status_code, [one["field"] for one in answer.json()["fields"]]) == (422, ["cursor"]), answer.text
+
+
+@pytest.mark.parametrize(("body", "refused"), [(b"[" * 50_000, 400), (b'{"a":' * 50_000, 413)])
+def test_a_body_nested_beyond_measure_is_refused(service: Service, body: bytes, refused: int) -> None:
+    headers: dict[str, Any] = {"Content-Type": "application/json"}
+    model = service.robot.post("/models", params={"name": "x"}, content=body, headers=headers)
+    assert (model.status_code, model.json()["type"]) == (422, "/api/v1/problems#not-a-model"), model.text
+    experiment = service.robot.post("/experiments", content=body, headers=headers)
+    assert experiment.status_code == refused, experiment.text
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "fields"),
+    [
+        ("/experiments", "{", ["body"]),
+        ("/experiments", "{}}", ["body"]),
+        (
+            "/experiments",
+            '{"spec": {"trajectory": {"kind": "ramp", "amplitude": [1]}}}',
+            ["spec.trajectory.ramp.amplitude"],
+        ),
+        (
+            "/experiments",
+            '{"spec": {"trajectory": {"kind": "ramp", "amplitude": {"9": 1}}}}',
+            ["spec.trajectory.ramp.amplitude", "spec.trajectory.ramp.amplitude.9"],
+        ),
+        ("/experiments", '{"spec": {"gains": {"9": [1, 2, 3]}}}', ["spec.gains.9"]),
+        ("/teaching/jog", '{"velocities": {"9": 1}}', ["velocities.9"]),
+    ],
+)
+def test_a_field_is_named_as_its_client_writes_it(service: Service, path: str, body: str, fields: list[str]) -> None:
+    answer = service.robot.post(path, content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 422
+    assert sorted({one["field"] for one in answer.json()["fields"]}) == fields
+
+
+@pytest.mark.parametrize(
+    ("trajectory", "field"),
+    [
+        ({"kind": "path", "times": [0.0], "positions": ["x"] * 100_000}, "spec.trajectory.path.positions.0"),
+        ({"kind": "via", "times": [1.0], "points": ["x"] * 100_000}, "spec.trajectory.via.points.0"),
+        (
+            {"kind": "sequence", "segments": [{"move": {"kind": "via", "points": ["x"] * 900}}] * 9},
+            "segments.0.move.via",
+        ),
+    ],
+)
+def test_of_a_long_list_the_first_error_is_told_and_no_other_collected(trajectory: dict[str, Any], field: str) -> None:
+    with pytest.raises(ValidationError) as refused:
+        ExperimentRequest.model_validate({"spec": {"trajectory": trajectory}})
+    assert refused.value.error_count() < 10
+    assert any(field in ".".join(map(str, error["loc"])) for error in refused.value.errors())
+
+
+def test_a_body_of_too_many_fields_is_refused_before_it_is_read(service: Service) -> None:
+    body = {str(number): 0 for number in range(MOST_FIELDS + 1)}
+    answer = service.robot.post("/experiments", json=body)
+    assert answer.status_code == 413, answer.text
+    assert f"a body may have {MOST_FIELDS} fields" in answer.json()["detail"]
+    assert service.robot.put("/programs/x", json=body).status_code == 422  # a program has more
+
+
+@pytest.mark.parametrize("key", ["", "k" * 201])
+@pytest.mark.parametrize("path", ["/experiments", "/jobs"])
+def test_a_key_that_says_nothing_is_refused(service: Service, path: str, key: str) -> None:
+    body = {"kind": "compare", "traces": ["a"]} if path == "/jobs" else {}
+    refused = service.robot.post(path, json=body, headers={"Idempotency-Key": key})
+    assert refused.status_code == 422, refused.text
+    assert refused.json()["fields"][0]["field"] == "idempotency-key"

@@ -4,14 +4,14 @@ import os
 import select
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from server.jobs.service import worker_processes
-from server.jobs.shared_workers import NICENESS
+from server.jobs.shared_workers import NICENESS, worker_processes
 
 FOREVER = """
-from server.jobs.service import worker_processes
+from server.jobs.shared_workers import worker_processes
 import os, sys
 
 if __name__ == "__main__":
@@ -52,3 +52,10 @@ def test_a_worker_is_in_a_session_of_its_own_and_keeps_a_tenth_of_the_weight_whe
         assert os.sched_getscheduler(worker) == os.SCHED_BATCH
         own = os.getpriority(os.PRIO_PROCESS, 0)
         assert os.getpriority(os.PRIO_PROCESS, worker) == min(own + NICENESS, 19), "19 is the most there is"
+
+
+@pytest.mark.skipif(not Path("/proc/self/autogroup").exists(), reason="a kernel without automatic groups")
+def test_a_worker_s_session_has_a_tenth_of_the_service_s_weight() -> None:
+    with worker_processes(1) as workers:
+        worker = workers.submit(os.getpid).result()
+        assert Path(f"/proc/{worker}/autogroup").read_text("ascii").split()[-1] == "10"

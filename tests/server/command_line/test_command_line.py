@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from daq.teaching.program import Program, load_program
 from daq.traces.reader import read_trace
 from tests.daq_cli.invoke import CommandLine, Said
+from tests.daq_cli.person import at_a_terminal
 from tests.server.other_user import environment_in
 from tests.server.polling import until
 from tests.server.service import DAQ, Service
@@ -52,17 +54,21 @@ def test_its_result_as_json_and_a_dry_run_are_the_same_too(
     assert service.robot.get("/experiments").json()["items"][0]["id"] == before
 
 
-def test_ctrl_c_stops_the_arm_and_the_partial_trace_is_fetched(service: Service, tmp_path: Path) -> None:
-    command = [*DAQ, "--server", service.url, *RAMP, "--hold", "600"]
-    running = subprocess.Popen(
-        command,
-        cwd=tmp_path,
-        env=environment_in(tmp_path),
+def _begun(service: Service, folder: Path, *words: str) -> subprocess.Popen[str]:
+    """A ramp by the command line in a process of its own, which signals reach."""
+    return subprocess.Popen(
+        [*DAQ, "--server", service.url, *RAMP, *words],
+        cwd=folder,
+        env=environment_in(folder),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
+
+
+def test_ctrl_c_stops_the_arm_and_the_partial_trace_is_fetched(service: Service, tmp_path: Path) -> None:
+    running = _begun(service, tmp_path, "--hold", "600")
     assert running.stderr is not None
     for line in running.stderr:
         if "ramp end" in line:
@@ -80,15 +86,7 @@ def test_ctrl_c_takes_back_what_waits_and_stops_nobody_else(service: Service, tm
     spec = {"trajectory": {"kind": "pause", "duration": 600}, "joints": [1]}
     others = service.robot.post("/experiments", json={"spec": spec}).json()["id"]
     service.until_recording(others)
-    running = subprocess.Popen(
-        [*DAQ, "--server", service.url, *RAMP],
-        cwd=tmp_path,
-        env=environment_in(tmp_path),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    running = _begun(service, tmp_path)
     try:
         mine = until(service.robot, "/queue/experiments", bool, process=running)[0]["id"]
         running.send_signal(signal.SIGINT)
@@ -115,9 +113,8 @@ def test_a_paused_queue_is_told_and_nothing_is_left_lying_in_it(daq: Daq, servic
 
 
 def test_a_motion_beyond_the_limits_is_refused_as_at_ones_own_robot(daq: Daq) -> None:
-    said = daq("run", "ramp", "--joints", "1", "--amplitude", "300")
-    assert said.code == 4, said
-    assert said.err.startswith("daq: ")
+    daq("run", "ramp", "--joints", "1", "--amplitude", "300").complains(4)
+    daq("teach", "step", "--to", "2=400").complains(2, "2")
 
 
 def test_stop_status_and_reset(daq: Daq, service: Service) -> None:
@@ -130,13 +127,6 @@ def test_stop_status_and_reset(daq: Daq, service: Service) -> None:
     assert json.loads(daq("status", "--json").out)["arm"] == "stopped"
     assert "takes set points again" in daq("reset").out
     assert daq("queue", "resume").code == 0
-
-
-def test_a_stop_that_reaches_nobody_is_told_as_not_delivered(here: CommandLine) -> None:
-    said = here("--server", "http://127.0.0.1:1", "stop")
-    assert said.code == 3
-    assert "NOT DELIVERED" in said.out
-    assert "emergency stop" in said.out
 
 
 def test_gains_signals_and_gripper(daq: Daq) -> None:
@@ -219,10 +209,6 @@ def test_a_lead_leaves_its_path(daq: Daq, tmp_path: Path) -> None:
     assert len(path["times"]) > 5
 
 
-def test_a_program_that_is_refused_moves_nothing(daq: Daq) -> None:
-    daq("teach", "step", "--to", "2=400").complains(2, "2")
-
-
 def test_control_that_another_client_has_is_told(daq: Daq, service: Service) -> None:
     lease = service.robot.post("/control", json={}).json()["lease"]
     try:
@@ -236,3 +222,54 @@ def test_the_actual_gains_are_measured_at_the_servers_robot(daq: Daq) -> None:
     assert said.code == 0, said.err
     (found,) = json.loads(said.out)["gains"]
     assert (found["joint"], found["gain"] is not None) == (1, True)
+
+
+# ---- in a terminal: keys drive the robot, and every key that stops, stops it
+
+
+RIGHT = b"\x1b[C"
+
+
+@pytest.mark.usefixtures("here")
+def test_a_key_drives_a_joint_and_a_posture_is_kept(service: Service, tmp_path: Path) -> None:
+    service.until_connected()
+    before = service.status()["sample"]["position"][2]
+    with at_a_terminal(["--server", service.url, "teach", "jog", "--program", "kept.json"]) as person:
+        person.until(b"joint 1 ")
+        person.type(b"3")
+        person.until(b"joint 3 ")
+        while abs(service.status()["sample"]["position"][2] - before) < 0.01:
+            person.type(RIGHT)
+        person.type(b"p")
+        person.until(b"posture 1 kept")
+        person.type(b"q")
+        code = person.end()
+    assert code == 0, person.seen
+    assert service.robot.get("/control").json()["holder"] == "nobody"
+    kept: Program = load_program(tmp_path / "kept.json")
+    assert len(kept.instructions) == 1
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("words", "shown", "keys"),
+    [
+        (["program", "wait.json"], b"instruction 1 of 1: wait", b"\x03"),
+        (["program", "wait.json"], b"instruction 1 of 1: wait", b"\x1a"),
+        (["jog"], b"joint 1 ", RIGHT + b"\x03"),
+    ],
+    ids=["a program, by Ctrl-C", "a program, by Ctrl-Z", "a jog, by Ctrl-C"],
+)
+def test_what_moves_the_arm_is_stopped_with_the_keys_that_stop(
+    service: Service, tmp_path: Path, words: list[str], shown: bytes, keys: bytes
+) -> None:
+    program = {"name": "wait", "instructions": [{"kind": "wait", "duration": 3600}]}
+    (tmp_path / "wait.json").write_text(json.dumps(program))
+    service.until_connected()
+    with at_a_terminal(["--server", service.url, "teach", *words]) as person:
+        person.until(shown)
+        person.type(keys)
+        code = person.end()
+    assert code == 6, person.seen
+    assert b"stopped, confirmed by the board" in person.seen
+    service.until_arm("stopped")

@@ -1,4 +1,4 @@
-"""The pure rules of the queue: states, order, schedule, what is missing."""
+"""The pure rules of the queue: states, order, schedule."""
 
 from datetime import UTC, datetime, timedelta
 from typing import Any, get_args
@@ -13,13 +13,10 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Trajectory
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ENDS
-from daq.contracts.service.robot import RobotIdentity
-from daq.owner.messages import ArmReport
 from daq.trajectories.planner import plan, start_angles
 from server.experiments.schedule import LONGEST, Plan, first, following, is_due, least_length, points_of, zone_here
 from server.experiments.states import Event, IllegalEventError, Waiting, advance, after_restart, next_due
 from server.problems import ProblemError
-from server.queue.readiness import Circumstances, what_is_missing
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 moments = st.datetimes(datetime(2026, 1, 1), datetime(2027, 1, 1)).map(lambda moment: moment.replace(tzinfo=UTC))
@@ -139,43 +136,6 @@ def test_a_clock_that_is_set_back_makes_no_run_due_again() -> None:
     last = START + timedelta(seconds=120)
     found = following(Plan(START, 60, None), 3, last, START - timedelta(days=1))
     assert found == last + timedelta(seconds=60)
-
-
-def _arm(**changes: object) -> ArmReport:
-    calm = {"arm": "idle", "cause": "", "activity": "none", "limp": (), "link": "connected", "counters": {}}
-    return ArmReport.model_validate(calm | changes)
-
-
-REAL = RobotIdentity(simulated=False, protocol=2, period=0.02, boots=1)
-MOCK = REAL.model_copy(update={"simulated": True})
-
-
-@pytest.mark.parametrize(
-    ("now", "line", "pauses"),
-    [
-        (Circumstances(None, None, "no such port", True, True), "the robot is not connected. no such port", False),
-        (Circumstances(MOCK, _arm(link="lost"), "", True, True), "the link to the robot is lost", False),
-        (Circumstances(MOCK, _arm(arm="disconnected"), "", True, True), "the link to the robot is lost", False),
-        (Circumstances(MOCK, _arm(arm="stopped", cause="x"), "", True, True), "the arm is stopped", True),
-        (Circumstances(MOCK, _arm(arm="fault"), "", True, True), "the arm has a fault", True),
-        (Circumstances(MOCK, _arm(activity="jog"), "", True, True), "the arm is busy: jog", False),
-        (Circumstances(REAL, _arm(), "", True, False), "no operator is present", True),
-    ],
-)
-def test_what_is_missing_is_said_and_pauses_the_queue_where_a_person_must_look(
-    now: Circumstances, line: str, pauses: bool
-) -> None:
-    missing = what_is_missing(now)
-    assert missing is not None
-    assert (missing.line, bool(missing.pause)) == (line, pauses)
-
-
-def test_a_real_arm_needs_an_operators_word_and_a_mock_does_not() -> None:
-    assert what_is_missing(Circumstances(MOCK, _arm(), "", False, True)) is None
-    missing = what_is_missing(Circumstances(REAL, _arm(), "", False, True))
-    assert missing is not None
-    assert "moves_real_arm" in missing.line
-    assert what_is_missing(Circumstances(REAL, _arm(), "", True, True)) is None
 
 
 def _repeated(amplitude: float, **more: object) -> ExperimentSpec:

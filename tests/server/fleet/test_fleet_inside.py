@@ -1,8 +1,10 @@
-"""Several robots in a service inside this process: what goes wrong with one, and what becomes of the others."""
+"""Several robots or parts in a service inside this process: what goes wrong with one, and what of the others."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -12,6 +14,7 @@ from daq.owner.stop_socket import FOLDER_VARIABLE
 from server.access.caller import LOCAL
 from server.api.system import get_system
 from server.clock import SystemClock
+from server.parts import Part
 from server.services import Services
 
 
@@ -33,25 +36,39 @@ def two_robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Serv
     made.close()
 
 
-@pytest.fixture
-def services(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Services]:
-    """Two robots, not connected."""
-    with two_robots(tmp_path, monkeypatch) as made:
-        yield made
-
-
-def test_a_folder_that_is_away_hides_neither_the_port_of_the_stop_nor_the_other_disk(
-    services: Services, tmp_path: Path
+def test_a_disk_is_told_once_and_one_that_is_away_hides_neither_the_port_of_the_stop_nor_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    both = get_system(services, LOCAL)
-    (tmp_path / "right").rmdir()
-    found = get_system(services, LOCAL)
+    with two_robots(tmp_path, monkeypatch) as services:
+        (line,) = services.warnings()
+        assert line.startswith("left, right: the disk of the traces is ")
+        both = get_system(services, LOCAL)
+        (tmp_path / "right").rmdir()
+        found = get_system(services, LOCAL)
     assert found.stop_port == 8301
     assert found.storage.traces_free > 0
     assert found.storage.traces_size == both.storage.traces_size  # one disk, which counts once
     assert any(line.startswith(f"right: the folder of traces, {tmp_path / 'right'}: ") for line in found.warnings)
 
 
-def test_the_disk_of_a_robots_own_folder_is_told_once_with_the_robots_names(services: Services) -> None:
-    (line,) = services.warnings()
-    assert line.startswith("left, right: the disk of the traces is ")
+class Broken(Part):
+    def queue_paused(self, robot: str, reason: str) -> None:
+        raise KeyError(robot)
+
+
+class Listening(Part):
+    def __init__(self) -> None:
+        self.heard: list[str] = []
+
+    def queue_paused(self, robot: str, reason: str) -> None:
+        self.heard.append(f"{robot}: {reason}")
+
+
+def test_a_part_that_fails_keeps_news_neither_from_the_others_nor_from_the_service(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    listening = Listening()
+    service: Any = SimpleNamespace(parts=[Broken(), listening])
+    Services.tell(service, lambda part: part.queue_paused("arm", "stopped"))
+    assert listening.heard == ["arm: stopped"]
+    assert "Broken" in caplog.text

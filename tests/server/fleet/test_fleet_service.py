@@ -8,7 +8,7 @@ import pytest
 from daq.client import Client
 from daq.contracts.errors import SpecError
 from daq.traces.reader import read_trace
-from tests.server.fleet_service import FleetService, fleet_service
+from tests.server.fleet_service import FleetService, two_arms
 from tests.server.polling import reset, until
 
 pytestmark = pytest.mark.slow
@@ -19,13 +19,8 @@ LONG = {"spec": {"trajectory": {"kind": "sine", "duration": 60.0}, "joints": [1]
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetService]:
-    ports = {name: f"mock://?pty=1&lock_step=1&seed={seed}" for seed, name in enumerate(("left", "right"), start=3)}
-    with fleet_service(tmp_path_factory.mktemp("fleet"), ports) as service:
-        for name in ports:  # here, so that no mock is left running by a test
-            service.post(f"robots/{name}/connect")
+    with two_arms(tmp_path_factory.mktemp("fleet"), seed=3) as service:
         yield service
-        for name in ports:
-            service.post(f"robots/{name}/disconnect")
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """The stop of all arms at the stop listener, and its result, which is as good as the worst."""
 
-import socket
 import threading
 from pathlib import Path
 
@@ -8,12 +7,9 @@ import httpx
 import pytest
 
 from daq.contracts.service.robot import FleetStopResult, StopResult
-from server.access.stop_gate import StopGate
-from server.access.tokens import KnownTokens, TokenStore
 from server.stopping.arm import together
-from server.stopping.listener import Asked, OnStop, Stop, StopListener
-from server.store.engine import Store
-from tests.server.clocks import HandClock
+from server.stopping.listener import Asked, OnStop, Stop
+from tests.server.stopping.test_stop_listener import listener_of
 
 FROZEN = StopResult(delivered=True, confirmed=True, tick=7, seconds=0.1, text="stopped, confirmed by the board")
 LOST = StopResult(
@@ -40,15 +36,9 @@ def test_all_arms_are_stopped_at_the_same_time_and_every_stop_is_told(tmp_path: 
 
 def stop_of_all(folder: Path, stops: dict[str, Stop], on_stop: OnStop) -> FleetStopResult:
     """The answer of a stop listener of these arms to the stop of all."""
-    store = Store(f"sqlite:///{folder / 'service.sqlite'}")
-    gate = StopGate(KnownTokens(TokenStore(store), HandClock()), True, (), 8300)
-    with socket.create_server(("127.0.0.1", 0)) as door:
-        url = f"http://127.0.0.1:{door.getsockname()[1]}/api/v1/fleet/stop"
-        listener = StopListener(door, gate, stops, on_stop)
-        answer = FleetStopResult.model_validate(httpx.post(url, timeout=60).json())
-        listener.close()
-    store.close()
-    return answer
+    with listener_of(folder, stops, on_stop) as (host, port):
+        answer = httpx.post(f"http://{host}:{port}/api/v1/fleet/stop", timeout=60)
+    return FleetStopResult.model_validate(answer.json())
 
 
 def test_a_stop_is_told_before_a_slower_arm_has_answered(tmp_path: Path) -> None:
@@ -87,13 +77,10 @@ def test_all_arms_are_stopped_though_no_thread_can_be_started(tmp_path: Path, mo
     assert len(refused) == 3  # the request's own, and those of two arms
 
 
-def test_one_arm_that_does_not_confirm_is_named() -> None:
+def test_one_arm_that_does_not_confirm_is_named_and_the_stop_of_the_only_arm_reads_as_ever() -> None:
     found = together({"left": FROZEN, "right": LOST})
     assert (found.delivered, found.confirmed, found.seconds) == (False, False, 0.9)
     assert found.detail == "not confirmed: right (no link). Use the emergency stop. Confirmed: left."
     assert found.text == "left: stopped, confirmed by the board; right: stop NOT DELIVERED: no link. Use it."
-
-
-def test_the_stop_of_the_only_arm_reads_as_ever() -> None:
     assert together({"ma2000": FROZEN}).text == FROZEN.text
     assert together({"left": FROZEN, "right": FROZEN}).detail == "all 2 arms hold their set points."

@@ -261,18 +261,23 @@ def test_a_folder_that_cannot_be_looked_into_keeps_neither_places_nor_turns_from
     bench.store.close()
 
 
-def test_a_job_waits_until_its_trace_is_fetched_from_the_archive_and_says_so(bench: Bench) -> None:
+@pytest.mark.parametrize("cancelled", [False, True])
+def test_a_job_waits_until_its_trace_is_fetched_from_the_archive_says_so_and_can_be_cancelled(
+    bench: Bench, cancelled: bool
+) -> None:
     archive = HandArchive(bench)
     job = _submitted(bench)
     bench.service.start()
-    with bench.changed:
-        bench.changed.wait_for(lambda: any(one.progress_text for one in bench.told))
+    _until(bench, lambda: any(one.progress_text for one in bench.told))
     assert bench.state_of(job) == "queued"
     said = bench.service.with_progress(job).progress_text
     assert said == "fetching its traces from the archive: 1.0 of 4.0 MB"
     assert bench.executor.given == []
+    if cancelled:
+        assert bench.service.cancel(job.id, "anna").state == "cancelled"
     archive.ends()
-    assert bench.end_of(job).state == "done"
+    assert bench.end_of(job).state == ("cancelled" if cancelled else "done")
+    assert bench.executor.given == ([] if cancelled else [job.id])
     assert set(archive.asked) == {TRACE}
 
 
@@ -312,16 +317,6 @@ def test_a_job_whose_trace_the_archive_cannot_give_fails_with_one_line_and_the_n
     assert (ended.state, ended.reason, ended.failure) == ("failed", archive.problem, "refused")
     archive.ends()
     assert bench.end_of(_submitted(bench)).state == "done"
-
-
-def test_a_job_that_waits_for_the_archive_can_be_cancelled(bench: Bench) -> None:
-    HandArchive(bench)
-    job = _submitted(bench)
-    bench.service.start()
-    with bench.changed:
-        bench.changed.wait_for(lambda: any(one.progress_text for one in bench.told))
-    assert bench.service.cancel(job.id, "anna").state == "cancelled"
-    assert bench.executor.given == []
 
 
 def test_a_worker_that_cannot_be_had_ends_its_job_and_no_other(bench: Bench) -> None:

@@ -1,9 +1,13 @@
-"""The places of workers, which the robots of a service take in turn."""
+"""The places of workers, which robots take in turn; what a worker says of its job, and may ask for."""
 
 from concurrent.futures import Future
+from pathlib import Path
 from typing import Any
 
+from daq.contracts.machine import load_machine
 from daq.executors import Workers
+from server.jobs.mailbox import Mailbox, Reported
+from server.jobs.next_experiment import experiment_chooser
 from server.jobs.shared_workers import SharedWorkers
 
 
@@ -99,3 +103,25 @@ def test_an_executor_is_opened_once_and_given_up_once() -> None:
     assert workers.executor("long") is second
     workers.abandon()
     assert opened[1].ended
+
+
+def _told(mailbox: Mailbox) -> tuple[float, str] | None:
+    reported: Reported | None = mailbox.reported()
+    return None if reported is None else (reported.fraction, reported.text)
+
+
+def test_the_beginning_of_something_long_is_told_however_soon_it_comes(tmp_path: Path) -> None:
+    mailbox = Mailbox(tmp_path)
+    mailbox.tell(0.5, "comparing")
+    mailbox.tell(0.9, "compared")
+    assert _told(mailbox) == (0.5, "comparing")
+    mailbox.tell(0.94, "locating", at_once=True)
+    assert _told(mailbox) == (0.94, "locating")
+
+
+def test_a_motion_is_searched_for_only_where_that_is_asked_for() -> None:
+    machine = load_machine("ma2000")
+    usual, designing = experiment_chooser(machine, 30.0), experiment_chooser(machine, design=True)
+    assert (usual.search, usual.budget) == (None, 30.0)
+    assert designing.search is not None
+    assert designing.experiments == usual.experiments

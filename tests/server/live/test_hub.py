@@ -1,4 +1,4 @@
-"""When the hub hands messages to clients: at once to a few, with the next sample to many."""
+"""When the hub hands messages to clients: at once to a few, with the next sample to many, and at an end."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -6,10 +6,12 @@ from collections.abc import Awaitable, Callable
 import pytest
 
 from daq.contracts.service.live import TeachingMessage, Topic
+from daq.contracts.service.robot import RobotStatus
 from daq.owner.messages import LiveSample
 from server.live.history import History
 from server.live.hub import MANY, Client, Hub
 from server.live.outbox import Outbox
+from server.live.waiting import when_ended
 from tests.server.clocks import HandClock
 
 TOPICS: set[Topic] = {"samples", "teaching"}
@@ -81,3 +83,28 @@ def test_many_watchers_get_messages_in_time_without_a_sample() -> None:
                 client.something.clear()
 
     _with_hub(MANY, watch)
+
+
+def _no_status() -> RobotStatus:
+    raise AssertionError("nobody asks for it")
+
+
+def test_whoever_waits_is_answered_when_the_service_ends() -> None:
+    async def waited() -> list[str]:
+        hub, looked = Hub(HandClock(), History(6, 0.02, 1.0), _no_status), asyncio.Event()
+        loop = asyncio.get_running_loop()
+
+        def look() -> str:
+            loop.call_soon_threadsafe(looked.set)
+            return "running"
+
+        def is_done(state: str) -> bool:
+            return state == "done"
+
+        begun = asyncio.create_task(when_ended(hub, {"jobs"}, look, is_done, 3600.0))
+        await looked.wait()
+        assert hub.clients == 0  # nobody watches
+        hub.end_waiting()
+        return [await begun, await when_ended(hub, {"jobs"}, look, is_done, 3600.0)]
+
+    assert asyncio.run(waited()) == ["running", "running"]

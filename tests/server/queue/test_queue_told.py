@@ -26,6 +26,7 @@ def test_what_becomes_of_an_experiment_is_told_with_its_number_and_whoever_asked
     bench.queue.start()
     bench.queue.resume("anna", moves_real_arm=False)
     bench.until(lambda event: event == "experiment: completed")
+    assert bench.request["moves_real_arm"] is False  # nobody has given a word for this arm, which is simulated
     assert bench.records == [
         ("queue: paused: for a look", "anna", None),
         ("experiment: queued", "anna", made.id),
@@ -70,7 +71,7 @@ def test_a_queue_with_nothing_to_do_is_open_and_the_database_knows_it(bench: Ben
     assert (kept.paused, kept.reason, kept.since) == (False, line, bench.clock.utc())
 
 
-def test_the_first_reason_stays_unless_a_person_gives_another(bench: Bench) -> None:
+def test_the_first_reason_stays_unless_a_person_gives_another_or_resumes_the_queue(bench: Bench) -> None:
     bench.queue.pause("the first")
     begun = bench.clock.utc()
     bench.clock.turn(5)
@@ -82,10 +83,6 @@ def test_the_first_reason_stays_unless_a_person_gives_another(bench: Bench) -> N
     assert (status.reason, status.since) == ("a look", begun + timedelta(seconds=5))
     assert bench.events == ["queue: paused: the first", "queue: paused: a look"]
     assert bench.queues.get("ma2000").reason == "a look"
-
-
-def test_who_resumed_the_queue_is_its_reason(bench: Bench) -> None:
-    bench.queue.pause("a look", "anna")
     bench.clock.turn(5)
     bench.queue.resume("bert", moves_real_arm=False)
     status = bench.queue.status()
@@ -175,15 +172,12 @@ def test_reports_of_the_owner_reach_the_queue(bench: Bench) -> None:
     assert bench.queue.status().reason == f"the link to the robot was lost: {LOOK}"
 
 
-def test_a_robot_that_is_connected_while_work_waits_pauses_the_queue(bench: Bench) -> None:
+def test_a_robot_that_is_connected_pauses_the_queue_only_while_work_waits(bench: Bench) -> None:
+    bench.queue.on_report(OPENED)
+    assert not bench.queue.status().paused
     bench.submit()
     bench.queue.on_report(OPENED)
     assert bench.queue.status().reason == f"the robot was connected while 1 experiment waited: {LOOK}"
-
-
-def test_connecting_with_nothing_waiting_pauses_nothing(bench: Bench) -> None:
-    bench.queue.on_report(OPENED)
-    assert not bench.queue.status().paused
 
 
 def test_an_event_of_the_robot_makes_the_queue_look_again(bench: Bench) -> None:
@@ -210,32 +204,18 @@ def test_people_know_an_experiment_by_its_name_or_its_kind(bench: Bench, spec: E
     bench.until(lambda event: event == f"queue: paused: {name} failed (): {LOOK}")
 
 
-def test_the_arm_is_asked_for_what_was_submitted_under_the_word_that_was_given(bench: Bench) -> None:
+def test_the_arm_is_asked_for_what_was_submitted_under_the_word_that_was_given_which_nobody_else_takes_back(
+    bench: Bench,
+) -> None:
     bench.robot.identity, bench.answer = REAL, done()
     bench.queue.resume("anna", moves_real_arm=True)
+    bench.queue.resume("bert", moves_real_arm=False)
     bench.queue.start()
     made = bench.submit()
     bench.until(lambda event: event == "experiment: completed")
     number = bench.experiments.trace_number(made.id)
     asked = {name: bench.request[name] for name in ("spec", "trace_id", "moves_real_arm", "asked")}
     assert asked == {"spec": SPEC, "trace_id": number, "moves_real_arm": True, "asked": bench.clock.monotonic()}
-
-
-def test_a_second_person_who_resumes_does_not_take_back_the_word_of_the_first(bench: Bench) -> None:
-    bench.robot.identity, bench.answer = REAL, done()
-    bench.queue.resume("anna", moves_real_arm=True)
-    bench.queue.resume("bert", moves_real_arm=False)
-    bench.queue.start()
-    bench.submit()
-    bench.until(lambda event: event == "experiment: completed")
-
-
-def test_without_anybody_s_word_a_simulated_arm_is_asked_all_the_same(bench: Bench) -> None:
-    bench.answer = done()
-    bench.queue.start()
-    bench.submit()
-    bench.until(lambda event: event == "experiment: completed")
-    assert bench.request["moves_real_arm"] is False
 
 
 def test_a_stopped_arm_is_named_to_whoever_wants_to_resume(bench: Bench) -> None:

@@ -23,8 +23,14 @@ def _running(bench: Bench) -> str:
     return made.id
 
 
-def test_only_the_one_that_runs_has_its_progress(bench: Bench) -> None:
+def test_what_runs_shows_itself_and_its_progress_only_while_it_runs(bench: Bench) -> None:
+    bench.queue.progressed(0.5, "nothing runs yet")
+    waiting = bench.submit()
+    assert bench.queue.with_progress(waiting) == waiting
+    bench.queue.cancel(waiting.id, "anna")
+    assert bench.queue.running is None
     identity = _running(bench)
+    assert bench.robot.experiment == identity
     waiting = bench.submit()
     bench.queue.progressed(0.25, "moving")
     shown = bench.queue.with_progress(bench.experiments.get("ma2000", identity))
@@ -32,13 +38,15 @@ def test_only_the_one_that_runs_has_its_progress(bench: Bench) -> None:
     assert bench.queue.with_progress(waiting) == waiting
     status = bench.queue.status()
     assert (status.running, status.queued, status.waiting_for, status.paused) == (identity, 1, "", False)
-
-
-def test_progress_without_a_run_is_nobody_s(bench: Bench) -> None:
-    bench.queue.progressed(0.25, "moving")
-    made = bench.submit()
-    assert bench.queue.with_progress(made) == made
-    assert bench.queue.running is None
+    bench.queue.cancel(waiting.id, "anna")
+    shown = bench.queue.cancel(identity, "anna")
+    assert (shown.id, shown.state) == (identity, "running")
+    bench.asked.set_result(done())
+    bench.until(lambda event: event.startswith("experiment: completed"))
+    ended = bench.experiments.get("ma2000", identity)
+    assert bench.queue.with_progress(ended) == ended
+    bench.queue.close(10)
+    assert (bench.robot.experiment, bench.queue.running, bench.queue.status().running) == (None, None, None)
 
 
 def test_cancelling_the_one_that_runs_stops_the_arm_and_is_its_reason(bench: Bench) -> None:
@@ -87,14 +95,6 @@ def test_a_run_that_the_end_of_the_service_stops_was_lost(bench: Bench) -> None:
     bench.queue.close(10)
     ended = bench.experiments.get("ma2000", identity)
     assert (ended.state, ended.reason) == ("interrupted", "the service was shut down while this ran")
-
-
-def test_a_stop_by_somebody_else_keeps_its_own_reason(bench: Bench) -> None:
-    identity = _running(bench)
-    bench.asked.set_result(STOPPED)
-    bench.until(lambda event: event.startswith("queue: paused"))
-    assert bench.experiments.get("ma2000", identity).reason == "the arm has been stopped"
-    assert bench.orders == []
 
 
 def test_a_run_that_ends_well_lets_the_next_begin(bench: Bench) -> None:
@@ -172,14 +172,6 @@ def test_an_end_that_is_written_already_is_not_written_again(bench: Bench) -> No
     assert bench.experiments.get("ma2000", following.id).state == "done"
 
 
-def test_a_run_that_left_no_whole_trace_is_looked_for(bench: Bench) -> None:
-    bench.answer = Answer(number=1, problem="the disk is full", exit_code=5)
-    bench.submit()
-    bench.queue.start()
-    bench.until(lambda event: event.startswith("queue: paused"))
-    assert bench.looked_for_traces == 1
-
-
 def test_one_that_was_refused_left_no_trace_and_holds_nothing(bench: Bench) -> None:
     made, following = bench.submit(), bench.submit()
     bench.queue.start()
@@ -187,19 +179,6 @@ def test_one_that_was_refused_left_no_trace_and_holds_nothing(bench: Bench) -> N
     assert bench.looked_for_traces == 0
     assert [bench.experiments.get("ma2000", each.id).state for each in (made, following)] == ["failed", "failed"]
     assert not bench.queue.status().paused
-
-
-def test_what_runs_shows_itself_only_while_it_runs(bench: Bench) -> None:
-    identity = _running(bench)
-    assert bench.robot.experiment == identity
-    shown = bench.queue.cancel(identity, "anna")
-    assert (shown.id, shown.state) == (identity, "running")
-    bench.asked.set_result(done())
-    bench.until(lambda event: event.startswith("experiment: completed"))
-    ended = bench.experiments.get("ma2000", identity)
-    assert bench.queue.with_progress(ended) == ended
-    bench.queue.close(10)
-    assert (bench.robot.experiment, bench.queue.running, bench.queue.status().running) == (None, None, None)
 
 
 def test_a_service_that_ends_begins_nothing_more(bench: Bench) -> None:

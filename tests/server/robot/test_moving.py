@@ -1,6 +1,12 @@
 """Moving the arm by hand through the service: only with the control, and never past a stop."""
 
-from tests.server.polling import until
+import json
+import socket
+from typing import Any
+
+import httpx
+
+from tests.server.polling import reset, until
 from tests.server.service import Service
 
 
@@ -39,17 +45,6 @@ def test_one_client_has_the_control_at_a_time_and_gives_it_back(service: Service
     assert service.robot.put("/control", headers=mine).json()["type"] == "/api/v1/problems#control-lost"
 
 
-def test_a_step_moves_the_arm_by_what_was_asked(service: Service) -> None:
-    mine = _lease(service)
-    before = service.status()["sample"]["set_point"][0]
-    answer = service.robot.post("/teaching/step", json={"by": {"1": 0.05}}, headers=mine)
-    assert answer.status_code == 202, answer.text
-    assert _until_taught(service)["result"] == "done: 1 instructions"
-    after = service.status()["sample"]["set_point"][0]
-    assert abs(after - before - 0.05) < 0.006
-    service.robot.delete("/control", headers=mine)
-
-
 def test_a_jog_ends_when_the_control_is_given_back(service: Service) -> None:
     mine = _lease(service)
     answer = service.robot.post("/teaching/jog", json={"velocities": {"2": -0.1}}, headers=mine)
@@ -71,38 +66,71 @@ def test_a_stop_ends_a_jog_and_no_other_begins_before_a_reset(service: Service) 
     service.robot.delete("/control", headers=mine)
 
 
-def test_jogging_too_fast_or_a_joint_that_is_not_there_is_refused(service: Service) -> None:
+def test_jogging_too_fast_or_a_joint_or_an_output_that_is_not_there_is_refused(service: Service) -> None:
     mine = _lease(service)
     for velocities in ({"1": 2.0}, {"9": 0.1}, {"1": 1e9}):
         answer = service.robot.post("/teaching/jog", json={"velocities": velocities}, headers=mine)
         assert answer.status_code == 422, answer.text
+    assert service.robot.put("/process/outputs/8", json={"on": True}, headers=mine).status_code == 422
     service.robot.delete("/control", headers=mine)
 
 
-def test_process_signals_gains_and_gripper(service: Service) -> None:
-    mine = _lease(service)
-    try:
-        assert service.robot.put("/process/outputs/3", json={"on": True}, headers=mine).json()["outputs"][3] is True
-        assert service.robot.put("/gripper", json={"closed": True}, headers=mine).json()["gripper"] == "closed"
-        assert service.robot.get("/process").json()["gripper"] == "closed"
-        gains = service.robot.put("/gains", json={"gains": {"6": [3, 0, 0]}}, headers=mine)
-        assert gains.json()["gains"]["6"] == [3, 0, 0], gains.text
-        assert service.robot.get("/gains").json() == gains.json()
-        assert service.robot.put("/gains", json={"gains": {"6": [2, 0, 0]}}, headers=mine).status_code == 200
-        assert service.robot.put("/process/outputs/8", json={"on": True}, headers=mine).status_code == 422
-    finally:
-        service.robot.delete("/control", headers=mine)
+# ---- an order counts from its first byte
 
 
-def test_an_experiment_waits_while_a_client_has_the_control_and_then_for_a_person(service: Service) -> None:
-    mine = _lease(service)
-    spec = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1], "settle": 0, "hold": 0}
-    made = service.robot.post("/experiments", json={"spec": spec}).json()
-    waiting_for = until(service.robot, "/queue", lambda queue: queue["waiting_for"])["waiting_for"]
-    assert waiting_for == "somebody has control of the robot"
-    service.robot.delete("/control", headers=mine)
-    queue = service.robot.get("/queue").json()
-    line = "local gave control back while 1 experiment waited: look at the arm, then resume the queue"
-    assert (queue["paused"], queue["reason"]) == (True, line)
-    service.robot.post("/queue/resume", json={})
-    assert service.end_of(made["id"])["state"] == "done"
+AT_ONCE = 40
+"""Number of resets that wait at the same time: as many as the service has threads."""
+
+
+class HalfSent:
+    """A request without its last byte, which `end` sends."""
+
+    def __init__(self, service: Service, method: str, path: str, body: dict[str, Any], lease: str = "") -> None:
+        address, content = httpx.URL(service.url), json.dumps(body).encode()
+        self._last = content[-1:]
+        self._socket = socket.create_connection((address.host, address.port or 0), timeout=60)
+        head = (
+            f"{method} /api/v1/robots/ma2000{path} HTTP/1.1\r\nHost: {address.host}:{address.port}\r\n"
+            f"Content-Type: application/json\r\nContent-Length: {len(content)}\r\nConnection: close\r\n"
+        )
+        self._socket.sendall(f"{head}Control-Lease: {lease}\r\n\r\n".encode() + content[:-1])
+
+    def end(self) -> tuple[int, dict[str, Any]]:
+        """Status and content of the answer."""
+        with self._socket as connection:
+            connection.sendall(self._last)
+            answer = b"".join(iter(lambda: connection.recv(65536), b""))
+        head, _, content = answer.partition(b"\r\n\r\n")
+        return int(head.split()[1]), json.loads(content)
+
+
+def test_what_was_begun_before_a_stop_changes_nothing_after_it(service: Service) -> None:
+    before = service.robot.get("/process").json()
+    lease = service.robot.post("/control", json={}).json()["lease"]
+    assert service.robot.post("/stop").json()["confirmed"]
+    address = str(service.robot.base_url).rstrip("/")
+    seen = until(service.client, address, lambda found: found["stop"] is not None)["stop"]
+    orders: list[tuple[str, str, dict[str, Any]]] = [
+        *[("POST", "/reset", {"stop": seen, "here": bool(n % 2)}) for n in range(AT_ONCE)],
+        ("PUT", "/gripper", {"closed": True, "while_stopped": True}),
+        ("PUT", "/process/outputs/3", {"on": True, "while_stopped": True}),
+        ("PUT", "/gains", {"gains": {"1": [2, 0, 0]}}),
+        ("POST", "/teaching/jog", {"velocities": {"1": 0.1}}),
+        ("POST", "/teaching/step", {"by": {"1": 0.1}}),
+    ]
+    begun = [HalfSent(service, *order, lease) for order in orders]
+    resume = HalfSent(service, "POST", "/queue/resume", {})
+    assert httpx.get(f"{service.url}/healthz", timeout=60).status_code == 200  # the service has read them all
+    beside = service.client.get("/system").json()["stop_port"]
+    stopped = httpx.post(f"http://127.0.0.1:{beside}/api/v1/robots/ma2000/stop", timeout=60).json()
+    assert stopped["confirmed"], stopped
+    for order, one in zip(orders, begun, strict=True):
+        status, answer = one.end()
+        assert status in (409, 503), (order, answer)  # 503: on a busy computer its time was over
+    assert service.robot.get("/process").json() == before
+    assert service.until_arm("stopped")["arm"] == "stopped"
+    headers = {"Control-Lease": service.robot.post("/control", json={}).json().get("lease", lease)}
+    assert reset(service.robot, headers=headers).status_code == 200
+    assert resume.end()[0] == 200
+    assert "stop" in service.until_paused()["reason"]
+    service.robot.delete("/control", headers=headers)

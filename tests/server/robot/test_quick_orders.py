@@ -56,11 +56,8 @@ def test_what_cannot_be_done_between_samples_is_refused_before_it_is_asked_for(a
     assert (refused.value.status, refused.value.kind) == (409, "arm-busy")
     assert activity in refused.value.detail
     assert asked.orders == []
-
-
-def test_an_experiment_of_the_queue_counts_before_its_owner_reports_it() -> None:
-    asked = Asked()
-    asked.robot.experiment = "77be01d3aa42"
+    asked.does("none")
+    asked.robot.experiment = "77be01d3aa42"  # of the queue: it counts before its owner reports it
     with pytest.raises(ProblemError, match="the arm is busy: experiment"):
         answer_of(asked.robot, Reset, NOW, stop=1, here=False)
 

@@ -9,8 +9,8 @@ import struct
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,7 +34,7 @@ from server.access.tokens import KnownTokens, TokenStore
 from server.problems import ProblemError
 from server.serve import ListenError, listening
 from server.stopping.door import StopDoor
-from server.stopping.listener import StopListener
+from server.stopping.listener import OnStop, Stop, StopListener
 from server.stopping.messages import Begin
 from server.stopping.tokens import UNKNOWN_FOR, StopTokens, reader_of
 from server.store.engine import Store
@@ -174,6 +174,17 @@ def _beside(service: Service) -> str:
     return f"http://127.0.0.1:{found}/api/v1/robots/ma2000"
 
 
+@contextmanager
+def listener_of(folder: Path, stops: dict[str, Stop], told: OnStop) -> Iterator[Any]:
+    """A listener without a service, of robots that are stopped so. Its address."""
+    with (
+        closing(Store(f"sqlite:///{folder / 'service.sqlite'}")) as store,
+        socket.create_server(("127.0.0.1", 0)) as door,
+        closing(StopListener(door, StopGate(KnownTokens(TokenStore(store), HandClock()), True, (), 8300), stops, told)),
+    ):
+        yield door.getsockname()
+
+
 def test_the_listener_stops_and_does_nothing_else(service: Service) -> None:
     base = _beside(service)
     answer = httpx.post(f"{base}/stop", timeout=30)
@@ -220,6 +231,8 @@ def test_a_head_too_large_is_refused_at_once(service: Service, head: bytes, stat
 
 def test_the_services_own_page_may_ask_the_listener_and_no_other_page(service: Service) -> None:
     base = _beside(service)
+    policy = service.client.get("/robots").headers["Content-Security-Policy"]
+    assert f"connect-src 'self' {base.partition('/api')[0]};" in policy
     own = {"Origin": service.url, "Sec-Fetch-Site": "same-site"}
     answer = httpx.post(f"{base}/stop", headers=own, timeout=30)
     assert answer.json()["confirmed"] is True
@@ -234,21 +247,12 @@ def test_the_services_own_page_may_ask_the_listener_and_no_other_page(service: S
     assert (named.status_code, named.json()["type"]) == (403, "/api/v1/problems#unknown-name")
 
 
-def test_the_page_is_told_that_it_may_connect_there(service: Service) -> None:
-    port = service.client.get("/system").json()["stop_port"]
-    policy = service.client.get("/robots").headers["Content-Security-Policy"]
-    assert f"connect-src 'self' http://127.0.0.1:{port};" in policy
-
-
 def test_a_silent_client_or_a_crowd_of_them_keeps_nobody_from_stopping(service: Service) -> None:
     port = service.client.get("/system").json()["stop_port"]
-    crowd = [socket.create_connection(("127.0.0.1", port)) for _ in range(40)]
-    try:
-        with Client(service.url) as client:
-            assert client.robot("ma2000").stop().confirmed
-    finally:
-        for connection in crowd:
-            connection.close()
+    with ExitStack() as crowd, Client(service.url) as client:
+        for _ in range(40):
+            crowd.enter_context(socket.create_connection(("127.0.0.1", port)))
+        assert client.robot("ma2000").stop().confirmed
 
 
 def test_whoever_does_not_ask_in_time_keeps_no_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -260,17 +264,13 @@ def test_whoever_does_not_ask_in_time_keeps_no_place(tmp_path: Path, monkeypatch
 
     monkeypatch.setattr("server.stopping.listener.READ_WITHIN", 1000.0)
     monkeypatch.setattr("server.stopping.listener.time", SimpleNamespace(monotonic=later_at_every_look))
-    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    gate = StopGate(KnownTokens(TokenStore(store), clock), True, (), 8300)
-    with socket.create_server(("127.0.0.1", 0)) as door:
-        address = door.getsockname()
-        listener = StopListener(door, gate, {}, lambda *_: None)
-        with socket.create_connection(address, timeout=60) as slow:
-            slow.sendall(b"POST ")
-            while slow.recv(4096):  # what it has sent is no request
-                pass
-        listener.close()
-    store.close()
+    with (
+        listener_of(tmp_path, {}, lambda *_: None) as address,
+        socket.create_connection(address, timeout=60) as slow,
+    ):
+        slow.sendall(b"POST ")
+        while slow.recv(4096):  # what it has sent is no request
+            pass
 
 
 def test_viewers_may_stop_and_strangers_may_not(tmp_path: Path) -> None:
@@ -382,8 +382,13 @@ def test_an_old_cookie_refuses_no_stop_that_needs_no_token(tmp_path: Path) -> No
             StopGate(unread, False, (), 8300).admit(stale)
 
 
-def _begin(folder: Path) -> Begin:
-    return Begin(
+@contextmanager
+def _door(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, *times: float
+) -> Iterator[tuple[StopDoor, Callable[..., httpx.Response]]]:
+    """A listener in a process of its own, and what asks it for a stop, with a token or without."""
+    monkeypatch.setenv(FOLDER_VARIABLE, str(folder / "run"))
+    begin = Begin(
         descriptor=-1,
         service_port=8300,
         open_on_loopback=True,
@@ -393,23 +398,27 @@ def _begin(folder: Path) -> Begin:
         database_url="sqlite://",
         sqlite=folder / "none.sqlite",
     )
+    with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, begin, *times)) as door:
+        address = f"http://127.0.0.1:{listener.getsockname()[1]}/api/v1/robots/ma2000/stop"
+
+        def stop(token: str | None = None) -> httpx.Response:
+            headers = {"Authorization": f"Bearer {token}"} if token else {}
+            return httpx.post(address, headers=headers, timeout=60)
+
+        yield door, stop
 
 
 def test_a_listener_that_is_killed_is_started_again_and_whoever_asks_meanwhile_waits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "run"))
-    begin = _begin(tmp_path)
-    with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, begin)) as door:
-        stop = f"http://127.0.0.1:{listener.getsockname()[1]}/api/v1/robots/ma2000/stop"
-        assert "no robot is connected" in httpx.post(stop, timeout=60).json()["text"]
+    with _door(tmp_path, monkeypatch) as (door, stop):
+        assert "no robot is connected" in stop().json()["text"]
         os.kill(door.pid, signal.SIGKILL)
-        unread = httpx.post(stop, headers={"Authorization": "Bearer daq_x"}, timeout=60)
+        unread = stop("daq_x")
         assert (unread.status_code, unread.json()["type"]) == (503, "/api/v1/problems#database")
         door.set_tokens({digest_of("daq_x"): Caller("anna", "viewer", digest_of("daq_x"))})
         os.kill(door.pid, signal.SIGKILL)
-        known = httpx.post(stop, headers={"Authorization": "Bearer daq_x"}, timeout=60)
-        assert "no robot is connected" in known.json()["text"]
+        assert "no robot is connected" in stop("daq_x").json()["text"]
         last = door.pid
     with pytest.raises(ProcessLookupError):
         os.kill(last, 0)
@@ -418,13 +427,11 @@ def test_a_listener_that_is_killed_is_started_again_and_whoever_asks_meanwhile_w
 def test_a_listener_that_is_started_again_knows_who_signed_in_and_not_who_left(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "run"))
-    with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, _begin(tmp_path))) as door:
-        stop = f"http://127.0.0.1:{listener.getsockname()[1]}/api/v1/robots/ma2000/stop"
+    with _door(tmp_path, monkeypatch) as (door, stop):
         anna, bert = (Caller(name, "viewer", digest_of(f"daq_{name}")) for name in ("anna", "bert"))
 
         def answer(name: str) -> int:
-            return httpx.post(stop, headers={"Authorization": f"Bearer daq_{name}"}, timeout=60).status_code
+            return stop(f"daq_{name}").status_code
 
         door.set_tokens({digest_of("daq_token"): Caller("token", "viewer"), digest_of("daq_bert"): bert})
         for caller in (anna, bert):
@@ -444,8 +451,7 @@ def test_a_listener_that_is_started_again_knows_who_signed_in_and_not_who_left(
 def test_a_listener_that_cannot_be_started_again_at_once_is_started_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "run"))
-    begin, refused, popen = _begin(tmp_path), [1, 2], subprocess.Popen
+    refused, popen = [1, 2], subprocess.Popen
 
     def seldom(*words: Any, **options: Any) -> Any:
         if refused:
@@ -453,43 +459,33 @@ def test_a_listener_that_cannot_be_started_again_at_once_is_started_later(
             raise BlockingIOError(11, "Resource temporarily unavailable")
         return popen(*words, **options)
 
-    with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, begin, 0.01)) as door:
+    with _door(tmp_path, monkeypatch, 0.01) as (door, stop):
         door.wait_ready()
         monkeypatch.setattr("daq.child.subprocess.Popen", seldom)
         os.kill(door.pid, signal.SIGKILL)
-        stop = f"http://127.0.0.1:{listener.getsockname()[1]}/api/v1/robots/ma2000/stop"
-        assert "no robot is connected" in httpx.post(stop, timeout=60).json()["text"]
+        assert "no robot is connected" in stop().json()["text"]
         assert refused == []
 
 
 def test_a_stop_is_told_though_whoever_asked_has_gone(tmp_path: Path) -> None:
-    clock, heard, gone = HandClock(), threading.Event(), threading.Event()
-    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")
-    gate = StopGate(KnownTokens(TokenStore(store), clock), True, (), 8300)
+    heard, gone = threading.Event(), threading.Event()
 
     def stop() -> StopResult:
         assert gone.wait(60)
         return StopResult(delivered=True, confirmed=True, tick=1, seconds=0.0, note="", text="x" * 5_000_000)
 
-    with socket.create_server(("127.0.0.1", 0)) as door:
-        listener = StopListener(door, gate, {"ma2000": stop}, lambda *_: heard.set())
-        with socket.create_connection(door.getsockname()) as line:
+    with listener_of(tmp_path, {"ma2000": stop}, lambda *_: heard.set()) as address:
+        with socket.create_connection(address) as line:
             line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
             line.sendall(b"POST /api/v1/robots/ma2000/stop HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
         gone.set()
         assert heard.wait(60)
-        listener.close()
-    store.close()
-
-
-# ---- where
 
 
 def test_the_listener_is_at_the_port_after_the_services_unless_it_is_set() -> None:
-    with listening(ServiceSettings(port=0)) as (own, stop):
-        assert stop.getsockname()[1] == own.getsockname()[1] + 1
-    with listening(ServiceSettings(port=0, stop_port=0)) as (own, stop):
-        assert stop.getsockname()[1] != own.getsockname()[1]
+    for settings, follows in ((ServiceSettings(port=0), True), (ServiceSettings(port=0, stop_port=0), False)):
+        with listening(settings) as (own, stop):
+            assert (stop.getsockname()[1] == own.getsockname()[1] + 1) is follows
 
 
 def test_a_service_whose_stop_cannot_be_listened_for_does_not_start() -> None:

@@ -158,9 +158,6 @@ def test_a_backup_is_advised_against_damage_alone(code: int, restore: bool) -> N
     own = sqlite3.OperationalError("in SQLite's words")
     own.sqlite_errorcode = code
     assert ("daq restore" in advice_of(DatabaseError("SELECT 1", None, own))) is restore
-
-
-def test_no_backup_is_advised_where_another_database_fails() -> None:
     assert advice_of(DatabaseError("SELECT 1", None, RuntimeError("deadlock detected"))).startswith("try again")
 
 

@@ -1,6 +1,6 @@
-"""The database: catalogue and cursors do what they say."""
+"""The database: catalogue and cursors do what they say, each robot's rows its own."""
 
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -17,11 +17,16 @@ from server.store.address import address_of
 from server.store.engine import Store, StoreError
 from server.store.experiments import ExperimentStore
 from server.store.lock import sqlite_file
+from server.store.models import ModelStore, NewModel
 from server.store.pages import Cursor
 from server.store.traces import TraceSearch, TraceStore
-from tests.server.store.rows import new_trace
+from tests.server.store.rows import NOW, new_trace
 
-NOW = datetime(2026, 1, 1, tzinfo=UTC)
+
+def _found(traces: TraceStore, **search: object) -> list[int]:
+    """The numbers of the traces that a search finds."""
+    page = traces.page("ma2000", TraceSearch(**search), None, 10)  # type: ignore[arg-type]
+    return [int(one.id, 16) for one in page.items]
 
 
 def test_nobody_else_may_read_the_database(sqlite_store: Store, tmp_path: Path) -> None:
@@ -139,29 +144,26 @@ def test_search_finds_what_it_is_asked_for_and_takes_nothing_as_a_pattern(store:
     traces.insert(new_trace(1, notes="Loose BELT at 100%"))
     traces.insert(new_trace(2, name="belt_test", kind="sine"))
     traces.insert(new_trace(3, outcome="fault"))
-
-    def found(**search: object) -> list[int]:
-        page = traces.page("ma2000", TraceSearch(**search), None, 10)  # type: ignore[arg-type]
-        return [int(one.id, 16) for one in page.items]
-
-    assert found() == [3, 2, 1]
-    assert found(text="belt") == [2, 1]
-    assert found(text="100%") == [1]
-    assert found(text="%") == [1]
-    assert found(text="belt_") == [2]
-    assert found(text="'; DROP TABLE traces; --") == []
-    assert found(text='"belt" OR loose') == []
-    assert found(text="\0\0\0") == []
-    assert found(tag="\0") == []
-    assert found(text="elt") == [2, 1]
-    assert found(text="lt") == [3, 2, 1]
-    assert found(outcome="fault") == [3]
-    assert found(kind="sine") == [2]
-    assert found(since=NOW + timedelta(seconds=2)) == [3, 2]
     traces.change("ma2000", f"{3:012x}", TraceChange(tags=("wear", "wear", "week 2")))
-    assert found(tag="wear") == [3]
-    assert found(text="WEEK") == [3]
     assert traces.get("ma2000", f"{3:012x}").tags == ("wear", "week 2")
+    for searched, numbers in (
+        (None, [3, 2, 1]),
+        ("belt", [2, 1]),
+        ("100%", [1]),
+        ("%", [1]),
+        ("belt_", [2]),
+        ("'; DROP TABLE traces; --", []),
+        ('"belt" OR loose', []),
+        ("\0\0\0", []),
+        ("elt", [2, 1]),
+        ("lt", [3, 2, 1]),
+        ("WEEK", [3]),
+    ):
+        assert _found(traces, text=searched) == numbers, searched
+    assert _found(traces, outcome="fault") == _found(traces, tag="wear") == [3]
+    assert _found(traces, kind="sine") == [2]
+    assert _found(traces, tag="\0") == []
+    assert _found(traces, since=NOW + timedelta(seconds=2)) == [3, 2]
 
 
 def test_a_file_that_is_gone_is_marked_and_comes_back(store: Store) -> None:
@@ -173,26 +175,25 @@ def test_a_file_that_is_gone_is_marked_and_comes_back(store: Store) -> None:
     assert not traces.get("ma2000", f"{1:012x}").missing
 
 
-def test_the_spec_comes_back_as_it_was_submitted(store: Store) -> None:
-    experiments = ExperimentStore(store)
+def test_a_spec_and_long_notes_come_back_as_they_were_given(store: Store) -> None:
+    experiments, traces = ExperimentStore(store), TraceStore(store)
     spec = ExperimentSpec.model_validate({"trajectory": {"kind": "sine", "amplitude": {1: 0.1}}, "joints": [1]})
     made, _ = experiments.submit("ma2000", ExperimentRequest(spec=spec), NOW, "anna")
     assert experiments.get("ma2000", made.id).spec == spec
+    notes = "".join(chr(33 + number * 7919 % 90) for number in range(20_000))  # no two parts are alike: nothing to pack
+    traces.insert(new_trace(1, notes=notes))
+    assert traces.get("ma2000", f"{1:012x}").notes == notes
 
 
 def test_the_search_follows_every_change_of_a_text(store: Store) -> None:
     traces = TraceStore(store)
     traces.insert(new_trace(1, notes="brass bush"))
     traces.insert(new_trace(2, notes="brass ring"))
-
-    def found(searched: str) -> list[int]:
-        return [int(one.id, 16) for one in traces.page("ma2000", TraceSearch(text=searched), None, 10).items]
-
-    assert found("brass") == [2, 1]
+    assert _found(traces, text="brass") == [2, 1]
     traces.change("ma2000", f"{1:012x}", TraceChange(notes="steel bush"))
-    assert (found("brass"), found("steel")) == ([2], [1])
+    assert (_found(traces, text="brass"), _found(traces, text="steel")) == ([2], [1])
     traces.remove("ma2000", f"{2:012x}")
-    assert (found("brass"), found("ring")) == ([], [])
+    assert (_found(traces, text="brass"), _found(traces, text="ring")) == ([], [])
 
 
 def test_texts_are_found_in_the_order_of_the_list_page_by_page(store: Store) -> None:
@@ -205,11 +206,30 @@ def test_texts_are_found_in_the_order_of_the_list_page_by_page(store: Store) -> 
         seen += [int(one.id, 16) for one in page.items]
         cursor = page.next
     assert seen == [7, 6, 4, 3, 1, 0]
-    assert [int(one.id, 16) for one in traces.page("ma2000", TraceSearch(text="rare"), None, 10).items] == [5, 2]
+    assert _found(traces, text="rare") == [5, 2]
 
 
-def test_a_trace_with_long_notes_is_kept(store: Store) -> None:
+def test_the_same_model_belongs_to_each_robot_and_its_file_to_the_last(store: Store) -> None:
+    models = ModelStore(store)
+    left, right = (
+        NewModel("m1", robot, f"of {robot}", "m1.json", NOW, "anna", None, None, ("000000000001",))
+        for robot in ("left", "right")
+    )
+    assert [models.insert(one, lambda: None) for one in (left, right, right)] == [True, True, False]
+    assert (models.get("left", "m1").name, models.get("right", "m1").name) == ("of left", "of right")
+    deleted: list[str] = []
+    models.remove("left", "m1", deleted.append)
+    assert deleted == []
+    assert models.get("right", "m1").traces == ("000000000001",)
+    models.remove("right", "m1", deleted.append)
+    assert deleted == ["m1.json"]
+
+
+def test_files_of_one_robot_are_not_missing_in_the_folder_of_another(store: Store) -> None:
     traces = TraceStore(store)
-    notes = "".join(chr(33 + number * 7919 % 90) for number in range(20_000))  # no two parts are alike: nothing to pack
-    traces.insert(new_trace(1, notes=notes))
-    assert traces.get("ma2000", f"{1:012x}").notes == notes
+    traces.insert(new_trace(1, robot="left"))
+    traces.insert(new_trace(2, robot="right"))
+    assert traces.files("left") == {"1.mcap"}
+    traces.mark_missing("left", {"1.mcap", "2.mcap"}, missing=True)
+    assert traces.get("left", f"{1:012x}").missing
+    assert not traces.get("right", f"{2:012x}").missing

@@ -64,10 +64,7 @@ def test_an_experiment_is_run_while_it_fits_into_the_remaining_robot_time() -> N
     assert next_to_run(answered(asked(8.1)), [run(7.0), run(5.0)], 20.0) is None
     assert time_left([run(7.0), run(5.0, "stopped")], 20.0) == 8.0
     assert next_to_run(answered(None), [], 20.0) is None
-
-
-def test_an_uncertain_name_is_followed_by_an_experiment() -> None:
-    assert next_to_run(answered(asked(8.0), "named"), [], 20.0) == asked(8.0)
+    assert next_to_run(answered(asked(8.0), "named"), [], 20.0) == asked(8.0), "an uncertain name"
 
 
 @pytest.mark.parametrize("outcome", ["stopped", "fault", "interrupted"])

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from daq.contracts.experiment import ExperimentSpec, Ramp
 from daq.contracts.machine import load_machine
 from mock_controller.hidden.experiment import read_experiment
 from model.trial.arms import compose
 from tests.daq.executors.by_hand import WorkersByHand
 from tests.daq_cli.invoke import CommandLine
 from tests.model.trial.answers import answer, step
+from tests.trials.blind.test_blind import short
 from trials.blind import sharpness
 from trials.blind.campaign import Campaign
 from trials.blind.experiments import write_experiment
@@ -25,12 +25,6 @@ from trials.blind.sharpness import rivals_wanted, work_out_sharpness
 MACHINE = load_machine("ma2000")
 SEED = compose(7654321, "single", "nominal")
 pytestmark = pytest.mark.timeout(300)
-
-
-def short(name: str) -> ExperimentSpec:
-    return ExperimentSpec(
-        trajectory=Ramp(amplitude=0.1, duration=0.3), joints=(1, 2, 3), settle=0.1, hold=0.2, name=name
-    )
 
 
 @pytest.fixture(scope="module")

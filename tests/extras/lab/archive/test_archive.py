@@ -54,6 +54,14 @@ def _drop(bench: Bench, trace: str) -> bytes:
     return content
 
 
+@pytest.fixture
+def dropped(bench: Bench) -> tuple[str, bytes]:
+    """A trace that only the archive has, and what its file was."""
+    trace = bench.trace()
+    bench.service.start()
+    return trace, _drop(bench, trace)
+
+
 def test_a_trace_is_sent_when_it_is_in_the_catalogue(bench: Bench, store: ObjectStore) -> None:
     before = bench.trace()
     bench.service.start()
@@ -69,10 +77,8 @@ def test_a_trace_is_sent_when_it_is_in_the_catalogue(bench: Bench, store: Object
     assert bench.told == []
 
 
-def test_a_dropped_trace_is_fetched_when_it_is_opened(bench: Bench) -> None:
-    trace = bench.trace()
-    bench.service.start()
-    content = _drop(bench, trace)
+def test_a_dropped_trace_is_fetched_when_it_is_opened(bench: Bench, dropped: tuple[str, bytes]) -> None:
+    trace, content = dropped
     entry = bench.traces.get(ROBOT, trace)
     assert (entry.archived, entry.local, entry.missing) == (True, False, False)
     with pytest.raises(ProblemError) as caught:
@@ -85,11 +91,9 @@ def test_a_dropped_trace_is_fetched_when_it_is_opened(bench: Bench) -> None:
 
 
 def test_a_start_after_a_drop_keeps_the_trace_and_sends_nothing_twice(
-    bench: Bench, make: Make, store: ObjectStore, proxy: FaultyStore
+    bench: Bench, dropped: tuple[str, bytes], make: Make, proxy: FaultyStore
 ) -> None:
-    trace = bench.trace()
-    bench.service.start()
-    _drop(bench, trace)
+    trace, _ = dropped
     bench.close()
     proxy.seen.clear()
     again = make(bench.service.status().place.split()[0], proxy.url)
@@ -127,10 +131,10 @@ def test_a_local_copy_stays_while_the_store_fails_and_goes_when_it_is_back(
 
 
 @pytest.mark.parametrize("fault", ["500", "refuse", "cut"])
-def test_a_fetch_waits_until_the_store_is_back(bench: Bench, proxy: FaultyStore, fault: Fault) -> None:
-    trace = bench.trace()
-    bench.service.start()
-    content = _drop(bench, trace)
+def test_a_fetch_waits_until_the_store_is_back(
+    bench: Bench, dropped: tuple[str, bytes], proxy: FaultyStore, fault: Fault
+) -> None:
+    trace, content = dropped
     proxy.fail(fault)
     bench.service.fetch(trace)
     bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
@@ -143,10 +147,8 @@ def test_a_fetch_waits_until_the_store_is_back(bench: Bench, proxy: FaultyStore,
     assert bench.path(trace).read_bytes() == content
 
 
-def test_wrong_bytes_never_become_a_trace(bench: Bench, proxy: FaultyStore) -> None:
-    trace = bench.trace()
-    bench.service.start()
-    content = _drop(bench, trace)
+def test_wrong_bytes_never_become_a_trace(bench: Bench, dropped: tuple[str, bytes], proxy: FaultyStore) -> None:
+    trace, content = dropped
     proxy.fail("wrong", "GET")
     bench.service.fetch(trace)
     bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
@@ -161,10 +163,10 @@ def test_wrong_bytes_never_become_a_trace(bench: Bench, proxy: FaultyStore) -> N
     assert bench.path(trace).read_bytes() == content
 
 
-def test_bytes_that_were_wrong_once_are_fetched_again(bench: Bench, proxy: FaultyStore) -> None:
-    trace = bench.trace()
-    bench.service.start()
-    content = _drop(bench, trace)
+def test_bytes_that_were_wrong_once_are_fetched_again(
+    bench: Bench, dropped: tuple[str, bytes], proxy: FaultyStore
+) -> None:
+    trace, content = dropped
     proxy.fail("wrong", "GET", times=1)
     bench.service.fetch(trace)
     bench.until(lambda: bench.service.of(trace).local)
@@ -268,10 +270,10 @@ def test_a_deleted_trace_is_deleted_in_the_archive_even_if_that_is_away(
     assert bench.archived.get(kept) is not None
 
 
-def test_a_fetch_without_room_says_so(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    trace = bench.trace()
-    bench.service.start()
-    _drop(bench, trace)
+def test_a_fetch_without_room_says_so(
+    bench: Bench, dropped: tuple[str, bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace, _ = dropped
     monkeypatch.setattr("extras.lab.archive.service.RESERVE", 1 << 60)
     bench.service.fetch(trace)
     bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
@@ -280,19 +282,13 @@ def test_a_fetch_without_room_says_so(bench: Bench, monkeypatch: pytest.MonkeyPa
     assert "MB are free, fetching needs" in transfer.problem
 
 
-def test_a_trace_of_the_archive_is_not_uploaded_a_second_time(bench: Bench, tmp_path: Path) -> None:
-    trace = bench.trace()
-    bench.service.start()
-    content = _drop(bench, trace)
+def test_a_trace_of_the_archive_is_not_uploaded_a_second_time_and_without_an_archive_it_says_so(
+    bench: Bench, dropped: tuple[str, bytes]
+) -> None:
+    trace, content = dropped
     other = bench.catalogue.folder / "other_name.mcap"
     other.write_bytes(content)
     assert bench.catalogue.add(other) is None
-
-
-def test_without_an_archive_a_trace_that_only_that_has_says_so(bench: Bench) -> None:
-    trace = bench.trace()
-    bench.service.start()
-    _drop(bench, trace)
     bench.catalogue.archive = None
     with pytest.raises(ProblemError) as caught:
         bench.catalogue.path_of(trace)
@@ -365,10 +361,10 @@ def test_a_trace_that_always_fails_holds_up_no_other(bench: Bench, proxy: Faulty
     bench.until(lambda: bench.service.of(bad).local)
 
 
-def test_what_failed_before_somebody_asked_is_fetched_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    trace = bench.trace()
-    bench.service.start()
-    _drop(bench, trace)
+def test_what_failed_before_somebody_asked_is_fetched_again(
+    bench: Bench, dropped: tuple[str, bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace, _ = dropped
     full = bench.clock.monotonic()
     with monkeypatch.context() as disk:
         disk.setattr("extras.lab.archive.service.RESERVE", 1 << 60)

@@ -165,3 +165,29 @@ def test_a_stop_is_answered_while_the_log_cannot_be_written_and_its_row_comes_la
         other.execute("ROLLBACK")
     while not newest(robot, action="stop_robot"):  # each answer waits a while for the rows that are noted
         pass
+
+
+# ---- the commands of docs/audit.md
+
+
+PAGE = Path(__file__).parents[4] / "docs" / "audit.md"
+
+
+def test_the_commands_of_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = [line.strip() for line in PAGE.read_text("utf-8").splitlines() if line.startswith("$ daq ")]
+    assert len(lines) == 5
+    with service_inside(tmp_path, SystemClock(), monkeypatch) as robot:
+        robot.post("stop")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "daq.toml").write_text('[server]\nfolder = "service"\n', "utf-8")
+    daq = CommandLine(capsys)
+    for line in lines:
+        assert daq(*line.removeprefix("$ daq ").split()).code == 0
+    daq("token", "add", "anna")
+    shown = daq("audit").out.splitlines()
+    assert [line.split()[4] for line in shown] == ["start_service", "stop_robot", "add_token"]
+    assert "local (127.0.0.1)" in shown[1]
+    assert "(command line)" in shown[2]
+    daq("audit", "verify", "--head", "3").complains(2, "--head '3': write NUMBER:DIGEST")

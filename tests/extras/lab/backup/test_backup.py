@@ -6,9 +6,11 @@ import shutil
 import sqlite3
 import threading
 import zipfile
+from collections.abc import Callable
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -35,9 +37,10 @@ from server.store.programs import ProgramStore
 from server.store.queues import QueueState, QueueStore
 from server.store.schema import VERSION, migrations
 from server.store.tables import TraceRow
-from server.store.traces import NewTrace, TraceStore
+from server.store.traces import TraceStore
 from tests.daq_cli.invoke import CommandLine
 from tests.server.service import Service
+from tests.server.store.rows import new_trace
 
 NOW = datetime(2026, 1, 1, 12, tzinfo=UTC)
 SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
@@ -47,9 +50,10 @@ def quietly(_fraction: float, _text: str) -> None:
     """Nobody watches."""
 
 
-def places_in(folder: Path, robot: str = "ma2000") -> Places:
-    database = folder / "service" / "service.sqlite"
-    return Places(database, {robot: folder / "traces"}, folder / "service")
+def places_in(folder: Path, *robots: str) -> Places:
+    """Of a service of one robot, or of these."""
+    traces = {name: folder / "traces" / name for name in robots} or {"ma2000": folder / "traces"}
+    return Places(folder / "service" / "service.sqlite", traces, folder / "service")
 
 
 def add_trace(store: Store, places: Places, number: str, robot: str = "ma2000") -> None:
@@ -59,24 +63,7 @@ def add_trace(store: Store, places: Places, number: str, robot: str = "ma2000") 
     part = folder / f"{number}.mcap.part"
     part.write_bytes(f"trace {number} ".encode() * 1000)
     part.replace(folder / f"{number}.mcap")
-    new = NewTrace(
-        id=number,
-        robot=robot,
-        file=f"{number}.mcap",
-        created=NOW,
-        source="mock",
-        kind="ramp",
-        name=None,
-        joints=(1,),
-        outcome="complete",
-        samples=1,
-        duration=0.0,
-        size=1,
-        operator=None,
-        experiment=None,
-        notes="",
-    )
-    TraceStore(store).insert(new)
+    TraceStore(store).insert(new_trace(1, id=number, robot=robot, file=f"{number}.mcap", created=NOW))
 
 
 def filled(folder: Path) -> Places:
@@ -257,32 +244,42 @@ def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archi
     assert sorted(before.values()) == sorted(data for name, data in after.items() if "before-restore" in name)
 
 
-def _changed(archive: Path, change: str) -> None:
+Files, Listed = dict[str, bytes], dict[str, Any]
+
+
+def _other_bytes(files: Files, _listed: Listed) -> None:
+    files["traces/bbb.mcap"] = files["traces/bbb.mcap"].replace(b"bbb", b"xxx")
+
+
+def _path_out_of_it(files: Files, listed: Listed) -> None:
+    files["../../evil.mcap"] = files.pop("traces/bbb.mcap")
+    listed["files"][2]["name"] = "../../evil.mcap"
+
+
+def _no_database(files: Files, listed: Listed) -> None:
+    del files[DATABASE]
+    listed["files"] = [entry for entry in listed["files"] if entry["name"] != DATABASE]
+
+
+WRONG: dict[str, Callable[[Files, Listed], object]] = {
+    "a file is missing": lambda files, _: files.pop("traces/bbb.mcap"),
+    "a file has other bytes": _other_bytes,
+    "a file too many": lambda files, _: files.update({"traces/ddd.mcap": b"whence?"}),
+    "another robot's": lambda _, listed: listed.update(robot="other"),
+    "a newer format": lambda _, listed: listed.update(format=2),
+    "newer tables": lambda _, listed: listed.update(revision="9999"),
+    "a path out of it": _path_out_of_it,
+    "no list": lambda files, _: files.pop(MANIFEST),
+    "no database": _no_database,
+}
+
+
+def _changed(archive: Path, change: Callable[[Files, Listed], object]) -> None:
     """Writes the backup again with something wrong in it, all checksums of the ZIP file right."""
     with zipfile.ZipFile(archive) as pack:
         files = {name: pack.read(name) for name in pack.namelist()}
     manifest = json.loads(files[MANIFEST])
-    match change:
-        case "a file is missing":
-            del files["traces/bbb.mcap"]
-        case "a file has other bytes":
-            files["traces/bbb.mcap"] = files["traces/bbb.mcap"].replace(b"bbb", b"xxx")
-        case "a file too many":
-            files["traces/ddd.mcap"] = b"whence?"
-        case "another robot's":
-            manifest["robot"] = "other"
-        case "a newer format":
-            manifest["format"] = 2
-        case "newer tables":
-            manifest["revision"] = "9999"
-        case "a path out of it":
-            files["../../evil.mcap"] = files.pop("traces/bbb.mcap")
-            manifest["files"][2]["name"] = "../../evil.mcap"
-        case "no list":
-            del files[MANIFEST]
-        case "no database":
-            del files[DATABASE]
-            manifest["files"] = [entry for entry in manifest["files"] if entry["name"] != DATABASE]
+    change(files, manifest)
     if MANIFEST in files:
         files[MANIFEST] = json.dumps(manifest).encode()
     with zipfile.ZipFile(archive, "w") as pack:
@@ -290,22 +287,9 @@ def _changed(archive: Path, change: str) -> None:
             pack.writestr(name, data)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        "a file is missing",
-        "a file has other bytes",
-        "a file too many",
-        "another robot's",
-        "a newer format",
-        "newer tables",
-        "a path out of it",
-        "no list",
-        "no database",
-    ],
-)
+@pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
 def test_what_is_not_a_whole_backup_of_this_robot_is_refused_before_anything_is_touched(
-    archive: Path, tmp_path: Path, change: str
+    archive: Path, tmp_path: Path, change: Callable[[Files, Listed], object]
 ) -> None:
     places = filled(tmp_path / "there")
     before = everything(tmp_path)
@@ -495,12 +479,7 @@ def test_the_configured_places(tmp_path: Path) -> None:
 
 
 def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> None:
-    def places_of_two(folder: Path) -> Places:
-        database = folder / "service" / "service.sqlite"
-        traces = {name: folder / "traces" / name for name in ("left", "right")}
-        return Places(database, traces, folder / "service")
-
-    here, there = places_of_two(tmp_path / "here"), places_of_two(tmp_path / "there")
+    here, there = (places_in(tmp_path / name, "left", "right") for name in ("here", "there"))
     store = Store(here.url)
     store.migrate()
     for number, robot in (("aaa", "left"), ("bbb", "right"), ("ccc", "right")):

@@ -2,6 +2,8 @@
 
 import csv
 import json
+import re
+import shlex
 import subprocess
 import sys
 from collections import Counter
@@ -9,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+import ma2000
+from tests.daq_cli.invoke import CommandLine
 from tests.extras.lab.batches.dask_processes import cluster
 from tests.extras.lab.batches.traces import folder_of_traces, number
 
@@ -102,3 +106,38 @@ def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path: Path) -> No
     done = daq("batch", "simulate", traces, "--out", tmp_path / "out", "--executor", url)
     assert done.returncode == 3
     assert "executor dask://127.0.0.1:9: no scheduler answers" in done.stderr.splitlines()[-1]
+
+
+def test_jobs_are_answered_once_with_their_own_errors_and_a_missing_scheduler_is_told_in_one_line() -> None:
+    """As far as one process shows it."""
+    found = json.loads(finished("tests.extras.lab.batches.one_process_cluster").stdout)
+    refused = found.pop("refused")
+    assert found == {"count": 1, "squares": [0, 1, 4, 9, 16, 25], "failed": "ValueError('3 is none')"}
+    assert refused.startswith("executor dask://127.0.0.1:9: no scheduler answers at tcp://127.0.0.1:9: ")
+    assert "\n" not in refused
+
+
+# ---- docs/batches.md
+
+
+PAGE = Path(__file__).parents[4].joinpath("docs", "batches.md").read_text("utf-8")
+COMMANDS = re.findall(r"^\$ daq (.+)$", PAGE, re.MULTILINE)
+
+
+@pytest.mark.timeout(300)
+def test_the_commands_of_the_page_give_a_table_each(daq: CommandLine) -> None:
+    folder_of_traces(Path("traces"), 2)
+    assert len(COMMANDS) >= 5
+    for command in COMMANDS:
+        words = shlex.split(command)
+        said = daq(*words, "--executor", "local://1")
+        assert said.code == 0, (command, said.err)
+        out = Path(words[words.index("--out") + 1])
+        with (out / "table.csv").open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        assert [row["state"] for row in rows] == ["done", "done"]
+        assert len(list((out / "answers").iterdir())) == 2
+    answer = next(Path("fits", "answers").iterdir())
+    assert daq("simulate", answer, "traces/000.mcap").code == 0
+    found = ma2000.batch("simulate", "traces", "simulated", executor="local://1")
+    assert (len(found.rows), found.failed) == (2, {})

@@ -1,13 +1,77 @@
-"""`daq traces` with files made to do harm: one line and the documented exit code, never a traceback."""
+"""`daq traces`: tables as traces, files made to do harm, and names of files that a CSV never replaces."""
 
+from __future__ import annotations
+
+import json
 from pathlib import Path
 
 import pytest
 
+from daq.traces.reader import read_trace
 from tests.daq.traces.samples import write
 from tests.daq.traces.test_files_that_are_no_trace import foreign, ours
 from tests.daq.traces.test_hostile_files import bomb
 from tests.daq_cli.invoke import CommandLine
+
+
+def test_a_table_is_shown_plotted_verified_and_exported_as_it_is(daq: CommandLine, tmp_path: Path) -> None:
+    path = tmp_path / "RIG.CSV"
+    path.write_text("time,position_1,drive_1\n0,0,1\n0.1,1,1\n20.1,1,1\n0.2")
+    shown = daq("traces", "show", path).out
+    assert "at most 20 s (after 0.1 s); it has no ticks, so whether some are missing is not known" in shown
+    assert "its last row has no line end" in shown
+    assert "is CSV: it has no checksums" in daq("traces", "verify", path).out
+    assert daq("traces", "plot", path, "-o", tmp_path / "a.png").code == 0
+    assert daq("traces", "export", path, "-o", tmp_path / "b.csv").code == 0
+    daq("traces", "export", path).complains(2, "is CSV already; name the file to write with -o")
+    made = json.loads(daq("traces", "import", path, "--drive-unit", "Nm", "--json").out)
+    assert read_trace(Path(made["file"])).record.drive_unit == "N·m"
+
+
+def test_names_of_files_that_are_no_text_are_listed_as_json_that_reads_back(daq: CommandLine, tmp_path: Path) -> None:
+    trace = write(tmp_path / "a.mcap", 3)
+    named = tmp_path / "b\udcff.mcap"
+    trace.rename(named)
+    listed = daq("traces", "ls", "--folder", tmp_path, "--json").out
+    listed.encode("utf-8")
+    assert json.loads(listed)[0]["path"] == str(named)
+
+
+# ---- a CSV never takes the place of a configuration or a machine file that has the name of its TOML
+
+
+@pytest.mark.parametrize(
+    "text", ['operator = "anna"\n', '[robot]\nname = "bench"\n', "", 'machine = "rig.toml"\ndrive_unit = "V"\n', "no"]
+)
+def test_a_toml_that_is_no_traces_is_not_replaced(daq: CommandLine, tmp_path: Path, text: str) -> None:
+    trace = write(tmp_path / "a.mcap", 3)
+    other = tmp_path / "other.toml"
+    other.write_text(text)
+    daq("traces", "export", trace, "-o", tmp_path / "other.csv").complains(2, "other.csv", "other.toml", "another name")
+    assert other.read_text() == text
+    assert not (tmp_path / "other.csv").exists()
+
+
+@pytest.mark.parametrize("name", ["a.toml", "a.mcap", "a.xlsx", "a"])
+def test_a_csv_is_named_as_one_so_that_it_replaces_neither_its_trace_nor_its_toml(
+    daq: CommandLine, tmp_path: Path, name: str
+) -> None:
+    trace = write(tmp_path / "a.mcap", 3)
+    before = trace.read_bytes()
+    daq("traces", "export", trace, "-o", tmp_path / name).complains(2, name, "is no .csv file")
+    assert trace.read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["a.mcap"]
+
+
+def test_a_trace_is_exported_again_and_to_a_table_in_capitals(daq: CommandLine, tmp_path: Path) -> None:
+    trace = write(tmp_path / "a.mcap", 3)
+    for name in ("a.csv", "a.csv", "a.PARQUET"):
+        assert daq("traces", "export", trace, "-o", tmp_path / name).code == 0
+    assert (tmp_path / "a.PARQUET").read_bytes()[:4] == b"PAR1"
+
+
+# ---- files made to do harm: one line and the documented exit code, never a traceback
+
 
 FILES = {
     "joints": (lambda: foreign(ours() | {"joints": ""}), "joints = ''"),
@@ -50,6 +114,7 @@ def test_a_malicious_trace_is_refused_in_one_line(daq: CommandLine, tmp_path: Pa
         ("0,0", "created = 9999-12-31T23:59:59-14:00", "created: a moment of the years 1970 to 2261"),
         ("0,0", "created = 2020-01-01T00:00:00", "created: 2020-01-01T00:00:00 has no time zone; write Z behind it"),
         ("0,0", "period = 1e-300", "period = 1e-300 s, allowed is 1e-06 to 86400 s"),
+        ("", "", "has no row below its header"),
     ],
 )
 def test_a_malicious_csv_is_refused_in_one_line(
@@ -110,9 +175,3 @@ def test_bytes_that_were_not_salvaged_are_named_with_their_file(daq: CommandLine
         "a.mcap: salvaged from a.mcap.part up to its damage; the 13 bytes after it are in a.mcap.part.damaged"
     )
     assert second.endswith("b.mcap.part: holds no trace; it was renamed to b.mcap.part.unreadable")
-
-
-def test_a_csv_of_a_header_alone_is_refused_in_one_line(daq: CommandLine, tmp_path: Path) -> None:
-    file = tmp_path / "header.csv"
-    file.write_text("time,position_1\n")
-    daq("traces", "import", file).complains(2, "header.csv", "has no row below its header")

@@ -1,5 +1,6 @@
-"""Keys that stop what a service's robot does, and `daq stop` at a service: sent in time, told, and never lost."""
+"""Keys and `daq stop`, at a service or for several robots: sent in time, told, and never lost."""
 
+import json
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +19,7 @@ from daq.contracts.service.problems import ProblemDetails
 from daq.contracts.service.queue import QueueStatus
 from daq.contracts.service.robot import RobotIdentity, RobotStatus, RobotSummary, StopResult
 from daq.contracts.service.teaching import TaughtPath, TeachingStatus
+from daq.owner.stop_socket import StopAnswer
 from daq.teaching.program import Program, Wait
 from daq.teaching.recording import RecordedPath
 from daq_cli.app.consent import ConsentPrompt
@@ -133,18 +135,12 @@ def test_an_experiment_that_still_runs_after_its_cancel_is_stopped(cancel: Calla
         assert stopped.wait(60)
 
 
-def test_a_key_cancels_a_waiting_experiment_and_stops_no_other() -> None:
-    robot: Any = Robot(state("cancelled"))
+@pytest.mark.parametrize("cancel", [state("cancelled"), raising(refused(404))], ids=["it waited", "it has ended"])
+def test_what_a_key_cancels_before_it_runs_or_after_it_has_run_stops_no_other(cancel: Callable[[], object]) -> None:
+    robot: Any = Robot(cancel)
     with patient_companion(robot) as keys:
         keys.press()
     assert (robot.stops, len(robot.patience)) == (0, 1)
-
-
-def test_an_experiment_that_has_ended_is_not_stopped() -> None:
-    robot: Any = Robot(raising(refused(404)))
-    with patient_companion(robot) as keys:
-        keys.press()
-    assert robot.stops == 0
 
 
 def test_the_third_key_leaves_and_the_stop_is_sent_all_the_same() -> None:
@@ -321,3 +317,52 @@ def test_a_token_that_is_not_ascii_is_refused_without_being_shown(
     told = daq("--server", "http://127.0.0.1:1", "status")
     told.complains(2, "token: only ASCII")
     assert "schl" not in stopped.out + stopped.err + told.err
+
+
+# ---- several robots in daq.toml: all of them unless one is named, and all in doubt
+
+
+TWO = "".join(f'[robots.{name}]\nport = "tcp://127.0.0.1:{port}"\n' for name, port in (("left", 1), ("right", 2)))
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str]]:
+    """The ports through which a stop was asked for; every one is confirmed."""
+    Path("daq.toml").write_text(TWO)
+    found: list[tuple[str, str]] = []
+
+    def stop(robot: str, url: str) -> StopAnswer:
+        found.append((robot, url))
+        return StopAnswer(robot=robot, port=url, delivered=True, confirmed=True, tick=7)
+
+    monkeypatch.setattr("daq.owner.port_stop.stop_at_port", stop)
+    return found
+
+
+LEFT, RIGHT = ("left", "tcp://127.0.0.1:1"), ("right", "tcp://127.0.0.1:2")
+
+
+@pytest.mark.parametrize(
+    ("words", "stopped"),
+    [(["stop"], [LEFT, RIGHT]), (["stop", "--robot", "right"], [RIGHT]), (["--robot", "left", "stop"], [LEFT])],
+)
+def test_all_robots_are_stopped_unless_one_is_named(
+    daq: CommandLine, asked: list[tuple[str, str]], words: Sequence[str], stopped: list[tuple[str, str]]
+) -> None:
+    said = daq(*words)
+    assert said.code == 0, said
+    assert sorted(asked) == stopped
+
+
+def test_a_name_that_no_robot_has_stops_all_and_says_so(daq: CommandLine, asked: list[tuple[str, str]]) -> None:
+    said = daq("stop", "--robot", "lfet", "--json")
+    assert said.err == "no robot is called lfet: every robot is stopped\n"
+    assert sorted(asked) == [LEFT, RIGHT]
+    assert {one["robot"] for one in json.loads(said.out)} == {"left", "right"}
+
+
+def test_other_commands_need_the_name_and_are_told_those_there_are(daq: CommandLine) -> None:
+    Path("daq.toml").write_text(TWO)
+    daq("status").complains(2, "say which one with --robot: left, right")
+    daq("--robot", "middle", "status").complains(2, "robot 'middle': is not configured; there is left, right")
+    daq("--robot", "left", "serve").complains(2, "`daq serve` is about all robots")

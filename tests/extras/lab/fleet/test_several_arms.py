@@ -1,4 +1,6 @@
-"""The page on several arms: its commands and its program work as they stand there."""
+"""Several arms: the same experiment for each of them or for none, and the commands and the program of docs/fleet.md."""
+
+from __future__ import annotations
 
 import re
 import shlex
@@ -9,10 +11,36 @@ from pathlib import Path
 
 import pytest
 
-from tests.server.fleet_service import FleetService, fleet_service
+from tests.server.fleet.test_fleet_service import RAMP
+from tests.server.fleet_service import FleetService, two_arms
 from tests.server.other_user import other_users_command_line
 
 pytestmark = pytest.mark.slow
+
+
+def test_an_experiment_that_one_arm_cannot_run_is_queued_on_none(fleet: FleetService) -> None:
+    far = {"spec": {"trajectory": {"kind": "ramp", "amplitude": 3.0}, "joints": [1]}}
+    answer = fleet.client.post("fleet/experiments", json={"request": far})
+    assert answer.status_code == 422
+    assert answer.json()["detail"].startswith("robot left: ")
+    assert "nothing was queued" in answer.json()["detail"]
+    assert all(one["queue"]["queued"] == 0 for one in fleet.get("fleet")["robots"])
+
+
+@pytest.mark.parametrize(
+    ("robots", "status", "said"),
+    [(["left", "middle"], 404, "middle"), (["left", "left"], 422, "named twice"), ([], 422, "robots")],
+)
+def test_a_wrong_choice_of_robots_is_one_clear_line(
+    fleet: FleetService, robots: list[str], status: int, said: str
+) -> None:
+    answer = fleet.client.post("fleet/experiments", json={"request": RAMP, "robots": robots})
+    assert answer.status_code == status
+    assert said in answer.text
+
+
+# ---- docs/fleet.md
+
 
 PAGE = Path(__file__).parents[4].joinpath("docs", "fleet.md").read_text("utf-8")
 URL = "http://127.0.0.1:8300"
@@ -26,13 +54,8 @@ PROGRAMS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetService]:
-    ports = {name: f"mock://?pty=1&lock_step=1&seed={seed}" for seed, name in enumerate(("left", "right"), start=5)}
-    with fleet_service(tmp_path_factory.mktemp("page"), ports) as service:
-        for name in ports:
-            service.post(f"robots/{name}/connect")
+    with two_arms(tmp_path_factory.mktemp("page"), seed=5) as service:
         yield service
-        for name in ports:
-            service.post(f"robots/{name}/disconnect")
 
 
 @pytest.mark.parametrize("line", LINES)

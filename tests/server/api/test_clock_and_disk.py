@@ -1,9 +1,11 @@
-"""A clock that is set back, and a disk without room: in a service inside the tests' process."""
+"""A clock that is set back, a disk or a database that cannot be written: in a service inside the tests' process."""
 
+import asyncio
 import errno
 import os
 import shutil
 import sqlite3
+import tempfile
 from collections.abc import Iterator
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
@@ -18,11 +20,14 @@ from server.api import upload
 from server.api.upload import Uploads
 from server.bounded.messages import Order
 from server.catalogue.catalogue import Catalogue
+from server.services import KEPT_FOR, Readiness
 from server.store.waiting_events import EventStore
+from tests.server.clocks import HandClock
 from tests.server.inside import WrongClock, service_inside
 from tests.server.polling import until
 
 SHORT = {"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1], "settle": 0, "hold": 0}
+TABLE = "time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50))
 
 
 @pytest.fixture
@@ -33,7 +38,7 @@ def clock() -> WrongClock:
 
 @pytest.fixture
 def api(tmp_path: Path, clock: WrongClock, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx.Client]:
-    """Of a service with that clock."""
+    """Of a service with that clock, which is not connected."""
     with service_inside(tmp_path, clock, monkeypatch) as client:
         yield client
 
@@ -148,13 +153,12 @@ def test_a_file_that_cannot_be_written_is_refused_and_leaves_nothing(
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(os, "fsync", refuses)
-    table = "time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50))
     for number, status, kind in (  # noqa: B007  # `refuses` reads the number
         (errno.ENOSPC, 507, "no-room"),
         (errno.EROFS, 503, "disk"),
         (errno.EIO, 503, "disk"),
     ):
-        answer = api.post("traces", content=table, headers={"Content-Type": "text/csv"})
+        answer = api.post("traces", content=TABLE, headers={"Content-Type": "text/csv"})
         assert (answer.status_code, answer.json()["type"]) == (status, f"/api/v1/problems#{kind}"), answer.text
         assert _listed(api, "traces") == []
         assert list((tmp_path / "traces").glob("*.mcap")) == []
@@ -178,24 +182,100 @@ def test_a_look_into_the_folder_while_a_trace_is_uploaded_takes_nothing_away(
     monkeypatch.setattr(Catalogue, "path_of", known)
     api.get("traces/none/data.mcap")
     monkeypatch.setattr("server.api.upload._read", then_looked)
-    table = "time,position_1\n" + "\n".join(f"{0.02 * n:.2f},{0.001 * n}" for n in range(50))
-    answer = api.post("traces", content=table, headers={"Content-Type": "text/csv"})
+    answer = api.post("traces", content=TABLE, headers={"Content-Type": "text/csv"})
     assert answer.status_code == 201, answer.text
     assert api.get(f"traces/{answer.json()['id']}/data.mcap").status_code == 200
 
 
-def test_a_clock_that_leaps_ahead_makes_no_run_of_those_that_it_leaves_out(
-    api: httpx.Client, clock: WrongClock
+# ---- what the service says about itself then, and to whom
+# ---- what the service says about itself then, and to whom
+
+
+STRANGER = {"X-Forwarded-For": "10.0.0.9"}
+
+
+def _read_only(**_: object) -> NoReturn:
+    raise OSError(errno.EROFS, os.strerror(errno.EROFS), "/the/folder")
+
+
+def test_a_disk_that_cannot_be_written_is_not_ready_and_only_who_may_see_the_robot_is_told_why(
+    api: httpx.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    api.post("queue/pause")
-    schedule = api.post("schedules", json={"spec": SHORT, "every": 3600}).json()["id"]
-    until(api, f"experiments?schedule={schedule}", lambda listed: listed["items"])
-    before = datetime.fromisoformat(api.get(f"schedules/{schedule}").json()["next"])
-    clock.ahead = timedelta(days=3650)
-    api.post("queue/pause")  # which wakes the queue
-    later = until(api, f"schedules/{schedule}", lambda one: datetime.fromisoformat(one["next"]) != before)
-    now = datetime.fromisoformat(later["next"])
-    assert timedelta(0) < now - clock.utc() <= timedelta(hours=1)
-    assert (now - before) % timedelta(hours=1) == timedelta(0)
-    assert len(_listed(api, f"experiments?schedule={schedule}")) == 1
-    assert api.post("control", json={}).json()["remaining"] > 0
+    monkeypatch.setattr("server.services.KEPT_FOR", 0.0)
+    address = api.base_url.join("/readyz")
+    healthy = {"database": "", "traces": "", "room": "", "robot ma2000": ""}
+    assert api.get(address).json()["checks"].items() >= healthy.items()
+    assert sorted(path.suffix for path in (tmp_path / "traces").iterdir()) == []
+    monkeypatch.setattr(tempfile, "TemporaryFile", _read_only)
+    told = api.get(address)
+    assert told.status_code == 503
+    for name in ("database", "traces"):
+        assert "Read-only file system" in told.json()["checks"][name]
+    stranger = api.get(address, headers=STRANGER)
+    assert stranger.status_code == 503
+    checks = stranger.json()["checks"]
+    assert {checks["database"], checks["traces"]} == {"not well: details need a token"}
+    assert "/the/folder" not in stranger.text
+
+
+def test_readiness_is_looked_at_once_for_all_who_ask_and_again_after_a_second() -> None:
+    clock = HandClock()
+    looks: list[int] = []
+    readiness = Readiness(clock)
+
+    def look() -> dict[str, str]:
+        looks.append(len(looks))
+        return {"looks": str(len(looks))}
+
+    async def ask() -> None:
+        for _ in range(2):
+            told = await asyncio.gather(*(readiness.check(look) for _ in range(20)))
+            assert {one["looks"] for one in told} == {"1"}
+        clock.turn(KEPT_FOR)
+        assert (await readiness.check(look))["looks"] == "2"
+
+    asyncio.run(ask())
+
+
+def test_a_folder_of_traces_that_is_away_is_told_and_takes_no_experiment(api: httpx.Client, tmp_path: Path) -> None:
+    """Both were a fault of the program, 500: the disk is away, and that is what has to be said."""
+    folder = tmp_path / "traces"
+    folder.rename(tmp_path / "elsewhere")
+    system = api.base_url.join("/api/v1/system")
+    answer = api.post("experiments", json={"spec": {}})
+    assert answer.status_code == 503, answer.text
+    assert answer.json()["type"] == "/api/v1/problems#traces-away"
+    assert str(folder) in answer.json()["detail"]
+    found = api.get(system).json()  # the page learns from it where it can stop
+    assert found["storage"]["traces_free"] == 0
+    assert str(folder) in found["warnings"][0]
+    (tmp_path / "elsewhere").rename(folder)
+    assert api.get(system).json()["storage"]["traces_free"] > 0
+    assert api.get("queue/experiments").json() == []
+
+
+def test_a_calibration_is_checked_and_queued_as_any_experiment(
+    api: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def asked(**options: Any) -> httpx.Response:
+        return api.post("calibrations/gain", **({"json": {"joints": [1]}} | options))
+
+    refused = asked(json={"joints": [9]})
+    assert refused.status_code == 422, refused.text
+    first = asked(headers={"Idempotency-Key": "1"})
+    assert first.status_code == 201, first.text
+    assert first.headers["Location"].endswith(f"/experiments/{first.json()['id']}")
+    again = asked(headers={"Idempotency-Key": "1"})
+    assert (again.status_code, again.json()["id"]) == (200, first.json()["id"])
+    monkeypatch.setattr(shutil, "disk_usage", _full)
+    assert asked().json()["type"] == "/api/v1/problems#no-room"
+    assert [one["id"] for one in api.get("queue/experiments").json()] == [first.json()["id"]]
+
+
+def test_the_size_of_the_database_counts_what_was_written_last(api: httpx.Client, tmp_path: Path) -> None:
+    for _ in range(20):
+        api.post("/experiments", json={}).raise_for_status()  # SQLite writes them to its log first
+    log = tmp_path / "service" / "service.sqlite-wal"
+    assert log.stat().st_size > 0
+    told = api.get(api.base_url.join("/api/v1/system")).json()["storage"]["database_size"]
+    assert told >= log.stat().st_size

@@ -1,4 +1,4 @@
-"""docs/any-arm.md: what it types prints what it shows, on files that others' libraries write."""
+"""docs/any-arm.md and docs/robots-from-urdf.md: what they type prints what they show, and their programs run."""
 
 import re
 import shlex
@@ -12,6 +12,9 @@ from scipy.io import savemat
 from tests.daq_cli.invoke import CommandLine
 from tests.extras.formats.bags.test_other_messages import bag
 from tests.extras.formats.tables.test_tables import data_set
+
+# ---- docs/any-arm.md, on files that others' libraries write
+
 
 ROOT = Path(__file__).parents[4]
 PAGE = (ROOT / "docs" / "any-arm.md").read_text("utf-8")
@@ -71,3 +74,34 @@ def test_the_page_s_commands_print_what_it_shows(daq: CommandLine, monkeypatch: 
 def test_the_page_s_program_reads_a_data_set() -> None:
     (program,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     exec(compile(program, "any-arm.md", "exec"), {})
+
+
+# ---- docs/robots-from-urdf.md
+
+
+URDF_PAGE = (ROOT / "docs" / "robots-from-urdf.md").read_text("utf-8")
+URDF_SESSIONS = [
+    block for block in re.findall(r"^```\n(.*?)^```", URDF_PAGE, re.DOTALL | re.MULTILINE) if "$ daq" in block
+]
+
+
+def test_the_commands_print_what_the_page_of_urdf_shows(daq: CommandLine) -> None:
+    shutil.copy(ROOT / "examples" / "reach_arm.urdf", "reach_arm.urdf")
+    commands = [part for session in URDF_SESSIONS for part in session.split("$ daq ")[1:]]
+    assert len(commands) == 3
+    for part in commands:
+        line, _, shown = part.partition("\n")
+        said = daq(*shlex.split(line))
+        assert (said.code, said.err + said.out) == (0, shown)
+
+
+def test_the_page_s_program_writes_what_the_commands_write(daq: CommandLine) -> None:
+    shutil.copy(ROOT / "examples" / "reach_arm.urdf", "reach_arm.urdf")
+    (program,) = re.findall(r"```python\n(.*?)```", URDF_PAGE, re.DOTALL)
+    exec(compile(program, "page", "exec"), {})
+    by_program = [Path(name).read_text("utf-8") for name in ("reach.toml", "reach.urdf", "reach.xml")]
+    for name in ("reach.toml", "reach.urdf", "reach.xml"):
+        Path(name).unlink()
+    for part in [part for session in URDF_SESSIONS for part in session.split("$ daq ")[1:4]][:3]:
+        daq(*shlex.split(part.partition("\n")[0]))
+    assert [Path(name).read_text("utf-8") for name in ("reach.toml", "reach.urdf", "reach.xml")] == by_program

@@ -1,15 +1,21 @@
-"""The smallest steps of a set point: what is written, in what order, and when the proof ends."""
+"""A map that was found is proved by smallest steps of a set point; a person completes it where a part is missing."""
 
 from dataclasses import dataclass, field
 
 import pytest
 
 from extras.commissioning.memory.commands import prove_by_command
+from extras.commissioning.memory.findings import Finding, Findings, begun_map_text
 from extras.commissioning.memory.joint import JointEvidence, SetPointBytes
 from extras.commissioning.memory.procedure import may_have_power
 from extras.commissioning.memory.recording import PageReading
 from extras.commissioning.memory.relations import Pair, Place
+from firmware_protocol.errors import MemoryMapError
+from firmware_protocol.memory_map import SINGLE_REGISTERS, default_memory_map, parse_memory_map
 from firmware_protocol.units import posture_to_counts
+
+# ---- what is written, in what order, and when the proof ends
+
 
 BASE = 0xFC00
 
@@ -137,3 +143,37 @@ def test_the_drives_get_no_power_while_an_error_is_large_or_unknown() -> None:
     assert "known" in may_have_power({1: 0})
     assert "joint 4: 300" in may_have_power(dict.fromkeys(range(1, 7), 0) | {4: 300})
     assert may_have_power(dict.fromkeys(range(1, 7), 3)) == ""
+
+
+# ---- a map of which a part was found
+
+
+SHIPPED = default_memory_map()
+UNKNOWN = ("gain_p", "gain_i", "gain_d", "gripper")
+
+
+def findings() -> Findings:
+    """Everything found where the shipped map has it, but for the gains and the gripper."""
+    every = []
+    for name, register in SHIPPED.registers.items():
+        for index, low in enumerate(register.low):
+            joint = None if name in SINGLE_REGISTERS else index + 1
+            high = None if register.high is None else register.high[index]
+            where = (None, None) if name in UNKNOWN else (low, high)
+            every.append(Finding(name, joint, "unknown" if name in UNKNOWN else "found", *where))
+    return Findings(SHIPPED.base, SHIPPED.size, tuple(every), (), (), ())
+
+
+def test_once_its_question_marks_are_addresses_it_is_a_memory_map() -> None:
+    text = begun_map_text(findings())
+    wanted = [address for name in SHIPPED.registers if name in UNKNOWN for address in SHIPPED[name].low]
+    with pytest.raises(MemoryMapError):
+        parse_memory_map(text, "begun")
+    for address in wanted:
+        head, mark, rest = text.partition("?")
+        assert mark
+        text = f"{head}0x{address:04X}{rest}"
+    completed = parse_memory_map(text, "completed")
+    for name, register in SHIPPED.registers.items():
+        assert (completed[name].low, completed[name].high) == (register.low, register.high)
+        assert set(completed[name].provenance) == {"assumed" if name in UNKNOWN else "found"}
