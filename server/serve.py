@@ -32,9 +32,9 @@ from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.system import stop_port_after
 from server.access.caller import Caller
 from server.access.connections import MOST_CONNECTIONS, Connection
+from server.access.cookies import session_cookie
 from server.access.gate import Gate
 from server.access.origin import is_loopback
-from server.access.sessions import session_cookie
 from server.access.tokens import KnownTokens
 from server.app import make_app
 from server.services import Services

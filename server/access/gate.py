@@ -28,6 +28,7 @@ from starlette.websockets import WebSocketClose
 
 from server import logs
 from server.access.caller import LOCAL, Caller, token_needed
+from server.access.cookies import says_where_it_is_from, session_cookie, session_of
 from server.access.headers import secure
 from server.access.limits import LARGEST_BODY, MOST_FIELDS, MOST_OF_A_PROGRAM, Buckets, counted
 from server.access.origin import (
@@ -38,7 +39,6 @@ from server.access.origin import (
     is_this_computers_user,
     prefix_of,
 )
-from server.access.sessions import says_where_it_is_from, session_cookie, session_of
 from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens
 from server.database_errors import DamagedError

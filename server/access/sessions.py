@@ -1,19 +1,13 @@
 """Sessions of people who have signed in: in the database, so that they outlast a restart, as hashes like tokens.
 
-The cookies of people who sign in. Pure, and without the web framework: the stop listener uses them, too.
-
-Browsers do not tell the ports of a host apart in cookies. So the names have the port at which people reach the service:
-two services on one host name then keep their sessions apart.
-
 Tells plug-ins what a command on the service's own computer changes, beside the service.
 """
 
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from datetime import datetime, timedelta
-from urllib.parse import urlsplit
 
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
@@ -22,8 +16,8 @@ from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.queue import Role, role_of
 from daq.plugins import named, plugins
 from server.access.caller import Caller
+from server.access.cookies import STOPS_FOR
 from server.access.digest import digest_of
-from server.access.origin import DEFAULT_PORTS
 from server.store.engine import Store
 from server.store.tables import SessionRow
 
@@ -37,51 +31,6 @@ def note_command(
     for plugin in plugins():
         for reference in plugin.noted:
             named(reference)(session, note)
-
-
-TLS_PREFIX = "__Host-"
-"""Beginning of a name that browsers take from its host over TLS only. On loopback, names are without it."""
-SESSION, SIGN_IN = "daq-session", "daq-sign-in"
-STOPS_FOR = 3600.0
-"""Time (s) for which an ended session still stops the robot, and nothing else: nobody shall find at the wrong moment
-that they must sign in again. A session that somebody has left stops nothing."""
-
-
-def session_cookie(address: str | None) -> str:
-    """Returns the name of the session's cookie. `address`: where people reach the service (`server.address`);
-    None where nobody signs in."""
-    return _name(SESSION, address)
-
-
-def sign_in_cookie(address: str | None) -> str:
-    """Returns the name of the cookie that ties an answer of the provider to the browser that asked."""
-    return _name(SIGN_IN, address)
-
-
-def is_over_tls(address: str | None) -> bool:
-    """Whether people reach the service over TLS."""
-    return address is not None and urlsplit(address).scheme == "https"
-
-
-def session_of(headers: Mapping[str, str], cookie: str) -> str:
-    """Returns the secret of the session in the cookie of this name; empty if there is none. `headers`: by name in lower
-    case."""
-    pairs = [one.strip().partition("=") for one in headers.get("cookie", "").split(";")]
-    return {name: value for name, _, value in pairs}.get(cookie, "")
-
-
-def says_where_it_is_from(headers: Mapping[str, str]) -> bool:
-    """Whether a browser says which page a request is for. All do where a request changes something; a request with a
-    session that does not is none of our page's."""
-    return "origin" in headers or "sec-fetch-site" in headers
-
-
-def _name(name: str, address: str | None) -> str:
-    if address is None:
-        return name
-    parts = urlsplit(address)
-    prefix = TLS_PREFIX if is_over_tls(address) else ""
-    return f"{prefix}{name}-{parts.port or DEFAULT_PORTS[parts.scheme]}"
 
 
 class SessionStore:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from server.access.caller import LOCAL, Caller
+from server.access.cookies import says_where_it_is_from, session_cookie, session_of
 from server.access.origin import is_known_name, is_this_computers_user, name_of, place_of
-from server.access.sessions import says_where_it_is_from, session_cookie, session_of
 from server.problems import ProblemError
 
 

@@ -13,7 +13,7 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 from daq.transport import Terminal
 from server.access.caller import Caller
-from server.access.sessions import STOPS_FOR
+from server.access.cookies import STOPS_FOR
 from server.stopping.messages import NEWS, Begin, Joined, Known, Left, Owned, Ready, Stopped
 
 READY_WITHIN = 30.0

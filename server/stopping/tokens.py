@@ -16,8 +16,8 @@ from typing import Any
 
 from daq.contracts.service.queue import role_of
 from server.access.caller import Caller
+from server.access.cookies import STOPS_FOR
 from server.access.digest import digest_of
-from server.access.sessions import STOPS_FOR
 from server.access.stop_gate import TokensCannotBeReadError
 from server.database_errors import open_to_read
 

@@ -20,7 +20,7 @@ from extras.lab.oidc.people import name_of
 from extras.lab.oidc.settings import OidcSettings, require_address
 from extras.lab.oidc.sign_in import GOOD_FOR, SignIns
 from server.access.caller import Caller
-from server.access.sessions import is_over_tls, session_cookie, sign_in_cookie
+from server.access.cookies import is_over_tls, session_cookie, sign_in_cookie
 from server.api.dependencies import ServicesDep, Viewer
 from server.parts import Part
 from server.problems import PROBLEMS, ProblemError, not_found

@@ -12,7 +12,7 @@ from fastapi import Response
 
 from extras.lab.oidc.routes import _set_cookie
 from extras.lab.oidc.sign_in import GOOD_FOR, SignIns
-from server.access.sessions import session_cookie, session_of, sign_in_cookie
+from server.access.cookies import session_cookie, session_of, sign_in_cookie
 from server.problems import ProblemError
 from tests.server.authority import Authority
 from tests.server.clocks import HandClock
