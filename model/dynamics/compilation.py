@@ -10,15 +10,15 @@ Since that name tells all, it does not matter where the sources lie: another clo
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import importlib
 import multiprocessing
 import os
+import re
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from importlib.util import resolve_name
@@ -120,30 +120,21 @@ def _source(module: str, root: Path) -> Path | None:
     return next((p for p in (path.with_suffix(".py"), path / "__init__.py") if p.is_file()), None)
 
 
-@cache
-def _imports_of_text(module: str, is_package: bool, text: bytes) -> tuple[str, ...]:
-    package = module if is_package else module.rpartition(".")[0]
-    names = []
-    for statement in _import_statements(ast.parse(text).body):
-        if isinstance(statement, ast.Import):
-            names += [alias.name for alias in statement.names]
-        else:
-            origin = resolve_name("." * statement.level + (statement.module or ""), package)
-            names += [origin, *(f"{origin}.{alias.name}" for alias in statement.names)]
-    return tuple(names)
+_STATEMENT = re.compile(r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+)?import[ \t]+(?:\(([^)]*)\)|(.*))", re.MULTILINE)
+"""An import as the formatter writes it. What only looks like one, in a text, adds a source at most."""
+_ALIAS = re.compile(r"([\w.]+)(?:[ \t]+as[ \t]+\w+)?[ \t]*(?:,|#.*|$)", re.MULTILINE)
 
 
-def _imports(module: str, path: Path) -> tuple[str, ...]:
-    """Names that a module may import: of `from a import b` both a and a.b, which is a module or something in one."""
-    return _imports_of_text(module, path.name == "__init__.py", path.read_bytes())
-
-
-def _import_statements(statements: Sequence[ast.AST]) -> Iterator[ast.Import | ast.ImportFrom]:
-    for statement in statements:
-        if isinstance(statement, ast.Import | ast.ImportFrom):
-            yield statement
-        for block in ("body", "orelse", "finalbody", "handlers", "cases"):
-            yield from _import_statements(getattr(statement, block, ()))
+def _imports(module: str, path: Path) -> set[str]:
+    """Names that a module may import: of `from a import b` both a and a.b, which is a module or something in one. To
+    parse the sources would take as long as to load the compiled code."""
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    names = set()
+    for origin, several, one in _STATEMENT.findall(path.read_text("utf-8")):
+        aliases = _ALIAS.findall(several or one)
+        whole = resolve_name(origin, package) if origin.startswith(".") else origin
+        names |= {whole, *(f"{whole}.{alias}" for alias in aliases)} if origin else set(aliases)
+    return names
 
 
 def _remove_old(parent: Path, before: float) -> None:
