@@ -66,7 +66,9 @@ def subtract_held(left: Floats, friction: RestingFriction, record: RecordedMotio
     low, high = friction.lowest, friction.highest
     asked = record.mean_in_turn(left + friction.sliding)
     held = np.where(record.turns, asked - np.clip(asked, low, high), left)
-    for _ in range(HOLDING_ROUNDS):
+    for _ in range(HOLDING_ROUNDS if np.any(high > low) else 0):
         less = held - low_pass(held, record.cutoff, record.period)
-        held = np.where(record.turns, np.clip(less, asked - high, asked - low), held)
+        before, held = held, np.where(record.turns, np.clip(less, asked - high, asked - low), held)
+        if np.array_equal(before, held):
+            break
     return np.asarray(held)

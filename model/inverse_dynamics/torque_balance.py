@@ -15,12 +15,12 @@ from scipy.signal import lfilter
 from model import layout as at
 from model.arrays import Floats
 from model.drives.piecewise import EDGE
-from model.dynamics.recursive import inverse_dynamics_along
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
 from model.inverse_dynamics.friction_at_rest import RestingFriction, friction_at_rest, subtract_held
 from model.inverse_dynamics.link_motion import SENSOR_COLUMNS, LinkMotion, link_motion
+from model.inverse_dynamics.needed_torque import NeededTorque
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
 from model.inverse_dynamics.smoothing import derivative
 from model.kinematics.chain import ChainArrays
@@ -46,6 +46,8 @@ THRESHOLD = "amplifier_threshold"
 """The effect whose parameter makes the residual jump."""
 LEAST_KEPT = 0.05
 """Least share of a torque that gears transmit: two losses together may exceed one."""
+GEOMETRIES = 3
+"""Geometries whose torques are kept: of the fit, of a parameter moved for a derivative, and of a candidate."""
 BODY_COLUMNS = (*range(at.A, at.SHIFT + 1), at.ROTOR_INERTIA, at.GEAR, at.PRISMATIC, at.SHAPE)
 FRICTION_COLUMNS = (at.COULOMB, at.COULOMB_ARM, at.GRAVITY_SHARE)
 
@@ -60,7 +62,7 @@ class TorqueBalance:
     model: Model
     records: tuple[RecordedMotion, ...]
     _kept: dict[str, tuple[bytes, list[Any]]] = field(default_factory=dict, repr=False)
-    _geometry: dict[int, bytes] = field(default_factory=dict, repr=False)
+    _geometries: dict[int, dict[bytes, NeededTorque]] = field(default_factory=dict, repr=False)
     _last: dict[tuple[int, int], list[tuple[Floats, Floats]]] = field(default_factory=dict, repr=False)
     difference: float = DIFFERENCE
     """Step of the finite differences, as a share of a parameter's natural size."""
@@ -190,18 +192,16 @@ class TorqueBalance:
     def _needed(self, sensors: bytes, chain: ChainArrays, motions: Sequence[LinkMotion], index: int) -> Floats:
         """Returns the torque (k, n) that the links' motion needs.
 
-        It is linear in the links' inertial parameters. From the second call for one geometry on, torques of unit
-        parameters are kept and combined.
+        What is known of a geometry is kept until others were used since. A geometry that was asked for once goes first,
+        as a derivative by a sensor's parameter asks for it.
         """
         key = sensors + b"".join(part.tobytes() for part in (chain.prismatic, chain.geometry, chain.gravity))
-        kept = self._kept.get("units")
-        if (kept is None or kept[0] != key) and self._geometry.get(index) != key:
-            self._geometry[index] = key
-            motion = motions[index]
-            return np.asarray(inverse_dynamics_along(chain, motion.position, motion.speed, motion.acceleration))
-        units = self._cached("units", key, lambda i: _of_units(chain, motions[i]))[index]
-        numbers = np.concatenate([chain.inertial.ravel(), chain.rotor_inertia])
-        return np.asarray((numbers @ units).reshape(motions[index].position.shape))
+        known = self._geometries.setdefault(index, {})
+        found = known.pop(key, None) or NeededTorque(motions[index])
+        if len(known) == GEOMETRIES:
+            del known[next((k for k, one in known.items() if one.asked == 1), next(iter(known)))]
+        known[key] = found
+        return found.of(chain)
 
     def _volts(self, index: int, vector: Floats, joints: Floats, samples: Floats) -> Floats:
         """Returns volts at the motors at the grid's times, after delay, threshold and limit; `_lost_in_dead_zone`
@@ -269,18 +269,6 @@ def _levels(model: Model, chain: ChainArrays, position: Floats, joints: Floats) 
     if joints[:, list(FRICTION_COLUMNS)].any():
         kernel.friction_levels(chain, position, joints, settings, out)
     return out
-
-
-def _of_units(chain: ChainArrays, motion: LinkMotion) -> Floats:
-    """Returns torques (11 n, k n) that the motion needs for one unit of each inertial parameter, the others being 0."""
-    links = len(chain.rotor_inertia)
-    found = []
-    for number in range(11 * links):
-        alone = np.zeros(11 * links)
-        alone[number] = 1.0
-        unit = chain._replace(inertial=alone[: 10 * links].reshape(links, 10), rotor_inertia=alone[10 * links :])
-        found.append(inverse_dynamics_along(unit, motion.position, motion.speed, motion.acceleration).ravel())
-    return np.stack(found)
 
 
 def _gravity(chain: ChainArrays, motion: LinkMotion) -> Floats:

@@ -29,7 +29,7 @@ from model.inverse_dynamics.drive_timing import expected_timing
 from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.inverse_dynamics.shaking import find_shaking
-from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
+from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import Lineage, Model
 from model.machine_model.posterior import summarise_posterior
 
@@ -68,8 +68,8 @@ def _within_file(standing: Standing, later: Sequence[Step]) -> BalanceFit:
         model = standing.model_without(step, model.with_values(back))
     known = model.by_name.keys() - out  # a disturbance is named by size and phase, and fitted by sine and cosine
     unknowns = [u.within_stated for u in standing.now.unknowns if u.nuisance or u.name in known]
-    balance = TorqueBalance(model, standing.case.records)
-    return fit(balance, unknowns, standing.now.values, standing.case.data, standing.now.noise.memory)
+    now, case = standing.now, standing.case
+    return fit(case.balance(model), unknowns, now.values, case.data, now.noise.memory, near=now.derivatives)
 
 
 def _roots(squares: np.ndarray, columns: Sequence[int]) -> tuple[float | None, ...]:

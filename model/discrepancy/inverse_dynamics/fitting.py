@@ -9,7 +9,7 @@ accelerations are known worst. The correlation of neighbouring samples enters th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,7 @@ from model.fitting.unknowns import Unknown
 from model.fitting.whitening import autocovariance
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.machine_model.model import Model
 
 Stretch = tuple[int, slice]
 
@@ -186,6 +187,8 @@ class BalanceFit:
     noise: NoiseModel
     by_joint: Floats
     prior: float
+    derivatives: Slopes | None = None
+    """By every unknown, at values from which the last step hardly led away; None where none of its own are known."""
 
     @property
     def criterion(self) -> float:
@@ -203,7 +206,7 @@ class BalanceFit:
 
     def slopes(self) -> Slopes:
         """Derivatives by every unknown, by name, for reuse in later fits."""
-        return {u.name: self.slope(u) for u in self.unknowns}
+        return self.derivatives or {u.name: self.slope(u) for u in self.unknowns}
 
 
 def fit(
@@ -214,15 +217,17 @@ def fit(
     memory: Floats | None = None,
     known: Slopes | None = None,
     rounds: int = ROUNDS,
+    near: Slopes | None = None,
 ) -> BalanceFit:
     """Values that make the residual most probable, starting from `begin` where it names an unknown.
 
     Args:
         memory: (n,) memory of the residual, where it is to be that of another fit, so that the two can be compared.
         known: derivatives by parameters in which the residual is all but linear; they are not computed again.
+        near: derivatives of a point near it, which hold until a step does otherwise than they say.
     """
     values = {u.name: float(np.clip(begin.get(u.name, u.expected), u.low, u.high)) for u in unknowns}
-    ready, slopes = known or {}, Slopes()
+    ready, slopes = known or {}, near or Slopes()
     if memory is None:
         first = _evaluate(balance, unknowns, values, data, np.ones(len(data.floor)))
         first, slopes = _descend(first, ready, slopes, rounds)
@@ -240,9 +245,11 @@ def _descend(best: BalanceFit, known: Slopes, slopes: Slopes, rounds: int) -> tu
         known: derivatives that are never computed anew. slopes: those of a point near it.
     """
     own = [u for u in best.unknowns if u.name not in known]
+    fresh = False
     for _ in range(rounds):
-        fresh = not slopes
-        slopes = slopes or {u.name: best.slope(u) for u in own}
+        lacking = [u for u in own if u.name not in slopes]
+        fresh = len(lacking) == len(own)
+        slopes = {**slopes, **{u.name: best.slope(u) for u in lacking}}
         every = {**known, **slopes}
         aim = gauss_newton(best, every)
         for share in STEPS:
@@ -258,6 +265,8 @@ def _descend(best: BalanceFit, known: Slopes, slopes: Slopes, rounds: int) -> tu
             break
         if not foretold:
             slopes = {}
+    if slopes and not known:
+        best = replace(best, derivatives={u.name: slopes[u.name] for u in best.unknowns})
     return best, slopes
 
 
@@ -334,6 +343,13 @@ class TorqueCase:
     held_out: tuple[RecordedMotion, ...]
     noise: NDArray[np.float64]
     options: TorqueOptions
+    _shared: list[TorqueBalance] = field(default_factory=list, init=False, repr=False)
+
+    def balance(self, model: Model) -> TorqueBalance:
+        """The balance of the fitted records with a model; all of them share what is kept."""
+        if not self._shared:
+            self._shared.append(TorqueBalance(model, self.records))
+        return self._shared[0].of_model(model)
 
     @cached_property
     def data(self) -> Data:

@@ -18,7 +18,6 @@ from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.tolerances import prior_distance
 from model.discrepancy.thresholds import CHANCES, WITHIN_NOISE
 from model.effects.library import find_named_effect
-from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.record_verdict import FAR_OFF
 
 
@@ -83,8 +82,8 @@ def _reference(standing: Standing, chosen: Fitted) -> BalanceFit:
     if not held:
         return now
     unknowns = [u for u in now.unknowns if u.name not in held]
-    balance = TorqueBalance(standing.model.with_values({**now.model_values, **held}), case.records)
-    return fit(balance, unknowns, now.values, case.data, now.noise.memory)
+    balance = case.balance(standing.model.with_values({**now.model_values, **held}))
+    return fit(balance, unknowns, now.values, case.data, now.noise.memory, near=now.derivatives)
 
 
 def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Floats) -> bool:

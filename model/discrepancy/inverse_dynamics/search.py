@@ -9,11 +9,13 @@ import numpy as np
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.arrays import Floats
+from model.discrepancy.candidates.ranking import WORTH_POLISHING
 from model.discrepancy.inverse_dynamics.candidates import list_trials, take_back
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, TorqueCase, fit, noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
 from model.discrepancy.inverse_dynamics.starts import Start
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
+from model.discrepancy.thresholds import THRESHOLDS
 from model.effects.library import find_named_effect
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import effect_on
@@ -135,28 +137,33 @@ def search(
         progress(0.6, f"fitting {effect_on(chosen[0].trial.effect, _joints(chosen))}{so_far}")
         found.append(_fit_effect(fitted_model, now, slopes, expected, chosen))
     places = sum(len(p.trial.starts) for p in probes)
-    found = _refined(_weigh(found, now, places), cancel)
+    weighed = _weigh(found, now, places)
+    found = _refined(weighed, weighed, cancel)
     weighed = _weigh(found, now, places)
     while weighed and len(weighed[0].joints) > 1:
         stop_if(cancel)
         fewer = [p for p in _with_fewer_joints(probes, weighed[0]) if not _is_fitted(p, found)]
         if not fewer:
             break
-        found += _refined([_fit_effect(fitted_model, now, slopes, expected, p) for p in fewer], cancel)
+        fits = [_fit_effect(fitted_model, now, slopes, expected, p) for p in fewer]
+        found += _refined(_weigh(fits, now, places), weighed, cancel)
         weighed = _weigh(found, now, places)
     return Findings(tuple(weighed), tuple(probes))
 
 
-def _refined(found: Sequence[Fitted], cancel: Cancel) -> list[Fitted]:
+def _refined(found: Sequence[Fitted], every: Sequence[Fitted], cancel: Cancel) -> list[Fitted]:
     """The candidates, of which the first have been fitted on with derivatives of their own: those that were reused are
-    of another place, and a number that the tolerances had taken far off does not come back by them."""
+    of another place, and a number that the tolerances had taken far off does not come back by them. Those that cannot
+    catch up with the best of `every` are left as they are."""
+    best = max((f.log_odds for f in every), default=0.0)
     refined = []
     for one in found[:REFINED]:
         stop_if(cancel)
         last = one.fit
-        own = (last.balance, last.unknowns, last.values, last.data, last.noise.memory)
-        fitted = fit(*own, rounds=REFINED_ROUNDS)
-        refined.append(replace(one, fit=fitted))
+        if one.log_odds >= min(best - THRESHOLDS.close, WORTH_POLISHING * best):
+            own = (last.balance, last.unknowns, last.values, last.data, last.noise.memory)
+            one = replace(one, fit=fit(*own, rounds=REFINED_ROUNDS))  # noqa: PLW2901 (the better one in its place)
+        refined.append(one)
     return [*refined, *found[REFINED:]]
 
 
@@ -240,7 +247,7 @@ def _fit_effect(
     if fitted.criterion > now.criterion:
         null = {p.name: now.values.get(p.name, float(p.null)) for p in own if p.null is not None}
         begin = {**now.values, **start, **null, **take_back(effect, own, now)}
-        again = fit(balance, unknowns, begin, now.data, now.noise.memory)
+        again = fit(balance, unknowns, begin, now.data, now.noise.memory, near=slopes)
         fitted = min(fitted, again, key=lambda f: f.criterion)
     if expected is not None:
         begin = {**now.values, **start, **_expected_values(unknowns)}

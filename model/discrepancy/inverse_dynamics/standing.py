@@ -11,7 +11,6 @@ from model.discrepancy.inverse_dynamics.search import Fitted
 from model.discrepancy.inverse_dynamics.tolerances import tolerances
 from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
-from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 from model.machine_model.posterior import load_posterior
@@ -46,7 +45,7 @@ class Standing:
         added = {**self.added, **{p.name: p for p in chosen.parameters}}
         stated = {**self.stated, **{p.name: p for p in chosen.stated}}
         model = chosen.model.with_values(chosen.fit.model_values)
-        now = _fit(self.case, self.given, self.known, model, chosen.fit.values, added)
+        now = _fit(self.case, self.given, self.known, model, chosen.fit, added)
         return replace(self, model=model, now=now, added=added, stated=stated)
 
     def remove(self, step: Step) -> Standing:
@@ -55,7 +54,7 @@ class Standing:
         added, stated = (
             {name: p for name, p in own.items() if name not in step.parameters} for own in (self.added, self.stated)
         )
-        now = _fit(self.case, self.given, self.known, self.model_without(step), self.now.values, added)
+        now = _fit(self.case, self.given, self.known, self.model_without(step), self.now, added)
         model = now.balance.model.with_values(now.model_values)
         return replace(self, model=model, now=now, added=added, stated=stated)
 
@@ -72,7 +71,7 @@ class Standing:
 def begin(given: Model, case: TorqueCase) -> Standing:
     """The model as it was given, with its numbers fitted."""
     known = load_posterior(given, (r.name for r in (*case.records, *case.held_out)))
-    return Standing(case, given, known, given, _fit(case, given, known, given, {}, {}), {}, {})
+    return Standing(case, given, known, given, _fit(case, given, known, given, None, {}), {}, {})
 
 
 def _fit(
@@ -80,7 +79,7 @@ def _fit(
     given: Model,
     known: Mapping[str, float],
     model: Model,
-    begun: Mapping[str, float],
+    begun: BalanceFit | None,
     added: Mapping[str, Parameter],
 ) -> BalanceFit:
     """The model fitted, with the numbers that the file states free within their tolerances, and those that the
@@ -90,4 +89,6 @@ def _fit(
     own = [u for u in before if u.name not in names]
     sizes = {**recorded_sizes(model, case.records), **added}
     found = [u for u in tolerances(model, names, sizes)[0] if u.name not in {o.name for o in own}]
-    return fit(TorqueBalance(model, case.records), [*own, *found, *timing_unknowns(model)], begun, case.data)
+    unknowns = [*own, *found, *timing_unknowns(model)]
+    values, near = ({}, None) if begun is None else (begun.values, begun.derivatives)
+    return fit(case.balance(model), unknowns, values, case.data, near=near)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from model.arrays import Floats
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
+
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -60,3 +63,17 @@ class Calibration:
     def only(self, kept: Sequence[int]) -> Calibration:
         """The same with the unknowns of these indices alone; all others are as the model has them."""
         return Calibration(self.model, tuple(self.unknowns[k] for k in kept), self.values[list(kept)])
+
+
+@dataclass
+class Remembered(Generic[Found]):
+    """What was computed of calibrations, so that none is simulated twice."""
+
+    _known: dict[tuple[int, bytes, tuple[str, ...]], tuple[Model, Found]] = field(default_factory=dict)
+
+    def of(self, tried: Calibration, compute: Callable[[], Found]) -> Found:
+        """The result of a calibration with this model and these values, computed where it is not known."""
+        key = id(tried.model), tried.values.tobytes(), tuple(u.name for u in tried.unknowns)
+        if key not in self._known:
+            self._known[key] = tried.model, compute()  # the model is kept, so that its identity stays its own
+        return self._known[key][1]

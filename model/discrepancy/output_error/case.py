@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from model.discrepancy.grounds import Refusal
 from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.phases import Residuals
 from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.output_error.calibration import Calibration
+from model.discrepancy.output_error.calibration import Calibration, Remembered
 from model.discrepancy.output_error.holdout import HeldOut, noise_floor
 from model.discrepancy.output_error.noise_model import residuals_of
 from model.discrepancy.output_error.observation import Observation, Signals
@@ -51,6 +51,7 @@ class Case:
     thresholds: Thresholds = THRESHOLDS
     excluded: tuple[str, ...] = ()
     watch: Watch | None = None
+    _scored: Remembered[Signals] = field(default_factory=Remembered, init=False, repr=False)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -71,8 +72,11 @@ class Case:
 
     def fitted_errors(self, before: Point, after: Point) -> tuple[SignalError, ...]:
         """Errors of every joint on the fitted traces."""
-        old, new = (self.scoring.residuals(p) for p in (before, after))
-        return self.scoring.errors(old, new, self.floor)
+        return self.scoring.errors(self.scored(before), self.scored(after), self.floor)
+
+    def scored(self, point: Calibration) -> Signals:
+        """Residuals of the fitted traces as errors are reported."""
+        return self._scored.of(point, lambda: self.scoring.residuals(point))
 
     def credited_against(self, before: Point, after: Point) -> Calibration:
         """What held-out errors of a point, `after`, are compared with.
@@ -125,7 +129,7 @@ class Case:
 
     def residuals_of(self, point: Point) -> Residuals:
         """Residuals of the fitted traces as errors are reported."""
-        return residuals_of(point.fitted_model, self.scoring, self.scoring.residuals(point))
+        return residuals_of(point.fitted_model, self.scoring, self.scored(point))
 
     def held_residuals_of(self, point: Point) -> Residuals | None:
         """The same of the held-out traces; None where there are none."""
@@ -135,7 +139,7 @@ class Case:
 
     def _square(self, point: Point) -> float:
         """Weighted sum of squares of a point, on the fitted traces as errors are reported."""
-        weighted = self.scoring.weighted(self.scoring.residuals(point))
+        weighted = self.scoring.weighted(self.scored(point))
         return float(weighted @ weighted)
 
 

@@ -8,15 +8,15 @@ the arm a little near standstill.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from daq.contracts.errors import SpecError
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.output_error.calibration import Calibration
+from model.discrepancy.output_error.calibration import Calibration, Remembered
 from model.discrepancy.output_error.observation import Observation, Signals, observe, side_by_side
 from model.discrepancy.output_error.search import STEPS, Point, descend, point_at
 from model.discrepancy.thresholds import FEEDBACK_SHARE, FEEDBACK_SHARE_FOR_ERRORS
@@ -27,33 +27,38 @@ from model.machine_model.parameter import Kind
 REPLICAS, SEED = 6, 1991
 
 
-def noise_floor(
-    observation: Observation, truth: Calibration, left: Callable[[Observation], Signals] | None = None
-) -> Floats:
+def noise_floor(observation: Observation, truth: Calibration, refitted: Sequence[int] = ()) -> Floats:
     """Root mean square of each joint's residual, (n,) rad, over simulated records of an arm that is this model.
 
     Where its simulations in closed loop do not stay finite: the noise of a reading.
 
     Args:
-        left: residuals of an observation, computed as those of the real records are; None for those of that very model.
+        refitted: indices of the unknowns that are estimated from every record anew. Noise moves them by so little that
+            derivatives say what that takes off the residual.
     """
-    left = left or (lambda made: made.residuals(truth))
-    rng = np.random.default_rng(SEED)
-    replicas = [_replica(observation, truth, rng) for _ in range(REPLICAS)]
-    if not all(np.isfinite(r.measured).all() for replica in replicas for r in replica.records):
+    stated = replace(observation, noise=None)
+    try:
+        tangents = stated.tangents(truth, refitted) if refitted else np.zeros((0, observation.samples))
+    except SpecError:
         return observation.deviations.copy()
-    squares = [
-        np.square(replica.rms(residuals))
-        for replica, residuals in zip(replicas, side_by_side(left, replicas), strict=True)
-    ]
-    return np.asarray(np.sqrt(np.mean(squares, axis=0)))
+    information = tangents @ tangents.T + np.diag(truth.precision[list(refitted)])
+    rng = np.random.default_rng(SEED)
+    drawn = [[rng.normal(size=p.noise.shape) for p in observation.prepared] for _ in range(REPLICAS)]
+
+    def squares(noise: Sequence[Floats]) -> Floats:
+        replica = _replica(observation, truth, noise)
+        left = stated.in_deviations(replica.residuals(truth))
+        left = left - np.linalg.lstsq(information, tangents @ left, rcond=None)[0] @ tangents
+        return np.array([np.mean(np.concatenate(runs) ** 2) for runs in stated.by_joint(left)])
+
+    found = np.mean(side_by_side(squares, drawn), axis=0)
+    return observation.deviations * (np.sqrt(found) if np.isfinite(found).all() else 1.0)
 
 
-def _replica(observation: Observation, truth: Calibration, rng: np.random.Generator) -> Observation:
-    """The same experiments on an arm that is this model, with random noise of the stated size, or as the records show
-    it."""
+def _replica(observation: Observation, truth: Calibration, noise: Sequence[Floats]) -> Observation:
+    """The same experiments on an arm that is this model, with that white noise (k, n) of unit size in each record made
+    as large as stated, or as the records show it."""
     scale = observation.deviations / observation.unit
-    noise = [rng.normal(size=p.noise.shape) for p in observation.prepared]
     if observation.noise is not None:
         whiteners = observation.noise.whiteners
         noise = [
@@ -75,11 +80,13 @@ class HeldOut:
     traces: tuple[Trace, ...]
     observation: Observation
     starts: tuple[Unknown, ...]
+    _left: Remembered[Signals] = field(default_factory=Remembered, init=False, repr=False)
 
     def floor(self, point: Calibration) -> Floats:
         """(n,) rad, as `noise_floor`, with the initial postures estimated here as well."""
         here = _values_here(point, self.starts)
-        return noise_floor(self.observation, here, lambda made: replace(self, observation=made).residuals(point))
+        count = len(here.unknowns)
+        return noise_floor(self.observation, here, range(count - len(self.starts), count))
 
     def residuals(self, point: Calibration) -> Signals:
         """Measured − simulated (m, n) rad of every held-out trace, with the point's values.
@@ -87,6 +94,9 @@ class HeldOut:
         Each trace itself gives what no other trace can: its initial posture, within a count or so, because friction
         holds the arm there; and its phase of a periodic disturbance, whose amplitude and frequency are kept.
         """
+        return self._left.of(point, lambda: self._residuals(point))
+
+    def _residuals(self, point: Calibration) -> Signals:
         return tuple(
             _residuals(
                 replace(self.observation, records=(record,), prepared=(prepared,)),

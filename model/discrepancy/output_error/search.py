@@ -45,13 +45,15 @@ class Point(Calibration):
     """A calibration, and the residual that it leaves of an observation.
 
     residuals: measured − simulated (m, n) rad per record; weighted (N,): the same in standard deviations of a reading;
-    tangents (p, N): derivatives of the weighted readings, at this point or one near it.
+    tangents (p, N): derivatives of the weighted readings, at this point or one near it; converged: whether a search
+    with derivatives of its own has ended here.
     """
 
     observation: Observation
     residuals: Signals
     weighted: Floats
     tangents: Floats
+    converged: bool = False
 
     @property
     def cost(self) -> float:
@@ -168,14 +170,16 @@ def converge(point: Point, steps: int, most: int = MOST_SEARCHES, goal: float = 
     beginning, hardly away, without the corrections made on the way: intervals come from derivatives, and a correction
     for a short step is mostly noise.
     """
-    for number in range(most):
+    for number in range(0 if point.converged else most):
         try:
             begun = point.with_new_tangents()
             following = descend(begun, steps, goal=goal)
         except SpecError:
             break  # on the verge of instability, as where a delay is missing: no derivative exists
         gained, point = point.cost - following.cost, replace(following, tangents=begun.tangents)
-        if gained < CONVERGED or point.cost - gained * (most - number - 1) > goal or _is_foretold(begun, following):
+        if gained < CONVERGED or _is_foretold(begun, following):
+            return replace(point, converged=True)
+        if point.cost - gained * (most - number - 1) > goal:
             break
     return point
 
@@ -191,7 +195,9 @@ def _step(point: Point) -> tuple[Point, bool]:
     """A step, and whether it descends; if not, the same point with corrected derivatives."""
     low, high = (np.array([getattr(u, side) for u in point.unknowns]) for side in ("low", "high"))
     for share, damping in ATTEMPTS:
-        step = _gauss_newton(point, low - point.values, high - point.values, damping)
+        step, promised = _gauss_newton(point, low - point.values, high - point.values, damping)
+        if promised < FORETOLD * CONVERGED:
+            break
         values = np.clip(point.values + share * step, low, high)  # against rounding: the whole step is within bounds
         tried = point.moved_to(values)
         if not tried.is_finite:
@@ -205,13 +211,15 @@ def _step(point: Point) -> tuple[Point, bool]:
     return point, False
 
 
-def _gauss_newton(point: Point, least: Floats, most: Floats, damping: float) -> Floats:
-    """The damped step (p,) to the minimum of the linearised problem, between `least` and `most` (p,)."""
+def _gauss_newton(point: Point, least: Floats, most: Floats, damping: float) -> tuple[Floats, float]:
+    """The damped step (p,) to the minimum of the linearised problem, between `least` and `most` (p,), and the fall of
+    the cost that it promises."""
     information = point.information.copy()
     diagonal = np.diag(information)
     information[np.diag_indices_from(information)] += (1e-9 + damping) * np.maximum(diagonal, 1e-12 * diagonal.max())
     descent = point.tangents @ point.weighted - point.precision * (point.values - point.expected)
-    return bounded_step(information, descent, least, most)
+    step = bounded_step(information, descent, least, most)
+    return step, float(2.0 * descent @ step - step @ point.information @ step)
 
 
 def _corrected(point: Point, tried: Point) -> tuple[Floats, Floats]:

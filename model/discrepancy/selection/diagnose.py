@@ -255,7 +255,7 @@ def _answer(
         *on_stated_numbers(_stated(end), end.by_name),
         Note(kind="tolerances-fitted-first", values={"traces": len(case.traces)}),
         Note(kind="errors-follow-record", values={"share": FEEDBACK_SHARE_FOR_ERRORS}),
-        *note_on_noise(end.observation, case.scoring.rms(case.scoring.residuals(end)), noisy),
+        *note_on_noise(end.observation, case.scoring.rms(case.scored(end)), noisy),
         *on_unfinished((*case.traces, *case.held_traces)),
         *(() if case.held_traces else (Note(kind="nothing-held-out"),)),
         *asked.notes,
