@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
@@ -96,6 +96,9 @@ class Plugin:
     beside the service that changes who may use it, within the command's transaction."""
     parts: tuple[str, ...] = ()
     """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
+    sections: tuple[str, ...] = ()
+    """Functions of a `Diagnosis` and its traces, as "module:function": a `model.blocks.Section` for its report, or
+    None."""
     routes_at_root: tuple[str, ...] = ()
     """Routers whose addresses begin at the root, as "module:router"."""
     routes: tuple[str, ...] = ()
@@ -108,6 +111,12 @@ def plugins() -> tuple[Plugin, ...]:
     robot must be stopped all the same."""
     found = (_loaded(name, reference) for name, reference in sorted(_entry_points().items()))
     return tuple(plugin for plugin in found if plugin is not None)
+
+
+def report_sections(found: object, traces: Sequence[object]) -> list[Any]:
+    """What plug-ins add to the report of a diagnosis of these traces, as sections."""
+    made = (named(section)(found, traces) for plugin in plugins() for section in plugin.sections)
+    return [section for section in made if section is not None]
 
 
 def named(reference: str) -> Any:

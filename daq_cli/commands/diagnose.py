@@ -206,6 +206,7 @@ def _beginning(
 def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], path: Path) -> Path:
     """Writes the report. If the traces can be simulated, it compares the models before and after on every trace."""
     from daq.contracts.machine import NoController
+    from daq.plugins import report_sections
     from model.comparison.compare import compare
     from model.discrepancy.inverse_dynamics.efforts import recorded_and_predicted
     from model.reports.diagnosis_report import LABELS, diagnosis_report
@@ -216,5 +217,7 @@ def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], p
     if simulated and all(t.set_point is not None for t in (*traces, *held)):
         models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
         comparison = compare(models, [*traces, *held], found.holdout)
-    efforts = recorded_and_predicted(found, [*traces, *held], found.holdout) if found.computed else ()
-    return write_report(diagnosis_report(found, comparison, files_of([*traces, *held]), efforts), path)
+    every = [*traces, *held]
+    efforts = recorded_and_predicted(found, every, found.holdout) if found.computed else ()
+    more = report_sections(found, every)
+    return write_report(diagnosis_report(found, comparison, files_of(every), efforts, more), path)

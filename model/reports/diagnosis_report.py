@@ -46,6 +46,7 @@ def diagnosis_report(
     comparison: Comparison | None = None,
     files: Mapping[str, str] | None = None,
     efforts: Sequence[TraceSignals] = (),
+    more: Sequence[Section] = (),
 ) -> Report:
     """The page of a diagnosis.
 
@@ -54,6 +55,7 @@ def diagnosis_report(
             are left out without it.
         files: names of the traces' files, by number, where they are known.
         efforts: recorded beside predicted torques (forces) of a diagnosis in torques, of the models `LABELS`.
+        more: sections of plug-ins (`daq.plugins.report_sections`), shown behind the comparisons.
     """
     files = files or {}
     of = compared(found)
@@ -76,6 +78,7 @@ def diagnosis_report(
         sections.append(_overlays(comparison, found, files))
     elif of.overlays and not efforts:
         sections.append(Section("Overlays", (Text(of.overlays, "quiet"),)))
+    sections += more
     sections.append(_remaining(found, of))
     if found.acquired:
         sections.append(_acquired(found.acquired))

@@ -190,6 +190,7 @@ class _Worker:
     def diagnose(self, request: DiagnoseRequest) -> Ended:
         """Does the same as `daq diagnose`."""
         from daq.contracts.machine import NoController
+        from daq.plugins import report_sections
         from model.discrepancy.explanation.answer_words import headline
         from model.discrepancy.inverse_dynamics.efforts import recorded_and_predicted
         from model.discrepancy.options import DiagnosisOptions
@@ -224,7 +225,7 @@ class _Worker:
             self._keep_model(found.model_after)
         efforts = recorded_and_predicted(found, [*traces, *held], found.holdout) if found.computed else ()
         result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison, given, efforts))
-        report = diagnosis_report(found, comparison, efforts=efforts)
+        report = diagnosis_report(found, comparison, None, efforts, report_sections(found, [*traces, *held]))
         return self._done(result, report, headline(found), found.model_after if changed else None)
 
     def _compared(

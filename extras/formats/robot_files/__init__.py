@@ -1,4 +1,4 @@
-"""Robots in the formats of others: URDF to machine files, models to URDF and MJCF."""
+"""Robots in the formats of others: URDF to machine files; models to URDF, MJCF and actuators; replays in MuJoCo."""
 
 from daq.plugins import Command, Name, Plugin
 
@@ -11,6 +11,7 @@ PLUGIN = Plugin(
             about="computer",
         ),
     ),
+    sections=("extras.formats.robot_files.replay_section:replay_section",),
     names=(
         Name("machine_from_urdf", "extras.formats.robot_files.machine_of_arm", "robot"),
         Name("write_mjcf", "extras.formats.robot_files.in_python", "model"),

@@ -1,4 +1,7 @@
-"""A model's links as URDF and MJCF want them: each in a frame at its own joint, with its inertia about its centre."""
+"""A model's links as URDF and MJCF want them: each in a frame at its own joint, with its inertia about its centre.
+
+It reads the numbers of a model, and no code of its simulation: what MuJoCo makes of them is a second opinion.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,9 @@ from daq.contracts.machine import NoController
 from extras.formats.robot_files.denavit_hartenberg import transform
 from model import layout as at
 from model.arrays import Floats
-from model.drives.magnet import back_emf_constant, torque_constant
 from model.effects.library import effect
 from model.machine_model.model import Model
-from model.simulation.chain_of_model import chain_of
+from model.machine_model.nominal import NO_LIMIT
 
 IN_BODIES = frozenset((at.MASS_ADDED, at.PAYLOAD, at.TILT_X, at.TILT_Y, at.SHIFT))
 """Numbers of effects that are part of masses, centres and gravity."""
@@ -35,6 +37,8 @@ class OutgoingLink:
     viscous, coulomb: friction at the joint
     stiffness, slack: of a spring at the joint, and where it is slack
     drive_limit: largest drive; None where there is none
+    numbers:  (layout.PER_JOINT,) every number of the joint
+    lags:     whether the winding's inductance is part of the model
     """
 
     name: str
@@ -56,6 +60,8 @@ class OutgoingLink:
     stiffness: float
     slack: float
     drive_limit: float | None
+    numbers: Floats
+    lags: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,24 +83,26 @@ class OutgoingArm:
 
 def outgoing_arm(model: Model) -> OutgoingArm:
     """The arm that a model describes, with its own numbers: effects in the masses, load and payload included."""
-    chain, machine = chain_of(model), model.machine
+    machine, shared = model.machine, model.vector[: at.SHARED]
     numbers = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
     place, angles = np.eye(4), (0.0, 0.0, 0.0)
     links, taken = [], set[str]()
     for i, joint in enumerate(numbers):
-        theta, d, a, alpha = (float(value) for value in chain.geometry[i])
+        theta, d, a, alpha = (float(joint[column]) for column in (at.THETA, at.D, at.A, at.ALPHA))
         rest = transform(theta, d, a, alpha)  # from the link's D–H frame to one at its joint, before θ
         described, limit = machine.joints[i], machine.limits.joint(i + 1)
-        mass, centre, inertia = _about_centre(chain.inertial[i])
-        gear, resistance = float(joint[at.GEAR]), float(joint[at.RESISTANCE])
-        gain = gear * float(torque_constant(joint)) / resistance
+        mass, centre, inertia = _body(joint)
+        if i == model.joint_count - 1:
+            mass, centre, inertia = _with_load(mass, centre, inertia, float(shared[at.LOAD] + shared[at.PAYLOAD]))
+        gear, resistance, flux = float(joint[at.GEAR]), float(joint[at.RESISTANCE]), 1.0 - float(joint[at.FLUX_LOSS])
+        gain = gear * flux * float(joint[at.TORQUE_CONSTANT]) / resistance
         name = _unlike(described.name or f"joint{i + 1}", taken)
         supply = float(joint[at.SUPPLY])
         links.append(
             OutgoingLink(
                 name=f"{name}_link",
                 joint=name,
-                slides=bool(chain.prismatic[i]),
+                slides=bool(joint[at.PRISMATIC]),
                 place=place,
                 angles=angles,
                 mass=mass,
@@ -103,21 +111,32 @@ def outgoing_arm(model: Model) -> OutgoingArm:
                 low=limit.low,
                 high=limit.high,
                 speed=limit.speed,
-                rotor=float(chain.rotor_inertia[i]),
+                rotor=float(joint[at.ROTOR_INERTIA]) * gear**2,
                 gain=gain,
-                back=gain * float(back_emf_constant(joint)) * gear,
+                back=gain * flux * float(joint[at.BACK_EMF]) * gear,
                 viscous=float(joint[at.VISCOUS]) * gear**2,
                 coulomb=float(joint[at.COULOMB]),
                 stiffness=float(joint[at.SPRING]),
                 slack=float(joint[at.SPRING_REST]),
-                drive_limit=supply if supply < 1e9 else None,
+                drive_limit=supply if supply < NO_LIMIT else None,
+                numbers=joint,
+                lags=bool(model.flags[i] & at.HAS_INDUCTANCE),
             )
         )
         place, angles = rest, (alpha, 0.0, theta)
-    x, y, z = (float(g) for g in chain.gravity)
+    x, y, z = _gravity(shared)
     down = math.hypot(y, z)
     tilt = (math.atan2(-y, -z) if down > 0.0 else 0.0, math.atan2(x, down) if x != 0.0 else 0.0)
     return OutgoingArm(machine.name, tuple(links), tilt, math.hypot(x, down), place, angles)
+
+
+def motor_numbers(link: OutgoingLink) -> tuple[float, float, float]:
+    """Gear, one constant for torque and back-EMF (V·s/rad), and the resistance (Ω) with which a voltage gives the
+    torque of the file, where that has two constants. Currents are K_T/K_b times the real ones."""
+    numbers = link.numbers
+    constant = float(numbers[at.BACK_EMF] * (1.0 - numbers[at.FLUX_LOSS]))
+    resistance = float(numbers[at.RESISTANCE] * numbers[at.BACK_EMF] / numbers[at.TORQUE_CONSTANT])
+    return float(numbers[at.GEAR]), constant, resistance
 
 
 def left_out(model: Model, held: frozenset[int]) -> list[str]:
@@ -136,15 +155,37 @@ def left_out(model: Model, held: frozenset[int]) -> list[str]:
     return found
 
 
-def _about_centre(inertial: Floats) -> tuple[float, Floats, Floats]:
-    """Mass, centre of mass and inertia about it, from mass, first moments and inertia about the frame's origin."""
-    mass, moments = float(inertial[0]), inertial[1:4]
-    xx, xy, xz, yy, yz, zz = inertial[4:]
-    about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if mass == 0.0:
-        return 0.0, np.zeros(3), about_origin
-    centre = moments / mass
-    return mass, centre, about_origin - mass * (float(centre @ centre) * np.eye(3) - np.outer(centre, centre))
+def _body(joint: Floats) -> tuple[float, Floats, Floats]:
+    """Mass, centre of mass (3,) and inertia (3, 3) about it, in the link's Denavit–Hartenberg frame."""
+    mass = float(joint[at.MASS] + joint[at.MASS_ADDED])
+    along, a, alpha = float(joint[at.SHIFT]), float(joint[at.A]), float(joint[at.ALPHA])
+    if joint[at.SHAPE] == at.CYLINDER:  # about the joint's axis, which this frame has turned by α; half of it across
+        axis = np.array([0.0, math.sin(alpha), math.cos(alpha)])
+        moment = 0.5 * mass * float(joint[at.RADIUS]) ** 2
+        return mass, np.array([along - a, 0.0, 0.0]), 0.5 * moment * (np.eye(3) + np.outer(axis, axis))
+    if joint[at.SHAPE] == at.ROD:
+        return mass, np.array([along - 0.5 * a, 0.0, 0.0]), np.diag([0.0, 1.0, 1.0]) * (mass * a**2 / 12.0)
+    xx, yy, zz, xy, xz, yz = (float(moment) for moment in joint[at.INERTIA_XX : at.INERTIA_YZ + 1])
+    heavier = mass / float(joint[at.MASS]) if joint[at.MASS] > 0.0 else 1.0  # of the same shape
+    centre = joint[at.CENTRE_X : at.CENTRE_Z + 1] + np.array([along, 0.0, 0.0])
+    return mass, centre, heavier * np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _with_load(mass: float, centre: Floats, inertia: Floats, load: float) -> tuple[float, Floats, Floats]:
+    """The body with a point at the origin of its frame."""
+    whole = mass + load
+    if whole == 0.0:
+        return 0.0, centre, inertia
+    about = mass * load / whole * (float(centre @ centre) * np.eye(3) - np.outer(centre, centre))
+    return whole, mass / whole * centre, inertia + about
+
+
+def _gravity(shared: Floats) -> tuple[float, float, float]:
+    """Gravity in the axes of a base that is turned about its x axis, then about its y axis."""
+    x, y, z = (float(component) for component in shared[at.GRAVITY_X : at.GRAVITY_Z + 1])
+    about_x, about_y = float(shared[at.TILT_X]), float(shared[at.TILT_Y])
+    y, z = math.cos(about_x) * y + math.sin(about_x) * z, math.cos(about_x) * z - math.sin(about_x) * y
+    return math.cos(about_y) * x - math.sin(about_y) * z, y, math.cos(about_y) * z + math.sin(about_y) * x
 
 
 def _unlike(name: str, taken: set[str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +13,7 @@ from daq.contracts.errors import SpecError
 from daq_cli.app.context import JsonOption, console, print_json, printable
 from daq_cli.app.output_file import check_folder, replacing
 from daq_cli.app.quantities import parse_numbers
-from daq_cli.models.model_input import MODEL_HELP, read_model
+from daq_cli.models.model_input import MODEL_HELP, TraceFolderOption, TracesArgument, read_model
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -308,14 +309,67 @@ def to_mjcf(
     _write(read_model(model), mjcf_text, output, "mjcf", json)
 
 
+class Form(StrEnum):
+    """A program whose actuators are written."""
+
+    MJLAB = "mjlab"
+    ISAACLAB = "isaaclab"
+    BAM = "bam"
+
+
+@app.command("to-actuators")
+def to_actuators(
+    model: Annotated[str, typer.Argument(help=MODEL_HELP)],
+    form: Annotated[Form, typer.Option("--for", help="The program.")],
+    joint: Annotated[int | None, typer.Option(min=1, help="Of BAM: the joint; its file has one.")] = None,
+    actuator: Annotated[str | None, typer.Option(help="Of BAM: its name of the actuator, such as sts3215.")] = None,
+    output: OutputFile = None,
+    json: JsonOption = False,
+) -> None:
+    """Write a model's drives, friction and position loops as actuators of mjlab, Isaac Lab or BAM."""
+    from extras.formats.robot_files.actuator_configs import actuator_text
+
+    suffix = "json" if form is Form.BAM else "py"
+    _write(read_model(model), lambda one: actuator_text(one, form.value, joint, actuator), output, suffix, json)
+
+
+@app.command("replay")
+def replay_command(
+    context: typer.Context,
+    model: Annotated[str, typer.Argument(help=f"The model to be judged. {MODEL_HELP}")],
+    traces: TracesArgument,
+    before: Annotated[str | None, typer.Option(help="Compare it with this one (default: its machine alone).")] = None,
+    folder: TraceFolderOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Replay recorded drives in MuJoCo with two models: a second opinion, which shares no code with our simulation."""
+    from dataclasses import asdict
+
+    from daq_cli.models.model_input import read_traces
+    from daq_cli.robot.access import robot_of
+    from extras.formats.robot_files.replay import replay
+    from extras.formats.robot_files.replay_section import replay_table
+    from model.machine_model.model import base_model
+
+    after = read_model(model)
+    other = base_model(after.machine) if before is None else read_model(before)
+    made = replay(other, after, read_traces(robot_of(context), folder, traces))
+    if json:
+        print_json({name: list(value) for name, value in asdict(made).items()})
+        return
+    table = replay_table([("all", made)])
+    print(f"{printable(str(table))}\n{printable(table.caption)}")
+
+
 def _write(
     model: Model, writer: Callable[[Model], tuple[str, list[str]]], output: Path | None, kind: str, json: bool
 ) -> None:
     """Writes a model's text to a file or to standard output."""
     if output is not None:
         check_folder(output, "--output")
-        if output.suffix.lower() not in (f".{kind}", ".xml"):
-            raise SpecError(f"{output}: name a .{kind} or .xml file")
+        allowed = (f".{kind}", ".xml") if kind in ("urdf", "mjcf") else (f".{kind}",)
+        if output.suffix.lower() not in allowed:
+            raise SpecError(f"{output}: name a {' or '.join(allowed)} file")
     text, left_out = writer(model)
     if output is not None:
         with replacing(output) as part:

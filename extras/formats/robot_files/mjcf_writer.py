@@ -9,14 +9,30 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from extras.formats.robot_files.bodies_of_model import OutgoingLink, left_out, outgoing_arm
+from extras.formats.robot_files.bodies_of_model import OutgoingLink, left_out, motor_numbers, outgoing_arm
 from extras.formats.robot_files.numbers import text_of
 from model import layout as at
 from model.arrays import Floats
 from model.machine_model.model import Model
 
-HELD = frozenset((at.VISCOUS, at.COULOMB, at.SPRING, at.SPRING_REST, at.FLUX_LOSS))
+HELD = frozenset(
+    (
+        *(at.VISCOUS, at.COULOMB, at.SPRING, at.SPRING_REST, at.CONSTANT_TORQUE, at.FLUX_LOSS, at.INDUCTANCE),
+        *(at.SUPPLY, at.HEATING, at.COOLING_TIME, at.STRIBECK, at.STRIBECK_SPEED),
+        *(at.RIPPLE_SINE, at.RIPPLE_COSINE, at.RIPPLE_CYCLES),
+    )
+)
 """Numbers of effects that MJCF has a place for, beside those of the bodies."""
+OF_MOTORS = frozenset(("motor_inductance", "resistance_drift"))
+"""Effects that only MuJoCo's `dcmotor` has."""
+NEARLY = {
+    "coulomb_friction": "as a constraint that yields a little",
+    "stribeck_friction": "as LuGre friction, which falls with exp(-(v/V)^2)",
+    "resistance_drift": "heated by the resistance that has risen",
+}
+"""What differs of an effect that MuJoCo has in another form."""
+COPPER = 0.0039
+"""Relative rise of a copper winding's resistance, 1/K."""
 LEAST_MOMENT = 1e-10
 """Least principal moment of a body, as a share of its largest: MuJoCo refuses the 0 of a thin rod about itself."""
 SMALLEST_MOMENT = 1e-14
@@ -28,17 +44,18 @@ LEAST_MASS = 1e-9
 def mjcf_text(model: Model) -> tuple[str, list[str]]:
     """The model's MJCF, and what of the model it leaves out.
 
-    Every drive is an actuator whose control is the recorded drive, back-EMF included. MuJoCo's friction loss is a
-    constraint, softer than Coulomb friction here. Raises SpecError for a link that no real body can be.
+    Every drive is an actuator whose control is the recorded drive: a `dcmotor` with the file's constants where back-EMF
+    is known, which MuJoCo has from 3.7 on. Raises SpecError for a link that no real body can be.
     """
     arm = outgoing_arm(model)
     lost = left_out(model, HELD)
+    simple = [link.joint for link in arm.links if not link.back]
+    lost += [f"{use.name} of {', '.join(simple)}" for use in model.effects if use.name in OF_MOTORS and simple]
+    nearly = [f"{use.name} {NEARLY[use.name]}" for use in model.effects if use.name in NEARLY]
+    said = f" Made from model {model.identity}. Not in it: {'; '.join(lost) or 'nothing'}. "
+    said += f"Nearly: {'; '.join(nearly)}. " if nearly else ""
     root = Xml.Element("mujoco", model=arm.name)
-    root.append(
-        Xml.Comment(
-            f" Made from model {model.identity}. Not in it: {'; '.join(lost) or 'nothing'}. ".replace("--", "- -")
-        )
-    )
+    root.append(Xml.Comment(said.replace("--", "- -")))
     Xml.SubElement(root, "compiler", angle="radian", autolimits="true")
     Xml.SubElement(root, "option", gravity=text_of(0.0, 0.0, -arm.gravity), timestep="0.001", integrator="implicitfast")
     roll, pitch = arm.tilt
@@ -48,8 +65,9 @@ def mjcf_text(model: Model) -> tuple[str, list[str]]:
         parent = _body(parent, link, end)
     Xml.SubElement(parent, "site", name="tool", pos=text_of(*arm.tool[:3, 3]), quat=_turn(arm.tool_angles))
     actuators = Xml.SubElement(root, "actuator")
-    for link in arm.links:
-        _actuator(actuators, link)
+    for write in (_drive, _passive, _preload):  # so that the drives are the first controls
+        for link in arm.links:
+            write(actuators, link)
     Xml.indent(root)
     return Xml.tostring(root, "unicode") + "\n", lost
 
@@ -69,7 +87,7 @@ def _body(parent: Xml.Element, link: OutgoingLink, end: Floats) -> Xml.Element:
     for name, value in (
         ("armature", link.rotor),
         ("damping", link.viscous),
-        ("frictionloss", link.coulomb),
+        ("frictionloss", 0.0 if link.numbers[at.STRIBECK] else link.coulomb),
         ("stiffness", link.stiffness),
         ("springref", link.slack if link.stiffness else 0.0),
     ):
@@ -90,14 +108,57 @@ def _body(parent: Xml.Element, link: OutgoingLink, end: Floats) -> Xml.Element:
     return body
 
 
-def _actuator(actuators: Xml.Element, link: OutgoingLink) -> None:
-    actuator = Xml.SubElement(actuators, "general", name=f"{link.joint}_drive", joint=link.joint)
-    actuator.set("gainprm", text_of(link.gain))
+def _drive(actuators: Xml.Element, link: OutgoingLink) -> None:
+    actuator = Xml.SubElement(actuators, "dcmotor" if link.back else "general")
+    actuator.set("name", f"{link.joint}_drive")
+    actuator.set("joint", link.joint)
     if link.back:
-        actuator.set("biastype", "affine")
-        actuator.set("biasprm", text_of(0.0, 0.0, -link.back))
+        _motor(actuator, link)
+    else:
+        actuator.set("gainprm", text_of(link.gain))
     if link.drive_limit is not None:
         actuator.set("ctrlrange", text_of(-link.drive_limit, link.drive_limit))
+
+
+def _motor(actuator: Xml.Element, link: OutgoingLink) -> None:
+    numbers = link.numbers
+    for name, value in zip(("gear", "motorconst", "resistance"), motor_numbers(link), strict=True):
+        actuator.set(name, text_of(value))
+    if link.lags:
+        actuator.set("inductance", text_of(0.0, float(numbers[at.INDUCTANCE] / numbers[at.RESISTANCE])))
+    if numbers[at.HEATING]:
+        # α R' i'² / C is to be h i², with this motor's current i' = K_T/K_b i
+        scale = float(numbers[at.TORQUE_CONSTANT] / numbers[at.BACK_EMF])
+        capacity = COPPER * float(numbers[at.RESISTANCE]) * scale / float(numbers[at.HEATING])
+        actuator.set("thermal", text_of(0.0, capacity, float(numbers[at.COOLING_TIME]), COPPER, 25.0, 25.0))
+
+
+def _passive(actuators: Xml.Element, link: OutgoingLink) -> None:
+    """Ripple and Stribeck friction: MuJoCo has them in a motor without constants or controls."""
+    numbers = link.numbers
+    ripple, kinetic = math.hypot(numbers[at.RIPPLE_SINE], numbers[at.RIPPLE_COSINE]), float(numbers[at.COULOMB])
+    parts = {}
+    if ripple:
+        phase = math.atan2(numbers[at.RIPPLE_COSINE], numbers[at.RIPPLE_SINE])
+        parts["cogging"] = text_of(ripple, float(numbers[at.RIPPLE_CYCLES]), phase)
+    if numbers[at.STRIBECK]:
+        static = kinetic + float(numbers[at.STRIBECK])
+        stiffness = static / float(numbers[at.PRESLIDING])
+        parts["lugre"] = text_of(stiffness, 0.0, kinetic, static, float(numbers[at.STRIBECK_SPEED]))
+    if parts:
+        Xml.SubElement(
+            actuators,
+            "dcmotor",
+            {"name": f"{link.joint}_losses", "joint": link.joint, "input": "none", "motorconst": "0", "resistance": "1"}
+            | parts,
+        )
+
+
+def _preload(actuators: Xml.Element, link: OutgoingLink) -> None:
+    if torque := float(link.numbers[at.CONSTANT_TORQUE]):
+        preload = Xml.SubElement(actuators, "general", name=f"{link.joint}_preload", joint=link.joint)
+        for name, value in (("gainprm", text_of(0.0)), ("biastype", "affine"), ("biasprm", text_of(torque))):
+            preload.set(name, value)
 
 
 def _heavy_enough(link: OutgoingLink) -> tuple[float, Floats]:
