@@ -173,7 +173,9 @@ class TeachingService:
     def _require_not_stopped(self) -> None:
         arm = self._robot.arm
         if arm is not None and arm.arm in _HELD:
-            raise conflict("arm-stopped", f"the arm is {_HELD[arm.arm]}: {arm.cause}", "reset the robot when it is safe")
+            raise conflict(
+                "arm-stopped", f"the arm is {_HELD[arm.arm]}: {arm.cause}", "reset the robot when it is safe"
+            )
 
     def _require_possible(self, velocities: dict[int, float]) -> None:
         machine = self._robot.machine
