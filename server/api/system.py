@@ -114,7 +114,7 @@ def _checks(services: Services) -> dict[str, str]:
         services.store.require_writable()
     except (SQLAlchemyError, OSError) as error:
         checks["database"] = one_line(error)
-    checks["room"] = "; ".join(services.storage_warnings())
+    checks["disk space"] = "; ".join(services.storage_warnings())
     for part in services.parts:
         checks |= part.checks()
     for rig in services.robots():

@@ -1,5 +1,5 @@
 import { svelte } from '@sveltejs/vite-plugin-svelte';
-import type { Plugin } from 'vite';
+import { build, type Plugin, type Rolldown } from 'vite';
 import { defineConfig } from 'vitest/config';
 
 /**
@@ -45,10 +45,45 @@ function taken(fileName: string): Plugin {
   };
 }
 
+/** Writes the saved report's program as one file: its script and its styles stand in it. */
+function offline(program: string, fileName: string): Plugin {
+  return {
+    name: 'offline-report',
+    async generateBundle() {
+      const made = (await build({
+        configFile: false,
+        plugins: [svelte()],
+        logLevel: 'error',
+        build: {
+          write: false,
+          target: 'es2022',
+          lib: { entry: program, formats: ['iife'], name: 'report', cssFileName: 'report' },
+        },
+      })) as Rolldown.RolldownOutput[];
+      const parts = made.flatMap((one) => one.output);
+      const script = parts.flatMap((one) => (one.type === 'chunk' ? [one.code] : [])).join('\n');
+      const style = parts.flatMap((one) => (one.type === 'asset' ? [String(one.source)] : [])).join('\n');
+      const source = [
+        '<!doctype html><html lang="en"><head><meta charset="utf-8" />',
+        '<meta name="viewport" content="width=device-width, initial-scale=1" />',
+        `<style>${style}</style></head><body><div id="app"></div>`,
+        '<script id="data" type="application/json">{}</script>',
+        `<script>${script.replaceAll('</script', '<\\/script')}</script></body></html>`,
+      ].join('\n');
+      this.emitFile({ type: 'asset', fileName, source });
+    },
+  };
+}
+
 export default defineConfig({
   // Relative addresses: a proxy may serve the page below a path of its own.
   base: './',
-  plugins: [svelte(), preloaded('/src/app.ts'), taken('taken.json')],
+  plugins: [
+    svelte(),
+    preloaded('/src/app.ts'),
+    taken('taken.json'),
+    offline('src/report/main.ts', 'report.html'),
+  ],
   build: {
     target: 'es2022',
     // The page's policy allows fonts and pictures as files of its own, not inside style sheets.

@@ -39,6 +39,9 @@ IF_A_LEAD_GOES_ON = (
     "HOLD THE ARM: led joints have no drive, and a stop does not hold them; reset it here, then set gains"
 )
 
+_HELD = {"stopped": "stopped", "fault": "at fault"}
+"""States in which it moves only after a reset, in words."""
+
 
 @dataclass(frozen=True)
 class Word:
@@ -169,8 +172,10 @@ class TeachingService:
 
     def _require_not_stopped(self) -> None:
         arm = self._robot.arm
-        if arm is not None and arm.arm in ("stopped", "fault"):
-            raise conflict("arm-stopped", f"the arm is {arm.arm}: {arm.cause}", "reset the robot when it is safe")
+        if arm is not None and arm.arm in _HELD:
+            raise conflict(
+                "arm-stopped", f"the arm is {_HELD[arm.arm]}: {arm.cause}", "reset the robot when it is safe"
+            )
 
     def _require_possible(self, velocities: dict[int, float]) -> None:
         machine = self._robot.machine

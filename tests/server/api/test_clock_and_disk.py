@@ -203,7 +203,7 @@ def test_a_disk_that_cannot_be_written_is_not_ready_and_only_who_may_see_the_rob
 ) -> None:
     monkeypatch.setattr("server.services.KEPT_FOR", 0.0)
     address = api.base_url.join("/readyz")
-    healthy = {"database": "", "traces": "", "room": "", "robot ma2000": ""}
+    healthy = {"database": "", "traces": "", "disk space": "", "robot ma2000": ""}
     assert api.get(address).json()["checks"].items() >= healthy.items()
     assert sorted(path.suffix for path in (tmp_path / "traces").iterdir()) == []
     monkeypatch.setattr(tempfile, "TemporaryFile", _read_only)

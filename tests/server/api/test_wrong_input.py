@@ -138,7 +138,7 @@ def test_health_and_system_tell_how_it_is(service: Service) -> None:
     asked = service.client.head(f"{base}/healthz")
     assert (asked.status_code, asked.content) == (200, b""), "monitors ask so"
     checks = service.client.get(f"{base}/readyz").json()["checks"]
-    assert checks.items() >= {"database": "", "room": "", "traces": "", "robot ma2000": ""}.items()
+    assert checks.items() >= {"database": "", "disk space": "", "traces": "", "robot ma2000": ""}.items()
     assert not any(checks.values())
     assert service.client.get("/system").json()["storage"]["database"] == "sqlite"
 

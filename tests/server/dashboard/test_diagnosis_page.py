@@ -2,6 +2,7 @@
 
 import re
 from math import degrees
+from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -49,8 +50,10 @@ def test_the_answer_is_told_with_the_numbers_that_were_found(studied: Studied, s
     page.get_by_role("link", name=re.compile("Coulomb friction on joint 2")).click()
     expect(page.get_by_role("heading", level=1)).to_have_text(re.compile("^Coulomb friction on joint 2, "))
     expect(page.get_by_text(found["summary"][1:]).first).to_be_visible()
+    _see_the_story(page, found)
+    page.get_by_role("button", name="Everything behind it").click()
     _see_the_map(page, found["given"])
-    best = page.get_by_role("listitem").filter(has_text="named")
+    best = page.get_by_role("region", name="Candidates").get_by_role("listitem").filter(has_text="named")
     expect(best).to_contain_text(f"{step['evidence']:.0f}")
     expect(page.get_by_text("explains", exact=False).first).to_be_attached()
     (value,) = step["parameters"].values()
@@ -63,6 +66,25 @@ def test_the_answer_is_told_with_the_numbers_that_were_found(studied: Studied, s
     expect(overlay.get_by_role("img", name=re.compile("^Position of joint 2"))).to_be_visible()
     overlay.get_by_role("combobox", name="Joint").select_option("3")
     expect(overlay.get_by_role("img", name=re.compile("^Measured minus simulated of joint 3"))).to_be_visible()
+
+
+def _see_the_story(page: Page, found: dict[str, Any]) -> None:
+    """Where, what, how much and what next; and the same in a saved file, which opens without the service."""
+    what, shrinks = (page.get_by_role("region", name=name) for name in ("What candidates", "How much it shrinks"))
+    expect(what.get_by_role("listitem").first).to_contain_text("Coulomb friction, joint 2")
+    after = degrees(found["gap"]["stages"][-1]["held_out"][1])
+    expect(shrinks.get_by_role("listitem").nth(1)).to_contain_text(f"{after:.2g}")
+    expect(page.get_by_role("img", name=re.compile("joint 2 not explained"))).to_be_visible()
+    page.get_by_role("button", name="with what was found").click()
+    expect(page.get_by_role("img", name=re.compile("joint 2 explained"))).to_be_visible()
+    with page.expect_download() as saving:
+        page.get_by_role("button", name="Report").click()
+    saved = page.context.new_page()
+    saved.goto(f"file://{saving.value.path()}")
+    expect(saved.get_by_role("heading", level=1)).to_have_text(re.compile("^Coulomb friction on joint 2, "))
+    expect(saved.get_by_role("region", name="How much it shrinks").get_by_role("listitem")).to_have_count(3)
+    assert faults_of(saved) == []
+    saved.close()
 
 
 def _see_the_map(page: Page, given: dict[str, object]) -> None:
@@ -101,6 +123,7 @@ def test_axe_finds_no_fault_in_an_answer(studied: Studied, studied_dashboard: Da
     page = studied_dashboard.page
     page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
     studied_dashboard.open(f"diagnosis/{studied.diagnosis}")
+    page.get_by_role("button", name="Everything behind it").click()
     expect(page.get_by_role("region", name="Remarks")).to_be_attached()
     for summary in page.get_by_text("As a table").all():
         summary.click()
@@ -111,5 +134,6 @@ def test_on_a_tablet_nothing_is_wider_than_the_page(studied: Studied, studied_da
     page = studied_dashboard.page
     page.set_viewport_size(TABLET)
     studied_dashboard.open(f"diagnosis/{studied.diagnosis}")
+    page.get_by_role("button", name="Everything behind it").click()
     expect(page.get_by_role("region", name="Candidates")).to_be_visible()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")

@@ -7,10 +7,11 @@ export class Playing {
   isUsed = $state(false);
   private frame = 0;
 
-  /** `speed`: seconds of the motion in a second. `again`: whether it begins anew at its end. */
+  /** `speed`: seconds of the motion in a second. `again`: whether it begins anew at its end, at `first` (s). */
   constructor(
     private readonly speed = 1,
     private readonly again = false,
+    private readonly first = 0,
   ) {}
 
   goTo(moment: number): void {
@@ -25,12 +26,15 @@ export class Playing {
       this.hold();
       return;
     }
-    const from = this.moment >= duration ? 0 : this.moment;
+    const from = this.moment >= duration ? 0 : Math.max(this.first, this.moment);
     const begun = performance.now();
     this.isPlaying = this.isUsed = true;
     const next = (now: number): void => {
       const at = from + (this.speed * Math.max(0, now - begun)) / 1000;
-      this.moment = this.again ? at % duration : Math.min(duration, at);
+      const { first } = this;
+      this.moment = this.again
+        ? first + ((at - first) % Math.max(1e-9, duration - first))
+        : Math.min(duration, at);
       if (this.again || this.moment < duration) this.frame = requestAnimationFrame(next);
       else this.isPlaying = false;
     };

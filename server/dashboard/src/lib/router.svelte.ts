@@ -24,11 +24,18 @@ class Router {
   route = $state.raw<Route>(routeOf(''));
 
   start(): void {
-    const read = (): void => {
-      this.route = routeOf(location.hash);
-    };
-    read();
-    addEventListener('hashchange', read);
+    this.read();
+    addEventListener('hashchange', () => this.read());
+  }
+
+  /** Takes over the address as it is now. */
+  read(): void {
+    this.route = routeOf(location.hash);
+  }
+
+  /** A page with a query, such as `#/experiments?again=42`. */
+  ask(page: string, query: Record<string, string>): void {
+    location.hash = `${linkTo(page)}?${new URLSearchParams(query)}`;
   }
 
   go(page: string, ...rest: string[]): void {

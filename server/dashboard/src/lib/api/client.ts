@@ -107,7 +107,12 @@ export async function download(path: string, name: string): Promise<void> {
     throw notAnswered();
   });
   if (!answer.ok) throw problemOf(answer.status, await answer.json().catch(() => null));
-  const address = URL.createObjectURL(await answer.blob());
+  saveAs(await answer.blob(), name);
+}
+
+/** Has the browser save data as a file. */
+export function saveAs(data: Blob, name: string): void {
+  const address = URL.createObjectURL(data);
   const link = document.createElement('a');
   link.href = address;
   link.download = name;

@@ -1,3 +1,3 @@
-export { addressOf, api, ask, download, here, newKey, pageOf, readiness, root } from './client';
+export { addressOf, api, ask, download, here, newKey, pageOf, readiness, root, saveAs } from './client';
 export { asProblem, Problem } from './problem';
 export type * from './types';

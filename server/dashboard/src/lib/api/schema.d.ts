@@ -1655,7 +1655,7 @@ export interface components {
         };
         /**
          * Approval
-         * @description Who has approved an experiment or a schedule, and when. `as_owner`: whether they owned the robot.
+         * @description Who approved an experiment or a schedule, and when. `as_owner`: whether this person owned the robot.
          */
         Approval: {
             /** By */
@@ -1670,7 +1670,7 @@ export interface components {
         };
         /**
          * ApprovalRequest
-         * @description Approves exactly the `content` that the caller has looked at: that of the experiment or schedule.
+         * @description Approves exactly the `content` that the caller has seen in the experiment or schedule.
          */
         ApprovalRequest: {
             /** Content */
@@ -1678,7 +1678,7 @@ export interface components {
         };
         /**
          * ArchiveOrder
-         * @description Asks for a trace to be archived now. `drop`: the local copy goes when that is done, whatever the policy says.
+         * @description Requests that a trace is archived now. `drop`: then delete the local copy, whatever the policy is.
          */
         ArchiveOrder: {
             /**
@@ -1718,9 +1718,9 @@ export interface components {
         };
         /**
          * ArmComparison
-         * @description The fits of one robot to one experiment, the oldest first, and what has changed from `reference` to the newest.
+         * @description A robot's fits to one experiment, the oldest first, and the changes from `reference` to the newest.
          *
-         *     `reference` is the newest fit that is older than the newest one by the time asked for; None if there is none.
+         *     `reference`: the newest fit that is older than the last one by the requested time; None if there is none.
          */
         ArmComparison: {
             /** Robot */
@@ -1835,7 +1835,7 @@ export interface components {
         };
         /**
          * BoardPid
-         * @description The MA2000's own controller: integer PID on ADC counts, every `period`, its output `delay` later.
+         * @description The MA2000's own controller: integer PID on ADC counts once per `period`; its output acts `delay` later.
          */
         BoardPid: {
             /**
@@ -1855,7 +1855,7 @@ export interface components {
         };
         /**
          * Body
-         * @description A rigid body: centre of mass in the link's own frame (m), inertia about it: xx, yy, zz, xy, xz, yz.
+         * @description A rigid body: mass, centre of mass (m, in the link's frame), and inertia about it: xx, yy, zz, xy, xz, yz.
          */
         Body: {
             /**
@@ -1962,7 +1962,7 @@ export interface components {
         };
         /**
          * Combination
-         * @description Changes that leave the records as they are, within the noise.
+         * @description A combination of changes that leaves the records unchanged, within the noise.
          */
         Combination: {
             /** Text */
@@ -2021,7 +2021,7 @@ export interface components {
         };
         /**
          * Control
-         * @description Who may move the robot now: nobody, one client, or the queue while an experiment runs.
+         * @description Who may move the robot now: nobody, one client or, during an experiment, the queue.
          */
         Control: {
             /**
@@ -2056,7 +2056,7 @@ export interface components {
         };
         /**
          * ControlRequest
-         * @description Requests control of the robot. A real arm needs the operator's consent: `moves_real_arm`.
+         * @description Requests control of the robot. A real arm requires the operator's consent: `moves_real_arm`.
          */
         ControlRequest: {
             /**
@@ -2128,7 +2128,7 @@ export interface components {
         };
         /**
          * Curve
-         * @description Mean squared error (rad², None where a run diverged) against one parameter's value, the others held.
+         * @description Mean squared error (rad², None where a run diverged) against one parameter's value; all others are held.
          */
         Curve: {
             /** Name */
@@ -2142,7 +2142,7 @@ export interface components {
         };
         /**
          * Cylinder
-         * @description A link turning about its own axis: I = ½ m r² about the joint (appendix B).
+         * @description A link that rotates about its own axis: I = ½ m r² about the joint (appendix B).
          */
         Cylinder: {
             /**
@@ -2155,9 +2155,9 @@ export interface components {
         };
         /**
          * DcMotor
-         * @description Permanent-magnet DC motor behind a linear amplifier and a gear (section 7.1 of the source).
+         * @description Permanent-magnet DC motor with a linear amplifier and a gear (section 7.1 of the source).
          *
-         *     `gear_ratio` is motor turns per joint turn. `dac_full_scale` is the controller's output at 127 counts.
+         *     `gear_ratio`: motor turns per joint turn. `dac_full_scale`: the controller's output at 127 counts.
          */
         DcMotor: {
             /**
@@ -2200,7 +2200,8 @@ export interface components {
         };
         /**
          * DestinationStatus
-         * @description How far the messages to one destination are. Counts are since the service started, `waiting` is of now.
+         * @description State of the messages to one destination. Counts are since the service started; `waiting` is the present
+         *     number.
          */
         DestinationStatus: {
             /** Name */
@@ -2495,7 +2496,7 @@ export interface components {
         };
         /**
          * Done
-         * @description Something was carried out.
+         * @description Result of a request, in one line.
          */
         Done: {
             /** Text */
@@ -2516,7 +2517,7 @@ export interface components {
         };
         /**
          * EffectFile
-         * @description The file that an effect of the user's own comes from: its name, and the first digits of its SHA-256.
+         * @description The file that defines a user's effect: its name, and the first digits of its SHA-256.
          */
         EffectFile: {
             /** Name */
@@ -2526,7 +2527,7 @@ export interface components {
         };
         /**
          * EffectInModel
-         * @description An effect of a model. `called`: the effect and its joints as people write them.
+         * @description An effect of a model. `called`: names of the effect and its joints for people.
          */
         EffectInModel: {
             /** Name */
@@ -2544,7 +2545,7 @@ export interface components {
         };
         /**
          * EventMessage
-         * @description Something that happened to the robot or its queue.
+         * @description An event of the robot or its queue.
          */
         EventMessage: {
             /**
@@ -2620,7 +2621,7 @@ export interface components {
         };
         /**
          * ExperimentChange
-         * @description Changes of a waiting experiment; what is None stays. A new specification ends its approval.
+         * @description Changes of a waiting experiment; fields that are None stay unchanged. A new specification ends its approval.
          */
         ExperimentChange: {
             /** Priority */
@@ -2678,10 +2679,9 @@ export interface components {
          * ExperimentSpec
          * @description One experiment. The same model serves the command line, the service and the trace's metadata.
          *
-         *     `start` gives angles (rad) of joints to be brought to before the record; joints not named go to the machine's rest
-         *     posture. `settle` s are held before the motion and `hold` s after it, both recorded. `record` names the joints to
-         *     record; None means every joint that the line has room for. `feedforward` says for which motion a path's set points
-         *     were computed.
+         *     `start`: angles (rad) of joints at the start of the record; joints not named go to the machine's rest posture.
+         *     `settle`, `hold`: times (s) at rest before and after the motion, both recorded. `record`: joints to record; None for
+         *     every joint that the line has capacity for. `feedforward`: the motion for which a path's set points were computed.
          */
         ExperimentSpec: {
             /**
@@ -2767,11 +2767,11 @@ export interface components {
         };
         /**
          * Feedforward
-         * @description Where a path's set points come from: they were computed so that the arm follows another experiment's motion.
+         * @description Origin of a path's set points: they were computed so that the arm follows another experiment's motion.
          *
-         *     `asked` is that experiment. Set points were computed with the model of this identity, learned from the trace of this
-         *     number, or both. `expected` is the error that the arm should have; `before` that of plain set points in the model's
-         *     simulation, or that of the trace which was learned from.
+         *     `asked`: that experiment. `model`, `learned_from`: ID of the model used and of the trace learned from; at least one
+         *     is given. `expected`: predicted tracking error. `before`: tracking error without feedforward, either simulated or
+         *     measured in that trace.
          */
         Feedforward: {
             asked: components["schemas"]["PlainExperiment"];
@@ -2790,11 +2790,11 @@ export interface components {
         };
         /**
          * Fidelity
-         * @description The transfer-function form of the distortion method for one model and its traces.
+         * @description Result of the transfer-function form of the distortion method, for one model and its traces.
          *
-         *     `outputs` are the joints whose errors count, `error_by_joint` their mean squared errors (rad²), `error` the sum.
-         *     Expected deviations of the parameters explain what is left when `sum_of_contributions` (Σλ²) is at least 1.
-         *     `verdict`: whether there is more left than noise; None in results of older versions.
+         *     `outputs` are the joints whose errors count, `error_by_joint` their mean squared errors (rad²), `error` the sum. If
+         *     `sum_of_contributions` (Σλ²) is at least 1, expected deviations of the parameters explain the error. `verdict`:
+         *     whether the error exceeds noise; None in results of older versions.
          */
         Fidelity: {
             /** Model */
@@ -2842,7 +2842,7 @@ export interface components {
         };
         /**
          * FieldProblem
-         * @description One field of a request that cannot be accepted.
+         * @description A rejected field of a request.
          */
         FieldProblem: {
             /** Field */
@@ -2925,21 +2925,21 @@ export interface components {
         };
         /**
          * FitOptions
-         * @description How a fit is to be done; the defaults suit traces of a known machine.
+         * @description Options of a fit; the defaults suit traces of a known machine.
          *
-         *     parameters: names or patterns (`joint2.*`, `*.mass`) of what to find; None: every number with an expected deviation
-         *         but the motor's torque constants and resistances, which fix the scale of torque.
-         *     held: names or patterns taken out of these again.
-         *     bounds, priors: instead of the model's own, by full name; a bound or prior of None is no bound, no prior.
-         *     use_priors: False leaves the expected deviations out altogether (nuisances keep theirs).
+         *     parameters: names or patterns (`joint2.*`, `*.mass`) to fit; None: every parameter with an expected deviation except
+         *         the motor's torque constants and resistances, which fix the scale of torque.
+         *     held: names or patterns that are excluded from these.
+         *     bounds, priors: replace the model's, by full name; None is no bound, no prior.
+         *     use_priors: False ignores all expected deviations (except those of nuisances).
          *     method: `nelder_mead` is the source's hill climbing: plain squared error summed over the joints, no priors.
-         *     starts: searches from different beginnings, the model's own values and seeded draws from the priors.
-         *     start_posture: let the arm start off the posture it was read at, by the sensor's error.
+         *     starts: number of searches, from the model's own values and from seeded draws from the priors.
+         *     start_posture: let the arm start at a distance from its first reading, within the sensor's error.
          *     sensor_bend: let the potentiometers bend within their stated linearity; None: where the machine states one.
          *     bend_terms: of the sine series of each bend, at most 8.
-         *     friction_form: leave open how friction behaves near zero speed, where laws of friction differ.
-         *     whiten: take out the correlation of the residual before weighing it.
-         *     consistent_inertias: find only bodies that can exist: of every link that is a body, if any of its numbers is fitted.
+         *     friction_form: fit the form of friction near zero speed, where laws of friction differ.
+         *     whiten: remove the correlation of the residual before weighting.
+         *     consistent_inertias: allow only physically consistent bodies, for every link with fitted inertial parameters.
          */
         FitOptions: {
             /** Parameters */
@@ -3125,7 +3125,7 @@ export interface components {
         };
         /**
          * FittedNumber
-         * @description A parameter that a fit has determined, with its 95 % interval.
+         * @description A parameter estimated by a fit, with its 95 % interval.
          */
         FittedNumber: {
             /** Name */
@@ -3145,8 +3145,8 @@ export interface components {
          * FittedParameter
          * @description One parameter after a fit.
          *
-         *     `value`, `deviation` and the 95 % interval `low` to `high` are None unless the data determine the parameter;
-         *     `model_value` is what the fitted model carries all the same, since a model needs a number.
+         *     `value`, `deviation` and the 95 % interval `low` to `high` are None unless the data determine the parameter.
+         *     `model_value` is the value in the fitted model, which needs one in any case.
          */
         FittedParameter: {
             /** Name */
@@ -3199,7 +3199,7 @@ export interface components {
         };
         /**
          * FleetExperimentRequest
-         * @description The same experiment for several robots; None for all of them. Each gets it in its own queue.
+         * @description An experiment for several robots; None for all of them. It is added to the queue of each.
          */
         FleetExperimentRequest: {
             request: components["schemas"]["ExperimentRequest"];
@@ -3208,7 +3208,7 @@ export interface components {
         };
         /**
          * FleetExperiments
-         * @description The experiments that were queued, one a robot.
+         * @description The queued experiments, one per robot.
          */
         FleetExperiments: {
             /** Experiments */
@@ -3216,7 +3216,7 @@ export interface components {
         };
         /**
          * FleetRobot
-         * @description One robot at a glance. Nothing here is from before the connection was lost, and the sample has its age.
+         * @description Overview of one robot. It contains no data from before a lost connection, and the age of its sample.
          */
         FleetRobot: {
             /** Robot */
@@ -3266,7 +3266,7 @@ export interface components {
         };
         /**
          * FleetStatus
-         * @description All robots of the service at one moment, in the order of the configuration.
+         * @description All robots of the service at one moment, in configuration order.
          */
         FleetStatus: {
             /**
@@ -3279,8 +3279,7 @@ export interface components {
         };
         /**
          * FleetStopResult
-         * @description Result of a stop of all robots. It is `confirmed` only if every board has confirmed it, and the same holds for
-         *     `delivered`.
+         * @description Result of a stop of all robots. It is `confirmed` or `delivered` only if that is true for every robot.
          */
         FleetStopResult: {
             /** Delivered */
@@ -3337,9 +3336,9 @@ export interface components {
         };
         /**
          * Friction
-         * @description Friction that is known beforehand. `viscous` is that of (7.30), on the motor's side, and multiplies the motor's
-         *     speed; `coulomb_arm` is μ̃ of (7.32)–(7.34), a length that multiplies the normal gravity force; `coulomb` is a plain
-         *     torque at the joint.
+         * @description Known friction. `viscous` is that of (7.30): it multiplies the motor's speed, on the motor side. `coulomb_arm` is
+         *     μ̃ of (7.32)–(7.34), a length that multiplies the normal gravity force. `coulomb` is a constant torque at the
+         *     joint.
          */
         Friction: {
             viscous_motor_side?: components["schemas"]["Quantity"] | null;
@@ -3485,7 +3484,8 @@ export interface components {
         };
         /**
          * GripperRequest
-         * @description The gripper. Refused while the arm is stopped, unless `while_stopped`: it may hold a load, or somebody's hand.
+         * @description Moves the gripper. Refused while the arm is stopped, unless `while_stopped`: it may hold a load, or a person's
+         *     hand.
          */
         GripperRequest: {
             /** Closed */
@@ -3498,7 +3498,7 @@ export interface components {
         };
         /**
          * Health
-         * @description Whether the service answers, and can take experiments. `checks`: one line each; empty if the check succeeded.
+         * @description Whether the service works and accepts experiments. `checks`: one line each; empty if the check succeeded.
          */
         Health: {
             /**
@@ -3614,7 +3614,7 @@ export interface components {
         };
         /**
          * HistoryMessage
-         * @description The last minutes, thinned so that no peak is lost. A signal has one row per joint; a missing value is None.
+         * @description The last minutes, thinned without losing peaks. A signal has one row per joint; a missing value is None.
          */
         HistoryMessage: {
             /**
@@ -3644,7 +3644,7 @@ export interface components {
         };
         /**
          * IdentifiabilityReport
-         * @description What the data of a fit determine, and what they do not.
+         * @description The parameters and combinations that the data of a fit determine, and those that they do not.
          */
         IdentifiabilityReport: {
             /** Parameters */
@@ -3758,7 +3758,7 @@ export interface components {
         /**
          * JogRequest
          * @description Velocities (rad/s) of joints, applied for at most 0.3 s: the client repeats the request while the key is held.
-         *     No velocities: hold.
+         *     Without velocities, the arm holds.
          */
         JogRequest: {
             /** Velocities */
@@ -3768,7 +3768,7 @@ export interface components {
         };
         /**
          * Joint
-         * @description One joint with everything that belongs to it.
+         * @description One joint with all its parts.
          */
         Joint: {
             /** Name */
@@ -3814,8 +3814,9 @@ export interface components {
         };
         /**
          * JointError
-         * @description Root mean square of simulated − measured on one joint over all traces, and the noise of the measurement
-         *     itself. `noise`: what a right model would leave, where noise goes round the loop; None in older results.
+         * @description Root mean square of simulated − measured on one joint over all traces, and the noise of the measurement.
+         *
+         *     `noise`: the error of a right model, with noise in its control loop; None in older results.
          */
         JointError: {
             /** Joint */
@@ -3836,8 +3837,8 @@ export interface components {
          * @description Figures of one joint: angles in degrees (`unit` °), lengths in mm on a prismatic joint; times in s, drive in the
          *     trace's unit.
          *
-         *     `overshoot` is how far beyond the last set point the joint went, in the direction of the motion; `rise_time` that
-         *     of the position between 10 and 90 % of the way; None where there is no set point, or no way.
+         *     `overshoot`: how far the joint went beyond the last set point, in the direction of the motion. `rise_time`: time of
+         *     the position from 10 to 90 % of the motion. Both are None without set points or motion.
          */
         JointFigureSet: {
             /** Joint */
@@ -3863,7 +3864,7 @@ export interface components {
         };
         /**
          * JointGains
-         * @description P, I, D of joints, each 0 to 20: the controller's numbers, not physical gains.
+         * @description P, I, D of joints, each 0 to 20, in the controller's units.
          */
         JointGains: {
             /** Gains */
@@ -3927,7 +3928,7 @@ export interface components {
         };
         /**
          * LeadRequest
-         * @description Joints to be led by hand. They lose their drive and sink: hold the arm.
+         * @description Joints to be guided by hand. They lose their drive and sink: hold the arm.
          */
         LeadRequest: {
             /**
@@ -3999,7 +4000,7 @@ export interface components {
         };
         /**
          * LinkMessage
-         * @description The link and its counters; sent once a second.
+         * @description The link and its counters; sent once per second.
          */
         LinkMessage: {
             /**
@@ -4021,7 +4022,7 @@ export interface components {
         };
         /**
          * LinkStatus
-         * @description The link to the controller. Counters since the link was opened (docs/traces.md names them).
+         * @description The link to the controller. Counters are since the link was opened (docs/traces.md names them).
          */
         LinkStatus: {
             /**
@@ -4045,7 +4046,7 @@ export interface components {
         };
         /**
          * LiveFrame
-         * @description One frame of the WebSocket: messages in the order in which they happened.
+         * @description One frame of the WebSocket: messages in chronological order.
          */
         LiveFrame: {
             /** Now */
@@ -4057,15 +4058,15 @@ export interface components {
         };
         /**
          * LoginWays
-         * @description How people sign in besides by a token. `openid` is None where no provider is configured.
+         * @description Ways to sign in besides a token. `openid` is None if no provider is configured.
          */
         LoginWays: {
             openid?: components["schemas"]["OpenIdWay"] | null;
         };
         /**
          * Machine
-         * @description A machine file. `modelled_joints` are the joints (from 1) whose motion the model describes; the others are held
-         *     and their mass is part of `load`, a point mass at the end of the last modelled link.
+         * @description A machine file. `modelled_joints`: the joints (from 1) whose motion the model describes. The others are held
+         *     still, and their mass is part of `load`, a point mass at the end of the last modelled link.
          */
         Machine: {
             /**
@@ -4132,7 +4133,7 @@ export interface components {
         /**
          * MeasuredGain
          * @description The actual proportional gain of one joint, in DAC counts per ADC count of error, and in V/rad at the motor; or
-         *     the reason why the trace does not determine it. Gains between `lowest` and `highest` agree with every sample.
+         *     the reason why the trace does not determine it. All gains between `lowest` and `highest` agree with every sample.
          */
         MeasuredGain: {
             /** Joint */
@@ -4155,7 +4156,7 @@ export interface components {
         };
         /**
          * Member
-         * @description A parameter's part in a combination: its change relative to its own value (or, at zero, in its unit).
+         * @description A parameter's part in a combination: its change as a share of its value (if that is zero, in its unit).
          */
         Member: {
             /** Name */
@@ -4233,7 +4234,7 @@ export interface components {
         };
         /**
          * ModelChange
-         * @description A new name or notes; a field that is None stays as it is.
+         * @description A new name or notes; fields that are None stay unchanged.
          */
         ModelChange: {
             /** Name */
@@ -4243,7 +4244,7 @@ export interface components {
         };
         /**
          * ModelDetails
-         * @description A model: its effects, its parameters, and the models from which it was made, the nearest first.
+         * @description A model: its effects, its parameters, and its ancestors, the nearest first.
          */
         ModelDetails: {
             entry: components["schemas"]["ModelEntry"];
@@ -4256,7 +4257,7 @@ export interface components {
         };
         /**
          * ModelEntry
-         * @description A model of the service, and how it was made.
+         * @description A model of the service, and its origin.
          */
         ModelEntry: {
             /** Id */
@@ -4291,8 +4292,8 @@ export interface components {
          * ModelLineage
          * @description The models of a robot, and the jobs that made or used them.
          *
-         *     A model's parent is another of these models, the one that the machine file describes, or one that has been
-         *     deleted. A job leads from the models and traces of its request to the model that it made, if it made one.
+         *     A model's parent is another of these models, the model of the machine file, or a deleted one. A job links the models
+         *     and traces of its request with the model that it made, if any.
          */
         ModelLineage: {
             /** Machine */
@@ -4304,8 +4305,8 @@ export interface components {
         };
         /**
          * ModelParameter
-         * @description A parameter of a model, in its unit. `deviation` is the standard deviation of the expected value; None if
-         *     none is stated.
+         * @description A parameter of a model, in its unit. `deviation`: standard deviation of the expected value; None if none is
+         *     stated.
          */
         ModelParameter: {
             /** Name */
@@ -4324,7 +4325,7 @@ export interface components {
         };
         /**
          * MotionMark
-         * @description Something that begins or ends during the motion.
+         * @description The beginning or end of a part of the motion.
          */
         MotionMark: {
             /** Time */
@@ -4339,8 +4340,8 @@ export interface components {
         };
         /**
          * MotionPreview
-         * @description The motion of an experiment, computed and checked without a robot. Columns of `set_points` are the machine's
-         *     joints, in rad; `violations` lists the limits that it violates, and is empty if it may run.
+         * @description The motion of an experiment, computed and checked without a robot. `set_points`: columns are the machine's
+         *     joints, in rad. `violations`: the limits that it violates; empty if it may run.
          */
         MotionPreview: {
             /** Time */
@@ -4361,8 +4362,8 @@ export interface components {
         };
         /**
          * MotionViolation
-         * @description One limit that a motion violates: the worst place of one rule and joint (or link, for `floor` and `reach`).
-         *     `time` in s from the start of the record; `value` and `limit` in rad, rad/s or m, for `posture` in posture units.
+         * @description A limit that a motion violates: the worst point of one rule and joint (or link, for `floor` and `reach`). `time`
+         *     in s from the start of the record; `value` and `limit` in rad, rad/s or m, for `posture` in posture units.
          */
         MotionViolation: {
             /**
@@ -4456,7 +4457,7 @@ export interface components {
         };
         /**
          * NoController
-         * @description No controller in the loop, or an unknown one: the recorded drive is the input.
+         * @description No controller in the loop, or an unknown one: the recorded drive is the model's input.
          */
         NoController: {
             /**
@@ -4498,7 +4499,7 @@ export interface components {
         };
         /**
          * NumberChange
-         * @description A number that two fits of one robot have determined. `low` to `high`: 95 % interval of the difference.
+         * @description A parameter that two fits of one robot estimated. `low` to `high`: 95 % interval of the difference.
          */
         NumberChange: {
             /** Name */
@@ -4520,7 +4521,7 @@ export interface components {
         };
         /**
          * OpenIdWay
-         * @description A provider of OpenID Connect. `start`: the address at this service that a browser opens to sign in.
+         * @description A provider of OpenID Connect. `start`: the path on this service that a browser opens to sign in.
          */
         OpenIdWay: {
             /** Label */
@@ -4552,7 +4553,7 @@ export interface components {
         };
         /**
          * OutputRequest
-         * @description One process output. Refused while the arm is stopped, unless `while_stopped`.
+         * @description Switches one process output. Refused while the arm is stopped, unless `while_stopped`.
          */
         OutputRequest: {
             /** On */
@@ -4660,11 +4661,11 @@ export interface components {
         };
         /**
          * ParameterDistortion
-         * @description How one parameter alone would have to vary to explain the residual.
+         * @description Variation of one parameter alone that would explain the residual.
          *
-         *     `change_down` and `change_up` (magnitudes, in `unit`) double the total mean squared error; None where no change
-         *     within the bounds does. `required` is σ, the standard deviation that would explain the residual; None for an
-         *     insensitive parameter, whose σ is very large. `expected` is τ′, `contribution` is λ² = τ′²/σ².
+         *     `change_down` and `change_up` (magnitudes, in `unit`) double the total mean squared error; None if no change within
+         *     the bounds does. `required` is σ, the standard deviation that would explain the residual; None for an insensitive
+         *     parameter, whose σ is very large. `expected` is τ′, `contribution` is λ² = τ′²/σ².
          */
         ParameterDistortion: {
             /** Name */
@@ -4691,10 +4692,11 @@ export interface components {
         };
         /**
          * ParameterVerdict
-         * @description What the data say about one parameter.
+         * @description Verdict on one parameter.
          *
-         *     `data_deviation` is what the data alone give, all other parameters being free too, `alone` if all others were
-         *     known exactly; both in the parameter's unit, None where they say nothing. `expected_deviation` is the prior's.
+         *     `data_deviation` follows from the data alone, with all other parameters free; `alone`, if all others were known
+         *     exactly. Both are in the parameter's unit; None if the data do not depend on it. `expected_deviation` is the
+         *     prior's.
          */
         ParameterVerdict: {
             /** Name */
@@ -4717,7 +4719,7 @@ export interface components {
         };
         /**
          * ParameterWords
-         * @description A parameter as people write it. `joint`: the one that it, or its link, belongs to; None where it is not one.
+         * @description Names of a parameter for people. `joint`: the joint that it, or its link, belongs to; None if there is none.
          */
         ParameterWords: {
             /** Joint */
@@ -4731,9 +4733,9 @@ export interface components {
         };
         /**
          * Path
-         * @description A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear between.
+         * @description A recorded or designed path: absolute angles (rad) of the experiment's joints at times (s), linear in between.
          *
-         *     The first point is the start: the arm is brought there by a slow move.
+         *     The first point is the start, to which the arm is brought by a slow move.
          */
         Path: {
             /**
@@ -4748,7 +4750,7 @@ export interface components {
         };
         /**
          * Pause
-         * @description No motion for `duration`: a piece of a sequence.
+         * @description No motion for `duration` s; a part of a sequence.
          */
         Pause: {
             /**
@@ -4839,7 +4841,7 @@ export interface components {
         };
         /**
          * PlainExperiment
-         * @description An experiment whose set points are those of its motion; its fields are described at ExperimentSpec.
+         * @description An experiment without `feedforward`. ExperimentSpec describes its fields.
          */
         PlainExperiment: {
             /**
@@ -4907,7 +4909,7 @@ export interface components {
         };
         /**
          * PlainGain
-         * @description A drive whose force or torque is proportional to its recorded input: N·m or N per unit of drive.
+         * @description A drive whose torque or force is proportional to its recorded input: N·m or N per unit of drive.
          */
         PlainGain: {
             /**
@@ -4937,7 +4939,7 @@ export interface components {
         };
         /**
          * Prior
-         * @description What is expected of a parameter before any data: Gaussian, in its unit.
+         * @description Prior of a parameter: Gaussian, in its unit.
          */
         Prior: {
             /** Expected */
@@ -4947,7 +4949,7 @@ export interface components {
         };
         /**
          * ProblemDetails
-         * @description What went wrong, and what to do about it.
+         * @description An error and the advice on it.
          */
         ProblemDetails: {
             /** Type */
@@ -5016,7 +5018,7 @@ export interface components {
         };
         /**
          * ProgramEntry
-         * @description A taught program that the service keeps. `revision` grows with every change; `instructions` is their number.
+         * @description A taught program stored by the service. `revision` grows with every change; `instructions` is their number.
          */
         ProgramEntry: {
             /** Name */
@@ -5056,8 +5058,8 @@ export interface components {
          * Quantity
          * @description A value of a machine file.
          *
-         *     `deviation` is the expected (standard) deviation between the value written here and the machine on the bench;
-         *     `low` and `high` bound what is physically possible. All three are None where nothing is claimed.
+         *     `deviation`: expected (standard) deviation between this value and the real machine. `low`, `high`: physical bounds.
+         *     Each is None if it is not stated.
          */
         Quantity: {
             /** Value */
@@ -5092,7 +5094,7 @@ export interface components {
         };
         /**
          * QueueResume
-         * @description The operator's consent that the queue may move the arm. A real arm needs `moves_real_arm`.
+         * @description The operator's consent that the queue moves the arm. A real arm requires `moves_real_arm`.
          */
         QueueResume: {
             /**
@@ -5105,8 +5107,8 @@ export interface components {
          * QueueStatus
          * @description Whether experiments are taken from the queue, and if not, why.
          *
-         *     `waiting_for` says in one line why nothing runs although the queue is not paused; it is empty if an experiment runs
-         *     or none waits.
+         *     `waiting_for`: why nothing runs although the queue is not paused, in one line; empty if an experiment runs or none
+         *     waits.
          */
         QueueStatus: {
             /** Paused */
@@ -5193,13 +5195,13 @@ export interface components {
         };
         /**
          * RecordFinding
-         * @description One thing that a record, or the machine file beside it, says and that cannot be, or should be known.
+         * @description One impossible or noteworthy value of a record, or of its machine file.
          *
          *     Args:
-         *         record: what the record is called; empty where the finding is of the machine file. joint: from 1; None: of all.
-         *         times: s of the record's own clock, the first of `count`. value, allowed: as measured, and the most (or the
-         *             value) that was expected, in `unit`.
-         *         says, advice: a sentence each.
+         *         record: name of the record; empty if the finding concerns the machine file. joint: from 1; None: all.
+         *         times: s of the record's own clock, the first of `count`.
+         *         value, allowed: measured value, and the largest (or the) expected one, in `unit`.
+         *         says, advice: one sentence each.
          */
         RecordFinding: {
             /**
@@ -5305,7 +5307,7 @@ export interface components {
         };
         /**
          * RefusedMessage
-         * @description The client's message cannot be carried out.
+         * @description The client's message was refused.
          */
         RefusedMessage: {
             /**
@@ -5377,7 +5379,7 @@ export interface components {
         };
         /**
          * ResetRequest
-         * @description Ends the stop of this number, and no later one. `here`: first make the measured posture the set points.
+         * @description Ends the stop of this number, and no later one. `here`: first set the set points to the measured posture.
          */
         ResetRequest: {
             /** Stop */
@@ -5390,7 +5392,7 @@ export interface components {
         };
         /**
          * RobotIdentity
-         * @description What the controller says about itself.
+         * @description Properties that the controller reports. `boots`: how often it has started.
          */
         RobotIdentity: {
             /** Simulated */
@@ -5452,7 +5454,7 @@ export interface components {
         };
         /**
          * RobotStatus
-         * @description Everything about one robot, at one moment.
+         * @description State of one robot at one moment.
          */
         RobotStatus: {
             /** Robot */
@@ -5540,8 +5542,8 @@ export interface components {
         };
         /**
          * Sample
-         * @description One control period. `host_time` is the monotonic clock (s) of the service's computer, `utc` the wall clock (s
-         *     since 1970) when it arrived, `age` the time (s) since then.
+         * @description One control period. At its arrival, `host_time` is the monotonic clock (s) of the service's computer and `utc`
+         *     its wall clock (s since 1970); `age` is the time (s) since then.
          */
         Sample: {
             /** Tick */
@@ -5596,7 +5598,7 @@ export interface components {
         };
         /**
          * SampleRate
-         * @description What the line can give: samples of so many joints, with a set point for each of them, every so many control
+         * @description A sampling rate that the serial link can sustain: `joints` joints with their set points, every `every` control
          *     periods.
          */
         SampleRate: {
@@ -5611,13 +5613,13 @@ export interface components {
         };
         /**
          * SampledPid
-         * @description PID in SI units, sampled: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) per joint. `velocity_gains` closes
-         *     an inner loop (cascade): the outer output is then a speed set point for it.
+         * @description Sampled PID in SI units: drive = P e + I ∫e dt + D de/dt. One row (P, I, D) per joint. `velocity_gains` adds an
+         *     inner loop (cascade), whose set point is the output of the outer one.
          *
-         *     The output is in the unit of the recorded drive. It is rounded to `drive_resolution`, then limited to
-         *     ± `output_limit` ahead of the amplifier, whose dead zone and supply limit come after; at that limit the error is not
-         *     integrated further. Set points are rounded to `set_point_resolution` before use. `gain_error` is relative: the
-         *     output is 1 + `gain_error` times what the gains say. One number for all joints, or one a joint.
+         *     The output has the unit of the recorded drive. It is rounded to `drive_resolution`, then limited to ±
+         *     `output_limit`; the amplifier's dead zone and supply limit follow. At the limit, the error is not integrated
+         *     further. Set points are rounded to `set_point_resolution` before use. `gain_error` is relative: the output is 1 +
+         *     `gain_error` times the output by the gains. All of these are one number for all joints, or one per joint.
          */
         SampledPid: {
             /**
@@ -5713,8 +5715,8 @@ export interface components {
         };
         /**
          * ScheduleRequest
-         * @description An experiment to run again and again, for studies of wear and drift: at even intervals (`every`), or by the wall
-         *     clock (`cron`).
+         * @description An experiment to repeat, for studies of wear and drift: at even intervals (`every`), or by the wall clock
+         *     (`cron`).
          */
         ScheduleRequest: {
             /**
@@ -5758,7 +5760,7 @@ export interface components {
         };
         /**
          * Segment
-         * @description One piece of a sequence, on its own joints (all of the experiment's when None).
+         * @description One part of a sequence, on its own joints (None: on all joints of the experiment).
          */
         Segment: {
             /** Move */
@@ -5768,7 +5770,8 @@ export interface components {
         };
         /**
          * Sensor
-         * @description Position sensor: `range` of the joint over 2^bits counts, the joint's value at count 0, the sign of counting.
+         * @description Position sensor: `range` of the joint over 2^bits counts, the joint's position at count 0, the sign of
+         *     counting.
          */
         Sensor: {
             /** Bits */
@@ -5792,7 +5795,7 @@ export interface components {
         };
         /**
          * Sequence
-         * @description Pieces one after the other, each from where the one before ended.
+         * @description Parts in order, each beginning where the previous one ended.
          */
         Sequence: {
             /**
@@ -5805,7 +5808,7 @@ export interface components {
         };
         /**
          * ServiceEvent
-         * @description Something that happened. `number` grows with every event, even if the clock is set back.
+         * @description An event. `number` grows with every event, even if the clock is set back.
          */
         ServiceEvent: {
             /** Number */
@@ -5857,7 +5860,7 @@ export interface components {
         };
         /**
          * SignedOut
-         * @description The session has ended. `provider`: where the provider's own session is left, if it has such an address.
+         * @description The session has ended. `provider`: the address that ends the provider's own session, if there is one.
          */
         SignedOut: {
             /** Provider */
@@ -5898,7 +5901,8 @@ export interface components {
         };
         /**
          * SlowRamp
-         * @description Constant low speed out to `amplitude` and back, with `reversals` changes of direction. Shows friction.
+         * @description Moves at constant low speed out to `amplitude` and back, with `reversals` changes of direction. Shows
+         *     friction.
          */
         SlowRamp: {
             /**
@@ -5926,7 +5930,7 @@ export interface components {
         };
         /**
          * Staircase
-         * @description `steps` equal steps up through `amplitude` and, if `back`, down again, `dwell` s on each.
+         * @description Moves through `amplitude` in `steps` equal steps and, if `back`, down again, `dwell` s on each step.
          */
         Staircase: {
             /**
@@ -5977,8 +5981,8 @@ export interface components {
         };
         /**
          * StepRequest
-         * @description One off-line step to absolute angles (`to`) or by relative ones (`by`), in rad; give one of the two. `speed` is
-         *     that of the fastest joint, in rad/s.
+         * @description One off-line step to absolute angles (`to`) or by relative ones (`by`), in rad; give one of the two. `speed`:
+         *     speed of the fastest joint (rad/s).
          */
         StepRequest: {
             /** To */
@@ -6097,7 +6101,7 @@ export interface components {
         /**
          * TaughtPath
          * @description Measured angles (rad), one row per control period, one column per joint; times (s) from the first row. An
-         *     experiment with this as its `path` plays it back.
+         *     experiment can play it back as its `path`.
          */
         TaughtPath: {
             /** Joints */
@@ -6109,7 +6113,7 @@ export interface components {
         };
         /**
          * TeachingLine
-         * @description A line for the operator who teaches, such as a refused joint, or the beginning of an instruction.
+         * @description A line for the person who teaches, such as a refused joint, or the beginning of an instruction.
          */
         TeachingLine: {
             /** Number */
@@ -6124,7 +6128,7 @@ export interface components {
         };
         /**
          * TeachingMessage
-         * @description A line for the operator who teaches.
+         * @description A line for the person who teaches the arm.
          */
         TeachingMessage: {
             /**
@@ -6137,7 +6141,7 @@ export interface components {
         };
         /**
          * TeachingStatus
-         * @description The teaching activity under way, and how the last one ended.
+         * @description The current teaching activity, and how the last one ended.
          */
         TeachingStatus: {
             /**
@@ -6164,7 +6168,7 @@ export interface components {
         };
         /**
          * ThinnedMessage
-         * @description This client reads too slowly, and samples were left out. It is disconnected if that goes on.
+         * @description This client reads too slowly, so samples were left out. If this continues, it is disconnected.
          */
         ThinnedMessage: {
             /**
@@ -6177,7 +6181,7 @@ export interface components {
         };
         /**
          * Ticket
-         * @description A ticket, valid once within `seconds` for a WebSocket, with which browsers cannot send a token.
+         * @description A ticket for one WebSocket connection within `seconds`, for browsers, which cannot send a token there.
          */
         Ticket: {
             /** Ticket */
@@ -6187,7 +6191,8 @@ export interface components {
         };
         /**
          * TimeDomain
-         * @description The time-domain form for one model and one trace. `smoothing` is the kernel's standard deviation in s.
+         * @description Result of the time-domain form for one model and one trace. `smoothing` is the kernel's standard deviation in
+         *     s.
          */
         TimeDomain: {
             /** Model */
@@ -6243,7 +6248,7 @@ export interface components {
         };
         /**
          * TraceArchive
-         * @description Where a trace is, and how far it is on its way.
+         * @description Where a trace is stored, and its transfer if there is one.
          */
         TraceArchive: {
             /** Id */
@@ -6262,7 +6267,7 @@ export interface components {
         };
         /**
          * TraceChange
-         * @description New tags or notes; a field that is None stays as it is.
+         * @description New tags or notes; fields that are None stay unchanged.
          */
         TraceChange: {
             /** Tags */
@@ -6286,7 +6291,7 @@ export interface components {
         };
         /**
          * TraceEvent
-         * @description Something that happened during the record. `time` is in s from the record's start.
+         * @description An event during the record. `time` is in s from the start of the record.
          */
         TraceEvent: {
             /** Time */
@@ -6305,7 +6310,7 @@ export interface components {
         };
         /**
          * TraceRecord
-         * @description What a trace says about itself: the metadata record at the start of the file, and at its end the outcome.
+         * @description Metadata of a trace: the metadata record at the start of the file and, at its end, the outcome.
          */
         TraceRecord: {
             /**
@@ -6398,10 +6403,10 @@ export interface components {
         };
         /**
          * TraceSignals
-         * @description Signals of a trace for a plot, thinned to the extremes of short stretches, so that no peak is lost.
+         * @description Signals of a trace for a plot, thinned to the extremes of short intervals, so that no peak is lost.
          *
-         *     `time` is in s; a signal has one row per joint, in the order of `joints`, in rad, or in m for a prismatic joint; the
-         *     drive is in `drive_unit`. A signal that the trace does not have is None.
+         *     `time` is in s. A signal has one row per joint, in the order of `joints`, in rad (m for a prismatic joint); the
+         *     drive is in `drive_unit`. A signal that was not recorded is None.
          */
         TraceSignals: {
             /** Id */
@@ -6430,7 +6435,7 @@ export interface components {
         };
         /**
          * TrackingError
-         * @description Distance of a joint from the motion asked for: root mean square and largest, rad (m on a prismatic joint).
+         * @description Deviation of a joint from the wanted motion: root mean square and largest, rad (m on a prismatic joint).
          */
         TrackingError: {
             /** Rms */
@@ -6440,7 +6445,7 @@ export interface components {
         };
         /**
          * Transfer
-         * @description A trace on its way between this computer and the archive.
+         * @description A transfer of a trace between this computer and the archive.
          */
         Transfer: {
             /**
@@ -6550,13 +6555,13 @@ export interface components {
         };
         /**
          * Variation
-         * @description α(t) of one parameter, where all parameters together vary as little as explains the motion.
+         * @description α(t) of one parameter, when all parameters together vary as little as explains the motion.
          *
-         *     `values` and `noise` (the standard deviation that the noise floor gives α) are in `unit` at the result's
-         *     times; None where no joint that the parameter acts on moves. `deviation` is the rms of α (4.23), corrected for
-         *     noise, `expected` is τ′, `mean` is what a constant change would be. `significant` is the share of times at which
-         *     α lies beyond noise. `alone_constant` and `alone_varying` are the shares of the residual's energy (beyond noise)
-         *     that this parameter explains by itself, as a constant and as a function of time.
+         *     `values` and `noise` (standard deviation of α due to the noise floor) are in `unit` at the result's times; None
+         *     where no joint that the parameter acts on moves. `deviation` is the rms of α (4.23), corrected for noise; `expected`
+         *     is τ′; `mean` is the constant change. `significant` is the share of times at which α exceeds noise. `alone_constant`
+         *     and `alone_varying` are the shares of the residual's energy (above noise) that this parameter explains alone, as a
+         *     constant and as a function of time.
          */
         Variation: {
             /** Name */
@@ -6619,7 +6624,7 @@ export interface components {
         };
         /**
          * WaitsBehind
-         * @description The job that a queued job waits for: the first of those before it in its lane.
+         * @description The job that a queued job waits for: the first one before it in its lane.
          */
         WaitsBehind: {
             /** Job */
@@ -6684,7 +6689,7 @@ export interface components {
         };
         /**
          * JointResidual
-         * @description What a fit leaves of one joint: root mean square of simulated − measured, and of the measurement's own noise.
+         * @description Residual of a fit at one joint: root mean square of simulated − measured, and of the measurement noise.
          */
         daq__contracts__service__fleet__JointResidual: {
             /** Joint */
@@ -6698,9 +6703,9 @@ export interface components {
         };
         /**
          * JointResidual
-         * @description Measured − expected acceleration of a joint (rad/s²; None where it does not move) and what it depends on.
+         * @description Measured − expected acceleration of a joint (rad/s²; None where it does not move) and its correlations.
          *
-         *     `noise` is its noise floor: the root mean square that is left of records which the model itself has made.
+         *     `noise` is its noise floor: the root mean square residual of records that the model itself makes.
          */
         model__validation__variation__JointResidual: {
             /** Joint */

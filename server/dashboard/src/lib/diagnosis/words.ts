@@ -46,3 +46,16 @@ export function listed(names: readonly string[], last = 'and'): string {
   if (names.length < 2) return names.join('');
   return `${names.slice(0, -1).join(', ')} ${last} ${names.at(-1) ?? ''}`;
 }
+
+/** What to do next where no experiment is proposed. */
+export function nothingNext(found: Pick<DiagnosisData, 'verdict' | 'suspicion'>): string {
+  if (found.suspicion) {
+    return `Record ${Math.ceil(found.suspicion.seconds)} s more of the same motion: it would show or refute the effect.`;
+  }
+  if (found.verdict === 'named')
+    return 'Nothing: these records leave no doubt. Use the model with the effect.';
+  if (found.verdict === 'nothing-significant') return 'Nothing: the model explains these records.';
+  if (found.verdict === 'check-the-record')
+    return 'Check what is doubted about the records, then diagnose again.';
+  return 'No experiment is proposed. Look at what is left, and at the candidates, below.';
+}

@@ -19,11 +19,11 @@ const DEGREES = 180 / Math.PI;
 const ANGLES: Record<AngleUnit, Record<'position' | 'error', Shown>> = {
   '°': {
     position: { unit: '°', factor: DEGREES, digits: 2, least: 4 },
-    error: { unit: '°', factor: DEGREES, digits: 2, least: 1 },
+    error: { unit: '°', factor: DEGREES, digits: 2, least: 3 },
   },
   rad: {
     position: { unit: 'rad', factor: 1, digits: 4, least: 0.07 },
-    error: { unit: 'mrad', factor: 1000, digits: 1, least: 17 },
+    error: { unit: 'mrad', factor: 1000, digits: 1, least: 52 },
   },
 };
 
@@ -39,7 +39,7 @@ export function shownAs(machine: Machine, joint: number, signal: Signal, angle: 
     // A drive that is a plain gain takes torque or force; a motor is told in volts, or in the current that it takes.
     const own: Record<string, string> = { dc_motor: 'V', current: 'A' };
     const unit = own[one?.drive.kind ?? ''] ?? (one?.kind === 'prismatic' ? 'N' : 'N·m');
-    return { unit, factor: 1, digits: 2, least: 4 };
+    return { unit, factor: 1, digits: 2, least: 16 };
   }
   const kind = signal === 'error' ? 'error' : 'position';
   return one?.kind === 'prismatic' ? LENGTHS[kind] : ANGLES[angle][kind];

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { queueBadge, queueState, whatGoesOn } from './words';
+import { homeOf, queueBadge, queueState, whatGoesOn } from './words';
 
 const robot = { connection: 'connected', arm: 'idle', activity: 'none' } as const;
 const queue = { paused: false, reason: 'resumed by anna', running: null, waiting_for: '' };
@@ -53,4 +53,27 @@ describe('the queue', () => {
     expect(queueBadge(running, true)).toEqual({ tone: 'busy', text: 'running the last one' });
     expect(queueBadge(paused, true)).toEqual({ tone: 'warn', text: 'paused' });
   });
+});
+
+it('home is one screen, and the arm comes before the queue', () => {
+  const screens = [
+    homeOf(null, null, 0),
+    homeOf({ ...robot, connection: 'disconnected' }, queue, 0),
+    homeOf(robot, queue, 0),
+    homeOf(robot, paused, 1),
+    homeOf(robot, queue, 1),
+    homeOf({ ...robot, activity: 'jog' }, paused, 0),
+    homeOf({ ...robot, arm: 'stopped' }, paused, 0),
+    homeOf({ ...robot, arm: 'fault', activity: 'experiment' }, queue, 0),
+  ].map((home) => home.screen);
+  expect(screens).toEqual([
+    'unknown',
+    'disconnected',
+    'ready',
+    'paused',
+    'waiting',
+    'running',
+    'stopped',
+    'fault',
+  ]);
 });

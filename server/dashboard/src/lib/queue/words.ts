@@ -33,6 +33,33 @@ export function whatGoesOn(robot: Robot | null, queue: Queue | null, waiting: nu
   return { text: 'Nothing is running or waiting.', isFree: true };
 }
 
+export interface Home {
+  /** Which of the screens it is: each has one next step. */
+  screen:
+    | 'disconnected'
+    | 'connecting'
+    | 'ready'
+    | 'waiting'
+    | 'paused'
+    | 'running'
+    | 'stopped'
+    | 'fault'
+    | 'unknown';
+  title: string;
+}
+
+/** Where the person stands: what the Live page says first. `waiting`: experiments in the queue. */
+export function homeOf(robot: Robot | null, queue: Queue | null, waiting: number): Home {
+  if (robot === null) return { screen: 'unknown', title: 'Not known' };
+  if (robot.connection === 'connecting') return { screen: 'connecting', title: 'Connecting' };
+  if (robot.connection !== 'connected') return { screen: 'disconnected', title: 'No arm is connected' };
+  if (robot.arm === 'fault') return { screen: 'fault', title: 'Fault' };
+  if (robot.arm === 'stopped') return { screen: 'stopped', title: 'Stopped' };
+  if (robot.activity !== 'none') return { screen: 'running', title: 'Moving' };
+  if (queue?.paused) return { screen: 'paused', title: 'The queue is paused' };
+  return waiting > 0 ? { screen: 'waiting', title: 'Waiting' } : { screen: 'ready', title: 'Ready' };
+}
+
 /** Why the queue does what it does. `isConnected`: whether there is an arm to move. */
 export function queueState(queue: Queue, isConnected: boolean): { head: string; text: string } {
   if (queue.paused) {

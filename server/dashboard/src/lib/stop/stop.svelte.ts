@@ -43,6 +43,8 @@ class Stop {
       told: (state) => this.tell(isFleet() && robot !== '' ? named(robot, state) : state),
     });
     this.call.begin();
+    // After the stop is on its way: a thumb feels that it was pressed. What became of it is said, not felt.
+    if ('vibrate' in navigator) navigator.vibrate(80);
   }
 
   /** The message about this press has been read, or a reset has ended it. A newer one is left as it is. */

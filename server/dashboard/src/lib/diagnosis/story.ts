@@ -1,0 +1,137 @@
+/** A diagnosis as a story: what speaks for and against each candidate, how much it shrinks, where and when. Pure. */
+
+import type { DiagnosisData, DiagnosisStep, Overlay, TriedEffect } from '../api/types';
+import { driftOf, heatAt, type Drift } from '../hidden/drift';
+import { fixed, significant } from '../format';
+import { shownUnit } from './overlay';
+
+export interface Told {
+  called: string;
+  joint: number | null;
+  /** 0 to 1, of all that were fitted: the posterior, if it is one of them. */
+  share: number;
+  evidence: number;
+  named: boolean;
+  speaksFor: string;
+  speaksAgainst: string;
+}
+
+/** The first `most` fitted candidates of a step, the best first. */
+export function toldOf(
+  step: Pick<DiagnosisStep, 'candidates' | 'group' | 'effect' | 'joints'>,
+  most = 4,
+): Told[] {
+  const fitted = step.candidates
+    .filter((one) => one.refitted)
+    .sort((one, other) => total(other) - total(one));
+  const best = fitted[0];
+  if (best === undefined) return [];
+  const weights = fitted.map((one) => Math.exp((total(one) - total(best)) / 2));
+  const sum = weights.reduce((all, one) => all + one, 0);
+  const named = new Set([key({ effect: step.effect ?? '', joints: step.joints }), ...step.group.map(key)]);
+  return fitted.slice(0, most).map((one, place) => {
+    const lead = total(best) - total(place === 0 ? (fitted[1] ?? one) : one);
+    return {
+      called: one.called,
+      joint: one.joints.length === 1 ? one.joints[0]! : null,
+      share: weights[place]! / sum,
+      evidence: total(one),
+      named: named.has(key(one)),
+      speaksFor:
+        total(one) > 0
+          ? `Explains ${fixed(total(one), 0)} more than its numbers cost.`
+          : 'Nothing: it explains less than its numbers cost.',
+      speaksAgainst: against(one, fitted, place, lead),
+    };
+  });
+}
+
+function against(one: TriedEffect, fitted: readonly TriedEffect[], place: number, lead: number): string {
+  const left =
+    one.misfit === null || one.misfit < 1.1 ? '' : `leaves ${fixed(one.misfit, 2)} times the noise`;
+  if (place === 0) {
+    if (fitted.length < 2) return left ? `It ${left}.` : 'No other candidate was worth a fit.';
+    const next = `the next best is behind by ${fixed(lead, 0)}`;
+    return left ? `It ${left}; ${next}.` : `Nothing found: ${next}.`;
+  }
+  const behind = lead < 1 ? 'Explains as much as the best' : `Explains ${fixed(lead, 0)} less than the best`;
+  return left ? `${behind}, and ${left}.` : `${behind}.`;
+}
+
+export interface Shrunk {
+  joint: number;
+  unit: string;
+  before: string;
+  after: string;
+  noise: string;
+  /** Of the given error: 0 to 1. */
+  left: number;
+  floor: number;
+}
+
+/** The error of each joint with the given and with the resulting model, and on which traces. */
+export function shrunkOf(found: Pick<DiagnosisData, 'gap'>): { joints: Shrunk[]; isHeldOut: boolean } {
+  const gap = found.gap;
+  const [first, last] = [gap?.stages[0], gap?.stages.at(-1)];
+  if (!gap || !first || !last) return { joints: [], isHeldOut: false };
+  const isHeldOut = first.held_out.length > 0;
+  const [before, after] = isHeldOut ? [first.held_out, last.held_out] : [first.fitted, last.fitted];
+  const joints = gap.joints.map((joint, place) => {
+    const [factor, unit] = shownUnit(gap.units[place] ?? 'rad');
+    const [from, to, noise] = [before[place] ?? null, after[place] ?? null, gap.noise[place] ?? 0];
+    const most = Math.max(from ?? 0, to ?? 0, noise) || 1;
+    return {
+      joint,
+      unit,
+      before: significant(from === null ? null : from * factor, 2),
+      after: significant(to === null ? null : to * factor, 2),
+      noise: significant(noise * factor, 2),
+      left: (to ?? 0) / most,
+      floor: noise / most,
+    };
+  });
+  return { joints, isHeldOut };
+}
+
+/** A record with what its model did not explain, over time. */
+export interface Scene {
+  trace: string;
+  isHeldOut: boolean;
+  drift: Drift;
+  /** By joint of the drift, in its unit. */
+  noise: readonly number[];
+  /** Whether the drift has postures: else torques or forces. */
+  hasPosture: boolean;
+}
+
+/** The records of a diagnosis, positions before torques. */
+export function scenesOf(found: Pick<DiagnosisData, 'signals' | 'efforts' | 'gap' | 'rmse_fit'>): Scene[] {
+  const own = found.signals.length > 0 ? found.signals : (found.efforts ?? []);
+  const noise = (joint: number): number => {
+    const place = found.gap?.joints.indexOf(joint) ?? -1;
+    return found.gap?.noise[place] ?? found.rmse_fit.find((one) => one.joint === joint)?.floor ?? 0;
+  };
+  return own.map((one: Overlay) => ({
+    trace: one.trace,
+    isHeldOut: one.held_out === true,
+    drift: driftOf(one, Math.max(0.05, (one.time.at(-1) ?? 0) / 1200)),
+    noise: one.joints.map(noise),
+    hasPosture: found.signals.length > 0,
+  }));
+}
+
+/** Heat of each joint in `count` stretches of a scene, without (`closed` 0) and with (1) what was found. */
+export function heatOverTime(scene: Scene, count: number, closed: number): number[][] {
+  const heats = Array.from({ length: count }, (_, index) =>
+    heatAt(scene.drift, scene.noise, ((index + 0.5) * scene.drift.duration) / count, closed),
+  );
+  return scene.drift.joints.map((_, joint) => heats.map((one) => one[joint]!));
+}
+
+function total(one: { evidence: number; evidence_held_out: number | null }): number {
+  return one.evidence + (one.evidence_held_out ?? 0);
+}
+
+function key(one: { effect: string; joints: readonly number[] }): string {
+  return `${one.effect} ${one.joints.join(',')}`;
+}
