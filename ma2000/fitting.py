@@ -1,4 +1,4 @@
-"""Parameters from traces: of motion, and of recorded torques."""
+"""Estimates parameters from traces: by simulated motion, and by recorded torques."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ def fit(
     progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> FitResult:
-    """The parameters with which the model best repeats the traces, and how far each can be trusted.
+    """Estimates the parameters with which the model best reproduces the traces, and how reliable each one is.
 
-    The model's own loop follows the recorded set points, and its readings are compared with the recorded ones.
+    The model's control loop follows the recorded set points; simulated readings are compared with recorded ones.
 
-    Raises TraceError, SpecError for input that cannot give a result; CancelledError when asked to end.
+    Raises TraceError, SpecError for unusable input; CancelledError if cancelled.
     """
     with told(progress, "fitting") as tell:
         return motion.fit(model, as_sequence(traces), options, tell, cancel)
@@ -43,10 +43,10 @@ def fit_torques(
     progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> TorqueFit:
-    """The parameters with which the torque that the motion needs is the recorded one. Nothing is simulated, so that a
-    machine without a controller can be fitted.
+    """Estimates the parameters with which the torque needed for the motion equals the recorded torque. Nothing is
+    simulated, so a machine without a controller can be fitted.
 
-    `result.held_out` is the share of torque that is left on `holdout`. Raises as `fit`.
+    `result.held_out`: share of the torque on `holdout` that remains unexplained. Raises as `fit`.
     """
     with told(progress, "fitting torques") as tell:
         fitted, held_out = as_sequence(traces), as_sequence(holdout)

@@ -79,9 +79,7 @@ class Traces:
             raise TraceError(f"trace {wanted!r}: no trace of the service has this ID or name")
         if len(found) > 1 and not exact:
             names = ", ".join(entry.file for entry in found[:MOST_NAMED])
-            raise TraceError(
-                f"trace {wanted!r}: {len(found)} traces of the service match: {names}; give more characters"
-            )
+            raise TraceError(f"trace {wanted!r}: {len(found)} of the service match: {names}; give more characters")
         return exact[0] if exact else found[0]
 
     def archive(self) -> ArchiveStatus:

@@ -100,9 +100,7 @@ def signals_of(table: Table, entries: Mapping[str, Said], beside: Path) -> Signa
             columns["time"] = columns["time"][: len(values[0])]
         lengths = {len(each) for each in (columns["time"], *values)}
         if len(lengths) > 1:
-            raise TraceError(
-                f"{table.origin}: {signal}: numbers of values and times differ: {max(lengths)} and {min(lengths)}"
-            )
+            raise TraceError(f"{table.origin}: {signal}: {max(lengths)} and {min(lengths)} values or times")
         columns[signal] = np.stack(values, axis=1)
         used |= {key: str(Said(e.expression, _unit(table, signal, e))) for key, e in _of(signal, entries).items()}
     if not {"position", "velocity"} & set(columns):
