@@ -2,7 +2,7 @@
 
 A plug-in is an object `Plugin`, named by an entry point of the group `ma2000_daq.plugins`:
 
-[project.entry-points."ma2000_daq.plugins"]
+    [project.entry-points."ma2000_daq.plugins"]
     gripper = "gripper_plugin:PLUGIN"
 
 The object is a description: names, one-line helps, and references like "module:object", which are imported on first

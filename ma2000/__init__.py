@@ -1,6 +1,7 @@
 """MA2000 DAQ for programs and notebooks: connect, run, read, simulate, fit, validate, diagnose.
 
-import ma2000
+    import ma2000
+
     with ma2000.connect("mock://?lock_step=1") as arm:
         trace = arm.run("ramp").trace
     model = ma2000.base_model(ma2000.load_machine("ma2000"))

@@ -54,14 +54,15 @@ def fit_torques(
 
 
 def base_parameters(model: Model, traces: Traces = (), *, seed: int = 0) -> BaseParameters:
-    """The base parameters of a model's machine: the fewest combinations of inertial and friction parameters that its
-    joint torques depend on, by QR with column pivoting of the regressor at random admissible postures (Gautier 1991).
+    """Returns the base parameters of a model's machine: the fewest combinations of inertial and friction parameters on
+    which its joint torques depend. Method: QR with column pivoting of the regressor at random admissible postures
+    (Gautier 1991).
 
-    With traces that have a recorded drive, `excitation` says which of them these tell: condition number of the columns,
-    and each one's deviation. Traces that cannot be judged are no error: `no_excitation` says why.
+    With traces that have a recorded drive, `excitation` states how well they determine each: condition number of the
+    columns, and deviation of each parameter. Unusable traces are no error: `no_excitation` gives the reason.
 
     Args:
-        seed: of the drawn postures.
+        seed: seed of the random postures.
     """
     return base.base_parameters(model, as_sequence(traces), seed=seed)
 
@@ -74,13 +75,13 @@ def profile(
     progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> Profile:
-    """The profile likelihood of a fitted parameter: how much worse the fit becomes when it is moved, and all others are
-    fitted again. It shows what the data bound on one side alone, or not at all.
+    """Computes the profile likelihood of a fitted parameter: how much worse the fit becomes if the parameter is moved
+    and all others are fitted again. It shows if the data bound the parameter on one side only, or not at all.
 
     Args:
-        traces: those that were fitted to.
+        traces: the traces of the fit.
 
-    Raises SpecError for a parameter that was not fitted, or other traces; CancelledError when asked to end.
+    Raises SpecError for a parameter that was not fitted, or other traces; CancelledError if cancelled.
     """
     with told(progress, name) as tell:
         return profiles.profile(fitted, as_sequence(traces), name, tell, cancel)

@@ -1,6 +1,6 @@
 """A typed, synchronous client of the service, with the service's own models (`daq.contracts.service`).
 
-with Client("http://127.0.0.1:8300") as client:
+    with Client("http://127.0.0.1:8300") as client:
         robot = client.robot()
         experiment = robot.experiments.submit(ExperimentSpec())
         done = robot.experiments.wait(experiment.id)

@@ -72,7 +72,7 @@ class Robot:
         """Ends a stop or a fault. With `here`, the set points are first set to the measured posture.
 
         stop: number of the stop (`RobotStatus.stop`); None for the one in force now. A newer stop stays in force and
-        raises ServiceError.
+            raises ServiceError.
         """
         body = ResetRequest(stop=self._newest_stop() if stop is None else stop, here=here)
         return self._connection.ask(Done, Request("POST", f"{self._path}/reset", body))

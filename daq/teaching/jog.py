@@ -63,8 +63,8 @@ class Jogger:
     """Computes one set point per sample. Its only state is the accepted angles and the tick of the last sample.
 
     every: control periods from one sample to the next; more than one on a slow line. A step covers the time between the
-    last two samples, but at most `every` periods. So the joint has the commanded speed, and after a gap it continues
-    from where it was.
+           last two samples, but at most `every` periods. So the joint has the commanded speed, and after a gap it
+           continues from where it was.
 
     Every sample must contain all joints of the machine, since floor and reach depend on all. Raises SpecError if not,
     and for commands that are too fast.

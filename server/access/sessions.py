@@ -1,11 +1,10 @@
-"""Sessions of people who have signed in: in the database, so that they outlast a restart, as hashes like tokens.
+"""Sessions of signed-in people, stored in the database as hashes like tokens, so that they survive a restart.
 
-The cookies of people who sign in. Pure, and without the web framework: the stop listener uses them, too.
+The functions for cookies are pure and do not need the web framework, since the stop listener uses them too. Browsers do
+not distinguish the ports of a host in cookies. The cookie names therefore contain the port at which people reach the
+service, which separates the sessions of two services on one host.
 
-Browsers do not tell the ports of a host apart in cookies. So the names have the port at which people reach the service:
-two services on one host name then keep their sessions apart.
-
-Tells plug-ins what a command on the service's own computer changes, beside the service.
+`note_command` informs plug-ins of changes by commands on the service's computer.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from server.store.tables import SessionRow
 def note_command(
     session: Session, at: datetime, by: str, action: str, command: str, subject: str, detail: str = ""
 ) -> None:
-    """Tells plug-ins, within the transaction that makes the change. `by`: who does it."""
+    """Informs plug-ins within the transaction that makes the change. `by`: name of the user who makes it."""
     said = {"actor": by, "action": action, "request": command, "subject": subject, "detail": detail}
     note = AuditNote(at=at, origin="command line", outcome="done", **said)
     for plugin in plugins():
@@ -40,21 +39,21 @@ def note_command(
 
 
 TLS_PREFIX = "__Host-"
-"""Beginning of a name that browsers take from its host over TLS only. On loopback, names are without it."""
+"""Prefix of a cookie name that browsers accept from its host over TLS only. On loopback, names have no prefix."""
 SESSION, SIGN_IN = "daq-session", "daq-sign-in"
 STOPS_FOR = 3600.0
-"""Time (s) for which an ended session still stops the robot, and nothing else: nobody shall find at the wrong moment
-that they must sign in again. A session that somebody has left stops nothing."""
+"""Time (s) for which an ended session may still stop the robot, and nothing else: nobody must find at the wrong moment
+that they have to sign in again. After signing out, a session stops nothing."""
 
 
 def session_cookie(address: str | None) -> str:
-    """Returns the name of the session's cookie. `address`: where people reach the service (`server.address`);
-    None where nobody signs in."""
+    """Returns the name of the session's cookie. `address`: where people reach the service (`server.address`); None if
+    nobody signs in."""
     return _name(SESSION, address)
 
 
 def sign_in_cookie(address: str | None) -> str:
-    """Returns the name of the cookie that ties an answer of the provider to the browser that asked."""
+    """Returns the name of the cookie that ties the provider's response to the browser that requested it."""
     return _name(SIGN_IN, address)
 
 
@@ -64,15 +63,15 @@ def is_over_tls(address: str | None) -> bool:
 
 
 def session_of(headers: Mapping[str, str], cookie: str) -> str:
-    """Returns the secret of the session in the cookie of this name; empty if there is none. `headers`: by name in lower
+    """Returns the session's secret in the cookie of this name; empty if there is none. `headers`: by name in lower
     case."""
     pairs = [one.strip().partition("=") for one in headers.get("cookie", "").split(";")]
     return {name: value for name, _, value in pairs}.get(cookie, "")
 
 
 def says_where_it_is_from(headers: Mapping[str, str]) -> bool:
-    """Whether a browser says which page a request is for. All do where a request changes something; a request with a
-    session that does not is none of our page's."""
+    """Whether a browser states which page a request is for. All browsers do this for requests that change something, so
+    a request with a session but without it does not come from our page."""
     return "origin" in headers or "sec-fetch-site" in headers
 
 
@@ -85,7 +84,7 @@ def _name(name: str, address: str | None) -> str:
 
 
 class SessionStore:
-    """Sessions of people whom a plug-in has let in."""
+    """Sessions of people accepted by a plug-in."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -93,8 +92,8 @@ class SessionStore:
     def begin(
         self, name_of: Callable[[Session], str], role: Role, now: datetime, lasts: timedelta
     ) -> tuple[str, Caller]:
-        """Begins a session, and returns its secret, which is shown to nobody else, with its caller. `name_of` returns
-        the person's name, within the same transaction."""
+        """Begins a session. Returns its secret, which nobody else sees, and its caller. `name_of` returns the person's
+        name within the same transaction."""
         secret = secrets.token_urlsafe(32)
         with self._store.writing() as session:
             session.execute(delete(SessionRow).where(SessionRow.expires < now - timedelta(seconds=STOPS_FOR)))
@@ -109,7 +108,7 @@ class SessionStore:
             session.execute(delete(SessionRow).where(SessionRow.digest == digest))
 
     def end_all(self, name: str, now: datetime, by: str = "unknown") -> int:
-        """Ends all sessions of a person, and returns how many there were. `by`: who does it."""
+        """Ends all sessions of a person, and returns their number. `by`: name of the user who ends them."""
         with self._store.writing() as session:
             rows = list(session.scalars(select(SessionRow).filter_by(name=name)))
             for row in rows:
@@ -125,7 +124,7 @@ class SessionStore:
             return [_caller(row) for row in session.scalars(query)]
 
     def callers(self, now: datetime) -> dict[str, Caller]:
-        """Returns the callers of all sessions by digest, also of those that have ended and may only stop the robot."""
+        """Returns the callers of all sessions by digest, including ended ones that may still stop the robot."""
         query = select(SessionRow).where(SessionRow.expires > now - timedelta(seconds=STOPS_FOR))
         with self._store.reading() as session:
             return {row.digest: _caller(row) for row in session.scalars(query)}
