@@ -65,8 +65,8 @@ class Endpoint(Protocol):
 
 
 def open_endpoint(url: str) -> Endpoint:
-    """Returns the endpoint of a URL. Starts a mock; in lock-step without a terminal, in this process. Sends nothing. Raises
-    TransportError."""
+    """Returns the endpoint of a URL. Starts a mock; in lock-step without a terminal, in this process. Sends nothing.
+    Raises TransportError."""
     port = parse_port_url(url)
     if isinstance(port, MockPort):
         if port.lock_step and not port.through_pty:

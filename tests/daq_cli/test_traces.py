@@ -18,7 +18,7 @@ def test_a_table_is_shown_plotted_verified_and_exported_as_it_is(daq: CommandLin
     path = tmp_path / "RIG.CSV"
     path.write_text("time,position_1,drive_1\n0,0,1\n0.1,1,1\n20.1,1,1\n0.2")
     shown = daq("traces", "show", path).out
-    assert "at most 20 s (after 0.1 s); it has no ticks, so whether some are missing is not known" in shown
+    assert "at most 20 s (after 0.1 s); it has no ticks, so missing samples cannot be detected" in shown
     assert "its last row has no line end" in shown
     assert "is CSV: it has no checksums" in daq("traces", "verify", path).out
     assert daq("traces", "plot", path, "-o", tmp_path / "a.png").code == 0
