@@ -1,5 +1,5 @@
-"""A process of this program that another one starts, and how the two speak: one message a line, on the standard input
-and output of the child. The end of its input tells the child that its parent has ended or wants it to end."""
+"""Child processes of this program, and their protocol: one message per line on the child's standard input and output.
+The end of its input tells the child that its parent has ended, or wants it to end."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from typing import IO, Any
 from pydantic import BaseModel
 
 PIECE = 1 << 16
-"""Bytes that a pipe holds on Linux: one read empties it."""
+"""Size (bytes) of a pipe's buffer on Linux: one read empties it."""
 
 
 class SilentError(Exception):
-    """A child has said no whole line."""
+    """A child sent no complete line."""
 
 
 class LateError(SilentError):
-    """It has said none in time."""
+    """The line did not come in time."""
 
 
 class LongError(SilentError):
-    """It has said too long a line."""
+    """The line was too long."""
 
 
 def line_of(message: BaseModel) -> bytes:
-    """Returns a message as it is sent."""
+    """Encodes a message as one line."""
     return message.model_dump_json().encode() + b"\n"
 
 
 class Child:
-    """A running child. It has a session of its own: Ctrl-C in the terminal is for its parent to handle."""
+    """A running child. It has a session of its own, so Ctrl-C in the terminal reaches only its parent."""
 
     def __init__(
         self,
@@ -51,8 +51,8 @@ class Child:
     ) -> None:
         """Starts a module of this program, or a command.
 
-        complaints: where its standard error goes; None for that of this process
-        descriptors: those that it inherits
+        complaints: destination of its standard error; None for that of this process
+        descriptors: descriptors that it inherits
         """
         command = [sys.executable, "-m", module] if isinstance(module, str) else [*module]
         self._process = subprocess.Popen(
@@ -72,7 +72,7 @@ class Child:
 
     @property
     def pid(self) -> int:
-        """The process number."""
+        """The process ID."""
         return self._process.pid
 
     @property
@@ -87,12 +87,12 @@ class Child:
             self.input.flush()
 
     def lines(self) -> Iterator[bytes]:
-        """What the child says, until it ends."""
+        """Yields the child's lines until it ends."""
         return iter(self.output)
 
     def line(self, until: float, longest: int) -> bytes:
-        """Returns the next line, which nothing may follow. Raises LateError after `until` (s, monotonic), LongError
-        beyond `longest` bytes, and SilentError if the process ends before."""
+        """Returns the next line, which must be the last. Raises LateError after `until` (s, monotonic), LongError
+        beyond `longest` bytes, and SilentError if the process ends first."""
         number, found, poll = self.output.fileno(), bytearray(), select.poll()
         poll.register(number, select.POLLIN)
         while not found.endswith(b"\n"):
@@ -113,12 +113,12 @@ class Child:
         return None
 
     def end_input(self) -> None:
-        """Closes the child's input, which asks it to end."""
+        """Closes the child's input, a request to end."""
         with suppress(OSError):
             self.input.close()
 
     def terminate(self) -> None:
-        """Asks the child by a signal to end."""
+        """Sends SIGTERM."""
         self._process.terminate()
 
     def kill(self) -> None:
@@ -137,5 +137,5 @@ class Child:
 
 
 def last_words(errors: str) -> str:
-    """Returns the last line of what a child has written to its standard error."""
+    """Returns the last line that a child wrote to its standard error."""
     return (errors.strip().splitlines() or ["it said nothing"])[-1]

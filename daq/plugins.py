@@ -1,13 +1,13 @@
-"""What a plug-in adds to the core, and where plug-ins are found.
+"""Plug-ins: what they can add, and how they are found.
 
 A plug-in is an object `Plugin`, named by an entry point of the group `ma2000_daq.plugins`:
 
     [project.entry-points."ma2000_daq.plugins"]
     gripper = "gripper_plugin:PLUGIN"
 
-It is a description: names, one-line helps, and references like "module:object", which are imported when they are used.
-So the module that describes it imports nothing but this one, and `daq --help` stays fast. The core has the same
-description of its own commands. docs/plugins.md shows a whole plug-in.
+The object is a description: names, one-line helps, and references like "module:object", which are imported on first
+use. Its module need import nothing but this one, so `daq --help` stays fast. The core describes its own commands in the
+same way. docs/plugins.md shows a complete plug-in.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 
 Group = Literal["Run", "Look", "Model", "Service", "Set up"]
-"""Headings of the help, in its order."""
+"""Headings of the help, in order."""
 
 
 @dataclass(frozen=True)
@@ -37,16 +37,16 @@ class Command:
 
     name: str
     line: str
-    """One line of help."""
+    """Help, one line."""
     module: str
-    """The module with the command: a Typer named `app`."""
+    """Module of the command: a Typer app named `app`."""
     about: Literal["robot", "computer", "service"] = "robot"
-    """What it is about: a robot, here or at a server; this computer alone, so that `--server` is refused; everything
-    that one service has, so that `--robot` is refused, too."""
+    """Subject of the command. `robot`: a robot, local or at a server. `computer`: this computer, so `--server` is
+    refused. `service`: a whole service, so `--robot` is refused too."""
     needs: Extra = "robot"
-    """The extra whose packages it needs here."""
+    """The extra whose packages the command needs here."""
     group: Group = "Set up"
-    """The heading below which the help lists it."""
+    """Its heading in the help."""
 
 
 @dataclass(frozen=True)
@@ -56,59 +56,60 @@ class Name:
     name: str
     module: str
     needs: Extra | None = None
-    """The extra whose packages it needs; none beside those that a client has."""
+    """The extra whose packages it needs; none if a client has them."""
 
 
 @dataclass(frozen=True)
 class Importer:
-    """Makes traces of recordings of others, for `daq traces import`."""
+    """Converts recordings of other programs to traces, for `daq traces import`."""
 
     what: str
-    """What it makes a trace of: "the joint states in a bag"."""
+    """Text about its input: "the joint states in a bag"."""
     claims: str
-    """"module:function" of a path and its first 16 bytes: whether the file is one for it."""
+    """"module:function" with the arguments path and its first 16 bytes: whether it can read the file."""
     read: str
-    """"module:function" of a path, `TraceLimits` and `daq.contracts.import_choice.Choice`: returns a `Trace`."""
+    """"module:function" with the arguments path, `TraceLimits` and `daq.contracts.import_choice.Choice`: returns a
+    `Trace`."""
 
 
 @dataclass(frozen=True)
 class Plugin:
-    """What a plug-in adds."""
+    """Everything that a plug-in adds."""
 
     commands: tuple[Command, ...] = ()
     names: tuple[Name, ...] = ()
     importers: tuple[Importer, ...] = ()
     dialects: Mapping[str, str] = field(default_factory=dict)
-    """Line protocols by the name that a port's URL has: "module:function" of the joints' numbers on the bus, which
-    makes a `firmware_protocol.dialect.LinkDialect`."""
+    """Line protocols by their name in port URLs. "module:function" gets the joints' IDs on the bus and returns a
+    `firmware_protocol.dialect.LinkDialect`."""
     settings: Mapping[str, str] = field(default_factory=dict)
-    """Sections of daq.toml by name: classes `daq.config.section.Section`, as "module:Class"."""
+    """Sections of daq.toml by name: subclasses of `daq.config.section.Section`, as "module:Class"."""
     checks: tuple[str, ...] = ()
-    """Functions of the `Settings`, as "module:function", that `daq config check` calls: each raises SpecError for what
-    cannot be used."""
+    """Functions for `daq config check`, as "module:function". Each gets the `Settings`, and raises SpecError for
+    unusable values."""
     migrations: Mapping[str, str] = field(default_factory=dict)
-    """Packages of migrations (`server/store/schema.py`), by a name that no other plug-in uses. They make tables of the
-    service's database, each named so that it begins with this name."""
+    """Packages of migrations (`server/store/schema.py`), by a name that no other plug-in uses. The names of their
+    database tables must begin with this name."""
     databases: Mapping[str, str] = field(default_factory=dict)
-    """Kinds of databases beside SQLite, by SQLAlchemy's name: `server.store.databases.Database`, as "module:object"."""
+    """Databases besides SQLite, by SQLAlchemy's name: `server.store.databases.Database`, as "module:object"."""
     noted: tuple[str, ...] = ()
-    """Functions of a session of the database and an `AuditNote`, as "module:function". They are called for each command
-    beside the service that changes who may use it, within the command's transaction."""
+    """Functions called with a database session and an `AuditNote`, as "module:function". They are called within the
+    transaction of every command, outside the service, that changes its users."""
     parts: tuple[str, ...] = ()
     """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
     sections: tuple[str, ...] = ()
     """Functions of a `Diagnosis` and its traces, as "module:function": a `model.blocks.Section` for its report, or
     None."""
     routes_at_root: tuple[str, ...] = ()
-    """Routers whose addresses begin at the root, as "module:router"."""
+    """Routers with paths at the root, as "module:router"."""
     routes: tuple[str, ...] = ()
-    """Routers below /api/v1, as "module:router": of `server.routes`, or FastAPI's."""
+    """Routers below /api/v1, as "module:router": from `server.routes`, or FastAPI's."""
 
 
 @cache
 def plugins() -> tuple[Plugin, ...]:
-    """Returns the plug-ins that are installed, by their names. One that cannot be loaded is left out with a warning: a
-    robot must be stopped all the same."""
+    """Returns the installed plug-ins by name. A plug-in that cannot be loaded is left out with a warning, so that a
+    robot can still be stopped."""
     found = (_loaded(name, reference) for name, reference in sorted(_entry_points().items()))
     return tuple(plugin for plugin in found if plugin is not None)
 
@@ -120,14 +121,14 @@ def report_sections(found: object, traces: Sequence[object]) -> list[Any]:
 
 
 def named(reference: str) -> Any:
-    """Returns the object "module:object"."""
+    """Imports and returns "module:object"."""
     module, _, name = reference.partition(":")
     return getattr(import_module(module), name)
 
 
 def _entry_points() -> dict[str, str]:
-    """The references of the group by name, from the same files as `importlib.metadata` reads: to import that takes a
-    third of the time of `daq --help`."""
+    """Returns the references of the group by name, from the files that `importlib.metadata` reads. That module's import
+    would take a third of the time of `daq --help`."""
     found: dict[str, str] = {}
     for folder in sys.path:
         for file in sorted(Path(folder).glob("*.dist-info/entry_points.txt")):
@@ -144,9 +145,9 @@ def _loaded(name: str, reference: str) -> Plugin | None:
         plugin = named(reference)
     except ModuleNotFoundError as error:
         if error.name is not None and f"{reference.partition(':')[0]}.".startswith(f"{error.name}."):
-            return None  # its own package was taken away, as `extras/` may be
+            return None  # the plug-in's own package was removed, as `extras/` may be
         plugin = error
-    except Exception as error:  # noqa: BLE001 - somebody else's module may raise anything
+    except Exception as error:  # noqa: BLE001  # another package's module may raise any error
         plugin = error
     if isinstance(plugin, Plugin):
         return plugin

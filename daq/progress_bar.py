@@ -1,7 +1,7 @@
-"""A progress bar of rich, in a terminal or a notebook, that is gone when the work ends, however it ends.
+"""Shows a progress bar in a terminal or a notebook, and removes it when the work ends.
 
-rich is what the commands print with. In a notebook it would need ipywidgets, and warn where they are missing; there,
-the bar is drawn as HTML, and IPython, in which every notebook runs, replaces it in place.
+In terminals, rich draws it. In notebooks, rich would need ipywidgets, so the bar is drawn as HTML and updated by
+IPython.
 """
 
 from __future__ import annotations
@@ -21,14 +21,13 @@ if TYPE_CHECKING:
 WIDTH = 100
 """Characters of a notebook's bar."""
 SHOWN_EVERY = 0.1
-"""Shortest time (s) between two pictures of a notebook's bar: each is a message to the reader's page."""
+"""Shortest time (s) between two updates of a notebook's bar; each is a message to the browser."""
 HTML = '<pre style="margin:0;line-height:normal;font-family:monospace">{code}</pre>'
 
 
 @contextmanager
 def progress_bar(what: str, console: Console) -> Iterator[Told]:
-    """What is to be told how far the work in the block is. Where nobody watches, as in a pipe or a log, nothing is
-    shown."""
+    """Yields a function to report the progress of the block. In a pipe or a log, nothing is shown."""
     if console.is_jupyter:
         with _notebook_place() as show, in_notebook(what, show) as told:
             yield told
@@ -38,21 +37,21 @@ def progress_bar(what: str, console: Console) -> Iterator[Told]:
 
 
 def terminal_bar(console: Console) -> Progress:
-    """A bar with a line on the present step, for a `with` block; nothing where the console is no terminal."""
+    """A bar with a line about the current step, for a `with` block; nothing if the console is not a terminal."""
     return _bar(console, disable=not is_watched(console))
 
 
 def is_watched(console: Console) -> bool:
-    """Whether a person sees the console. FORCE_COLOR makes of a log a terminal for rich, but nobody watches it."""
+    """Whether a person sees the console. With FORCE_COLOR, rich treats a log as a terminal, but nobody watches it."""
     try:
         return console.is_terminal and console.file.isatty()
-    except ValueError:  # closed
+    except ValueError:  # the stream is closed
         return False
 
 
 @contextmanager
 def in_notebook(what: str, show: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> Iterator[Told]:
-    """Shows the bar as HTML by `show`, at most every SHOWN_EVERY s, and as nothing at the end."""
+    """Shows the bar as HTML by `show`, at most once per SHOWN_EVERY s; shows an empty text at the end."""
     from rich.console import Console
 
     page = Console(
@@ -79,10 +78,10 @@ def in_notebook(what: str, show: Callable[[str], None], clock: Callable[[], floa
 
 @contextmanager
 def _notebook_place() -> Iterator[Callable[[str], None]]:
-    """A place in the output of a notebook's cell, which is made when something is first shown in it."""
+    """Yields a function that shows HTML in the output of a notebook cell, created at its first use."""
     from IPython.display import DisplayHandle
 
-    handle: Any = cast("Any", DisplayHandle)()  # IPython states no types here
+    handle: Any = cast("Any", DisplayHandle)()  # IPython has no type annotations here
     begun = False
 
     def show(html: str) -> None:

@@ -1,4 +1,4 @@
-"""The command line: the top of the house. One file a subcommand; heavy libraries are imported where they are used."""
+"""The command line. Each subcommand has a file; heavy libraries are imported where they are used."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from typing import NoReturn
 
 
 def main() -> None:
-    """Entry point of `daq`. A stop is sent before anything else is imported."""
-    gc.set_threshold(100_000)  # with 700, collections take a third of the imports' time, and find nothing
+    """Entry point of `daq`. A stop is sent before other modules are imported."""
+    gc.set_threshold(100_000)  # with 700, collections take a third of the import time and find nothing
     stopping = sys.argv[1:2] == ["stop"] and not {"-h", "--help"} & set(sys.argv)
     try:
         if stopping:
             from daq_cli.app import early_stop
 
             early_stop.ask(sys.argv[2:])
-        import ma2000  # noqa: F401 - says in one line which file of the user's hides a package; loads nothing else
+        import ma2000  # noqa: F401  # reports a user's file that hides a package; loads nothing else
     except ImportError as error:
         _end(str(error), 2, stopping=stopping)
-    if sys.argv[1:] == ["--version"]:  # asked of every installation, also of one without the command line's packages
+    if sys.argv[1:] == ["--version"]:  # must work without the packages of the command line
         from importlib.metadata import version
 
         print(f"daq {version('ma2000-daq')}")
         raise SystemExit(0)
-    # Matrices here are thin: a second thread in each product costs a fifth of a diagnosis. Simulations share the cores.
+    # Matrices here are small: BLAS threads would slow a diagnosis by a fifth. Simulations use the cores instead.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from daq.contracts.errors import DaqError
     from daq.contracts.extras import missing_extras_named
@@ -37,12 +37,12 @@ def main() -> None:
             from daq_cli.app.command import main as run
 
             run()
-    except DaqError as error:  # every other one ends inside `run`
+    except DaqError as error:  # `run` handles every other error
         _end(str(error), error.exit_code, stopping=command == "stop")
 
 
 def _end(line: str, code: int, *, stopping: bool) -> NoReturn:
-    """Ends with one line; after a stop also with what the early stop has reached, all that is left of the command."""
+    """Ends with one line; after a stop, also with the results of the early stop."""
     if stopping:
         print("\n".join(_stopped() or ["NOTHING WAS STOPPED: no program here moves a robot"]), flush=True)
     print(f"daq: {line}", file=sys.stderr)
@@ -50,11 +50,11 @@ def _end(line: str, code: int, *, stopping: bool) -> NoReturn:
 
 
 def _stopped() -> list[str]:
-    """What the early stop was told; stops now if there was none, or nobody by the name that was given."""
+    """Returns the results of the early stop. Stops now if there was none, or if no robot has the given name."""
     try:
         from daq_cli.app import early_stop
     except ImportError:
         return ["NOTHING WAS STOPPED: the program cannot be loaded"]
     if not early_stop.told():
-        early_stop.ask()  # a name that nobody has stops all
+        early_stop.ask()  # stops all robots, since none has the given name
     return early_stop.told()

@@ -1,4 +1,5 @@
-"""A memory map as a header of the bridge's core: `python -m firmware_protocol.c_header [MAP.toml] > memory_map.h`."""
+"""Writes a memory map as a header of the bridge's core: `python -m firmware_protocol.c_header [MAP.toml] >
+memory_map.h`."""
 
 from __future__ import annotations
 
@@ -10,13 +11,13 @@ from firmware_protocol.errors import MemoryMapError
 from firmware_protocol.memory_map import SINGLE_REGISTERS, MemoryMap, Register, default_memory_map, parse_memory_map
 
 PAGE_BYTES = 256
-"""Largest memory that the core serves: it keeps a register's place in one byte."""
+"""Largest memory that the core serves: it stores a register's place in one byte."""
 WITH_BITS = ("set_point", "position", "error", "power")
-"""Registers whose width the core needs to know."""
+"""Registers whose width the core needs."""
 
 
 def c_header(memory_map: MemoryMap) -> str:
-    """The header's text. Raises MemoryMapError for a memory larger than a page."""
+    """Returns the header's text. Raises MemoryMapError for a memory larger than a page."""
     if memory_map.size > PAGE_BYTES:
         raise MemoryMapError(f"{memory_map.name}: {memory_map.size} bytes: the core serves {PAGE_BYTES} at most")
     lines = [
@@ -46,7 +47,7 @@ def _defined(name: str, register: Register, base: int) -> Iterable[str]:
 
 
 def main(arguments: list[str]) -> int:
-    """Prints the header of a map, or of the one that ships; the exit code."""
+    """Prints the header of a map, or of the packaged one. Returns the exit code."""
     try:
         paths = [Path(argument) for argument in arguments]
         maps = [parse_memory_map(path.read_text("utf-8-sig"), str(path)) for path in paths] or [default_memory_map()]

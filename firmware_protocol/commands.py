@@ -1,10 +1,11 @@
-"""What host and controller say to each other: every message, and its way into and out of a frame.
+"""All messages between host and controller, and their conversion to and from frames.
 
-The one place to import messages from. A request's opcode is below 0x80; its reply's is the same with the top bit
-set; a refusal is `Refused` (0xFF). Numbers are little-endian. Joint masks have bit 0 for joint 1; values follow in
-the order of the joints in the mask.
+Import messages from here. A request's opcode is below 0x80; its reply's is the same with the top bit set; a refusal is
+`Refused` (0xFF). Numbers are little-endian. In joint masks, bit 0 is joint 1; values follow in the order of the joints
+in the mask.
 
-Decides which commands are obeyed: the bridge's part of the rules on sessions, and on time in lock-step.
+`Session` and `AdvanceOrder` decide which commands a bridge carries out: the rules on sessions, and on time in
+lock-step.
 """
 
 from __future__ import annotations
@@ -66,11 +67,11 @@ from firmware_protocol.stamp import STAMP_BYTES, UNSTAMPED, Stamp
 
 WINDOW = 0x4000
 """Largest distance by which the number of the last `Advance` may lag behind the newest request. Without this bound, the
-next `Advance` after half a circle of other requests would look old."""
+next `Advance` after half a circle of other requests would seem old."""
 
 
 class Arrival(Enum):
-    """What a bridge does with a request."""
+    """A bridge's handling of a request."""
 
     NEW = "carry out, and answer"
     AGAIN = "a repeat: answer again, and let no time pass"
@@ -81,7 +82,7 @@ class Arrival(Enum):
 class Session:
     """The session of the host that sent the last `Hello`: twelve bytes of state.
 
-    Within a session commands are numbered upwards and never wrap, so that no recorded command can count as new again.
+    Within a session, commands are numbered upwards and never wrap, so that no recorded command can seem new again.
     """
 
     def __init__(self) -> None:
@@ -90,7 +91,7 @@ class Session:
         self._newest = 1
 
     def greet(self, nonce: int, fresh: Callable[[], int]) -> bool:
-        """Handles a `Hello`; returns whether a new session has begun, under the number that `fresh` gives.
+        """Handles a `Hello`. Returns whether a new session has begun, with the number from `fresh`.
 
         The nonce of the present session is a repeat of its own greeting, and changes nothing.
         """
@@ -100,11 +101,11 @@ class Session:
         return True
 
     def end(self) -> None:
-        """No command is obeyed until the next greeting."""
+        """Ends the session: no command is carried out until the next greeting."""
         self.number = NO_SESSION
 
     def judge(self, stamp: Stamp) -> Arrival:
-        """What to do with a command: NEW, STALE or FOREIGN. A repeat is NEW: it changes nothing."""
+        """Returns the handling of a command: NEW, STALE or FOREIGN. A repeat is NEW, since it changes nothing."""
         if self.number == NO_SESSION or stamp.session != self.number:
             return Arrival.FOREIGN
         if stamp.number < self._newest:
@@ -114,21 +115,22 @@ class Session:
 
 
 class AdvanceOrder:
-    """Lock-step only: which `Advance` lets time pass, by sequence numbers on a circle of 2^16.
+    """Lock-step only: which `Advance` advances time, by sequence numbers modulo 2^16.
 
-    Lock-step exists only on a bench without an arm: there a circle is enough, and an `Advance` needs no session.
+    Lock-step exists only without an arm. There a number that wraps is enough, and an `Advance` needs no session.
     """
 
     def __init__(self) -> None:
         self._number: int | None = None
 
     def judge(self, sequence: int, request: Request) -> Arrival:
-        """What to do with a request that has just arrived. Of requests other than `Advance` only the number matters."""
+        """Returns the handling of a request that has just arrived. For requests other than `Advance` only the number
+        matters."""
         if isinstance(request, Hello):
             self._number = None
             return Arrival.NEW
         if isinstance(request, Advance) and request.microseconds == 0:
-            return Arrival.AGAIN  # asks for the time
+            return Arrival.AGAIN  # repeats the time
         ahead = 0 if self._number is None else (sequence - self._number) & 0xFFFF
         if not isinstance(request, Advance):
             if WINDOW < ahead < 0x8000:
@@ -210,7 +212,8 @@ __all__ = [
 
 
 def to_frame(sequence: int, message: Message, stamp: Stamp = UNSTAMPED) -> Frame:
-    """The frame that carries a message, a command behind its stamp. Raises ProtocolError when a value is no integer."""
+    """Returns the frame of a message; in a command, the stamp comes first. Raises ProtocolError if a value is no
+    integer."""
     try:
         payload = message.pack()
         if isinstance(message, Request) and message.IS_COMMAND:
@@ -221,7 +224,8 @@ def to_frame(sequence: int, message: Message, stamp: Stamp = UNSTAMPED) -> Frame
 
 
 def parse_request(frame: Frame) -> Request:
-    """The request in a frame, without its stamp. Raises ProtocolError when opcode or payload are not a request's."""
+    """Returns the request in a frame, without its stamp. Raises ProtocolError if opcode or payload are not a
+    request's."""
     kind = REQUESTS.get(frame.opcode)
     if kind is None:
         raise UnknownOpcodeError(f"opcode {frame.opcode:#04x} is no request")
@@ -232,12 +236,12 @@ def parse_request(frame: Frame) -> Request:
 
 
 def stamp_of(frame: Frame) -> Stamp:
-    """The stamp in a frame that holds a command. Raises PayloadLengthError when there is none."""
+    """Returns the stamp in a command's frame. Raises PayloadLengthError if there is none."""
     return Stamp.parse(frame.payload)
 
 
 def parse_reply(frame: Frame) -> Reply:
-    """The reply in a frame. Raises ProtocolError when opcode or payload are not a reply's."""
+    """Returns the reply in a frame. Raises ProtocolError if opcode or payload are not a reply's."""
     kind = REPLIES.get(frame.opcode)
     if kind is None:
         raise UnknownOpcodeError(f"opcode {frame.opcode:#04x} is no reply")
@@ -245,7 +249,7 @@ def parse_reply(frame: Frame) -> Reply:
 
 
 def refusal_of(error: ProtocolError) -> Refusal:
-    """How a bridge answers a request that `parse_request` raised `error` for."""
+    """Returns the refusal with which a bridge answers a request for which `parse_request` raised `error`."""
     match error:
         case UnknownOpcodeError():
             return Refusal.UNKNOWN_OPCODE

@@ -1,7 +1,7 @@
-"""The interface for another line protocol under the same driver.
+"""The interface for other line protocols under the same driver.
 
-The real line protocol of the MA2000 is not public, so our frames are our own. A laboratory whose bridge uses
-another protocol writes a `LinkDialect` and names it in the port's URL; driver, safety and runner stay as they are.
+The real line protocol of the MA2000 is not public, so this project defines its own frames. For a bridge with another
+protocol, write a `LinkDialect` and name it in the port's URL; driver, safety and runner stay unchanged.
 """
 
 from __future__ import annotations
@@ -25,64 +25,64 @@ from firmware_protocol.scale import LineScale
 
 IDLE_MARK = b"\0\0\0\0"
 """In lock-step the bridge ends each turn with this mark: it sends nothing more until the next request. Frames never
-contain it: at most two zeros follow each other, where one frame ends and the next begins."""
+contain it: at most two zeros follow each other, between two frames."""
 
 
 class LinkDialect(Protocol):
-    """Turns requests into bytes and bytes into numbered replies. Holds the state of one connection, no more.
+    """Converts requests to bytes, and bytes to numbered replies. Stores only the state of one connection.
 
     Called by one thread at a time, though not always by the same one.
     """
 
     @property
     def scale(self) -> LineScale:
-        """What this line can say of its machine."""
+        """Properties of the machine on this line."""
         ...
 
     def encode(self, sequence: int, request: Request) -> bytes:
-        """Bytes that ask `request` under a sequence number (0–65535). Called once per request."""
+        """Returns the bytes of `request` with a sequence number (0–65535). Called once per request."""
         ...
 
     def again(self, request: Request, frame: bytes) -> bytes:
-        """Bytes of a repeat of a request that `encode` has made `frame` of. Only where a repeat of the same bytes could
-        undo a stop that has come meanwhile are they others."""
+        """Returns the bytes of a repeat of a request, for which `encode` returned `frame`. They differ from `frame`
+        only if repeating it could undo a stop that came meanwhile."""
         ...
 
     def feed(self, data: bytes) -> list[tuple[int, Reply]]:
-        """The (sequence number, reply) pairs that `data` completes. Damage is counted, never raised."""
+        """Returns the (sequence number, reply) pairs that `data` completes. Damage is counted, never raised."""
         ...
 
     def forget(self, sequence: int) -> None:
-        """The host has given up this request, or has its reply: no further step of it may be written."""
+        """Notes that the host has given up this request, or has its reply: no further step of it may be written."""
         ...
 
     def answer(self) -> bytes:
-        """Bytes to be written because of what `feed` has taken in: the next step of a request that needs several."""
+        """Returns bytes to write after `feed`: the next step of a request that needs several."""
         ...
 
     def farewell(self) -> bytes:
-        """Bytes to be written before the connection is closed in good order."""
+        """Returns bytes to write before the connection is closed in good order."""
         ...
 
     def reset(self) -> None:
-        """Forgets unfinished input after a reconnection."""
+        """Discards unfinished input after a reconnection."""
         ...
 
     @property
     def damaged(self) -> int:
-        """Pieces of input thrown away because they were no whole reply."""
+        """Pieces of input discarded because they were not a whole reply."""
         ...
 
     @property
     def complaint(self) -> str:
-        """What is known about why a request has no reply, for people; empty where nothing is."""
+        """Explanation, for people, why a request has no reply; empty if none is known."""
         ...
 
 
 class FramedDialect:
     """The dialect of PROTOCOL.md: binary frames with length, sequence number and CRC-16.
 
-    Holds the session: commands are stamped with it. The first answer to the last greeting begins it.
+    Stores the session, with which commands are stamped. The first answer to the last greeting begins it.
     """
 
     scale = LineScale()
@@ -95,7 +95,7 @@ class FramedDialect:
         self._last = UNSTAMPED
 
     def encode(self, sequence: int, request: Request) -> bytes:
-        """One frame. Raises ProtocolError when the session's numbers are used up."""
+        """Returns one frame. Raises ProtocolError if the session's numbers are used up."""
         if isinstance(request, Hello):
             self._greeted_with = request.nonce
         elif request.IS_COMMAND and self._last.session != NO_SESSION:
@@ -103,7 +103,7 @@ class FramedDialect:
         return encode_frame(to_frame(sequence, request, self._last))
 
     def feed(self, data: bytes) -> list[tuple[int, Reply]]:
-        """Replies in the order of their arrival."""
+        """Returns replies in the order of their arrival."""
         replies: list[tuple[int, Reply]] = []
         for frame in self._decoder.feed(data):
             try:
@@ -117,30 +117,30 @@ class FramedDialect:
         return replies
 
     def _begin(self, reply: HelloReply) -> None:
-        """Takes the session of a greeting's first answer; a later one may be of a greeting that was only delayed."""
+        """Uses the session in a greeting's first answer; a later answer may be to a delayed greeting."""
         if reply.session != NO_SESSION and reply.nonce == self._greeted_with:
             self._greeted_with = None
             if reply.session != self._last.session:
                 self._last = Stamp(reply.session, 0)
 
     def again(self, request: Request, frame: bytes) -> bytes:
-        """The same bytes: the bridge refuses a command that is older than a stop."""
+        """Returns the same bytes: the bridge refuses a command that is older than a stop."""
         del request
         return frame
 
     def forget(self, sequence: int) -> None:
-        """Nothing: a request has one frame."""
+        """Does nothing: a request has one frame."""
 
     def answer(self) -> bytes:
-        """Nothing: every request is one frame."""
+        """Returns nothing: every request is one frame."""
         return b""
 
     def farewell(self) -> bytes:
-        """Nothing: the arm stays at its last set points."""
+        """Returns nothing: the arm stays at its last set points."""
         return b""
 
     def reset(self) -> None:
-        """Forgets an unfinished frame and the session; counters stay."""
+        """Discards an unfinished frame and the session; counters stay."""
         self._decoder.reset()
         self._greeted_with = None
         self._last = UNSTAMPED

@@ -2,24 +2,24 @@
 
 
 class ProtocolError(ValueError):
-    """Something on the wire, or meant for it, breaks the protocol."""
+    """Data on the wire, or meant for it, violate the protocol."""
 
 
 class UnknownOpcodeError(ProtocolError):
-    """A frame whose opcode stands for no message of its direction."""
+    """A frame has an opcode that is no message in its direction."""
 
 
 class PayloadLengthError(ProtocolError):
-    """A payload that is shorter or longer than its message."""
+    """A payload is shorter or longer than its message."""
 
 
 class BlockAddressError(ProtocolError):
-    """A block that reaches beyond the address space."""
+    """A block extends beyond the address space."""
 
 
 class UnitsError(ProtocolError):
-    """A value outside its register's range or the joint's range."""
+    """A value is outside its register's range or the joint's range."""
 
 
 class MemoryMapError(ProtocolError):
-    """A memory map that contradicts itself or lacks what the protocol needs."""
+    """A memory map is inconsistent or lacks what the protocol needs."""

@@ -1,10 +1,10 @@
-"""Frames: how bytes on the line become numbered messages, and back.
+"""Frames: encodes numbered messages as bytes on the line, and decodes them.
 
     00 | COBS( length, sequence low, sequence high, opcode, payload …, CRC high, CRC low ) | 00
 
-A zero byte stands only between frames (consistent overhead byte stuffing), so that a receiver which lost its place
-finds it again at the next zero. `length` counts the payload. The CRC is CRC-16/CCITT (polynomial 1021, start FFFF)
-over everything before it. The largest frame is 57 bytes: 4.95 ms of a line at 115200 baud.
+Zero bytes occur only between frames (consistent overhead byte stuffing), so that a receiver can resynchronise at the
+next zero. `length` counts the payload. The CRC is CRC-16/CCITT (polynomial 1021, start FFFF) over everything before it.
+The largest frame is 57 bytes: 4.95 ms on a line at 115200 baud.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MAX_BODY = HEADER + MAX_PAYLOAD + CRC_BYTES
 MAX_ENCODED = MAX_BODY + 1
 """COBS adds one byte to anything shorter than 254."""
 FRAME_OVERHEAD = 2 + 1 + HEADER + CRC_BYTES
-"""Bytes that a frame adds to its payload: two delimiters, one of stuffing, header and CRC."""
+"""Bytes that a frame adds to its payload: two delimiters, one byte of stuffing, header and CRC."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,8 @@ def crc16(data: bytes) -> int:
 
 
 def stuff(body: bytes) -> bytes:
-    """COBS: `body` (at most MAX_BODY bytes) without zeros, one byte longer. Raises ProtocolError when it is longer."""
+    """COBS: returns `body` (at most MAX_BODY bytes) without zeros, one byte longer. Raises ProtocolError if it is
+    longer."""
     if len(body) > MAX_BODY:
         raise ProtocolError(f"body of {len(body)} bytes: at most {MAX_BODY}")
     encoded = bytearray()
@@ -60,10 +61,10 @@ def stuff(body: bytes) -> bytes:
 
 
 def unstuff(encoded: bytes) -> bytes:
-    """The bytes that `stuff` was given.
+    """Inverse of `stuff`.
 
-    Raises ProtocolError when `encoded` is empty, too long or holds a zero, or a code byte points past the end:
-    whatever is accepted is exactly what `stuff` would make of the result.
+    Raises ProtocolError if `encoded` is empty, too long or contains a zero, or a code byte points beyond the end.
+    Everything accepted is exactly the result of `stuff`.
     """
     if not 0 < len(encoded) <= MAX_ENCODED:
         raise ProtocolError(f"{len(encoded)} bytes between delimiters: allowed are 1 to {MAX_ENCODED}")
@@ -74,7 +75,7 @@ def unstuff(encoded: bytes) -> bytes:
     position = 0
     while position < size:
         code = body[position]
-        body[position] = 0  # each code byte but the first stands for a zero
+        body[position] = 0  # each code byte except the first replaces a zero
         position += code
     if position > size:
         raise ProtocolError(f"byte stuffing broken: it ends {position - size} bytes after the frame")
@@ -82,15 +83,15 @@ def unstuff(encoded: bytes) -> bytes:
 
 
 def encode_frame(frame: Frame) -> bytes:
-    """The frame as it travels, delimiters included."""
+    """Returns the frame as sent, including delimiters."""
     body = bytes((len(frame.payload), frame.sequence & 0xFF, frame.sequence >> 8, frame.opcode)) + frame.payload
     return DELIMITER + stuff(body + crc16(body).to_bytes(2, "big")) + DELIMITER
 
 
 def decode_body(encoded: bytes) -> Frame:
-    """The frame between two delimiters.
+    """Returns the frame between two delimiters.
 
-    Raises ProtocolError when stuffing, length or CRC do not agree; nothing else, whatever the bytes.
+    Raises ProtocolError, and nothing else for any bytes, if stuffing, length or CRC do not agree.
     """
     body = unstuff(encoded)
     if len(body) < HEADER + CRC_BYTES:
@@ -104,17 +105,17 @@ def decode_body(encoded: bytes) -> Frame:
 
 @dataclass
 class FrameDecoder:
-    """Turns a stream of bytes, in any pieces, into frames. Holds at most one frame's bytes, whatever arrives."""
+    """Decodes a stream of bytes, however split, into frames. Stores at most one frame's bytes."""
 
     damaged: int = 0
-    """Pieces between delimiters that were not a frame: stuffing, length or CRC wrong."""
+    """Pieces between delimiters that were not a frame: wrong stuffing, length or CRC."""
     oversized: int = 0
     """Pieces longer than any frame; they are discarded without being stored."""
     _partial: bytearray = field(default_factory=bytearray)
     _overrun: bool = False
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The frames that `data` completes, in order. Damage is counted, never raised."""
+        """Returns the frames that `data` completes, in order. Damage is counted, never raised."""
         frames: list[Frame] = []
         *ended, begun = data.split(DELIMITER)
         for piece in ended:
@@ -124,7 +125,7 @@ class FrameDecoder:
             elif piece:
                 frame = self._decoded(piece)
             else:
-                continue  # nothing lies between two delimiters
+                continue  # two adjacent delimiters
             if frame is not None:
                 frames.append(frame)
         if begun:
@@ -133,11 +134,11 @@ class FrameDecoder:
 
     @property
     def held(self) -> int:
-        """Bytes of an unfinished frame that wait for their rest: never more than MAX_ENCODED."""
+        """Number of stored bytes of an unfinished frame: at most MAX_ENCODED."""
         return len(self._partial)
 
     def reset(self) -> None:
-        """Forgets an unfinished frame (after a reconnection); counters stay."""
+        """Discards an unfinished frame (after a reconnection); counters stay."""
         self._partial.clear()
         self._overrun = False
 

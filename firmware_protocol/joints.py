@@ -1,4 +1,4 @@
-"""Joints in messages: masks, the order of values, and what the board holds of one joint."""
+"""Joints in messages: masks, the order of values, and the board's data of one joint."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ from firmware_protocol.units import ADC_COUNTS, counts_to_posture
 ALL_JOINTS = (1 << JOINTS) - 1
 """Mask of joints 1 to 6."""
 SET_POINT_REGISTER_MAX = 1023
-"""Largest value of the ten bits of a set point. The controller takes 0–999; memory may hold anything."""
+"""Largest value of a ten-bit set point. The controller accepts 0–999; the memory may contain any value."""
 
 
 @lru_cache(maxsize=1 << JOINTS)
 def joints_of(mask: int) -> tuple[int, ...]:
-    """Joint numbers (from 1) in a mask, ascending."""
+    """Returns the joint numbers (from 1) in a mask, ascending."""
     return tuple(joint for joint in range(1, JOINTS + 1) if mask >> (joint - 1) & 1)
 
 
 def mask_of(joints: Iterable[int]) -> int:
-    """Mask of joint numbers (from 1), in any order. Raises ProtocolError for a joint that does not exist."""
+    """Returns the mask of joint numbers (from 1), in any order. Raises ProtocolError for a joint that does not
+    exist."""
     mask = 0
     for joint in joints:
         if not 1 <= joint <= JOINTS:
@@ -38,13 +39,13 @@ def mask_of(joints: Iterable[int]) -> int:
 
 
 def check_mask(what: str, mask: int) -> None:
-    """Raises ProtocolError unless the mask names at least one joint and none that does not exist."""
+    """Raises ProtocolError unless the mask contains at least one joint, and only existing ones."""
     if not 0 < mask <= ALL_JOINTS:
         raise ProtocolError(f"{what}: joint mask {mask:#04x}: allowed are 0x01 to {ALL_JOINTS:#04x}")
 
 
 def check_ascending(what: str, joints: tuple[int, ...]) -> None:
-    """Raises ProtocolError unless joints exist, ascend and are at least one: a mask keeps no other order."""
+    """Raises ProtocolError unless joints exist, ascend and are at least one: a mask has no other order."""
     if joints and joints[0] > 0 and joints[-1] <= JOINTS and all(map(lt, joints, joints[1:])):
         return
     if not joints:
@@ -55,7 +56,8 @@ def check_ascending(what: str, joints: tuple[int, ...]) -> None:
 
 
 def split_mask(what: str, payload: bytes) -> tuple[tuple[int, ...], bytes]:
-    """Joints of the mask that a payload begins with, and the rest. Raises ProtocolError for an impossible mask."""
+    """Returns the joints of the mask at the start of a payload, and the rest. Raises ProtocolError for an impossible
+    mask."""
     if not payload:
         raise PayloadLengthError(f"{what}: empty payload, expected a joint mask first")
     check_mask(what, payload[0])
@@ -64,8 +66,8 @@ def split_mask(what: str, payload: bytes) -> tuple[tuple[int, ...], bytes]:
 
 @dataclass(frozen=True)
 class JointReading:
-    """What the board holds of one joint. Set point in posture units, position and error in ADC counts, power in
-    DAC counts (the PID output before the amplifier; section 6.3)."""
+    """The board's data of one joint. Set point in posture units, position and error in ADC counts, power in DAC counts
+    (the PID output before the amplifier; section 6.3)."""
 
     LAYOUT: ClassVar[str] = "HHhb"
     set_point: int
@@ -74,7 +76,7 @@ class JointReading:
     power: int
 
     def __post_init__(self) -> None:
-        # Six are made on each side in every period, so values in range take one quick test.
+        # Fast path: six readings are made on each side in every period, so valid values take one quick test.
         if (
             0 <= self.set_point <= SET_POINT_REGISTER_MAX
             and 0 <= self.position < ADC_COUNTS
@@ -91,13 +93,13 @@ class JointReading:
 _READING = struct.Struct("<" + JointReading.LAYOUT)
 
 COMPACT_ERROR_MAX = 2047
-"""Largest error that twelve bits hold; one further out is told as this, or as -2048."""
+"""Largest error in twelve bits; larger ones are sent as this value, or as -2048."""
 
 
 @dataclass(frozen=True)
 class CompactReading:
-    """Position and error (ADC counts, twelve bits each) and power of one joint: the set point that was taken is what
-    position and error come to. An error beyond twelve bits is told as the largest of its sign."""
+    """Position and error (ADC counts, twelve bits each) and power of one joint. The set point used is the sum of
+    position and error. An error beyond twelve bits is sent as the largest of its sign."""
 
     position: int
     error: int
@@ -110,24 +112,24 @@ class CompactReading:
 
     @classmethod
     def of(cls, reading: JointReading) -> CompactReading:
-        """What is left of a whole reading."""
+        """Converts a full reading to the compact form."""
         error = min(max(reading.error, -COMPACT_ERROR_MAX - 1), COMPACT_ERROR_MAX)
         return cls(reading.position, error, reading.power)
 
     @property
     def packed(self) -> int:
-        """32 bits: position, error, power, from the least significant bit on."""
+        """Returns 32 bits: position, error, power, from the least significant bit on."""
         return self.position | (self.error & 0xFFF) << 12 | (self.power & 0xFF) << 24
 
     @classmethod
     def unpacked(cls, bits: int) -> CompactReading:
-        """The reading in 32 bits, all of whose values are possible."""
+        """Returns the reading in 32 bits; every value is possible."""
         error, power = bits >> 12 & 0xFFF, bits >> 24
         return cls(bits & 0xFFF, (error ^ 0x800) - 0x800, (power ^ 0x80) - 0x80)
 
     @property
     def whole(self) -> JointReading:
-        """With the set point that the controller took."""
+        """Converts to a full reading, with the set point that the controller used."""
         counts = min(max(self.position + self.error, 0), ADC_COUNTS - 1)
         return JointReading(counts_to_posture(counts), self.position, self.error, self.power)
 
@@ -139,14 +141,14 @@ JointReadings = tuple[tuple[int, JointReading], ...]
 
 
 def pack_readings(readings: JointReadings) -> bytes:
-    """Mask, then seven bytes per joint."""
+    """Returns the mask, then seven bytes per joint."""
     return bytes((mask_of(joint for joint, _ in readings),)) + b"".join(
         struct.pack("<" + JointReading.LAYOUT, r.set_point, r.position, r.error, r.power) for _, r in readings
     )
 
 
 def parse_readings(what: str, payload: bytes) -> JointReadings:
-    """Readings from mask and values. Raises ProtocolError for a wrong mask, length or value."""
+    """Returns the readings in mask and values. Raises ProtocolError for a wrong mask, length or value."""
     joints, rest = split_mask(what, payload)
     if len(rest) != _READING.size * len(joints):
         unpack("<" + JointReading.LAYOUT * len(joints), rest, what)  # says what is wrong

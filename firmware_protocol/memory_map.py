@@ -15,26 +15,26 @@ from firmware_protocol.errors import MemoryMapError, UnitsError
 from firmware_protocol.invalid import first_invalid
 
 JOINTS = 6
-"""Joints that the controller serves (section 6.2)."""
+"""Number of joints that the controller drives (section 6.2)."""
 
 Provenance = Literal["documented", "found", "assumed"]
-"""Where an address comes from: the source, evidence at the machine itself (`daq memory find`), or nowhere."""
+"""Origin of an address: the source, evidence from the machine itself (`daq memory find`), or an assumption."""
 Unit = Literal["posture_unit", "adc_count", "dac_count", "gain", "bit_field", "on_off"]
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
 Addresses = Annotated[tuple[Address, ...], Field(strict=False)]
-"""TOML has arrays where Python has tuples; the elements stay strict."""
+"""TOML has arrays where Python has tuples; the elements stay strictly checked."""
 
 PER_JOINT_REGISTERS = ("set_point", "position", "error", "power", "gain_p", "gain_i", "gain_d")
 SINGLE_REGISTERS = ("process_inputs", "process_outputs", "gripper")
 GAIN_REGISTERS = ("gain_p", "gain_i", "gain_d")
-"""A map has all of them or none. Without them the bridge refuses to read and to write gains."""
+"""A map has all of them or none. Without them the bridge refuses to read and write gains."""
 MAY_BE_ABSENT = (*GAIN_REGISTERS, *SINGLE_REGISTERS)
-"""Registers that a map may leave out, because nobody knows where they are. What is left out is neither read nor
-written: without one of `SINGLE_REGISTERS` the bridge refuses all process requests."""
+"""Registers that a map may leave out, if their addresses are unknown. They are neither read nor written: without one of
+`SINGLE_REGISTERS` the bridge refuses all process requests."""
 
 
 class Kind(NamedTuple):
-    """How driver and controller use a register. A memory map may move a register but not change its use."""
+    """Use of a register by driver and controller. A memory map may move a register but not change its use."""
 
     unit: Unit
     signed: bool
@@ -88,14 +88,14 @@ class Register(BaseModel):
         return self.low + (self.high or ())
 
     def decode(self, low: int, high: int = 0) -> int:
-        """Integer value of the register's bytes; bits above `bits` are ignored."""
+        """Returns the integer value of the register's bytes; bits above `bits` are ignored."""
         value = (low | high << 8) & ((1 << self.bits) - 1)
         if self.signed and value >> (self.bits - 1):
             value -= 1 << self.bits
         return value
 
     def encode(self, value: int) -> tuple[int, int]:
-        """Low and high byte of a value. Raises UnitsError when the value does not fit the register."""
+        """Returns low and high byte of a value. Raises UnitsError if the value does not fit the register."""
         lowest = -(1 << (self.bits - 1)) if self.signed else 0
         highest = lowest + (1 << self.bits) - 1
         if not lowest <= value <= highest:
@@ -181,7 +181,7 @@ class MemoryMap(BaseModel):
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Names like `error 2` of every register whose address is an assumption."""
+        """Names like `error 2` of every register with an assumed address."""
         return tuple(
             f"{name} {i + 1}" if len(register.low) > 1 else name
             for name, register in self.registers.items()
@@ -191,16 +191,16 @@ class MemoryMap(BaseModel):
 
 
 def open_places(text: str) -> str:
-    """What is to be done with a text of a map that still has question marks in place of addresses; empty where it has
-    none. Such a text is no TOML."""
+    """Returns what to do with a map's text that still has question marks in place of addresses; empty if it has none.
+    Such a text is not TOML."""
     marked = [str(number) for number, line in enumerate(text.splitlines(), 1) if re.search(r"[\[,]\s*\?", line)]
     return f"line {', '.join(marked)}: put an address, as 0xFC40, in place of each question mark" if marked else ""
 
 
 def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
-    """A memory map from TOML text; `origin` names the file in errors.
+    """Parses a memory map from TOML text; `origin` names the file in errors.
 
-    Raises MemoryMapError with one line that says what is wrong and where.
+    Raises MemoryMapError with one line: what is wrong and where.
     """
     try:
         return MemoryMap.model_validate(tomllib.loads(text.removeprefix("\ufeff")))
@@ -210,20 +210,20 @@ def parse_memory_map(text: str, origin: str = "memory map") -> MemoryMap:
         first = first_invalid(error)
         found = f" (found {first.value!r:.60})" if isinstance(first.value, bool | int | float | str) else ""
         raise MemoryMapError(f"{origin}: {first.where('registers')}: {first.message}{found}") from error
-    except ValueError as error:  # malformed TOML, or an integer with thousands of digits
+    except ValueError as error:  # invalid TOML, or an integer with thousands of digits
         raise MemoryMapError(f"{origin}: {open_places(text) or f'not TOML: {error}'}") from error
 
 
 @cache
 def default_memory_map() -> MemoryMap:
-    """The map that ships: documented positions of joints 1–3, everything else assumed."""
+    """Returns the packaged map: documented positions of joints 1–3, all else assumed."""
     return parse_memory_map(
         resources.files("firmware_protocol").joinpath("memory_map.toml").read_text("utf-8"), "memory_map.toml"
     )
 
 
 def memory_map_text(memory_map: MemoryMap, remarks: Sequence[str] = ()) -> str:
-    """The file of a map: remarks, then every register with where each address comes from."""
+    """Returns the file of a map: remarks, then every register with the origin of each address."""
     lines = [f"# {remark}" for remark in remarks]
     lines += ["version = 1", f'name = "{memory_map.name}"', f"base = 0x{memory_map.base:04X}"]
     lines.append(f"size = 0x{memory_map.size:02X}")
@@ -239,5 +239,5 @@ def memory_map_text(memory_map: MemoryMap, remarks: Sequence[str] = ()) -> str:
 
 
 def addresses_text(addresses: Sequence[int | None]) -> str:
-    """A list of addresses as the file has it; a question mark for one that is not known."""
+    """Returns a list of addresses as in the file; a question mark for an unknown one."""
     return "[" + ", ".join("?" if address is None else f"0x{address:04X}" for address in addresses) + "]"

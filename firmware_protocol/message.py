@@ -1,6 +1,6 @@
-"""What every request and reply has in common: an opcode, and a payload that packs and parses.
+"""Base classes of requests and replies: an opcode, and a payload that is packed and parsed.
 
-A message that could be constructed can be sent: values are checked when it is made, by hand or from a payload.
+Every message that can be constructed can be sent: values are checked on construction, by hand or from a payload.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _RANGES = {
     "I": (0, 0xFFFFFFFF),
     "Q": (0, 0xFFFFFFFFFFFFFFFF),
 }
-"""Values that each letter of a `struct` layout holds."""
+"""Range of values of each letter of a `struct` layout."""
 
 
 def check_range(what: str, value: int, lowest: int, highest: int) -> None:
@@ -30,7 +30,8 @@ def check_range(what: str, value: int, lowest: int, highest: int) -> None:
 
 
 def unpack(layout: str, payload: bytes, what: str) -> tuple[int, ...]:
-    """The integers of a payload. Raises PayloadLengthError unless the payload is exactly as long as the layout."""
+    """Returns the integers of a payload. Raises PayloadLengthError unless the payload has exactly the layout's
+    length."""
     try:
         return struct.unpack(layout, payload)
     except struct.error:
@@ -42,8 +43,8 @@ def unpack(layout: str, payload: bytes, what: str) -> tuple[int, ...]:
 class Message:
     """Base of every request and reply.
 
-    A subclass with plain integer fields names their `LAYOUT` (a `struct` format, one letter per field); a subclass
-    with anything else has its own `pack` and `parse`. Construction raises ProtocolError when a value does not fit.
+    A subclass with plain integer fields defines their `LAYOUT` (a `struct` format, one letter per field); any other
+    subclass has its own `pack` and `parse`. Construction raises ProtocolError if a value does not fit.
     """
 
     OPCODE: ClassVar[int]
@@ -61,11 +62,11 @@ class Message:
 
     @classmethod
     def _ranges(cls) -> tuple[tuple[str, int, int], ...]:
-        return _ranges_of(cls)  # type: ignore[arg-type]  # mypy takes the classes of dataclasses for unhashable
+        return _ranges_of(cls)  # type: ignore[arg-type]  # mypy considers classes of dataclasses unhashable
 
     @classmethod
     def parse(cls, payload: bytes) -> Self:
-        """The message of a payload. Raises ProtocolError for any payload that `pack` cannot have made."""
+        """Parses the message of a payload. Raises ProtocolError for any payload that `pack` cannot have made."""
         return cls(*unpack(cls.LAYOUT, payload, cls.__name__))
 
 
@@ -79,7 +80,7 @@ class Request(Message):
     """Host to controller."""
 
     IS_COMMAND: ClassVar[bool] = False
-    """Whether the request changes something. A command travels with a `Stamp`, and is refused in another session or
+    """Whether the request changes something. A command is sent with a `Stamp`, and is refused in another session or
     after a later command."""
 
 

@@ -1,4 +1,4 @@
-"""Replies: what the controller answers. An opcode is its request's with the top bit set; `Refused` is 0xFF."""
+"""Replies of the controller. An opcode is its request's with the top bit set; `Refused` is 0xFF."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from firmware_protocol.units import POSTURE_UNITS
 _TICK_AND_STATUS = 5
 """Bytes of a snapshot before its joints."""
 _COMPACT_HEAD = 6
-"""The same of a compact snapshot."""
+"""The same for a compact snapshot."""
 _SHORT_HELLO = 10
-"""Bytes of the reply to `Hello` in version 1, and where no session has begun."""
+"""Bytes of the reply to `Hello` in version 1, and if no session has begun."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class HelloReply(Reply):
 
     @classmethod
     def parse(cls, payload: bytes) -> Self:
-        """Either form. Raises ProtocolError for the long one without a session."""
+        """Parses either form. Raises ProtocolError for the long one without a session."""
         if len(payload) == _SHORT_HELLO:
             return super().parse(payload + bytes(8))
         reply = super().parse(payload)
@@ -89,14 +89,14 @@ class Block(Reply):
 
 @dataclass(frozen=True)
 class BlockWritten(Reply):
-    """The poke has been carried out."""
+    """The poke was carried out."""
 
     OPCODE = 0x83
 
 
 @dataclass(frozen=True)
 class SetPointsTaken(Reply):
-    """The set points are in the shared memory. `tick` is the last period that began before they were."""
+    """The set points are in the shared memory. `tick`: the last period that began before they were."""
 
     OPCODE = 0x84
     LAYOUT = "<IB"
@@ -106,7 +106,7 @@ class SetPointsTaken(Reply):
 
 @dataclass(frozen=True)
 class Gains(Reply):
-    """(P, I, D) of joints 1 to 6 as the memory holds them: bytes, whatever was poked there."""
+    """(P, I, D) of joints 1 to 6 in the memory: any bytes."""
 
     OPCODE = 0x86
     gains: tuple[tuple[int, int, int], ...]
@@ -131,14 +131,14 @@ class Gains(Reply):
 
 @dataclass(frozen=True)
 class GainsSet(Reply):
-    """The gains have been written."""
+    """The gains were written."""
 
     OPCODE = 0x87
 
 
 @dataclass(frozen=True)
 class ErrorsPositionsPowers(Reply):
-    """REPORTEPP's answer. The set points are those in the memory, which the controller may not have taken yet."""
+    """The answer of REPORTEPP. The set points are those in the memory, which the controller may not have used yet."""
 
     OPCODE = 0x88
     joints: JointReadings
@@ -158,9 +158,9 @@ class ErrorsPositionsPowers(Reply):
 
 @dataclass(frozen=True)
 class Snapshot(Reply):
-    """One period of the controller, consistent over joints: the set points it took, its measurements and its outputs.
+    """One period of the controller, consistent over joints: the set points it used, its measurements and its outputs.
 
-    A new set point has been missed when it differs from what was sent; then position + error shows the old one.
+    A new set point was missed if it differs from the one sent; then position + error shows the old one.
     """
 
     OPCODE = 0x90
@@ -188,9 +188,9 @@ class Snapshot(Reply):
 
 @dataclass(frozen=True)
 class CompactSnapshot(Reply):
-    """A snapshot in four bytes a joint: the answer to `MoveAndSample`.
+    """A snapshot with four bytes per joint: the answer to `MoveAndSample`.
 
-    taken: the lowest eight bits of what `SetPointsTaken.tick` would say of the request's set points
+    taken: the lowest eight bits of the `SetPointsTaken.tick` for the request's set points
     """
 
     OPCODE = 0x91
@@ -207,7 +207,7 @@ class CompactSnapshot(Reply):
 
     @property
     def taken_tick(self) -> int:
-        """The tick that `taken` ends in: the one nearest to the snapshot's."""
+        """The tick that ends in `taken`: the one nearest to the snapshot's."""
         return self.tick + ((self.taken - self.tick + 0x80) & 0xFF) - 0x80
 
     def pack(self) -> bytes:
@@ -274,23 +274,23 @@ class Process(Reply):
 
 @dataclass(frozen=True)
 class OutputsWritten(Reply):
-    """The outputs have been written."""
+    """The outputs were written."""
 
     OPCODE = 0xB1
 
 
 @dataclass(frozen=True)
 class GripperSet(Reply):
-    """The gripper has been switched."""
+    """The gripper was switched."""
 
     OPCODE = 0xB2
 
 
 @dataclass(frozen=True)
 class Status(Reply):
-    """Tick, status flags, count of board resets, periods whose set points were missed, number of the newest stop.
+    """Tick, status flags, count of board resets, periods with missed set points, number of the newest stop.
 
-    `stop` is 0 if the bridge has obeyed none since it started.
+    `stop` is 0 if the bridge has carried out none since it started.
     """
 
     OPCODE = 0xB3
@@ -314,7 +314,7 @@ class Advanced(Reply):
 
 @dataclass(frozen=True)
 class Refused(Reply):
-    """The request was not carried out; nothing changed. `reason` is a `Refusal`, or a number of a later version."""
+    """The request was not carried out; nothing changed. `reason`: a `Refusal`, or a number of a later version."""
 
     OPCODE = 0xFF
     LAYOUT = "<BB"
@@ -324,12 +324,12 @@ class Refused(Reply):
 
 @dataclass(frozen=True)
 class ExplainedRefusal(Refused):
-    """A refusal of another dialect, which says why in its own words. It has no frame."""
+    """A refusal of another dialect, with its own explanation. It has no frame."""
 
     why: str = ""
 
     def __post_init__(self) -> None:
-        """Nothing to check: it is never packed."""
+        """Checks nothing, since it is never packed."""
 
 
 REPLIES: dict[int, type[Reply]] = {kind.OPCODE: kind for kind in Reply.__subclasses__()}

@@ -1,7 +1,7 @@
-"""Requests: what the host asks of the controller.
+"""Requests of the host to the controller.
 
-Every one but `Advance` may be repeated without harm: reads change nothing, commands name absolute values. A command
-travels with a `Stamp`, which `to_frame` puts before its payload; `Stop` needs none.
+All except `Advance` may be repeated without harm: reads change nothing, commands contain absolute values. A command has
+a `Stamp`, which `to_frame` puts before its payload; `Stop` needs none.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from firmware_protocol.stamp import STAMP_BYTES
 from firmware_protocol.units import GAIN_MAX, POSTURE_UNITS
 
 AFTER_NEWEST = 0xFFFFFFFF
-"""`Sample(after=AFTER_NEWEST)` waits for the next snapshot, whichever ones have been delivered."""
+"""`Sample(after=AFTER_NEWEST)` waits for the next snapshot, whichever ones were delivered before."""
 MAX_READ = MAX_PAYLOAD
 """Most bytes that one `ReadBlock` asks for."""
 MAX_WRITE = MAX_PAYLOAD - STAMP_BYTES - 2
@@ -40,10 +40,10 @@ def _check_block(what: str, address: int, count: int, most: int) -> None:
 
 @dataclass(frozen=True)
 class Hello(Request):
-    """The greeting. With a nonce that is not the present session's, a new session begins.
+    """The greeting. If its nonce is not the present session's, a new session begins.
 
-    nonce: chosen by the host at random; only a repeated greeting has the same one.
-    A host of version 1 sends no payload at all, and one of a later version may send more: both begin no session.
+    nonce: chosen by the host at random; only a repeated greeting has the same nonce.
+    A host of version 1 sends no payload, and one of a later version may send more: neither begins a session.
     """
 
     OPCODE = 0x01
@@ -104,7 +104,7 @@ class WriteBlock(Request):
 
 @dataclass(frozen=True)
 class WriteSetPoints(Request):
-    """Set points of some joints (posture units), taken together (DRIVESA, SAMOVE, CONTPATH; section 6.4)."""
+    """Set points of some joints (posture units), applied together (DRIVESA, SAMOVE, CONTPATH; section 6.4)."""
 
     OPCODE = 0x04
     IS_COMMAND = True
@@ -129,7 +129,7 @@ class WriteSetPoints(Request):
 
     @classmethod
     def parse(cls, payload: bytes) -> Self:
-        """Raises ProtocolError for a set point outside 0–999 too."""
+        """Raises ProtocolError also for a set point outside 0–999."""
         joints, rest = split_mask(cls.__name__, payload)
         postures = unpack(f"<{len(joints)}H", rest, cls.__name__)
         return cls(tuple(zip(joints, postures, strict=True)))
@@ -173,7 +173,7 @@ class SetGains(Request):
 
 @dataclass(frozen=True)
 class ReportErrorsPositionsPowers(Request):
-    """Errors, positions and powers of the masked joints as the memory holds them now (REPORTEPP).
+    """Errors, positions and powers of the masked joints that are in the memory now (REPORTEPP).
 
     Read byte by byte: a value may be torn. `Sample` is the consistent form.
     """
@@ -188,9 +188,9 @@ class ReportErrorsPositionsPowers(Request):
 
 @dataclass(frozen=True)
 class Sample(Request):
-    """The oldest snapshot newer than tick `after`; waits for one when there is none.
+    """The oldest snapshot newer than tick `after`; waits for the next if there is none.
 
-    A lost reply costs nothing: the same question gets the same answer again.
+    A lost reply does no harm: a repeated request gets the same answer.
     """
 
     OPCODE = 0x10
@@ -205,8 +205,8 @@ class Sample(Request):
 
 @dataclass(frozen=True)
 class MoveAndSample(Request):
-    """`WriteSetPoints` and `Sample` in one frame, for slow lines: set points of the joints in `postures`, if there are
-    any, then the oldest snapshot newer than tick `after` of the joints in `sampled`, in its compact form."""
+    """`WriteSetPoints` and `Sample` in one frame, for slow lines: set points of the joints in `postures`, if any, then
+    the oldest snapshot newer than tick `after` of the joints in `sampled`, in the compact form."""
 
     OPCODE = 0x11
     IS_COMMAND = True
@@ -222,13 +222,13 @@ class MoveAndSample(Request):
             WriteSetPoints(self.postures)
 
     def pack(self) -> bytes:
-        """Tick and mask of the question, then the set points with theirs."""
+        """Tick and mask of the sample, then the mask and values of the set points."""
         postures = WriteSetPoints(self.postures).pack() if self.postures else b"\0"
         return struct.pack("<IB", self.after, self.sampled) + postures
 
     @classmethod
     def parse(cls, payload: bytes) -> Self:
-        """Raises ProtocolError for a set point outside 0–999 too."""
+        """Raises ProtocolError also for a set point outside 0–999."""
         if len(payload) < _QUESTION + 1:
             raise PayloadLengthError(f"MoveAndSample: payload of {len(payload)} bytes, expected at least 6")
         after, sampled = unpack("<IB", payload[:_QUESTION], cls.__name__)
@@ -242,9 +242,11 @@ class MoveAndSample(Request):
 
 @dataclass(frozen=True)
 class Stop(Request):
-    """Set points := measured posture, at once, and held until `Release`. Obeyed at any moment, in any state.
+    """Makes the measured posture the set points at once, and holds it until `Release`. Carried out at any moment, in
+    any state.
 
-    Needs no session and no stamp, and is the same in every version: whoever can write a frame can stop the arm.
+    Needs no session and no stamp, and is the same in every version, so any program that can write a frame can stop the
+    arm.
     """
 
     OPCODE = 0x20
@@ -269,7 +271,7 @@ class ReadProcess(Request):
 
 @dataclass(frozen=True)
 class WriteOutputs(Request):
-    """Process outputs in `mask` (bit 0 is output 1; any, or none) take the bits of `values`; the others stay."""
+    """Sets the process outputs in `mask` (bit 0 is output 1; any, or none) to the bits of `values`; the others stay."""
 
     OPCODE = 0x31
     LAYOUT = "<BB"
@@ -301,9 +303,9 @@ class ReadStatus(Request):
 
 @dataclass(frozen=True)
 class Advance(Request):
-    """Lock-step only: let `microseconds` of the board's time pass.
+    """Lock-step only: advances the board's time by `microseconds`.
 
-    Relative, so a repeat under the same sequence number is answered again and not carried out again.
+    Relative, so a repeat with the same sequence number is answered again but not carried out again.
     """
 
     OPCODE = 0x40

@@ -1,4 +1,4 @@
-"""What a line protocol can say of its machine: how many joints, in which steps, how often, in how many bytes."""
+"""Properties of the machine on a line: number of joints, step sizes, sampling period, bytes per exchange."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from firmware_protocol.units import ADC_COUNTS, POSTURE_UNITS
 class LineScale:
     """The defaults are those of the MA2000.
 
-    joints:          number of joints behind the line
-    set_point_units: units of a set point over a joint's range, 0 the lowest
-    position_counts: counts of a position over a joint's range, 0 the lowest
-    every:           control periods from one sample to the next on a line that is quick enough
-    turn_bytes:      bytes that pass for one sample of all joints and their set points, both ways together; None where
-                     they are those of PROTOCOL.md, which depend on the joints asked for
-    greeting_bytes:  bytes of the answer to a greeting, where it is longer than a turn
-    half_duplex:     both sides share one wire, so that a request must not be written while an answer may be coming
+    joints:          number of joints on the line
+    set_point_units: units of a set point over a joint's range, from 0
+    position_counts: counts of a position over a joint's range, from 0
+    every:           control periods from one sample to the next on a fast enough line
+    turn_bytes:      bytes per sample of all joints with their set points, both directions together; None for those of
+                     PROTOCOL.md, which depend on the joints
+    greeting_bytes:  bytes of the answer to a greeting, if it is longer than an exchange
+    half_duplex:     both sides share one wire, so a request must not be written while an answer may be coming
     """
 
     joints: int = JOINTS

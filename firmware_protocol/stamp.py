@@ -1,4 +1,4 @@
-"""What a command carries beside its own fields: the session it belongs to, and its place in it."""
+"""The stamp of a command: its session, and its number in it."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _LAYOUT = struct.Struct("<II")
 STAMP_BYTES = _LAYOUT.size
 """Bytes at the beginning of a command's payload."""
 LARGEST_NUMBER = 0xFFFFFFFF
-"""Largest number of a command in one session: enough for 2.7 years at one command a period."""
+"""Largest number of a command in one session: enough for 2.7 years at one command per period."""
 
 
 @dataclass(frozen=True)
 class Stamp:
-    """`session` is the number that the bridge gave in `HelloReply`; `number` counts the session's commands from 1.
+    """`session`: the number that the bridge gave in `HelloReply`; `number`: counts the session's commands from 1.
 
-    A repeated command has the stamp that it had.
+    A repeated command has its original stamp.
     """
 
     session: int
@@ -37,7 +37,7 @@ class Stamp:
 
     @classmethod
     def parse(cls, payload: bytes) -> Self:
-        """The stamp that a command's payload begins with. Raises PayloadLengthError when it is shorter."""
+        """Returns the stamp at the start of a command's payload. Raises PayloadLengthError if it is shorter."""
         if len(payload) < STAMP_BYTES:
             raise PayloadLengthError(
                 f"command: payload of {len(payload)} bytes, expected a stamp of {STAMP_BYTES} first"
@@ -46,4 +46,4 @@ class Stamp:
 
 
 UNSTAMPED = Stamp(NO_SESSION, 0)
-"""The stamp of a command that belongs to no session. Every bridge refuses it."""
+"""The stamp of a command without a session, which every bridge refuses."""

@@ -1,9 +1,9 @@
-"""Posture units, ADC counts, radians, DAC counts and volts, and the one rounding rule between them.
+"""Converts posture units, ADC counts, radians, DAC counts and volts, with one rounding rule.
 
-The source gives 1000 posture units over each axis' range (section 6.2) and a 12-bit reading (section 6.3).
-A posture unit is therefore range/1000 and an ADC count range/4096. Wherever a quantity becomes an integer the
-rule is the same: round half up, `floor(x + 1/2)`. Between posture units and counts it is done in integers, so
-that a controller of 8 bits and a host of 64 agree on every value.
+The source gives 1000 posture units over each axis' range (section 6.2) and a 12-bit reading (section 6.3). A posture
+unit is therefore range/1000 and an ADC count range/4096. All conversions to integers round half up, `floor(x + 1/2)`.
+Between posture units and counts this is done in integers, so that an 8-bit controller and a 64-bit host agree on every
+value.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ ADC_COUNTS = 4096
 GAIN_MAX = 20
 """Adjustable P, I and D run from 0 to 20; they are not the physical gains (section 6.4)."""
 DAC_MAX = 127
-"""Largest magnitude of the 8-bit DAC's signed input."""
+"""Largest absolute value of the signed 8-bit DAC input."""
 
 
 def posture_to_counts(posture: int) -> int:
-    """ADC counts of a set point in posture units (0–999), rounded half up.
+    """Returns the ADC counts of a set point in posture units (0–999), rounded half up.
 
     Raises UnitsError outside 0–999.
     """
@@ -35,7 +35,7 @@ def posture_to_counts(posture: int) -> int:
 
 
 def counts_to_posture(counts: int) -> int:
-    """Posture units nearest to an ADC reading (0–4095), rounded half up and never above 999.
+    """Returns the posture units nearest to an ADC reading (0–4095), rounded half up and at most 999.
 
     Raises UnitsError outside 0–4095.
     """
@@ -48,7 +48,7 @@ def counts_to_posture(counts: int) -> int:
 class JointCalibration:
     """Conversion of one joint's counts and posture units to an angle.
 
-    angle = angle_at_zero + direction · range · counts / 4096  (rad); other machines have other numbers of counts and of
+    angle = angle_at_zero + direction · range · counts / 4096  (rad). Other machines have other numbers of counts and
     posture units over the range.
     """
 
@@ -90,9 +90,9 @@ class JointCalibration:
         return (angle_rad - self.angle_at_zero_rad) / self.rad_per_count
 
     def rad_to_posture(self, angle_rad: float) -> int:
-        """Set point in posture units for an angle (rad), rounded half up.
+        """Returns the set point in posture units for an angle (rad), rounded half up.
 
-        A set point is never clipped: raises UnitsError when the angle is not finite or outside postures 0–999.
+        A set point is never clipped: raises UnitsError if the angle is not finite or outside postures 0–999.
         """
         if not math.isfinite(angle_rad):
             raise UnitsError(f"joint {self.joint}: set point of {angle_rad} rad: must be finite")
@@ -108,10 +108,10 @@ class JointCalibration:
 
 @dataclass(frozen=True)
 class DriveScale:
-    """Volts for the controller's DAC counts.
+    """Conversion of the controller's DAC counts to volts.
 
-    `full_scale_v` is the DAC's output at 127 counts (the source does not give it: an assumption of the
-    caller); `amplifier_gain` is 28 on joints 1–3 (section 6.2). Other machines have another count of full scale.
+    `full_scale_v`: the DAC's output at 127 counts (the source does not give it: an assumption of the caller).
+    `amplifier_gain`: 28 on joints 1–3 (section 6.2). Other machines have another full-scale count.
     """
 
     full_scale_v: float

@@ -1,7 +1,7 @@
-"""Replies of other dialects, with more room than the frames of PROTOCOL.md have: counts and powers of 32 bits, and any
+"""Replies of other dialects with wider values than the frames of PROTOCOL.md: counts and powers of 32 bits, and any
 number of joints up to the driver's six.
 
-They have no frame: they go from a dialect to the driver, whose own are their bases.
+They have no frame: they are passed from a dialect to the driver as subclasses of its own replies.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ _GAIN_HIGHEST = 0xFFFF
 
 @dataclass(frozen=True)
 class WideReading(JointReading):
-    """Set point in the line's own steps, position and error in its counts (where both count alike, error is set point −
-    position), power in steps of the controller's output (`controller.drive_resolution` of the machine file each)."""
+    """Set point in the line's own steps, position and error in its counts, power in steps of the controller's output
+    (both by the machine file). If set points and positions have the same steps, error is set point − position."""
 
     def __post_init__(self) -> None:
         for name in ("set_point", "position", "error", "power"):
@@ -28,8 +28,8 @@ class WideReading(JointReading):
 
 @dataclass(frozen=True)
 class WideStopped(Stopped):
-    """Set points at which a stop holds the joints 1, 2 …, in the line's own steps. A joint moved by hand may be
-    outside its range."""
+    """Set points at which a stop holds the joints 1, 2 …, in the line's own steps. A joint moved by hand may be outside
+    its range."""
 
     def __post_init__(self) -> None:
         check_range("tick", self.tick, 0, 0xFFFFFFFF)
@@ -37,7 +37,7 @@ class WideStopped(Stopped):
 
 @dataclass(frozen=True)
 class WideGains(Gains):
-    """(P, I, D) of the joints 1, 2 … in the controller's own numbers: 0–65535."""
+    """(P, I, D) of the joints 1, 2 … in the controller's own units: 0–65535."""
 
     def __post_init__(self) -> None:
         for gains in self.gains:

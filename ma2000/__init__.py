@@ -7,8 +7,8 @@
     model = ma2000.base_model(ma2000.load_machine("ma2000"))
     answer = ma2000.diagnose(model, [trace])
 
-What `__all__` names is the public interface (docs/python.md), with the names of plug-ins; everything else of the
-packages is internal and may change with any version.
+The public interface is `__all__` (docs/python.md) and the names of plug-ins. Everything else in the packages is
+internal and may change with any version.
 """
 
 from __future__ import annotations
@@ -124,8 +124,8 @@ _HOME = {
     "write_table": "ma2000.files",
     "write_trace": "ma2000.files",
 }
-"""Module of each public name. They are imported when they are first used: a notebook that only reads traces waits for
-no compiler."""
+"""Module of each public name. Modules are imported on first use, so that a notebook that only reads traces does not
+wait for a compiler."""
 
 _ON_A_ROBOT = {"Arm", "Run", "RunError", "connect", "plot", "run"}
 _ON_A_SERVICE = {"LocalService"}
@@ -149,7 +149,7 @@ _NEEDED: dict[Extra, tuple[str, ...]] = {
     "model": ("numba",),
     "server": ("uvicorn",),
 }
-"""Packages that tell whether an extra is installed."""
+"""Packages whose presence shows that an extra is installed."""
 
 require_own_packages()
 
@@ -174,7 +174,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """The public names that work with the extras that are installed."""
+    """The public names that work with the installed extras."""
     from daq.contracts.extras import is_installed
 
     works = {extra: all(map(is_installed, packages)) for extra, packages in _NEEDED.items()}
@@ -183,7 +183,7 @@ def __dir__() -> list[str]:
 
 
 def _homes() -> dict[str, str]:
-    """Module of each public name, those of plug-ins too."""
+    """Module of each public name, including plug-ins."""
     return {**{name: added.module for name, added in _added().items()}, **_HOME}
 
 
@@ -194,7 +194,7 @@ def _added() -> dict[str, Name]:
 
 
 def _extra_of(name: str) -> Extra | None:
-    """The extra that a public name needs; None for one that a client's installation has."""
+    """The extra that a public name needs; None if a client's installation has it."""
     if name in _WITH_MODELS:
         return "model"
     if name in _ON_A_SERVICE:

@@ -1,4 +1,4 @@
-"""An arm at a port: its state, its stop, and experiments on it."""
+"""An arm at a port: its state, its stop, and experiments."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ma2000.running import MOCK, Run, run
 
 @dataclass(frozen=True)
 class ArmState:
-    """An arm at one moment. `position` and `set_point` are in rad (m on a prismatic joint), by joint."""
+    """State of an arm at one moment. `position` and `set_point` by joint, in rad (m on a prismatic joint)."""
 
     position: Mapping[int, float]
     set_point: Mapping[int, float]
@@ -33,14 +33,14 @@ class ArmState:
 
 @dataclass(frozen=True)
 class Arm:
-    """An arm at a port. The port is open only for a question or a run, so that `daq stop` gets through."""
+    """An arm at a port. The port is open only during a request or a run, so that `daq stop` can use it otherwise."""
 
     port: str
     machine: Machine
     memory_map: Path | None = None
 
     def state(self) -> ArmState:
-        """The state now. Moves nothing. Raises ReachError, LinkError."""
+        """Reads the present state. Moves nothing. Raises ReachError, LinkError."""
         with self._controller() as controller:
             readings = dict(controller.next_snapshot().joints)
             status, gains = controller.status(), controller.gains()
@@ -79,7 +79,7 @@ class Arm:
             return controller.stop()
 
     def release(self) -> None:
-        """Ends the stop that is in force now, and none that comes later: the arm takes set points again."""
+        """Ends the stop that is now in force, but no later one: the arm accepts set points again."""
         with self._controller() as controller:
             controller.release(controller.status().stop)
 
@@ -89,11 +89,11 @@ class Arm:
 
 @contextmanager
 def connect(port: str = MOCK, machine: Machine | None = None, memory_map: Path | None = None) -> Iterator[Arm]:
-    """The arm at a port, after its controller has answered. Moves nothing.
+    """Yields the arm at a port, after its controller has answered. Moves nothing.
 
     A `mock://` port starts a mock, which keeps its state until the end of the block.
 
-    Raises SpecError for a port or file that is not valid, TransportError and LinkError where no controller answers.
+    Raises SpecError for an invalid port or file, TransportError and LinkError if no controller answers.
     """
     arm = Arm(port, machine or load_machine("ma2000"), memory_map)
     wanted = parse_port_url(port)

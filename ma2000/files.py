@@ -1,4 +1,4 @@
-"""Traces in files, by names that a notebook has at hand."""
+"""Reads and writes trace files, for notebooks."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from firmware_protocol.invalid import first_invalid
 
 
 def read_trace(path: Path | str, **choice: Any) -> Trace:
-    """The trace in a file: MCAP, CSV and other text, Parquet, a data set of lerobot, .mat, .npz, .json, a bag of ROS.
+    """Reads the trace in a file: MCAP, CSV and other text, Parquet, a LeRobot data set, .mat, .npz, .json, a ROS bag.
 
-    Of a file of another program a choice says what is taken, and goes before the TOML beside it:
+    For a file of another program, `choice` selects what to import; it takes precedence over the TOML beside the file:
     `map={"position": "q{} in deg"}`, `where="episode_index=3"`, `joints=("pan", "lift")`, `drive_unit="A"`,
-    `as_guessed=True`; of a bag `topic`, `set_points`, `received` (`daq traces import --help` explains each).
+    `as_guessed=True`; for a bag `topic`, `set_points`, `received` (`daq traces import --help` explains each).
 
-    Raises TraceError, which says what was found where a choice is needed; SpecError for a choice that there is not.
+    Raises TraceError, with the columns or topics found if a choice is needed; SpecError for an unknown choice.
     """
     known = [each.name for each in fields(Choice)]
     if unknown := sorted(set(choice) - set(known)):
@@ -35,19 +35,18 @@ def read_trace(path: Path | str, **choice: Any) -> Trace:
 
 
 def read_traces(folder: Path | str, pattern: str = "*.mcap", **query: object) -> tuple[Trace, ...]:
-    """Every trace of a folder whose file's name matches, in the order of names, which is that of time.
+    """Reads every trace of a folder whose file name matches, ordered by name, which is the order in time.
 
-    A query selects by what files say of themselves, before samples are read: `outcome="complete"`, `robot="bench 2"`,
-    and so on, one or more of the fields of `daq.traces.catalogue.TraceSummary`.
+    `query` selects by metadata before samples are read: `outcome="complete"`, `robot="bench 2"`, and so on. Its names
+    are the fields of `daq.traces.catalogue.TraceSummary`.
 
-    Raises TraceError for a folder or file that cannot be read, SpecError for a query of a field that there is not, or
-    for a value that the field cannot have.
+    Raises TraceError for an unreadable folder or file, SpecError for an unknown field or an impossible value.
     """
     for name, value in query.items():
         _check_query(name, value)
     folder = Path(folder)
     try:
-        folder.stat()  # a pattern finds nothing in a folder that is not there, and a name is soon misspelled
+        folder.stat()  # a pattern would find nothing in a missing or misspelt folder
         if not folder.is_dir():
             raise TraceError(f"{folder}: is no folder; `read_trace` reads one file")
     except OSError as error:
@@ -59,7 +58,7 @@ def read_traces(folder: Path | str, pattern: str = "*.mcap", **query: object) ->
 
 
 def list_traces(folder: Path | str) -> tuple[TraceSummary, ...]:
-    """What each trace of a folder says of itself, the oldest first; samples are not read.
+    """Lists the metadata of each trace of a folder, the oldest first, without reading samples.
 
     `pandas.DataFrame(one.model_dump() for one in list_traces(folder))` is the folder as a table. Raises TraceError.
     """
@@ -75,12 +74,12 @@ def write_table(trace: Trace, path: Path | str) -> Path:
 
 
 def write_trace(trace: Trace, path: Path | str) -> Path:
-    """Writes a trace as MCAP; nothing is written over. Returns the path. Raises TraceError."""
+    """Writes a trace as MCAP to a new file. Returns the path. Raises TraceError."""
     return store.write_trace(trace, Path(path))
 
 
 def _check_query(name: str, value: object) -> None:
-    """Raises SpecError where no file of a folder can ever answer."""
+    """Raises SpecError if no file can match."""
     field = TraceSummary.model_fields.get(name)
     if field is None:
         raise SpecError(f"read_traces: {name}: traces are selected by {', '.join(TraceSummary.model_fields)}")

@@ -1,4 +1,4 @@
-"""Parameters from traces: of motion, and of recorded torques."""
+"""Estimates parameters from traces: by simulated motion, and by recorded torques."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ def fit(
     progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> FitResult:
-    """The parameters with which the model best repeats the traces, and how far each can be trusted.
+    """Estimates the parameters with which the model best reproduces the traces, and how reliable each one is.
 
-    The model's own loop follows the recorded set points, and its readings are compared with the recorded ones.
+    The model's control loop follows the recorded set points; simulated readings are compared with recorded ones.
 
-    Raises TraceError, SpecError for input that cannot give a result; CancelledError when asked to end.
+    Raises TraceError, SpecError for unusable input; CancelledError if cancelled.
     """
     with told(progress, "fitting") as tell:
         return motion.fit(model, as_sequence(traces), options, tell, cancel)
@@ -43,10 +43,10 @@ def fit_torques(
     progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> TorqueFit:
-    """The parameters with which the torque that the motion needs is the recorded one. Nothing is simulated, so that a
-    machine without a controller can be fitted.
+    """Estimates the parameters with which the torque needed for the motion equals the recorded torque. Nothing is
+    simulated, so a machine without a controller can be fitted.
 
-    `result.held_out` is the share of torque that is left on `holdout`. Raises as `fit`.
+    `result.held_out`: share of the torque on `holdout` that remains unexplained. Raises as `fit`.
     """
     with told(progress, "fitting torques") as tell:
         fitted, held_out = as_sequence(traces), as_sequence(holdout)
@@ -54,14 +54,15 @@ def fit_torques(
 
 
 def base_parameters(model: Model, traces: Traces = (), *, seed: int = 0) -> BaseParameters:
-    """The base parameters of a model's machine: the fewest combinations of inertial and friction parameters that its
-    joint torques depend on, by QR with column pivoting of the regressor at random admissible postures (Gautier 1991).
+    """Returns the base parameters of a model's machine: the fewest combinations of inertial and friction parameters on
+    which its joint torques depend. Method: QR with column pivoting of the regressor at random admissible postures
+    (Gautier 1991).
 
-    With traces that have a recorded drive, `excitation` says which of them these tell: condition number of the columns,
-    and each one's deviation. Traces that cannot be judged are no error: `no_excitation` says why.
+    With traces that have a recorded drive, `excitation` states how well they determine each: condition number of the
+    columns, and deviation of each parameter. Unusable traces are no error: `no_excitation` gives the reason.
 
     Args:
-        seed: of the drawn postures.
+        seed: seed of the random postures.
     """
     return base.base_parameters(model, as_sequence(traces), seed=seed)
 
@@ -74,13 +75,13 @@ def profile(
     progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> Profile:
-    """The profile likelihood of a fitted parameter: how much worse the fit becomes when it is moved, and all others are
-    fitted again. It shows what the data bound on one side alone, or not at all.
+    """Computes the profile likelihood of a fitted parameter: how much worse the fit becomes if the parameter is moved
+    and all others are fitted again. It shows if the data bound the parameter on one side only, or not at all.
 
     Args:
-        traces: those that were fitted to.
+        traces: the traces of the fit.
 
-    Raises SpecError for a parameter that was not fitted, or other traces; CancelledError when asked to end.
+    Raises SpecError for a parameter that was not fitted, or other traces; CancelledError if cancelled.
     """
     with told(progress, name) as tell:
         return profiles.profile(fitted, as_sequence(traces), name, tell, cancel)

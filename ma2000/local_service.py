@@ -1,4 +1,4 @@
-"""A service of one's own on this computer, for programs and notebooks."""
+"""Runs a private service on this computer, for programs and notebooks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from daq.transport import MockPort, parse_port_url
 from ma2000.running import MOCK
 
 ENDS_WITHIN = 20.0
-"""Time (s) in which a service ends in order, with the run under way; after it, it is killed."""
+"""Time (s) for a service to end in good order, including the current run; then it is killed."""
 LOG = "service.log"
 _OWNED = """
 import os, signal, sys, threading
@@ -28,36 +28,31 @@ threading.Thread(target=end_with_owner, daemon=True).start()
 from daq_cli import main
 main()
 """
-"""`daq` that ends in order when its standard input does, that is, with the program that started it, however that
-ends."""
+"""`daq` that ends in good order when its standard input does, that is, when the program that started it ends."""
 
 
 class LocalServiceError(DaqError):
-    """The service did not start. The message has the last line of its log."""
+    """The service did not start. The message contains the last line of its log."""
 
 
 class LocalService:
-    """`daq serve` on a mock, for this computer alone. `url` is what `ma2000.Client` takes.
+    """Runs `daq serve` with a mock, only for this computer. `url` is the argument of `ma2000.Client`.
 
-    It ends with the `with` block, by `close()`, or with this program. Its configuration is that of `daq` without any;
-    its database, traces and log lie in `folder`.
+    It ends with the `with` block, by `close()`, or with this program. It uses the default configuration; its database,
+    traces and log are in `folder`.
     """
 
     def __init__(self, folder: Path | str = "lab", port: str = MOCK) -> None:
-        """Starts it and waits until it answers.
+        """Starts the service and waits until it answers.
 
-        Raises SpecError for a port that is no mock, since a service that moves an arm is started by its operator, and
-        for a folder with a configuration of its own; LocalServiceError when it does not start.
+        Raises SpecError for a port that is no mock (a service that moves an arm is started by its operator), and for a
+        folder with a daq.toml; LocalServiceError if the service does not start.
         """
         if not isinstance(parse_port_url(port), MockPort):
-            raise SpecError(
-                f"port {port!r}: a program's own service runs on mock:// alone; for an arm, use `daq serve`"
-            )
+            raise SpecError(f"port {port!r}: a private service runs only on mock://; for an arm, use `daq serve`")
         self.folder = Path(folder)
         if (self.folder / "daq.toml").exists():
-            raise SpecError(
-                f"{self.folder}: has a daq.toml, whose service is begun with `daq serve`; name another folder"
-            )
+            raise SpecError(f"{self.folder}: has a daq.toml: start its service by `daq serve`, or name another folder")
         self._process = _started(self.folder, port)
         self.url = self._process.output.readline().decode().strip()
         if not self.url:
@@ -79,7 +74,7 @@ class LocalService:
         self.close()
 
     def close(self) -> None:
-        """Ends the service in order. May be called twice."""
+        """Ends the service in good order. May be called twice."""
         self._process.terminate()
         self._process.close(ENDS_WITHIN)
 

@@ -1,4 +1,4 @@
-"""The machine file."""
+"""Writes machine files."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from daq.contracts.machine import Machine
 
 
 def save_machine(machine: Machine, path: Path | str) -> Path:
-    """Writes a machine file (.toml), from which `load_machine` makes a machine of the same numbers. Returns the path.
+    """Writes a machine file (.toml), from which `load_machine` restores the same numbers. Returns the path.
 
-    Raises SpecError when the file cannot be written.
+    Raises SpecError if the file cannot be written.
     """
     return written(machine_text(machine), Path(path))
 
 
 def written(text: str, path: Path) -> Path:
-    """Writes a file. Raises SpecError when it cannot."""
+    """Writes a file. Raises SpecError if it cannot be written."""
     try:
         path.write_text(text, "utf-8")
     except OSError as error:

@@ -1,6 +1,6 @@
-"""What the file of an effect of your own imports (docs/own-effect.md).
+"""The names that the file of a user-defined effect imports (docs/own-effect.md).
 
-The functions take real and dual numbers, so that derivatives stay exact.
+The functions accept real and dual numbers, so that derivatives stay exact.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Tells when a file of the user's hides one of this project's packages, whose names are short."""
+"""Detects a file of the user that hides one of this project's packages, which have short names."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ PACKAGES = ("daq", "extras", "firmware_protocol", "mock_controller", "model", "s
 
 
 class HiddenPackageError(ImportError):
-    """A module or folder on the path has the name of a package of this project, and comes before it."""
+    """A module or folder earlier on Python's path has the name of a package of this project."""
 
 
 def require_own_packages() -> None:
-    """Raises HiddenPackageError, with one line that says which file is in the way."""
+    """Raises HiddenPackageError, with one line that names the file, if a package is hidden."""
     home = Path(__file__).resolve().parents[1]
     for name in PACKAGES:
         found = _place_of(name)
@@ -25,7 +25,7 @@ def require_own_packages() -> None:
 
 
 def _place_of(name: str) -> Path | None:
-    """The package's folder, or the module's file, that Python would import under a name; None if there is none."""
+    """The package folder or module file that Python would import for a name; None if there is none."""
     spec = find_spec(name)
     if spec is None:
         return None

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 
 def plot(trace: Trace, joints: tuple[int, ...] | None = None) -> Figure:
-    """The figure of a trace, as `Trace.plot` makes it.
+    """Plots a trace, as `Trace.plot` does.
 
-    Raises TraceError for a joint that the trace does not have, and for a trace without samples; MissingExtraError.
+    Raises TraceError for a joint that the trace lacks, and for a trace without samples; MissingExtraError.
     """
     require_extra("robot", "ma2000.plot", "matplotlib")
     return trace.plot(joints)

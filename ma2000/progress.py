@@ -1,4 +1,4 @@
-"""Progress of the long calls: a bar where a person watches, nothing elsewhere, or a function of the caller's."""
+"""Progress of long calls: a bar in a terminal or notebook, nothing elsewhere, or a function of the caller."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from contextlib import AbstractContextManager, nullcontext
 from daq.contracts.progress import Progress, silent
 
 Shown = bool | Progress
-"""True: a bar on standard error where that is a terminal, or in a notebook; nothing elsewhere. False: nothing.
-A function is called with the fraction done (0 to 1) and one line."""
+"""True: a bar on standard error in a terminal, or in a notebook; nothing elsewhere. False: nothing. A function is
+called with the fraction done (0 to 1) and a line of text."""
 
 
 def told(progress: Shown, what: str) -> AbstractContextManager[Progress]:
-    """What the computation in the block is to tell how far it is."""
+    """Returns a context whose function reports the progress of the block."""
     if callable(progress):
         return nullcontext(progress)
     if not progress:

@@ -1,4 +1,4 @@
-"""Runs an experiment in a process of its own, as `daq run` does."""
+"""Runs an experiment in a separate process, as `daq run` does."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from daq.transport import parse_port_url
 from ma2000.progress import Shown, told
 
 MOCK = "mock://?lock_step=1"
-"""The port where none is named: a mock that runs as fast as this computer can, and moves nothing."""
+"""Default port: a mock that runs as fast as this computer can. It moves nothing."""
 
 
 class RunError(DaqError):
@@ -37,7 +37,7 @@ class RunError(DaqError):
 
 @dataclass(frozen=True)
 class Run:
-    """How a run ended. `reason` is empty for a complete one; `missing` samples were not received."""
+    """Result of a run. `reason` is empty if it is complete; `missing`: number of samples not received."""
 
     file: Path
     outcome: Outcome
@@ -47,7 +47,7 @@ class Run:
 
     @cached_property
     def trace(self) -> Trace:
-        """What was recorded. Raises TraceError if the file cannot be read any more."""
+        """The recorded trace. Raises TraceError if the file can no longer be read."""
         return read_trace(self.file)
 
 
@@ -63,23 +63,23 @@ def run(
 ) -> Run:
     """Runs an experiment, or the preset of that name, and records its trace in `folder`.
 
-    An interrupt (Ctrl-C, a notebook's stop button) stops the arm; the trace so far is closed, and a note of the
-    KeyboardInterrupt names it.
+    An interrupt (Ctrl-C, a notebook's stop button) stops the arm and closes the trace recorded so far, which a note of
+    the KeyboardInterrupt names.
 
     Args:
         port: URL of the controller's port: `serial:///dev/ttyUSB0`, `tcp://…`, `mock://…`.
-        machine: the machine that the limits and angles are of; None for the MA2000.
-        memory_map: file of the controller's addresses; None for the one that ships.
+        machine: machine with the limits and calibrations; None for the MA2000.
+        memory_map: file of the controller's addresses; None for the packaged one.
         moves_real_arm: the operator's consent. Without it, a controller that is not simulated is refused.
-        progress: whether a bar shows how far it is; or a function that is told the fraction done and one line.
+        progress: whether to show a progress bar; or a function that gets the fraction done and a line of text.
 
     Raises:
-        SpecError: for an unknown preset, a port or a file that is not valid.
+        SpecError: for an unknown preset, or an invalid port or file.
         SafetyError, RunError: nothing was recorded: no controller, a motion outside the limits, no consent.
     """
     spec = preset(experiment).spec if isinstance(experiment, str) else experiment
     machine = machine or load_machine("ma2000")
-    parse_port_url(port)  # an invalid port is refused without starting a process
+    parse_port_url(port)  # reject an invalid port before starting a process
     if memory_map is not None:
         load_memory_map(memory_map)
     opening = Open(

@@ -1,6 +1,6 @@
-"""Design, validation and diagnosis with the defaults of the commands of the same names.
+"""Design, validation and diagnosis, with the defaults of the commands of the same names.
 
-`progress` of each says whether a bar shows how far it is: docs/python.md.
+The argument `progress` selects a progress bar: docs/python.md.
 """
 
 from __future__ import annotations
@@ -33,12 +33,13 @@ def validate(
     progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> Fidelity:
-    """Whether expected deviations of the parameters explain the model's errors, by distortion: Σλ² (thesis, chapter 4).
+    """Tests whether expected deviations of the parameters explain the model's errors, by distortion: Σλ² (thesis,
+    chapter 4).
 
     Args:
-        parameters: names or patterns (`joint2.*`); None for those that were fitted, or else for all uncertain ones.
+        parameters: names or patterns (`joint2.*`); None for the fitted ones, or else all with a stated deviation.
 
-    Raises SpecError, TraceError; CancelledError when asked to end.
+    Raises SpecError, TraceError; CancelledError if cancelled.
     """
     names = names_to_validate(model, parameters)
     options = Options(quantise=False)
@@ -56,15 +57,16 @@ def diagnose(
     progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> Diagnosis:
-    """Where a model and traces disagree, which effects are missing, and, where the loop is simulated, what to measure
-    next.
+    """Finds where a model and traces disagree and which effects are missing. By output error, also proposes what to
+    measure next.
 
     Args:
-        options: `DiagnosisOptions(method="output-error")` simulates; by default torques are balanced where a sampled
-            controller's drive was recorded (unless `design` is set), and they propose no experiment.
-        design: what to measure next may be a motion that is designed for the candidates; it takes some 10 s more.
+        options: `DiagnosisOptions(method="output-error")` simulates. By default, torques are balanced (inverse
+    dynamics) if a sampled controller's drive was recorded, unless `design` is set; no experiment is proposed then.
+        design: whether the proposed experiment may be a motion designed for the candidates, which takes about 10 s
+    more.
 
-    Raises TraceError, SpecError for input that cannot give an answer; CancelledError when asked to end.
+    Raises TraceError, SpecError for unusable input; CancelledError if cancelled.
     """
     chooser = experiment_chooser(model.machine, design=design)
     with told(progress, "diagnosing") as tell:
@@ -79,9 +81,9 @@ def design(
     progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> DesignedExperiments:
-    """Experiments within the machine's limits that make the parameters of `fit_options` best known together.
+    """Designs experiments within the machine's limits that determine the parameters of `fit_options` best together.
 
-    Raises SpecError when no candidate is within the limits; CancelledError when asked to end.
+    Raises SpecError if no candidate is within the limits; CancelledError if cancelled.
     """
     with told(progress, "designing") as tell:
         return search.design(model, lambda spec: planned(spec, model.machine), options, fit_options, tell, cancel)

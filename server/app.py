@@ -1,4 +1,4 @@
-"""The web application: its routes, its problems, and the start and end of the services behind them."""
+"""The web application: its routes, its problems, and the start and end of its services."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Angles are in rad, times in s, joints are numbered from 1. Errors are applicatio
 
 
 def make_app(services: Services, gate: Gate) -> FastAPI:
-    """Makes the application, behind its gate, for services that are not yet started."""
+    """Makes the application with its gate, for services that are not yet started."""
     app = bare_app(services)
     app.add_middleware(gate.middleware)
     app.add_middleware(HeadAsGet)
@@ -51,7 +51,7 @@ def make_app(services: Services, gate: Gate) -> FastAPI:
 
 
 class HeadAsGet:
-    """Answers HEAD, which monitors send, as GET. The server leaves the body out, as it does for every HEAD."""
+    """Answers HEAD, which monitors send, like GET. The server omits the body, as for every HEAD."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -76,7 +76,7 @@ def bare_app(services: Services | None) -> FastAPI:
                 _ = route.of_fastapi  # the first stop must not wait for it
         await run_in_threadpool(services.start)
         yield
-        # With a thread of its own: those of requests may all be taken by some that cannot be interrupted.
+        # On a separate thread: all request threads may be busy with work that cannot be interrupted.
         await asyncio.to_thread(services.close)
         for rig in services.robots():
             await rig.hub.close()

@@ -1,4 +1,4 @@
-"""Clocks: wall time for people and schedules, monotonic time for everything else."""
+"""Clocks: wall time for people and schedules, monotonic time for all else."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Clock(Protocol):
         ...
 
     def elapsed(self) -> float:
-        """Returns the same, including the time while the computer was asleep."""
+        """Returns the same, including time in sleep mode."""
         ...
 
 
@@ -36,5 +36,5 @@ class SystemClock:
         return time.monotonic()
 
     def elapsed(self) -> float:
-        """Returns the time including sleep (CLOCK_BOOTTIME), by which leases and confirmed presence expire."""
+        """Returns the time including sleep mode (CLOCK_BOOTTIME), by which leases and confirmed presence expire."""
         return time.clock_gettime(time.CLOCK_BOOTTIME) if sys.platform == "linux" else time.monotonic()

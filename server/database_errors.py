@@ -1,4 +1,4 @@
-"""Errors of the database, in one line that names the table. Does not import SQLAlchemy."""
+"""Formats database errors in one line that names the table. Does not import SQLAlchemy."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 BRING_BACK = "`daq restore FILE --overwrite` restores a backup"
 TRY_AGAIN = "try again; if this goes on, see the database's own log"
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
-"""SQLite's result codes that mean that the file or its tables are damaged. The last one is that of a table or column
-that a statement does not find, or that a migration finds already."""
+"""SQLite's result codes for a damaged file or damaged tables. The last one is also that of a missing table or column,
+or one that a migration finds already present."""
 _FULL = "53100"
 """PostgreSQL's code of a full disk."""
 _TABLE = re.compile(r'\b(?:FROM|INTO|UPDATE)\s+"?(\w+)', re.IGNORECASE)
@@ -25,13 +25,13 @@ _LONGEST = 200
 
 
 class DamagedError(DaqError):
-    """The database is damaged: this program cannot have written what it holds."""
+    """The database is damaged: its contents cannot come from this program."""
 
     exit_code = exit_codes.WRONG_INPUT
 
 
 def open_to_read(file: Path, busy: float = 5.0) -> sqlite3.Connection:
-    """Opens a SQLite file that must exist, and changes nothing in it. busy: time (s) to wait for a lock."""
+    """Opens an existing SQLite file for reading only. busy: longest wait (s) for a lock."""
     return sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True, timeout=busy)
 
 
@@ -48,9 +48,9 @@ def line_of(error: DatabaseError) -> str:
 
 
 def advice_of(error: DatabaseError) -> str:
-    """Returns what helps: a backup against damage, disk space if the disk is full, patience against anything else.
+    """Returns advice: a backup for damage, disk space if the disk is full, otherwise a retry.
 
-    A restored backup loses everything written after it, so only SQLite's own codes of damage lead to this advice.
+    A restored backup loses everything written after it, so only SQLite's own damage codes lead to this advice.
     """
     if is_full(error):
         return "make room on its disk"
@@ -63,25 +63,25 @@ def is_full(error: DatabaseError) -> bool:
 
 
 def is_value(error: DatabaseError) -> bool:
-    """Whether the database refused a value: PostgreSQL a text with the character NUL, for example."""
+    """Whether the database rejected a value: PostgreSQL rejects text with the character NUL, for example."""
     from sqlalchemy.exc import DataError
 
     return isinstance(error, DataError)
 
 
 def _result_code(error: object) -> int | None:
-    """SQLite's primary result code; None from another database. The higher bits tell the reason more exactly."""
+    """SQLite's primary result code; None for another database. The higher bits would give details."""
     code = getattr(getattr(error, "orig", error), "sqlite_errorcode", None)
     return code & 0xFF if isinstance(code, int) else None
 
 
 def is_locked(error: object) -> bool:
-    """Whether another program holds SQLite's database."""
+    """Whether another program has locked SQLite's database."""
     return _result_code(error) == sqlite3.SQLITE_BUSY
 
 
 def one_line(error: object) -> str:
-    """Returns the beginning of an error's text in one line: of the database's own, without the statement."""
+    """Returns the beginning of an error's text in one line, without the statement."""
     if is_locked(error):
         return "locked by another program"
     return " ".join(str(getattr(error, "orig", None) or error).split())[:_LONGEST]

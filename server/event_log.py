@@ -19,8 +19,8 @@ log = logging.getLogger("server")
 class EventLog:
     """Records events.
 
-    `hubs`: those of the robots' live clients, by name, as soon as there are any. `counted`: hears of the robot and kind
-    of each event.
+    `hubs`: hubs of the robots' live clients by name, once they exist. `counted`: called with robot and kind of each
+    event.
     """
 
     def __init__(self, store: EventStore, counted: Callable[[str, str], None], clock: Clock) -> None:
@@ -40,10 +40,10 @@ class EventLog:
         experiment: str | None = None,
         at: datetime | None = None,
     ) -> None:
-        """Records an event. `at`: when it happened; now by default.
+        """Records an event. `at`: when it happened; by default now.
 
         Never raises, even if the database fails: the request that caused the event has already been carried out. Its
-        row is written as soon as the database can be.
+        row is written once the database works again.
         """
         log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
         self._counted(robot, kind)
@@ -56,11 +56,11 @@ class EventLog:
         self._later.submit(self.record, robot, kind, text, actor=actor, at=self._clock.utc())
 
     def settle(self) -> None:
-        """Takes nothing more to be recorded later, and waits until that is done."""
+        """Accepts no more events to record later, and waits until the accepted ones are recorded."""
         self._later.shutdown()
 
     def close(self, seconds: float) -> None:
-        """Writes the rows that wait, within this time."""
+        """Writes the waiting rows within this time (s)."""
         self._waiting.close(seconds)
 
     def _publish(self, robot: str, event: ServiceEvent) -> None:

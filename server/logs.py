@@ -64,8 +64,8 @@ class StandardError(io.TextIOBase):
         self._writing = threading.local()
 
     def write(self, text: str) -> int:
-        """Logs complete lines, and keeps the rest until its end comes. A line that cannot be logged is lost: logging
-        prints its own failures here, and logging these again would never end."""
+        """Logs complete lines, and stores the rest until its end arrives. A line that cannot be logged is lost: logging
+        prints its own errors here, and logging them again would never end."""
         if getattr(self._writing, "active", False):
             return len(text)
         self._writing.active = True
@@ -92,8 +92,8 @@ class StandardError(io.TextIOBase):
 
 
 def begin(stream: TextIO | None = None, level: int = logging.INFO) -> None:
-    """Sends all logs of this process to `stream`, by default standard error. If that is not a terminal, they are JSON,
-    and so is everything else that this process prints there: warnings, uncaught errors, output of libraries."""
+    """Sends all logs of this process to `stream`, by default standard error. If it is not a terminal, they are JSON, as
+    is everything else printed there: warnings, uncaught errors, output of libraries."""
     if stream is None:
         stream = sys.stderr.real if isinstance(sys.stderr, StandardError) else sys.stderr
     handler = logging.StreamHandler(stream)

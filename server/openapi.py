@@ -1,4 +1,4 @@
-"""`python -m server.openapi` prints the description of the API, from which the types of the page are generated."""
+"""`python -m server.openapi` prints the API's OpenAPI description, from which the page's types are generated."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Serves the files of the dashboard's built page. The first request reads all of them; the build has made their
-compressed forms."""
+"""Serves the files of the dashboard. The first request reads all of them; the build has made their compressed forms."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ from starlette.types import Receive, Scope, Send
 FOLDER = Path(__file__).parent / "dashboard" / "dist"
 INDEX = "index.html"
 REFERENCE = "reference.html"
-"""The reference of the API; `/api/docs` leads to it."""
+"""The API reference, to which `/api/docs` redirects."""
 NOT_BUILT = "the dashboard's page is not built: run `make page` in the source tree (it needs no Node of your own)"
 TYPES = {
     ".html": "text/html; charset=utf-8",
@@ -34,7 +33,7 @@ FOREVER = "public, max-age=31536000, immutable"
 ASK_AGAIN = "no-cache"
 """Cache header of all other files: browsers ask each time whether the file has changed."""
 PACKINGS = {"br": ".br", "gzip": ".gz"}
-"""Content encodings, the smallest first, and the suffixes of the build's files in them."""
+"""Content encodings, the smallest first, with the suffixes of the build's files."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class PageFile:
 
 
 def encodings(accepted: str) -> set[str]:
-    """Returns the encodings that the header Accept-Encoding names and does not refuse (`;q=0`)."""
+    """Returns the encodings that the header Accept-Encoding lists and does not refuse (`;q=0`)."""
     found = set()
     for one in accepted.lower().split(","):
         name, _, weight = one.partition(";")
@@ -76,8 +75,8 @@ def is_built(folder: Path = FOLDER) -> bool:
 
 
 class Page(BaseRoute):
-    """The routes of all files of the page. `/` is its index, and `/api/docs` leads to the reference of the API; if the
-    page is not built, both say how to build it."""
+    """The routes of all files of the page. `/` is its index, and `/api/docs` redirects to the API reference. If the
+    page is not built, both explain how to build it."""
 
     def __init__(self, folder: Path = FOLDER) -> None:
         self._folder = folder
@@ -87,7 +86,7 @@ class Page(BaseRoute):
         return _files(self._folder) if is_built(self._folder) else {}
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        """Whether this is a request of the page."""
+        """Whether a request is for the page."""
         if scope["type"] != "http" or (
             scope["path"] not in ("/", "/api/docs") and scope["path"][1:] not in self._found
         ):
@@ -105,7 +104,7 @@ class Page(BaseRoute):
         if wanted not in self._found:
             return PlainTextResponse(NOT_BUILT + "\n", 503)
         if path == "/api/docs":
-            return RedirectResponse(f"../{REFERENCE}")  # beside its files, which it names by relative addresses
+            return RedirectResponse(f"../{REFERENCE}")  # beside its files, which it references by relative addresses
         return self._found[wanted].response(request)
 
 

@@ -1,4 +1,4 @@
-"""What a plug-in does in a running service."""
+"""Base class of the parts that plug-ins add to a running service."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from daq.owner.messages import Report
 
 @dataclass(frozen=True)
 class Attention:
-    """Something that needs somebody for as long as it lasts; `topic` is one of notifications."""
+    """A condition that needs a person as long as it lasts; `topic` is a topic of notifications."""
 
     topic: str
     text: str
@@ -24,76 +24,77 @@ class Attention:
 
 
 class Watch(Protocol):
-    """Watches one request and its answer."""
+    """Observes one request and its response."""
 
     def receive(self, receive: Receive) -> Receive:
-        """Returns `receive`, which this hears."""
+        """Returns a wrapped `receive`, whose messages this observes."""
         ...
 
     def send(self, send: Send) -> Send:
-        """Returns `send`, which this hears."""
+        """Returns a wrapped `send`, whose messages this observes."""
         ...
 
     def end(self) -> None:
-        """Hears that the request has ended, answered or not."""
+        """Called when the request has ended, with or without a response."""
         ...
 
 
 class Part:
     """A part of the service that a plug-in adds: `Plugin.parts` names the class. It is made with the `Services`, before
-    they start, and found again as `services.part(Class)`. It overrides what it needs of the following. The name of its
-    log begins with `server.`, so that it is written as the others are."""
+    they start, and is found by `services.part(Class)`. It overrides the methods that it needs. The name of its logger
+    must begin with `server.`, so that its log is written like all others."""
 
     lets_people_in = False
-    """Whether people may come in without a token (`services.sessions`)."""
+    """Whether people may sign in without a token (`services.sessions`)."""
 
     def robots_made(self, robots: Sequence[Any]) -> None:
-        """Is given the `RobotServices` of every robot, before anything starts."""
+        """Receives the `RobotServices` of every robot, before anything starts."""
 
     def start(self) -> None:
-        """Begins: the robots have started."""
+        """Starts the part, after the robots."""
 
     def close(self, seconds: float) -> None:
-        """Ends within this time. Nothing else of the service runs any more but the log and the database."""
+        """Ends the part within this time (s). Only the log and the database are still available."""
         del seconds
 
     def warnings(self) -> list[str]:
-        """Returns what will need somebody soon, one line each."""
+        """Returns what will soon need a person, one line each."""
         return []
 
     def checks(self) -> dict[str, str]:
-        """Returns what the readiness of the service says: by its name, a problem, or an empty text."""
+        """Returns the part's readiness checks: by name, a problem, or an empty text."""
         return {}
 
     def attention(self) -> dict[str, Attention]:
-        """Returns what needs somebody, by a key that stays the same meanwhile."""
+        """Returns conditions that need a person, by a key that stays the same while they last."""
         return {}
 
     def watch(self, scope: Scope, *, with_content: bool) -> Watch | None:
-        """Returns a watch over a request (ASGI's scope); None for none. `with_content`: whether its body is no file."""
+        """Returns an observer of a request (ASGI's scope); None for none. `with_content`: whether its body is not a
+        file."""
 
-    # News. These may be called on any thread, and must not wait.
+    # News. May be called on any thread, and must not block.
 
     def acted(self, note: AuditNote, *, again: bool = False) -> None:
-        """Hears of what somebody did otherwise than by a request that is watched. `again`: it may come all the time."""
+        """Called for an action other than an observed request. `again`: it may come continuously."""
 
     def request_answered(self, method: str, status: int, seconds: float) -> None:
-        """Hears of a request, its status and how long it took."""
+        """Called with a request's method, status and duration (s)."""
 
     def refused(self, kind: str) -> None:
-        """Hears of the kind of problem of a request or WebSocket that is refused."""
+        """Called with the kind of problem of a refused request or WebSocket."""
 
     def event_recorded(self, robot: str, kind: str) -> None:
-        """Hears of an event."""
+        """Called with an event."""
 
     def arm_reported(self, robot: str, report: Report) -> None:
-        """Hears what the owner of a robot's port reports."""
+        """Called with a report of a robot's owner process."""
 
     def experiment_ended(self, robot: str, identity: str, state: ExperimentState, reason: str) -> None:
-        """Hears of the end of an experiment."""
+        """Called at the end of an experiment."""
 
     def queue_paused(self, robot: str, reason: str) -> None:
-        """Hears that a queue is paused until somebody has looked."""
+        """Called when a queue is paused until a person has looked."""
 
     def job_changed(self, job: Job) -> None:
-        """Hears of a job that has begun, advanced or ended."""
+        """Called with a job that has begun, advanced or ended."""

@@ -1,4 +1,4 @@
-"""Errors as application/problem+json: one line that says what is wrong, and one that says what to do."""
+"""Errors as application/problem+json: one line about the error, and one with advice."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 MEDIA_TYPE = "application/problem+json"
 PATH = "/api/v1/problems"
-"""The page on all kinds of problems. The type of a problem is its place there."""
+"""The page about all kinds of problems. A problem's type is its anchor there."""
 SCHEMA = {"$ref": f"#/components/schemas/{ProblemDetails.__name__}"}
 log = logging.getLogger("server")
 
@@ -48,16 +48,16 @@ TITLES = {
 }
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Error numbers of the operating system that mean that the disk is full."""
+"""Operating-system error numbers for a full disk."""
 NOT_WRITABLE = (errno.EROFS, errno.EIO)
-"""Error numbers that mean that the disk can be read at most: the system makes one read-only after an error."""
+"""Error numbers for a disk that is at most readable: the system makes it read-only after an error."""
 
 NO_FIELD = re.compile(r"(constrained|function)-.*|(dict|list|set|tuple)\[.*\]|\[key\]")
-"""Parts of pydantic's error locations that are not fields: the type of a union that was tried, or the mark of a key."""
+"""Parts of pydantic's error locations that are not fields: the type tried in a union, or the mark of a key."""
 
 
 class ProblemError(Exception):
-    """A request is not carried out. `kind` is the last part of the problem's type."""
+    """A request was not carried out. `kind`: the last part of the problem's type."""
 
     def __init__(
         self,
@@ -88,7 +88,7 @@ def conflict(kind: str, detail: str, advice: str) -> ProblemError:
 
 
 def of_error(error: DaqError) -> ProblemError:
-    """Returns the problem for an error of this program's other packages."""
+    """Returns the problem for an error of this project's other packages."""
     if isinstance(error, PortBusyError):
         return conflict("port-in-use", str(error), "end the other program, then connect again")
     if isinstance(error.__cause__, OSError) and (problem := of_disk(error.__cause__)) is not None:
@@ -97,7 +97,7 @@ def of_error(error: DaqError) -> ProblemError:
 
 
 def of_database(error: DatabaseError) -> ProblemError:
-    """Returns a 503 that names the table, a 507 if the disk is full, a 422 for a value that no row can hold."""
+    """Returns a 503 that names the table, a 507 if the disk is full, a 422 for a value that a row cannot store."""
     line = line_of(error)
     if is_value(error):
         return ProblemError(422, "not-valid", f"the database: {line}", "leave out what it cannot hold")
@@ -114,7 +114,7 @@ def of_damage(error: DamagedError) -> ProblemError:
 
 
 def of_disk(error: OSError) -> ProblemError | None:
-    """Returns a 507 if the disk is full, a 503 if it cannot be written, and None if the error is another one."""
+    """Returns a 507 if the disk is full, a 503 if it is not writable, and None for other errors."""
     if error.errno not in (*NO_ROOM, *NOT_WRITABLE):
         return None
     log.error("disk: %s", error)
@@ -125,7 +125,7 @@ def of_disk(error: OSError) -> ProblemError | None:
 
 
 def of_exit_code(exit_code: int, line: str) -> ProblemError:
-    """Returns the problem for another process's error, from its line and its exit code (docs/command-line.md)."""
+    """Returns the problem for another process's error, from its line and exit code (docs/command-line.md)."""
     if exit_code == exit_codes.WRONG_INPUT:
         return ProblemError(422, "not-valid", line, "correct the request")
     if exit_code == exit_codes.NOT_REACHED:
@@ -136,7 +136,7 @@ def of_exit_code(exit_code: int, line: str) -> ProblemError:
 
 
 def details_of(problem: ProblemError, request_id: str | None = None, base: str = "") -> ProblemDetails:
-    """Returns the body of a problem's answer. base: what precedes the path of the service's addresses."""
+    """Returns the body of a problem's response. base: prefix of the service's paths."""
     return ProblemDetails(
         type=f"{base}{PATH}#{problem.kind}",
         title=TITLES.get(problem.status, "Problem"),
@@ -149,7 +149,7 @@ def details_of(problem: ProblemError, request_id: str | None = None, base: str =
 
 
 def response(request: Request, problem: ProblemError) -> JSONResponse:
-    """Returns the answer for a problem."""
+    """Returns the response for a problem."""
     from fastapi.responses import JSONResponse
 
     state = request.state
@@ -158,7 +158,7 @@ def response(request: Request, problem: ProblemError) -> JSONResponse:
 
 
 def install(app: FastAPI) -> None:
-    """Makes `app` answer every error with a problem."""
+    """Makes `app` respond to every error with a problem."""
     # Imported here, because the stop listener uses this file and starts without web framework and database library.
     from fastapi.exceptions import RequestValidationError
     from sqlalchemy.exc import DatabaseError
@@ -208,13 +208,14 @@ def install(app: FastAPI) -> None:
 
 
 def field_of(place: Sequence[int | str]) -> str:
-    """Returns the name of a field as a client writes it, without pydantic's parts for unions, keys and bodies."""
+    """Returns the name of a field as clients write it, without pydantic's parts for unions, keys and bodies."""
     parts = [str(part) for part in place if part not in ("body", "query", "path", "header")]
     return ".".join(part for part in parts if not NO_FIELD.fullmatch(part)) or "body"
 
 
 def _where(error: Mapping[str, Any]) -> str:
-    return "body" if error["type"] == "json_invalid" else field_of(error["loc"])  # which has the byte's number
+    # whose location contains the byte's number
+    return "body" if error["type"] == "json_invalid" else field_of(error["loc"])
 
 
 def _what(error: Mapping[str, Any]) -> str:
@@ -229,5 +230,5 @@ PROBLEMS: dict[int | str, dict[str, Any]] = {
     status: {"description": TITLES[status], "content": {MEDIA_TYPE: {"schema": SCHEMA}}}
     for status in (400, 401, 403, 404, 409, 413, 422, 429, 503, 507)
 }
-"""The problems with which any route may answer, for its `responses`. They refer to the schema, which the description
-adds once: with the model itself FastAPI would make a validator of its own for each of them at every route."""
+"""The problems that any route may return, for its `responses`. They refer to the schema, which the description adds
+once: from the model itself, FastAPI would build a validator for each problem of every route."""

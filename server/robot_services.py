@@ -1,6 +1,6 @@
-"""What belongs to one robot, and what its requests must fulfil.
+"""The services of one robot, and the conditions of its requests.
 
-The status of a robot, every value with its age.
+`status_of` returns the status of a robot, every value with its age.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from server.robot.teaching import TeachingService, Word
 
 
 def status_of(robot: Robot, control: Control, queue: QueueStatus) -> RobotStatus:
-    """Returns the status of `robot` now, with who has control and the state of its queue."""
+    """Returns the present status of `robot`, with the holder of control and the state of its queue."""
     arm, seen = robot.arm, robot.arm_seen
     now, utc = robot.clock.monotonic(), robot.clock.utc()
     connected = robot.identity is not None
@@ -76,7 +76,7 @@ class RobotServices:
     events: EventLog
     unattended: bool
     jogged: Callable[[AuditNote], None]
-    """Tells plug-ins of a command to jog."""
+    """Informs plug-ins of a jog command."""
     owners: tuple[str, ...] = ()
     """Names of this robot's owners; empty: every owner."""
 
@@ -111,7 +111,7 @@ class RobotServices:
 
     def approval(self, caller: Caller, content: str) -> Given:
         """Returns the caller's approval of some content. Raises a 403 for callers without a token, who may be the
-        author, and where only owners of the robot may approve; a 409 where nobody needs to."""
+        author, and if only owners of the robot may approve; a 409 if no approval is needed."""
         reviewer, is_owner = self.queue.review.reviewer, caller.owns(self.owners)
         if reviewer is None:
             line = f"experiments of {self.robot.name} need no approval"
@@ -119,8 +119,8 @@ class RobotServices:
         if reviewer == "owner" and not is_owner:
             line = f"an owner of {self.robot.name} must approve its experiments, and {caller.name} is none"
             raise ProblemError(403, "owner-needed", line, "ask an owner of the robot")
-        if caller.token is None:  # they may have submitted it by their token: nobody can tell
-            line = "a user of this computer without a token cannot be told from whoever submitted the experiment"
+        if caller.token is None:  # this caller may have submitted the experiment with a token, which cannot be excluded
+            line = "a user of this computer without a token may be the person who submitted the experiment"
             raise ProblemError(403, "own-experiment", line, "approve it with a token, or sign in on the page")
         return Given(content, caller.name, is_owner)
 

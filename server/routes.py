@@ -1,5 +1,5 @@
-"""Routes that FastAPI looks at when they are first asked for: to look at all of them takes longer than everything else
-that the service does when it starts."""
+"""Routes that are passed to FastAPI on first use: analysing all of them would take longer than the whole rest of the
+service's start."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Router:
-    """Declares routes with the decorators of FastAPI's `APIRouter`, whose options they take."""
+    """Declares routes with the decorators of FastAPI's `APIRouter` and their options."""
 
     def __init__(
         self, prefix: str = "", tags: Iterable[str] = (), responses: Mapping[int | str, Any] | None = None
@@ -31,7 +31,7 @@ class Router:
         self._declared: list[Callable[[str], BaseRoute]] = []
 
     def below(self, prefix: str) -> list[BaseRoute]:
-        """Returns the routes, with addresses that begin with `prefix`."""
+        """Returns the routes with paths below `prefix`."""
         return [made(prefix + self._prefix) for made in self._declared]
 
     def get(self, path: str, **options: Any) -> Callable[[F], F]:
@@ -80,7 +80,7 @@ class Router:
 
 
 class DeclaredRoute(BaseRoute):
-    """A route that becomes FastAPI's when somebody asks for its address, or for the description of the API."""
+    """A route that is converted to FastAPI's on the first request of its path, or of the API description."""
 
     def __init__(self, path: str, endpoint: Callable[..., Any], options: Mapping[str, Any]) -> None:
         self.path = path
@@ -90,23 +90,23 @@ class DeclaredRoute(BaseRoute):
 
     @cached_property
     def of_fastapi(self) -> APIRoute:
-        """The route of FastAPI. Two threads that make it at the same time make the same."""
+        """The FastAPI route. Two threads that make it at the same time make equal ones."""
         with warnings.catch_warnings():
-            # As FastAPI does: the field of a body has the body's name, which pydantic needs not.
+            # As in FastAPI: the field of a body has the body's name, which pydantic does not need.
             warnings.simplefilter("ignore", UnsupportedFieldAttributeWarning)
             route = APIRoute(self.path, self._endpoint, **{**self._options, **self._named()})
             for field in (route.body_field, route.response_field):
                 if field is not None:
-                    field.validate(None)  # models are built when they are used first: now
+                    field.validate(None)  # builds the models now; otherwise their first use would
         return route
 
     def _named(self) -> dict[str, Any]:
-        """The model of the answer, where "module:name" names it: some are loaded with much that the start needs not."""
+        """The model of the response, if given as "module:name": some have imports that the start does not need."""
         model = self._options.get("response_model")
         return {"response_model": named(model)} if isinstance(model, str) else {}
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        """Whether this is the route of a request."""
+        """Whether this route matches a request."""
         if scope["type"] == "http":
             asked = scope["path"].split("/")
             if len(asked) == len(self._segments) and all(
@@ -116,7 +116,7 @@ class DeclaredRoute(BaseRoute):
         return Match.NONE, {}
 
     async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answers a request."""
+        """Responds to a request."""
         await self.of_fastapi.handle(scope, receive, send)
 
 
@@ -129,10 +129,10 @@ def include(app: FastAPI, router: Router | APIRouter, prefix: str = "") -> None:
 
 
 def described(routes: Iterable[BaseRoute]) -> list[BaseRoute]:
-    """Returns routes as FastAPI describes them."""
+    """Returns routes in the form that FastAPI describes."""
     return [route.of_fastapi if isinstance(route, DeclaredRoute) else route for route in routes]
 
 
 def _name(route: APIRoute) -> str:
-    """Names an operation like its function, since clients are generated from these names."""
+    """Names an operation after its function, since clients are generated from these names."""
     return route.name

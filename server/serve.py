@@ -1,12 +1,8 @@
-"""Starts the service: its sockets, its stop listener, its database and its web server.
+"""Starts and ends the service: its sockets, its stop listener, its database and its web server.
 
-Ends the service in time, whatever still computes, waits or blocks.
-
-By then, everything that can end in order has ended: the process that owns the robot's port freezes the arm and closes
-the trace by itself, and the database's transactions are on the disk. Only threads and processes that cannot be
-interrupted are left.
-
-The sockets on which the service and its stop listener listen.
+The end has a time limit, whatever still computes, waits or blocks. By then everything that needs an orderly end has
+ended: the owner process freezes the arm and closes the trace by itself, and the database's transactions are on the
+disk. Only threads and processes that cannot be interrupted are left.
 """
 
 from __future__ import annotations
@@ -47,16 +43,16 @@ from server.store.lock import sole_use, sqlite_file
 END_WITHIN = 4.2
 """Time (s) from the signal to the end of this process."""
 LAST_RESORT = 4.7
-"""Time (s) after which the kernel ends the process, even if its interpreter no longer runs."""
+"""Time (s) after which the kernel ends the process, even if its interpreter is blocked."""
 FORCED = 1
-"""Exit code of a forced end, so that the supervisor of the service notices it."""
+"""Exit code of a forced end, so that the service's supervisor notices it."""
 log = logging.getLogger("server")
 
 
 class EndInTime:
-    """A time limit for the end of this process, armed once. `children` ends this service's processes before a
-    forced end; `in_order` says whether everything that had to end in order has ended but for `last`, which is ended
-    then: only threads are left that nobody waits for, and the exit code is 0."""
+    """A time limit for the end of this process, started once. `children` ends this service's processes before a forced
+    end. `in_order`: whether everything that needs an orderly end, except `last`, has ended. `last` is then ended and
+    the exit code is 0, since only threads are left for which nobody waits."""
 
     def __init__(self, children: Callable[[], None], in_order: Callable[[], bool], last: Callable[[], None]) -> None:
         self._children = children
@@ -65,7 +61,7 @@ class EndInTime:
         self._armed = threading.Lock()
 
     def arm(self) -> None:
-        """Starts the time limit. Called in the main thread, from a signal's handler."""
+        """Starts the time limit. Called on the main thread by a signal handler."""
         if not self._armed.acquire(blocking=False):
             return
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
@@ -75,8 +71,8 @@ class EndInTime:
         timer.start()
 
     def finish(self) -> None:
-        """Ends this process now if everything has ended in order after a signal. Python would wait for threads that
-        still compute, until the time limit."""
+        """Ends this process now, if everything has ended in good order after a signal. Python would wait for threads
+        that still compute, until the time limit."""
         if self._armed.locked() and self._in_order():
             self._last()
             logging.shutdown()
@@ -95,7 +91,7 @@ class EndInTime:
 
 
 TRIES = 50
-"""Number of pairs of neighbouring ports that are tried if the configuration allows any free port."""
+"""Number of pairs of neighbouring ports to try if the configuration allows any free port."""
 
 
 class ListenError(DaqError):
@@ -142,10 +138,10 @@ def _bound(host: str, port: int, setting: str) -> socket.socket:
 
 
 KEEP_ALIVE = 60
-"""Time (s) for which an idle connection stays open. Clients close theirs after a few seconds (httpx: 5 s); if the
-service were as quick, a request could arrive just as it closes the connection."""
+"""Time (s) for which an idle connection stays open. Clients close theirs after a few seconds (httpx: 5 s). If the
+service did so as early, a request could arrive just as it closes the connection."""
 GRACE = 1
-"""Time (s) to answer requests under way when the service ends; streams are told to end before."""
+"""Time (s) to answer requests in progress when the service ends; streams are ended before."""
 
 
 def serve(settings: Settings, ready: Callable[[str], None]) -> None:
@@ -175,11 +171,11 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
             services.uploads.close()
             services.motions.close()
 
-        # The web server raises the signal again when it has ended; the with-blocks then end everything else.
+        # The web server raises the signal again when it has ended; the with-blocks then end all else.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         door.wait_ready()
         end = EndInTime(services.end_processes, lambda: services.closed, door.close)
-        with suppress(KeyboardInterrupt):  # by then the web server has ended in order
+        with suppress(KeyboardInterrupt):  # by then the web server has ended in good order
             _Server(config, lambda: ready(address), ending, end.arm).run([listener])
     end.finish()
 
@@ -207,7 +203,7 @@ def _address_of(listener: socket.socket) -> str:
 
 
 def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
-    """Makes the gate. Raises SpecError if tokens are needed and there is none."""
+    """Makes the gate. Raises SpecError if tokens are needed and there are none."""
     loopback = is_loopback(section.host)
     local = _is_open_here(section)
     let_in = any(part.lets_people_in for part in services.parts)
@@ -255,7 +251,8 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
 
 
 def _note_of_stop(news: Stopped) -> AuditNote:
-    """Returns what plug-ins are told of a stop at the listener. It is done; `detail` says what the arm answered."""
+    """Returns the note for plug-ins about a stop at the listener. The stop is done; `detail` contains the arm's
+    answer."""
     return AuditNote(
         at=news.at,
         actor=news.actor,
@@ -271,7 +268,8 @@ def _note_of_stop(news: Stopped) -> AuditNote:
 
 
 def _connect(services: Services, door: StopDoor, listener: socket.socket) -> None:
-    """Connects the service and the stop listener: stops go to the service, and each robot's port to the listener."""
+    """Connects the service and the stop listener: reports stops to the service, and each robot's owner to the
+    listener."""
 
     def stopped(news: Stopped) -> None:
         services.robot(news.robot).queue.stop_asked(news.actor)
@@ -287,7 +285,8 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
 
 
 def _tell_sessions(services: Services, gate: Gate, door: StopDoor) -> None:
-    """Lets the gate and the stop listener know of sessions at once; they read the others from the database."""
+    """Informs the gate and the stop listener of new and ended sessions at once; they read the others from the
+    database."""
 
     def signed_in(caller: Caller) -> None:
         gate.tokens.add(caller)
@@ -301,7 +300,7 @@ def _tell_sessions(services: Services, gate: Gate, door: StopDoor) -> None:
 
 
 class _Server(uvicorn.Server):
-    """uvicorn's server, with calls when it is ready and when it begins to end."""
+    """uvicorn's server, with callbacks when it is ready and when it begins to end."""
 
     def __init__(
         self,
@@ -316,7 +315,7 @@ class _Server(uvicorn.Server):
         self._told_to_end = told_to_end
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Handles a signal as uvicorn does, after it has started the time limit for the end."""
+        """Handles a signal as uvicorn does, after starting the time limit for the end."""
         self._told_to_end()
         super().handle_exit(sig, frame)
 
@@ -328,6 +327,6 @@ class _Server(uvicorn.Server):
             self._ready()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Calls `ending`, and then shuts down as uvicorn does, which grants requests under way GRACE s only."""
+        """Calls `ending`, and then shuts down as uvicorn does, which allows requests in progress only GRACE s."""
         self._ending()
         await super().shutdown(sockets)

@@ -1,13 +1,13 @@
-"""How the service is composed, and in which order it ends.
+"""Composition of the service, and the order in which it ends.
 
-It has the database with a store for each kind of row; what all robots share (events, lanes, processes with
-limits, workers of jobs); the parts of plug-ins; and for each robot its `RobotServices`. Routes are given what they
-declare (`server/api/dependencies.py`), never all of this.
+It consists of the database with a store per kind of row; shared parts of all robots (events, lanes, processes with
+limits, workers of jobs); the parts of plug-ins; and for each robot its `RobotServices`. Routes receive only the parts
+that they declare (`server/api/dependencies.py`).
 
-It ends in this order: processes that read and plan; queues begin nothing more; connections, queues and jobs; workers;
-events that are recorded later, control and stops; the parts of plug-ins and the last events; the database.
+It ends in this order: processes that read and plan; queues, which begin nothing more; connections, queues and jobs;
+workers; deferred events, control and stops; the parts of plug-ins and the last events; the database.
 
-Whether the service is ready: checked at most once a second, however many clients ask.
+Readiness is checked at most once per second, however many clients ask.
 """
 
 from __future__ import annotations
@@ -73,12 +73,11 @@ from server.store.waiting_events import EventStore
 KEPT_FOR = 1.0
 """Time (s) for which a result is reused, since a check writes to the disk and may wait for the database."""
 Checks = dict[str, str]
-"""What is wrong, by the name of the check; an empty text if nothing is."""
+"""Problems by name of the check; an empty text if there is none."""
 
 
 class Readiness:
-    """Runs one check at a time, on a thread; requests that come meanwhile get its result. Use it on the event loop
-    only."""
+    """Runs one check at a time, on a thread; requests that come meanwhile get its result. For the event loop only."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -87,8 +86,8 @@ class Readiness:
         self._running: asyncio.Task[Checks] | None = None
 
     async def check(self, look: Callable[[], Checks]) -> Checks:
-        """Returns what `look`, called on a thread, returns, or returned less than KEPT_FOR s ago. Raises what it
-        raises."""
+        """Returns the result of `look`, called on a thread, or its last result if less than KEPT_FOR s old. Raises its
+        errors."""
         if self._clock.monotonic() - self._at < KEPT_FOR:
             return self._checks
         if self._running is None or self._running.done():
@@ -102,8 +101,8 @@ class Readiness:
 
 
 SHUTDOWN, TIDYING = 2.0, 0.5
-"""Times (s) to freeze the arm and close the trace, and to tidy up, when the service ends. The process that owns the
-robot's port finishes alone if it needs longer."""
+"""Times (s) to freeze the arm and close the trace, and to clean up, when the service ends. An owner process that needs
+longer finishes alone."""
 ENDING = 0.5
 """Time (s) for events and plug-ins to write their last rows when the service ends."""
 log = logging.getLogger("server")
@@ -117,7 +116,7 @@ class Services:
         self.settings = settings
         self.clock = clock or SystemClock()
         self.closed = False
-        """Whether `close` has done everything."""
+        """Whether `close` has finished."""
         self.store = Store(address_of(settings.server))
         self.store.migrate()
         self.store.require_sound()
@@ -138,12 +137,12 @@ class Services:
         limits = Limits(memory=settings.server.upload_memory << 20, seconds=settings.server.upload_time)
         self.uploads = Workers(limits, 1)
         self.motions = Workers(limits, 1)
-        """Separate from uploads, so that they delay no preview."""
+        """Separate from uploads, so that those delay no preview."""
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
         self.sessions = SessionStore(self.store)
         self.signed_in: Callable[[Caller], None] = lambda _caller: None
-        """Called when a session has begun, and when one was left, with its caller."""
+        """Called with the caller when a session has begun, or was ended by signing out."""
         self.signed_out: Callable[[Caller], None] = lambda _caller: None
         self._robots: dict[str, RobotServices] = {}
         self.parts: list[Part] = [named(part)(self) for plugin in plugins() for part in plugin.parts]
@@ -161,7 +160,7 @@ class Services:
         return robot_named(self.robots(), name)
 
     def part(self, kind: type[P]) -> P:
-        """Returns the part of a plug-in that is of this class."""
+        """Returns the part of a plug-in with this class."""
         return next(part for part in self.parts if isinstance(part, kind))
 
     def start(self) -> None:
@@ -183,8 +182,8 @@ class Services:
             part.start()
 
     def close(self) -> None:
-        """Freezes arms, closes traces, ends threads and processes, within SHUTDOWN + TIDYING s. Anything left then ends
-        with this process."""
+        """Freezes arms, closes traces, ends threads and processes, within SHUTDOWN + TIDYING s. The rest ends with this
+        process."""
         self.end_processes()
         every = self.robots()
         for rig in every:
@@ -201,8 +200,8 @@ class Services:
         self.closed = True
 
     def end_processes(self) -> None:
-        """Ends the processes that read uploads and plan motions, at once. The owner of a robot's port ends by itself,
-        and workers of jobs end with this process."""
+        """Kills the processes that read uploads and plan motions. The owner of a robot's port ends by itself, and
+        workers of jobs end with this process."""
         self.uploads.close()
         self.motions.close()
 
@@ -214,7 +213,7 @@ class Services:
         )
         catalogue = Catalogue(folder, name, self.traces, self.experiments, settings.traces.limits)
         queue = self._make_queue(robot, control, catalogue, settings)
-        # After the loss of a process that wrote a trace, its part file is finished and found.
+        # After the loss of a process that was writing a trace, its part file is salvaged and found.
         robot.disconnected.append(lambda _why: self._take_in(catalogue))
         teaching = TeachingService(robot, lambda line: self.event_log.record_later(name, "teaching", line))
         history = History(len(robot.machine.joints), control_period(robot.machine), settings.server.history)
@@ -259,19 +258,19 @@ class Services:
         )
 
     def warnings(self) -> list[str]:
-        """Returns what will need somebody soon, one line each."""
+        """Returns what will soon need a person, one line each."""
         return self.storage_warnings() + [line for part in self.parts for line in part.warnings()]
 
     def tell(self, news: Callable[[Part], None]) -> None:
-        """Tells every part some news, on this thread."""
+        """Passes news to every part, on this thread."""
         for part in self.parts:
             try:
                 news(part)
-            except Exception:  # the thread that has the news goes on: it may be that of the queue
+            except Exception:  # this thread must continue: it may be that of the queue
                 log.exception("%s", type(part).__name__)
 
     def attention(self) -> dict[str, Attention]:
-        """Returns what needs somebody for as long as it lasts, by a key that stays the same meanwhile."""
+        """Returns conditions that need a person, by a key that stays the same while they last."""
         found = {}
         if lines := self.storage_warnings():
             found["storage"] = Attention("storage.warning", "; ".join(lines))
@@ -285,14 +284,14 @@ class Services:
         return found
 
     def storage_warnings(self) -> list[str]:
-        """Returns the warnings about the folders of traces, each of which may be on a disk of its own."""
+        """Returns the warnings about the folders of traces, which may be on different disks."""
         folders = {rig.robot.name: rig.catalogue.folder for rig in self.robots()}
         return storage_warnings(folders, self.settings.traces.warn_at)
 
     def _make_queue(
         self, robot: Robot, control: ControlService, catalogue: Catalogue, settings: Settings
     ) -> QueueService:
-        """Returns the queue of a robot, which hears the robot's reports."""
+        """Returns the queue of a robot, which receives the robot's reports."""
 
         def add_trace(answer: Answer) -> None:
             assert answer.finished is not None
@@ -327,7 +326,7 @@ class Services:
         hub.publish("jobs", JobMessage(job=job))
 
     def _lapsed(self, robot: Robot, holder: str) -> None:
-        """Handles a lapsed lease: the arm holds, and the queue is paused until a person resumes it."""
+        """Handles an expired lease: the arm holds, and the queue is paused until a person resumes it."""
         rig = self._robots.get(robot.name)
         if rig is not None:
             rig.queue.control_lapsed(holder)
@@ -357,7 +356,7 @@ def _all_within(seconds: float, steps: Iterable[Callable[[], object]]) -> None:
 
 
 def _place(settings: Settings) -> RobotPlace:
-    """Returns where the configured robot is. Raises an error for a memory map that cannot be used."""
+    """Returns the configured robot's name, port, machine and folder. Raises an error for an unusable memory map."""
     path = settings.robot.memory_map
     if path is not None:
         load_memory_map(path)

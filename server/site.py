@@ -1,4 +1,4 @@
-"""The site of the documents, as the service has it at `/docs/`."""
+"""The documentation site, served at `/docs/`."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from starlette.types import Scope
 
 SITE_POLICY = SECURITY[POLICY].replace("form-action 'none'", "form-action 'self'")
-"""The service's policy, but for the form of the site's search. The build keeps scripts and styles out of the pages."""
+"""The service's policy, plus the form of the site's search. The build keeps scripts and styles out of the pages."""
 
 
 class Site(StaticFiles):
-    """Files of the site. A browser asks each time whether one has changed."""
+    """Files of the site. A browser asks each time whether a file has changed."""
 
     def file_response(
         self, full_path: str | os.PathLike[str], stat_result: os.stat_result, scope: Scope, status_code: int = 200
     ) -> Response:
-        """The file, with the site's own policy."""
+        """Returns the file with the site's own policy."""
         response = super().file_response(full_path, stat_result, scope, status_code)
         response.headers["Cache-Control"] = "no-cache"
         response.headers[POLICY] = SITE_POLICY
@@ -35,12 +35,12 @@ class Site(StaticFiles):
 
 
 def serve_site(app: FastAPI, index: Path | None) -> None:
-    """Serves the site at `/docs/`, from its first page on. Where it is not built (None), the pages are made from the
-    documents themselves."""
+    """Serves the site at `/docs/`, beginning with its first page. If it is not built (None), pages are rendered from
+    the documents."""
 
     @app.get("/docs", include_in_schema=False)
     async def documents_below() -> Response:
-        return RedirectResponse("docs/")  # relative: a proxy may serve all this below a path of its own
+        return RedirectResponse("docs/")  # relative, since a proxy may serve all this below a path
 
     if index is not None:
         app.mount("/docs", Site(directory=index.parent, html=True), "documents")

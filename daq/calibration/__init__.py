@@ -1,4 +1,4 @@
-"""Measurements of the controller and the sensors themselves. Pure: arrays and traces in, estimates out."""
+"""Calibrates controller and sensors. Pure: arrays and traces in, estimates out."""
 
 from daq.calibration.gain import GainEstimate, NoEstimate, estimate_gain, gains_from_trace
 from daq.calibration.gain_experiment import gain_experiment

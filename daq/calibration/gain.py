@@ -1,10 +1,9 @@
-"""The actual proportional gain, from errors and powers that the controller reports (section 6.5 of the source).
+"""Estimates the actual proportional gain from the errors and powers that the controller reports (section 6.5).
 
-With I = D = 0 the controller's law is power = gain · error, made an integer by a rule that nobody documents: floor,
-truncation or nearest. Error and power of one snapshot are the integers that the controller worked with, so there is no
-noise to average away: each sample confines the gain to |power − gain · error| < 1, and the same error must always give
-the same power. Repeating an error therefore adds nothing, and an error or power that contradicts the others shows
-that the law is another one.
+With I = D = 0 the controller's law is power = gain · error, rounded to an integer by an undocumented rule: floor,
+truncation or nearest. Error and power of one snapshot are the integers that the controller used, so there is no noise
+to average out. Each sample limits the gain to |power − gain · error| < 1, and equal errors always give equal powers.
+Repeating an error therefore adds no information, and a contradiction between samples shows that the law is different.
 """
 
 from __future__ import annotations
@@ -22,11 +21,11 @@ from daq.contracts.trace import Floats, Integers, Trace
 from firmware_protocol.units import DAC_MAX
 
 FEWEST_ERRORS = 3
-"""Least number of different error magnitudes for an estimate: a choice."""
+"""Least number of different error magnitudes for an estimate (a choice)."""
 WIDEST = 0.1
-"""Largest relative half-width of the interval of possible gains for which an estimate is given: a choice."""
+"""Largest relative half-width of the interval of possible gains for an estimate (a choice)."""
 ROUNDING = 1 / math.sqrt(12)
-"""Standard deviation of a rounding error spread evenly over one count; scatter is never taken to be less."""
+"""Standard deviation of a rounding error, uniform over one count; the scatter is taken to be at least this."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +34,10 @@ class GainEstimate:
 
     gain:            DAC counts per ADC count of error, by least squares through the origin
     standard_error:  of the gain
-    lowest, highest: gains that agree with every sample, whatever the controller's rounding; the limits are excluded
-    volts_per_rad:   the same at the motor; its standard error is `volts_per_rad_error`
-    per_unit:        gain per unit of the adjustable P; None when P is not known
-    samples, saturated, errors: samples used, left out as saturated, and different errors among those used
+    lowest, highest: range of gains that agree with every sample, whatever the rounding; the ends are excluded
+    volts_per_rad:   the gain at the motor (V/rad); its standard error is `volts_per_rad_error`
+    per_unit:        gain per unit of the adjustable P; None if P is unknown
+    samples, saturated, errors: samples used, samples left out as saturated, and different errors among those used
     """
 
     joint: int
@@ -67,7 +66,7 @@ class GainEstimate:
 
 @dataclass(frozen=True)
 class NoEstimate:
-    """Why the data of a joint give no gain."""
+    """The reason why a joint's data do not determine the gain."""
 
     joint: int
     reason: str
@@ -85,9 +84,9 @@ class NoEstimate:
 def estimate_gain(
     machine: Machine, joint: int, errors: Integers, powers: Integers, gains: Gain | None = None
 ) -> GainEstimate | NoEstimate:
-    """Gain of `joint` from errors (n,) in ADC counts and powers (n,) in DAC counts, each pair from one snapshot.
+    """Estimates the gain of `joint` from errors (n,) in ADC counts and powers (n,) in DAC counts, paired by snapshot.
 
-    `gains` are the adjustable (P, I, D) where known. Samples at the DAC's end are left out. Raises SpecError when the
+    `gains`: the adjustable (P, I, D), if known. Samples at the DAC's limits are left out. Raises SpecError if the
     arrays differ in shape or the joint has no DC motor.
     """
     if errors.shape != powers.shape or errors.ndim != 1:
@@ -126,7 +125,7 @@ def estimate_gain(
 
 @dataclass(frozen=True)
 class CommonGain:
-    """Gain per unit of P that `joints` have in common (DAC counts per ADC count), and its standard error."""
+    """Gain per unit of P common to `joints` (DAC counts per ADC count), and its standard error."""
 
     joints: tuple[int, ...]
     value: float
@@ -134,7 +133,7 @@ class CommonGain:
 
 
 def common_gain(estimates: Sequence[GainEstimate]) -> CommonGain | None:
-    """The gain per unit of P that agrees with every sample of every joint; None where there is none, or no P is
+    """Returns the gain per unit of P that agrees with every sample of every joint; None if there is none, or no P is
     known."""
     known = [(one, one.gain / one.per_unit) for one in estimates if one.per_unit]
     if not known or len(known) < len(estimates):
@@ -149,7 +148,7 @@ def common_gain(estimates: Sequence[GainEstimate]) -> CommonGain | None:
 
 
 def gains_from_trace(trace: Trace, machine: Machine) -> list[GainEstimate | NoEstimate]:
-    """Gain of every joint of a trace. Raises SpecError when it has no errors or no raw powers."""
+    """Estimates the gain of every joint of a trace. Raises SpecError if it has no errors or no raw powers."""
     name = trace.record.trace_id
     if trace.error is None or trace.power_raw is None:
         raise SpecError(
@@ -178,7 +177,7 @@ def _too_little(errors: Integers, saturated: int) -> str | None:
 
 
 def _not_proportional(errors: Integers, powers: Integers) -> str | None:
-    """The contradiction between samples, if there is one."""
+    """Returns the contradiction between samples, or an empty text."""
     advice = "not proportional: I and D must be 0, and error and power of one snapshot"
     order = np.lexsort((powers, errors))
     same = np.flatnonzero((np.diff(errors[order]) == 0) & (np.diff(powers[order]) != 0))
@@ -197,13 +196,13 @@ def _not_proportional(errors: Integers, powers: Integers) -> str | None:
 
 
 def _possible_gains(errors: Integers, powers: Integers) -> tuple[float, float]:
-    """Limits of the gains for which |power − gain · error| < 1 in every sample; crossed when there are none."""
+    """Limits of the gains for which |power − gain · error| < 1 in every sample; lower > upper if there are none."""
     size, power = _as_positive(errors, powers)
     return float(((power - 1) / size).max()), float(((power + 1) / size).min())
 
 
 def _least_squares(errors: Integers, powers: Integers) -> tuple[float, float]:
-    """Slope through the origin and its standard error, each different error counting once."""
+    """Slope through the origin and its standard error; each different error counts once."""
     distinct, first = np.unique(errors, return_index=True)
     e, p = distinct.astype(np.float64), powers[first].astype(np.float64)
     weight = float(e @ e)
@@ -213,7 +212,7 @@ def _least_squares(errors: Integers, powers: Integers) -> tuple[float, float]:
 
 
 def _as_positive(errors: Integers, powers: Integers) -> tuple[Floats, Floats]:
-    """Errors other than 0 as magnitudes, and powers with their sign relative to the error."""
+    """Nonzero errors as magnitudes, and powers with their sign relative to the error."""
     some = errors != 0
     sign = np.sign(errors[some])
     return np.abs(errors[some]).astype(np.float64), (powers[some] * sign).astype(np.float64)

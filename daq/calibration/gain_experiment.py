@@ -1,4 +1,4 @@
-"""The motion that shows the gain: small steps at several postures."""
+"""The motion from which the gain is estimated: small steps at several postures."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import math
 from daq.contracts.experiment import Cubic, ExperimentSpec, Pause, Segment, Sequence, Simple, Step
 
 POSTURES = (0.0, 15.0, -15.0)
-"""Postures about the start, in degrees, visited in this order: choices."""
+"""Postures relative to the start, in degrees, in this order (choices)."""
 STEPS = (1.0, 2.0, 3.0)
-"""Steps at each posture, up and down, in degrees: choices. On a major axis 3° are 46 ADC counts, below the 63.5 at
-which P = 2 saturates the DAC."""
+"""Steps at each posture, up and down, in degrees (choices). On a major axis 3° are 46 ADC counts; at 63.5, P = 2
+saturates the DAC."""
 DWELL = 0.5
 """Time (s) held after each step."""
 TRAVEL = 1.5
@@ -18,9 +18,9 @@ TRAVEL = 1.5
 
 
 def gain_experiment(joints: tuple[int, ...] = (1, 2, 3), start: dict[int, float] | None = None) -> ExperimentSpec:
-    """The experiment to record for `gains_from_trace`: it ends where it began. `start` in rad, as in any experiment.
+    """Returns the experiment to record for `gains_from_trace`; it ends where it began. `start` in rad.
 
-    I and D must be 0 while it runs; P stays as it is.
+    I and D must be 0 while it runs; P is not changed.
     """
     moves: list[Simple] = []
     at = 0.0

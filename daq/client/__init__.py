@@ -1,4 +1,4 @@
-"""A client of the service, for programs: typed, synchronous, with the service's own models (`daq.contracts.service`).
+"""A typed, synchronous client of the service, with the service's own models (`daq.contracts.service`).
 
     with Client("http://127.0.0.1:8300") as client:
         robot = client.robot()
@@ -6,8 +6,8 @@
         done = robot.experiments.wait(experiment.id)
         robot.traces.download(done.trace, Path("traces"))
 
-Requests that change nothing, and those with an idempotency key, are sent again when the service does not answer or is
-busy; nothing else is.
+Requests that change nothing, and those with an idempotency key, are repeated if the service does not answer or is busy.
+Other requests are never repeated.
 """
 
 from daq.client.client import Client

@@ -1,4 +1,4 @@
-"""The service as a program sees it."""
+"""The client of a whole service."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from daq.contracts.service.system import Me, SystemStatus
 
 
 class Client:
-    """A client of one service. Methods raise ServiceError for what it refuses, ServiceNotReachedError when it is not
-    there. Safe to use from any thread.
+    """A client of one service. Methods raise ServiceError if it refuses, ServiceNotReachedError if it cannot be
+    reached. Safe to use from any thread.
 
-    url:      as `daq serve` tells it, such as http://127.0.0.1:8300
-    token:    as `daq token add` shows it; None at loopback
-    stop_url: address of the stop listener, where it is not at the port after the service's (behind a proxy)
+    url:      as printed by `daq serve`, such as http://127.0.0.1:8300
+    token:    as printed by `daq token add`; None at loopback
+    stop_url: address of the stop listener, if it is not on the port after the service's (behind a proxy)
     """
 
     def __init__(self, url: str, token: str | None = None, *, stop_url: str | None = None) -> None:
-        """Connects to nothing yet. Raises SpecError."""
+        """Opens no connection yet. Raises SpecError."""
         self._connection = Connection(url, token)
         self._stop_url = stop_url
 
@@ -41,7 +41,7 @@ class Client:
         self.close()
 
     def close(self) -> None:
-        """Ends all connections."""
+        """Closes all connections."""
         self._connection.close()
 
     @property
@@ -50,35 +50,35 @@ class Client:
         return self._connection.url
 
     def me(self) -> Me:
-        """This client as the service identified it."""
+        """This client, as identified by the service."""
         return self._connection.get(Me, "me")
 
     def system(self) -> SystemStatus:
-        """Version, storage, watchers."""
+        """Version, storage and clients of the service."""
         return self._connection.get(SystemStatus, "system")
 
     def robots(self, *, within: float | None = None) -> Sequence[RobotSummary]:
-        """The robots of the service; with `within` (s for the answer) asked for once."""
+        """Returns the robots of the service. With `within` (s for the answer), the request is sent only once."""
         request = Request("GET", "robots", repeatable=within is None, within=within)
         return self._connection.ask(tuple[RobotSummary, ...], request)
 
     def stop(self) -> StopResult:
-        """Freezes every arm of the service, at once. Read `confirmed`: anything else means that an emergency stop is
-        needed; a `FleetStopResult` says in `robots` which.
+        """Freezes every arm of the service at once. If `confirmed` is false, an emergency stop is needed: `robots` of a
+        `FleetStopResult` states which.
 
-        Asked for at the service and at its stop listener at the same time; never raises.
+        The request goes to the service and to its stop listener at the same time. Never raises.
         """
         addresses = stopping.stop_addresses(self.url, self._stop_url)
         return stopping.stop(addresses, "fleet", self._connection.token, FleetStopResult)
 
     def fleet(self) -> FleetStatus:
-        """The state of every robot at a glance."""
+        """Returns an overview of every robot."""
         return self._connection.get(FleetStatus, "fleet")
 
     def submit_to_all(
         self, spec: ExperimentSpec, robots: Sequence[str] | None = None, *, key: str | None = None
     ) -> Sequence[Experiment]:
-        """Puts the same experiment into the queue of each of `robots`; None for all. If one of them cannot run it, none
+        """Adds the same experiment to the queue of each of `robots`; None for all. If one of them cannot run it, none
         gets it."""
         body = FleetExperimentRequest(
             request=ExperimentRequest(spec=spec), robots=None if robots is None else tuple(robots)
@@ -88,7 +88,7 @@ class Client:
         return self._connection.ask(FleetExperiments, request).experiments
 
     def robot(self, name: str | None = None) -> Robot:
-        """One of them, by name; without one, the only one there is. Raises SpecError when there are more."""
+        """Returns a robot by name; without a name, the only robot. Raises SpecError if there are several."""
         if name is None:
             names = [one.robot for one in self.robots()]
             if len(names) != 1:

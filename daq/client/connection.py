@@ -1,4 +1,4 @@
-"""Requests to the service and its answers: typed, with problems as errors, and repeated where that changes nothing."""
+"""HTTP requests to the service: typed answers, problems as errors, and repeats of requests that allow them."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ API = "/api/v1"
 CONNECT_WITHIN = 5.0
 """Time-out (s) for connecting."""
 ANSWER_WITHIN = 30.0
-"""Time-out (s) until an answer begins, beyond the time that the request itself allows."""
+"""Time-out (s) for the start of an answer, in addition to the time that the request itself may take."""
 PAUSES = (0.2, 0.5, 1.0)
-"""Pauses (s) before a request that changes nothing is sent a second, third and fourth time."""
+"""Pauses (s) before the second, third and fourth attempt of a request that may be repeated."""
 LONGEST_PAUSE = 5.0
-"""Longest `Retry-After` (s) that is waited for; beyond it the refusal is reported."""
+"""Longest `Retry-After` (s) that is waited for; if it is longer, the refusal is raised."""
 PART = 65536
-"""Size (bytes) of the parts in which a download is written."""
+"""Size (bytes) of the parts of a download."""
 TOKEN = re.compile(r"[!-~]+")
 """Characters of a token that an HTTP header can carry."""
 T = TypeVar("T")
@@ -41,8 +41,8 @@ Query = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Request:
-    """One request. `path` is below the API's; `repeatable` says that sending it twice does what sending it once does;
-    `patience` is in s, beyond ANSWER_WITHIN; `within` (s) takes the place of both."""
+    """One request. `path` is relative to the API's; `repeatable`: sending it twice has the same effect as once.
+    `patience`: time-out (s) in addition to ANSWER_WITHIN; `within` (s) replaces both."""
 
     method: str
     path: str
@@ -56,7 +56,7 @@ class Request:
 
 
 class Connection:
-    """A service at an address. Safe to use from any thread; `close` ends it."""
+    """Connections to a service. Safe to use from any thread; `close` ends them."""
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class Connection:
         transport: httpx.BaseTransport | None = None,
         pause: Callable[[float], None] = time.sleep,
     ) -> None:
-        """`transport` and `pause` can replace the network and its time in tests. Raises SpecError."""
+        """`transport` and `pause` replace network and waiting in tests. Raises SpecError."""
         self.url = parse_url(url)
         if token is not None and TOKEN.fullmatch(token) is None:
             raise SpecError("token: only ASCII characters without spaces are allowed; `daq token add` shows one")
@@ -77,15 +77,15 @@ class Connection:
             headers={} if token is None else {"Authorization": f"Bearer {token}"},
             timeout=httpx.Timeout(ANSWER_WITHIN, connect=CONNECT_WITHIN),
             transport=transport,
-            trust_env=not is_loopback(self.url),  # no proxy can reach this computer's own services
+            trust_env=not is_loopback(self.url),  # a proxy cannot reach services of this computer
         )
 
     def close(self) -> None:
-        """Ends all connections."""
+        """Closes all connections."""
         self._http.close()
 
     def ask(self, answer: type[T], request: Request) -> T:
-        """The answer to a request. Raises ServiceError, ServiceNotReachedError."""
+        """Returns the answer to a request. Raises ServiceError, ServiceNotReachedError."""
         response = self._sent(request)
         try:
             # A newer service may send fields that this client does not know.
@@ -97,15 +97,15 @@ class Connection:
             raise ServiceNotReachedError(f"{self.url}: {line}") from error
 
     def do(self, request: Request) -> None:
-        """A request whose answer says nothing. Raises ServiceError, ServiceNotReachedError."""
+        """Sends a request without data in the answer. Raises ServiceError, ServiceNotReachedError."""
         self._sent(request)
 
     def get(self, answer: type[T], path: str, *, patience: float = 0.0, **query: Any) -> T:
-        """What an address tells."""
+        """Sends a GET request, and returns the answer."""
         return self.ask(answer, Request("GET", path, query=_given(query), repeatable=True, patience=patience))
 
     def every(self, item: type[T], path: str, **query: Any) -> Iterator[T]:
-        """All items of a list, part by part."""
+        """Yields all items of a list, page by page."""
         cursor: str | None = None
         while True:
             page: Page[T] = self.get(Page[item], path, **query, cursor=cursor)  # type: ignore[valid-type]
@@ -115,10 +115,10 @@ class Connection:
                 return
 
     def download(self, path: str, target: Path) -> None:
-        """A file, whole or not at all. Raises OSError when it cannot be written."""
+        """Downloads a file, completely or not at all. Raises OSError if it cannot be written."""
         try:
             with replacing(target) as part, self._http.stream("GET", quote(path)) as response:
-                if not response.is_success:  # a redirection, such as a proxy's, is no file
+                if not response.is_success:  # a redirection, such as a proxy's, is not the file
                     response.read()
                     raise ServiceError(_problem(response))
                 with part.open("wb") as stream:
@@ -128,7 +128,8 @@ class Connection:
             raise ServiceNotReachedError(f"{self.url}: not reached: {reason_of(error)}") from error
 
     def _sent(self, request: Request) -> httpx.Response:
-        """The answer, repeated as long as that may help. Raises ServiceError, ServiceNotReachedError."""
+        """Returns the response; repeats the request while that may help. Raises ServiceError,
+        ServiceNotReachedError."""
         pauses = iter(PAUSES if request.repeatable else ())
         while True:
             try:
@@ -154,7 +155,7 @@ class Connection:
             headers["Content-Type"] = "application/json"
         return self._http.request(
             request.method,
-            quote(request.path),  # a name that somebody typed may have `?`, `#` or `%` in it
+            quote(request.path),  # a name typed by a user may contain `?`, `#` or `%`
             content=content,
             params=dict(request.query),
             headers=headers,
@@ -163,7 +164,7 @@ class Connection:
 
 
 def parse_url(text: str) -> str:
-    """The address of a service, without a slash at its end. Raises SpecError."""
+    """Returns the address of a service, without a final slash. Raises SpecError."""
     try:
         url = httpx.URL(text)
     except (httpx.InvalidURL, UnicodeError) as error:
@@ -176,7 +177,7 @@ def parse_url(text: str) -> str:
 
 
 def is_loopback(url: str) -> bool:
-    """Whether an address is of this computer."""
+    """Whether an address refers to this computer."""
     host = httpx.URL(url).host
     try:
         return host == "localhost" or ipaddress.ip_address(host).is_loopback
@@ -194,7 +195,7 @@ def _given(query: Query) -> Query:
 
 
 def _problem(response: httpx.Response) -> ProblemDetails:
-    """What the service says is wrong; of something else that answers, such as a proxy, its status."""
+    """Returns the problem in a response; for a response of another program, such as a proxy, its status."""
     try:
         return ProblemDetails.model_validate_json(response.content)
     except ValidationError:
@@ -203,7 +204,7 @@ def _problem(response: httpx.Response) -> ProblemDetails:
 
 
 def _may_pass(problem: ProblemDetails) -> bool:
-    """Whether the same request may be answered in a moment."""
+    """Whether the same request may succeed in a moment."""
     return problem.status == 429 or (problem.status == 503 and problem.type.endswith("#database"))
 
 

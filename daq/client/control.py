@@ -1,4 +1,4 @@
-"""The control of the robot: a lease that is renewed as long as it is held, and what may be done with it."""
+"""Control of the robot: a lease that is renewed while it is held, and the operations that require it."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from daq.contracts.service.teaching import JogRequest, LeadRequest, StepRequest,
 HEADER = "Control-Lease"
 T = TypeVar("T")
 JOIN_WITHIN = 10.0
-"""Time (s) allowed for the heartbeat thread to end."""
+"""Longest wait (s) for the heartbeat thread to end."""
 
 
 class ControlLostError(DaqError):
-    """The lease has lapsed, or the service is gone: the arm holds."""
+    """The lease has ended, or the service is gone: the arm holds."""
 
     exit_code = exit_codes.REFUSED
 
 
 class HeldControl:
-    """The control while entered; its lease is renewed by a thread of its own. Every motion raises ControlLostError
-    once it is lost."""
+    """Holds the control within a `with` block; a separate thread renews the lease. Every motion raises ControlLostError
+    once the control is lost."""
 
     def __init__(self, connection: Connection, robot: str, *, moves_real_arm: bool = False) -> None:
         self._connection = connection
@@ -45,7 +45,7 @@ class HeldControl:
         self._thread = threading.Thread(target=self._renew, name="control-heartbeat", daemon=True)
 
     def __enter__(self) -> Self:
-        """Takes the control. Raises ServiceError when another client has it, or a real arm's consent is missing."""
+        """Takes control. Raises ServiceError if another client has it, or the consent for a real arm is missing."""
         body = ControlRequest(moves_real_arm=self._moves_real_arm)
         self._lease = self._connection.ask(ControlLease, Request("POST", f"{self._path}/control", body))
         self._thread.start()
@@ -54,7 +54,7 @@ class HeldControl:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Gives the control back, unless it has been lost."""
+        """Returns control, unless it was lost."""
         self._ended.set()
         self._thread.join(JOIN_WITHIN)
         if self._lost:
@@ -67,7 +67,7 @@ class HeldControl:
 
     @property
     def lease(self) -> ControlLease:
-        """The newest one, with its secret. Raises ControlLostError."""
+        """The newest lease, with its secret. Raises ControlLostError."""
         if self._lost or self._lease is None:
             raise ControlLostError(
                 f"the control of the robot is lost: {self._lost or 'it was not taken'}; the arm holds"
@@ -75,14 +75,14 @@ class HeldControl:
         return self._lease
 
     def jog(self, velocities: Mapping[int, float]) -> TeachingStatus:
-        """Drives joints (rad/s; m/s those that slide) for at most 0.3 s; to be repeated while the key is held."""
+        """Drives joints (rad/s; m/s for prismatic ones) for at most 0.3 s; repeat it while the key is held."""
         return self._teaching("jog", JogRequest(velocities=dict(velocities)))
 
     def step(
         self, *, to: Mapping[int, float] | None = None, by: Mapping[int, float] | None = None, speed: float = 0.25
     ) -> TeachingStatus:
-        """Begins one step to absolute angles, or by relative ones (rad, m), the fastest joint at `speed` (rad/s; m/s
-        where one slides, up to 0.07)."""
+        """Begins one step to absolute angles, or by relative ones (rad, m); the fastest joint moves at `speed` (rad/s;
+        m/s if one is prismatic, up to 0.07)."""
         given = {name: dict(angles) for name, angles in (("to", to), ("by", by)) if angles is not None}
         return self._teaching("step", StepRequest(speed=speed, **given))
 
@@ -91,15 +91,15 @@ class HeldControl:
         return self._teaching("program", program)
 
     def lead(self, joints: Sequence[int]) -> TeachingStatus:
-        """Begins to record a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive."""
+        """Begins to record a path while the arm is guided by hand. HOLD THE ARM: the guided joints have no drive."""
         return self._teaching("lead", LeadRequest(joints=tuple(joints)))
 
     def finish(self) -> TeachingStatus:
-        """Ends jogging, or leading: its path is in the answer."""
+        """Ends jogging or hand guiding; the answer contains the path."""
         return self._teaching("finish", None)
 
     def set_gains(self, gains: Mapping[int, Gain]) -> JointGains:
-        """Writes gains of the joints named, and reads all back."""
+        """Writes gains of some joints, and returns those of all."""
         return self._put(JointGains, "gains", JointGains(gains=dict(gains)))
 
     def set_output(self, output: int, *, on: bool, while_stopped: bool = False) -> ProcessState:

@@ -1,4 +1,4 @@
-"""Errors between a client and the service: one line each, with advice."""
+"""Errors between client and service: one line each, with advice."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _OF_STATUS = {409: REFUSED, 429: NOT_REACHED, 500: PROGRAM_FAULT, 503: NOT_REACH
 
 
 class ServiceError(DaqError):
-    """The service refused a request. `problem` is its application/problem+json, `kind` the end of the problem's type
-    (docs/service.md), `exit_code` what the same refusal ends a local command with."""
+    """The service refused a request. `problem`: its application/problem+json; `kind`: the end of the problem's type
+    (docs/service.md); `exit_code`: the exit code of a local command for the same refusal."""
 
     def __init__(self, problem: ProblemDetails) -> None:
         advice = f"; {problem.advice}" if problem.advice else ""
@@ -26,14 +26,14 @@ class ServiceError(DaqError):
 
     @property
     def status(self) -> int:
-        """Status code of the HTTP response."""
+        """HTTP status code of the response."""
         return self.problem.status
 
 
 class ServiceNotReachedError(ReachError):
-    """The service does not answer, or what answers is no such service."""
+    """The service does not answer, or another program answers."""
 
 
 def reason_of(error: httpx.HTTPError) -> str:
-    """Why a request got no answer, in a few words."""
+    """Returns why a request got no answer, in a few words."""
     return "no answer in time" if isinstance(error, httpx.TimeoutException) else str(error) or type(error).__name__

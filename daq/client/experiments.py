@@ -1,4 +1,4 @@
-"""Experiments, the queue that runs them, and schedules that fill it."""
+"""Experiments, their queue, and schedules that submit them."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from daq.contracts.service.experiments import (
 from daq.contracts.service.queue import QueueResume, QueueStatus
 
 WAIT = 30.0
-"""Time (s) that one request for the end of an experiment waits at the service."""
+"""Time (s) that a request for the end of an experiment waits at the service."""
 FIRST_WAIT = 2.0
-"""The same of the first request: whoever waits for a paused queue hears of it soon."""
+"""The same for the first request. It is short, so that a paused queue is reported soon."""
 
 
 def new_key() -> str:
-    """A key with which a request that is sent twice is carried out once."""
+    """Returns an idempotency key, with which a repeated request is carried out once."""
     return str(uuid4())
 
 
 class Experiments:
-    """Past, running and waiting experiments."""
+    """Past, running and waiting experiments of a robot."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
         self._connection, self._robot = connection, robot
@@ -46,32 +46,33 @@ class Experiments:
     def submit(
         self, spec: ExperimentSpec, *, at: datetime | None = None, priority: int = 0, key: str | None = None
     ) -> Experiment:
-        """Puts an experiment into the queue. A lost answer is asked for again under the same `key`: it runs once."""
+        """Adds an experiment to the queue. If the answer is lost, the request is repeated with the same `key`, so it
+        runs once."""
         body = ExperimentRequest(spec=spec, at=at, priority=priority)
         headers = {"Idempotency-Key": key or new_key()}
         return self._connection.ask(Experiment, Request("POST", self._path, body, headers=headers, repeatable=True))
 
     def preview(self, spec: ExperimentSpec) -> MotionPreview:
-        """The motion and all that speaks against it; nothing is queued."""
+        """Returns the motion and the limits that it violates; nothing is queued."""
         body = ExperimentRequest(spec=spec)
         return self._connection.ask(MotionPreview, Request("POST", f"{self._path}/preview", body, repeatable=True))
 
     def get(self, experiment: str, wait: float = 0.0) -> Experiment:
-        """The present state of an experiment; with `wait` (s, at most 60) its state at its end or after that time."""
+        """Returns the state of an experiment; with `wait` (s, at most 60), the state at its end or after that time."""
         path = f"{self._path}/{experiment}"
         return self._connection.get(Experiment, path, wait=wait or None, patience=wait)
 
     def list(self, *states: ExperimentState, schedule: str | None = None) -> Iterator[Experiment]:
-        """The newest first; all states where none is named."""
+        """Yields experiments, the newest first; of all states if none is given."""
         return self._connection.every(Experiment, self._path, state=states or None, schedule=schedule)
 
     def wait(
         self, experiment: str, seconds: float | None = None, clock: Callable[[], float] = time.monotonic
     ) -> Experiment:
-        """Waits until it has ended. Raises TimeoutError after `seconds`; it goes on then.
+        """Waits until the experiment has ended. Raises TimeoutError after `seconds`; the experiment continues then.
 
-        While it waits in a queue that does not move on before somebody acts, a UserWarning says so, once for each
-        reason: the queue is paused, or consent, presence or an approval is missing.
+        If the queue waits for a person, a UserWarning reports it, once per reason: the queue is paused, or consent,
+        presence or an approval is missing.
         """
         until = None if seconds is None else clock() + seconds
         longest, told, before = FIRST_WAIT, set[str](), ""
@@ -83,73 +84,74 @@ class Experiments:
             if until is not None and clock() >= until:
                 raise TimeoutError(f"experiment {experiment} is {found.state} after {seconds:g} s")
             line, stays = self._held_up() if found.state == "queued" else ("", False)
-            if line and line not in told and (stays or line == before):  # what only passes is not worth a word
+            if line and line not in told and (stays or line == before):  # a passing reason is not reported
                 told.add(line)
                 warnings.warn(f"experiment {experiment} waits: {line}", stacklevel=2)
             longest, before = WAIT, line
 
     def _held_up(self) -> tuple[str, bool]:
-        """Why the queue lets nothing begin, empty if it does; and whether only a person changes that."""
+        """Returns why the queue starts nothing (empty if it does), and whether only a person can change that."""
         queue = self._connection.get(QueueStatus, f"{self._robot}/queue")
         return (f"the queue is paused: {queue.reason}", True) if queue.paused else (queue.waiting_for, False)
 
     def cancel(self, experiment: str, *, within: float | None = None) -> Experiment:
-        """Withdraws a waiting experiment; for a running one it stops the arm, which then needs a reset. `within`: s for
+        """Withdraws a waiting experiment. If it is running, stops the arm, which then needs a reset. `within`: s for
         the answer."""
         return self._connection.ask(Experiment, Request("POST", f"{self._path}/{experiment}/cancel", within=within))
 
     def change(self, experiment: str, spec: ExperimentSpec) -> Experiment:
-        """Gives a waiting experiment another specification. Its approval ends."""
+        """Replaces the specification of a waiting experiment, which ends its approval."""
         body = ExperimentChange(spec=spec)
         return self._connection.ask(Experiment, Request("PATCH", f"{self._path}/{experiment}", body))
 
     def approve(self, experiment: Experiment) -> Experiment:
-        """Approves a waiting experiment exactly as it is in this record, which is what the caller has looked at."""
+        """Approves a waiting experiment exactly as it is in this record, which the caller has seen."""
         body = ApprovalRequest(content=experiment.content)
         return self._connection.ask(Experiment, Request("PUT", f"{self._path}/{experiment.id}/approval", body))
 
     def withdraw_approval(self, experiment: str) -> Experiment:
-        """Ends the approval of a waiting experiment."""
+        """Withdraws the approval of a waiting experiment."""
         return self._connection.ask(Experiment, Request("DELETE", f"{self._path}/{experiment}/approval"))
 
     def set_priority(self, experiment: str, priority: int) -> Experiment:
-        """Sets the priority of a waiting experiment; higher goes first."""
+        """Sets the priority of a waiting experiment; higher runs first."""
         body = ExperimentChange(priority=priority)
         return self._connection.ask(Experiment, Request("PATCH", f"{self._path}/{experiment}", body))
 
 
 class Queue:
-    """Whether experiments are taken, and in which order."""
+    """The queue of a robot."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
         self._connection = connection
         self._path = f"{robot}/queue"
 
     def status(self) -> QueueStatus:
-        """Paused or not, and what is missing."""
+        """Returns whether the queue is paused, and what it waits for."""
         return self._connection.get(QueueStatus, self._path)
 
     def waiting(self) -> Sequence[Experiment]:
-        """What waits, in the order in which it will be run."""
+        """Returns the waiting experiments in the order in which they will run."""
         return self._connection.get(tuple[Experiment, ...], f"{self._path}/experiments")
 
     def pause(self) -> QueueStatus:
-        """Keeps further experiments from starting."""
+        """Prevents further experiments from starting."""
         return self._connection.ask(QueueStatus, Request("POST", f"{self._path}/pause"))
 
     def resume(self, *, moves_real_arm: bool = False) -> QueueStatus:
-        """Gives the operator's consent that the queue may move the arm."""
+        """Gives the operator's consent that the queue moves the arm."""
         body = QueueResume(moves_real_arm=require_word(moves_real_arm))
         return self._connection.ask(QueueStatus, Request("POST", f"{self._path}/resume", body))
 
     def attend(self, *, within: float | None = None) -> QueueStatus:
-        """Confirms that an operator is present for the next 60 s; with `within` (s for the answer) sent only once."""
+        """Confirms that an operator is present for the next 60 s. With `within` (s for the answer), the request is sent
+        only once."""
         request = Request("POST", f"{self._path}/attend", repeatable=within is None, within=within)
         return self._connection.ask(QueueStatus, request)
 
 
 class Schedules:
-    """Experiments that are submitted every so often."""
+    """Schedules, which submit experiments repeatedly."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
         self._connection = connection
@@ -166,19 +168,20 @@ class Schedules:
         count: int | None = None,
         priority: int = 0,
     ) -> Schedule:
-        """Every `every` s, or whenever `cron` (`0 2 * * *`: daily at 02:00) fits the clock of `zone` (None: that of the
-        service's computer); from `starts` (None: now), `count` times (None: without end)."""
+        """Creates a schedule: every `every` s, or at the times of `cron` (`0 2 * * *`: daily at 02:00) in time zone
+        `zone` (None: that of the service's computer). `starts`: None for now; `count`: number of runs, None for no
+        end."""
         body = ScheduleRequest(
             spec=spec, every=every, cron=cron, zone=zone, starts=starts, count=count, priority=priority
         )
         return self._connection.ask(Schedule, Request("POST", self._path, body))
 
     def get(self, schedule: str) -> Schedule:
-        """One of them."""
+        """Returns one schedule."""
         return self._connection.get(Schedule, f"{self._path}/{schedule}")
 
     def list(self) -> Iterator[Schedule]:
-        """The newest first."""
+        """Yields schedules, the newest first."""
         return self._connection.every(Schedule, self._path)
 
     def switch(self, schedule: str, *, active: bool) -> Schedule:
@@ -188,14 +191,14 @@ class Schedules:
         )
 
     def approve(self, schedule: Schedule) -> Schedule:
-        """Approves a schedule exactly as it is in this record; its later runs are approved, too."""
+        """Approves a schedule exactly as it is in this record, and so its later runs."""
         body = ApprovalRequest(content=schedule.content)
         return self._connection.ask(Schedule, Request("PUT", f"{self._path}/{schedule.id}/approval", body))
 
     def withdraw_approval(self, schedule: str) -> Schedule:
-        """Ends the approval of a schedule; runs that wait keep theirs."""
+        """Withdraws the approval of a schedule; waiting runs keep theirs."""
         return self._connection.ask(Schedule, Request("DELETE", f"{self._path}/{schedule}/approval"))
 
     def delete(self, schedule: str) -> None:
-        """Deletes a schedule; the experiments that it submitted stay."""
+        """Deletes a schedule; experiments that it submitted stay."""
         self._connection.do(Request("DELETE", f"{self._path}/{schedule}"))

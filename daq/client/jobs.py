@@ -1,4 +1,4 @@
-"""Computations in the background, and the models they make."""
+"""Background jobs, and the models that they make."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from daq.contracts.service.jobs import (
 
 
 class Jobs:
-    """Fits, validations, comparisons, diagnoses."""
+    """Fits, validations, comparisons and diagnoses of a robot."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
         self._connection = connection
         self._path = f"{robot}/jobs"
 
     def submit(self, request: JobRequest, *, key: str | None = None) -> Job:
-        """Begins a computation as soon as a worker is free; a lost answer is asked for again under the same `key`."""
+        """Submits a job. If the answer is lost, the request is repeated with the same `key`, so it runs once."""
         headers = {"Idempotency-Key": key or new_key()}
         return self._connection.ask(Job, Request("POST", self._path, request, headers=headers, repeatable=True))
 
     def get(self, job: str) -> Job:
-        """The present state of a job."""
+        """Returns the present state of a job."""
         return self._connection.get(Job, f"{self._path}/{job}")
 
     def list(self, *states: JobState, kind: JobKind | None = None) -> Iterator[Job]:
-        """The newest first; all states where none is named."""
+        """Yields jobs, the newest first; of all states if none is given."""
         return self._connection.every(Job, self._path, state=states or None, kind=kind)
 
     def wait(
@@ -51,9 +51,9 @@ class Jobs:
         seconds: float | None = None,
         look_every: float = WAIT,
     ) -> Job:
-        """Waits until it has ended; `told` is called with it at least every `look_every` s.
+        """Waits until the job has ended; calls `told` with it at least every `look_every` s.
 
-        Raises TimeoutError after `seconds`; it goes on then.
+        Raises TimeoutError after `seconds`; the job continues then.
         """
         until = None if seconds is None else clock() + seconds
         while True:
@@ -67,45 +67,45 @@ class Jobs:
                 raise TimeoutError(f"job {job} is {found.state} after {seconds:g} s")
 
     def cancel(self, job: str) -> Job:
-        """Withdraws a waiting job; asks a running one to end."""
+        """Withdraws a waiting job; requests a running one to end."""
         return self._connection.ask(Job, Request("POST", f"{self._path}/{job}/cancel"))
 
     def result(self, job: str) -> dict[str, Any]:
-        """The result of a finished job; the OpenAPI description of the service gives its form by kind of job."""
+        """Returns the result of a finished job; its form by kind of job is in the service's OpenAPI description."""
         return self._connection.get(dict[str, Any], f"{self._path}/{job}/result")
 
     def download_report(self, job: str, target: Path) -> Path:
-        """Downloads a job's report, one page. Raises SpecError when it cannot be written."""
+        """Downloads a job's report, one page. Raises SpecError if it cannot be written."""
         return _written(self._connection, f"{self._path}/{job}/report.html", target)
 
     def delete(self, job: str) -> None:
-        """An ended job and its result; a model that it made stays."""
+        """Deletes an ended job and its result; a model that it made stays."""
         self._connection.do(Request("DELETE", f"{self._path}/{job}"))
 
 
 class Models:
-    """Models that the service keeps, with what they come from."""
+    """Models stored by the service, with their origin."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
         self._connection = connection
         self._path = f"{robot}/models"
 
     def list(self) -> Iterator[ModelEntry]:
-        """The newest first."""
+        """Yields models, the newest first."""
         return self._connection.every(ModelEntry, self._path)
 
     def get(self, model: str) -> ModelDetails:
-        """A model's effects, parameters and ancestors."""
+        """Returns a model's effects, parameters and ancestors."""
         return self._connection.get(ModelDetails, f"{self._path}/{model}")
 
     def machine_parameters(self) -> Sequence[ModelParameter]:
-        """Parameters of the model that the machine file describes (`machine` in requests)."""
+        """Returns the parameters of the machine file's model (`machine` in requests)."""
         return self._connection.get(tuple[ModelParameter, ...], f"{self._path}/machine/parameters")
 
     def upload(self, file: Path, name: str | None = None) -> ModelEntry:
-        """Takes in a file as `daq fit` writes it; the same model has the same number, however often it is sent.
+        """Uploads a file written by `daq fit`. The same model always has the same ID, so it may be sent repeatedly.
 
-        Raises SpecError when the file cannot be read.
+        Raises SpecError if the file cannot be read.
         """
         try:
             content = Path(file).read_bytes()
@@ -122,16 +122,16 @@ class Models:
         return self._connection.ask(ModelEntry, request)
 
     def download(self, model: str, target: Path) -> Path:
-        """Downloads a model's file, for `daq validate` and the like. Raises SpecError when it cannot be written."""
+        """Downloads a model's file, for commands such as `daq validate`. Raises SpecError if it cannot be written."""
         return _written(self._connection, f"{self._path}/{model}/model.json", target)
 
     def change(self, model: str, *, name: str | None = None, notes: str | None = None) -> ModelEntry:
-        """A new name or notes; what is None stays."""
+        """Changes name or notes; a value of None stays unchanged."""
         body = ModelChange(name=name, notes=notes)
         return self._connection.ask(ModelEntry, Request("PATCH", f"{self._path}/{model}", body))
 
     def delete(self, model: str) -> None:
-        """Deletes a model for good. Refused while another model derives from it."""
+        """Deletes a model permanently. Refused while another model derives from it."""
         self._connection.do(Request("DELETE", f"{self._path}/{model}"))
 
 

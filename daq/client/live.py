@@ -1,4 +1,4 @@
-"""What is happening, as it happens: frames of the service's WebSocket, one after the other."""
+"""Live data: frames of the service's WebSocket."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _FRAME: TypeAdapter[LiveFrame] = TypeAdapter(LiveFrame)
 
 
 class LiveStream:
-    """An open stream. Iterate over it for frames; `next_frame` waits no longer than it is told."""
+    """An open stream. Iterate over it for frames; `next_frame` has a time-out."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
-        """Raises ServiceNotReachedError, also when the service refuses this client; MissingExtraError."""
+        """Raises ServiceNotReachedError, also if the service refuses this client; MissingExtraError."""
         self._url = f"{_websocket(connection.url)}{API}/{quote(robot)}/live"
         proxy = proxy_to(connection.url)
         self._socket = WebSocket(self._url, connection.token, CONNECT_WITHIN, LARGEST_FRAME, proxy)
@@ -40,13 +40,14 @@ class LiveStream:
         self.close()
 
     def close(self) -> None:
-        """Ends the stream."""
+        """Closes the stream."""
         self._socket.close()
 
     def subscribe(
         self, *topics: Topic, rate: SampleRate | None = None, history: float | None = None, points: int = 1000
     ) -> None:
-        """Subscribes to further topics; `rate` samples a second; `history` s of samples at once, in about `points`."""
+        """Subscribes to further topics. `rate`: samples per second; `history`: past samples (s) to send at once, in
+        about `points` points."""
         self.send(LiveRequest(subscribe=topics, rate=rate, history=history, points=points))
 
     def unsubscribe(self, *topics: Topic) -> None:
@@ -54,18 +55,18 @@ class LiveStream:
         self.send(LiveRequest(unsubscribe=topics))
 
     def send(self, request: LiveRequest) -> None:
-        """Whatever the stream takes, such as a jog command. Raises ServiceNotReachedError."""
+        """Sends any message that the stream accepts, such as a jog command. Raises ServiceNotReachedError."""
         self._socket.send(request.model_dump_json(exclude_none=True))
 
     def next_frame(self, timeout: float | None = None) -> LiveFrame | None:
-        """The next frame; None when none came within `timeout` s. Raises ServiceNotReachedError."""
+        """Returns the next frame; None if none comes within `timeout` s. Raises ServiceNotReachedError."""
         text = self._socket.receive(timeout)
         if text is None:
             return None
         try:
             return _FRAME.validate_json(text, extra="ignore")
         except ValidationError as error:
-            line = f"a frame is not as this version's service sends them: {first_invalid(error).message}"
+            line = f"a frame does not match this version of the service: {first_invalid(error).message}"
             raise ServiceNotReachedError(f"{self._url}: {line}") from error
 
     def __iter__(self) -> Iterator[LiveFrame]:
@@ -73,7 +74,7 @@ class LiveStream:
             yield frame
 
     def messages(self) -> Iterator[LiveMessage]:
-        """The messages of all frames, one by one."""
+        """Yields the messages of all frames one by one."""
         for frame in self:
             yield from frame.messages
 
@@ -81,14 +82,14 @@ class LiveStream:
 def open_stream(
     connection: Connection, robot: str, topics: Iterable[Topic], rate: SampleRate | None, history: float | None
 ) -> LiveStream:
-    """A stream that has asked for something."""
+    """Opens a stream and subscribes to topics."""
     stream = LiveStream(connection, robot)
     stream.subscribe(*topics, rate=rate, history=history)
     return stream
 
 
 def proxy_to(url: str) -> str | None:
-    """The proxy that the environment names for the service's requests: the stream goes the same way."""
+    """Returns the proxy that the environment sets for the service's requests; the stream uses it too."""
     address = httpx.URL(url)
     if is_loopback(url) or proxy_bypass(address.host):
         return None

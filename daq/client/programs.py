@@ -1,4 +1,4 @@
-"""Taught programs that the service keeps."""
+"""Taught programs stored by the service."""
 
 from __future__ import annotations
 
@@ -20,31 +20,32 @@ class _Kept(BaseModel):
 
 
 class Programs:
-    """Listed, fetched, kept, deleted. Their content is a `daq.teaching.Program`, of which this part of the client knows
-    nothing: it is handed in."""
+    """Lists, reads, stores and deletes programs. Their content is a `daq.teaching.Program`; the caller passes that
+    class."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
         self._connection = connection
         self._path = f"{robot}/programs"
 
     def list(self) -> tuple[ProgramEntry, ...]:
-        """The programs, most recently changed first."""
+        """Returns the programs, most recently changed first."""
         return self._connection.get(tuple[ProgramEntry, ...], self._path)
 
     def get(self, kind: type[Content], name: str) -> tuple[Content, ProgramEntry]:
-        """One of them, read as `kind`, with the revision that a change of it names. Raises ServiceError."""
+        """Returns a program, parsed as `kind`, with the revision that a change must state. Raises ServiceError."""
         found = self._connection.get(_Kept, f"{self._path}/{name}")
         return kind.model_validate(found.program), found.entry
 
     def put(self, program: BaseModel, name: str, *, revision: int | None = None) -> ProgramEntry:
-        """Keeps a new program as `name`, or a change of the `revision` of the one that has it.
+        """Stores a new program as `name`, or changes the existing one of that `revision`.
 
-        A program with another name in it renames that one. Raises ServiceError where that revision is not the newest.
+        If the program contains another name, the stored one is renamed. Raises ServiceError if that revision is not the
+        newest.
         """
         query = {} if revision is None else {"revision": revision}
         request = Request("PUT", f"{self._path}/{name}", program, query=query, repeatable=True)
         return self._connection.ask(ProgramEntry, request)
 
     def delete(self, name: str) -> None:
-        """Deletes one for good."""
+        """Deletes a program permanently."""
         self._connection.do(Request("DELETE", f"{self._path}/{name}"))

@@ -22,10 +22,10 @@ from daq.contracts.service.robot import Done, JointGains, ProcessState, ResetReq
 from daq.contracts.service.teaching import CalibrationRequest, TeachingStatus
 
 CONNECT_PATIENCE = 60.0
-"""Time (s) allowed for a mock with its physics engine to start on a busy computer."""
+"""Time (s) for a mock with its physics engine to start on a busy computer."""
 NUMBERED_WITHIN, LOOK_EVERY = 5.0, 0.02
-"""Times (s) for the service to read the number of a stop just made, which takes a control period or two, and between
-two looks for it."""
+"""Times (s): for the service to read the number of a new stop (a control period or two), and between two checks for
+it."""
 
 
 class Robot:
@@ -45,34 +45,34 @@ class Robot:
         self.programs = Programs(connection, self._path)
 
     def stop(self) -> StopResult:
-        """Freezes the arm, at once. Read `confirmed`: anything else means that the emergency stop is needed.
+        """Freezes the arm at once. If `confirmed` is false, the emergency stop is needed.
 
-        Asked for at the service and at its stop listener at the same time; never raises.
+        The request goes to the service and to its stop listener at the same time. Never raises.
         """
         return stopping.stop(self._stop_addresses, self._path, self._connection.token)
 
     def status(self) -> RobotStatus:
-        """The present status; every value states its age."""
+        """Returns the present status; every value has its age."""
         return self._connection.get(RobotStatus, self._path)
 
     def machine(self) -> Machine:
-        """Its machine file, with the service's limits in it."""
+        """Returns its machine file, with the service's limits."""
         return self._connection.get(Machine, f"{self._path}/machine")
 
     def connect(self) -> RobotStatus:
-        """Has the service connect, and keep connected. Moves nothing."""
+        """Makes the service connect, and stay connected. Moves nothing."""
         request = Request("POST", f"{self._path}/connect", repeatable=True, patience=CONNECT_PATIENCE)
         return self._connection.ask(RobotStatus, request)
 
     def disconnect(self) -> Done:
-        """Has the service give the port back."""
+        """Makes the service return the port."""
         return self._connection.ask(Done, Request("POST", f"{self._path}/disconnect"))
 
     def reset(self, *, here: bool = False, stop: int | None = None) -> Done:
-        """Ends a stop or a fault; with `here` the posture measured now becomes the set points first.
+        """Ends a stop or a fault. With `here`, the set points are first set to the measured posture.
 
-        stop: which one, by `RobotStatus.stop`; None for the one that is in force when this is called. A later one
-            holds, and raises ServiceError.
+        stop: number of the stop (`RobotStatus.stop`); None for the one in force now. A newer stop stays in force and
+            raises ServiceError.
         """
         body = ResetRequest(stop=self._newest_stop() if stop is None else stop, here=here)
         return self._connection.ask(Done, Request("POST", f"{self._path}/reset", body))
@@ -81,7 +81,7 @@ class Robot:
         until = time.monotonic() + NUMBERED_WITHIN
         while (found := self.status()).stop is None and found.arm != "disconnected" and time.monotonic() < until:
             time.sleep(LOOK_EVERY)
-        return found.stop or 0  # which releases no stop: the service says what is wrong
+        return found.stop or 0  # releases no stop: the service returns the error
 
     def gains(self) -> JointGains:
         """P, I, D of every joint."""
@@ -92,27 +92,27 @@ class Robot:
         return self._connection.get(ProcessState, f"{self._path}/process")
 
     def teaching(self) -> TeachingStatus:
-        """What is being taught now, and how the last one ended."""
+        """Returns the current teaching activity, and how the last one ended."""
         return self._connection.get(TeachingStatus, f"{self._path}/teaching")
 
     def events(self, experiment: str | None = None) -> Iterator[ServiceEvent]:
-        """What happened, and who asked for it; the newest first."""
+        """Yields events and who caused them, the newest first."""
         return self._connection.every(ServiceEvent, f"{self._path}/events", experiment=experiment)
 
     def control_status(self) -> Control:
-        """Who may move it now."""
+        """Returns who may move the robot now."""
         return self._connection.get(Control, f"{self._path}/control")
 
     def control(self, *, moves_real_arm: bool = False) -> HeldControl:
-        """The control of the robot, for a `with` block; a real arm needs the operator's word."""
+        """Returns the control of the robot, for a `with` block; a real arm requires the operator's consent."""
         return HeldControl(self._connection, self._path, moves_real_arm=moves_real_arm)
 
     def calibrate_gain(self, joints: Sequence[int] = (1, 2, 3)) -> Experiment:
-        """Queues the experiment that shows the actual proportional gains (`traces.gains` tells them afterwards)."""
+        """Queues the experiment that shows the actual proportional gains; `traces.gains` then computes them."""
         path, headers = f"{self._path}/calibrations/gain", {"Idempotency-Key": new_key()}
         body = CalibrationRequest(joints=tuple(joints))
         return self._connection.ask(Experiment, Request("POST", path, body, headers=headers, repeatable=True))
 
     def live(self, *topics: Topic, rate: SampleRate | None = None, history: float | None = None) -> LiveStream:
-        """A stream of what happens: samples, robot, link, queue, jobs, events, teaching."""
+        """Opens a live stream of samples, robot, link, queue, jobs, events and teaching."""
         return open_stream(self._connection, self._path, topics, rate, history)

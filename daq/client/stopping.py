@@ -1,5 +1,5 @@
-"""A stop through the service, requested at two addresses at once: the service's own, and the stop listener's, which
-does not depend on the service's event loop."""
+"""Requests a stop at two addresses at once: the service's, and that of the stop listener, which does not depend on the
+service's event loop."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from daq.contracts.service.system import stop_port_after
 
 CONNECT_WITHIN = 1.0
 ANSWER_WITHIN = 3.0
-"""Time-out (s) for one address; the service itself answers within 1.1 s, whatever the link does."""
+"""Time-out (s) for one address; the service itself answers within 1.1 s, even without a link."""
 
 
 class RefusedStop(StopResult):
-    """The service has answered, and says why it does not stop."""
+    """The service answered why it does not stop."""
 
 
 class NoSuchRobot(RefusedStop):
-    """The service has answered, and has no robot of this name."""
+    """The service answered that it has no robot of this name."""
 
 
 def stop_addresses(url: str, stop_url: str | None = None) -> list[str]:
-    """Where a stop can be asked for: at the service, and at its stop listener, which is `stop_url` or, where the
-    service's address says its port, the port after that."""
+    """Returns the addresses for a stop: the service, and its stop listener. The latter is `stop_url`, otherwise the
+    port after the service's, if its address contains one."""
     if stop_url is not None:
         return [url, stop_url.rstrip("/")]
     found = httpx.URL(url)
@@ -41,9 +41,9 @@ def stop_addresses(url: str, stop_url: str | None = None) -> list[str]:
 
 
 def stop(addresses: Sequence[str], path: str, token: str | None, kind: type[StopResult] = StopResult) -> StopResult:
-    """Asks at every address at once; the first confirmed answer counts, else the one that says most.
+    """Requests a stop at every address at once. The first confirmed answer counts, otherwise the most informative one.
 
-    Never raises: what is not known is in the result, which then says to use the emergency stop.
+    Never raises: errors are in the result, which then advises to use the emergency stop.
     """
     headers = {} if token is None else {"Authorization": f"Bearer {token}"}
     pool = ThreadPoolExecutor(len(addresses), thread_name_prefix="stop")
@@ -63,7 +63,7 @@ def stop(addresses: Sequence[str], path: str, token: str | None, kind: type[Stop
 
 
 def _tells(answer: StopResult) -> tuple[bool, bool, bool, bool, bool]:
-    """Rank of an answer: the higher, the more it confirms, or says of why it does not."""
+    """Rank of an answer: the more it confirms or explains, the higher."""
     refused, is_unknown = isinstance(answer, RefusedStop), isinstance(answer, NoSuchRobot)
     return answer.confirmed, answer.delivered, answer.seconds > 0, is_unknown, refused
 

@@ -1,4 +1,4 @@
-"""Traces: search, look into, download, upload, tag."""
+"""Lists, reads, downloads, uploads and tags traces of the service."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from daq.contracts.service.teaching import MeasuredGain
 from daq.contracts.service.traces import CatalogueEntry, TraceChange, TraceDetails, TraceSignals
 
 LAST = "last"
-"""Name of the newest trace, in place of its number."""
+"""Name of the newest trace, usable in place of its ID."""
 MCAP = b"\x89MCAP0\r\n"
-"""First bytes of a file of MCAP."""
+"""First bytes of an MCAP file."""
 KINDS = {".mcap": "application/octet-stream", ".csv": "text/csv"}
 MOST_NAMED = 4
-"""Number of traces named in the error about an ambiguous beginning."""
+"""Most traces listed in the error about an ambiguous name."""
 FETCH_LOOK = 0.5
-"""Pause (s) between two looks at a trace that the service fetches from its archive."""
+"""Pause (s) between two checks of a trace that is being fetched from the archive."""
 Progress = Callable[[Transfer], None]
 UPLOAD_WITHIN = 600.0
 """Time-out (s) for the answer to an upload."""
 
 
 class Traces:
-    """The service's catalogue."""
+    """The service's catalogue of traces."""
 
     def __init__(self, connection: Connection, robot: str) -> None:
         self._connection = connection
@@ -48,7 +48,7 @@ class Traces:
         since: datetime | None = None,
         until: datetime | None = None,
     ) -> Iterator[CatalogueEntry]:
-        """The newest first; `text` is looked for in number, file, name, kind, operator, notes and tags."""
+        """Yields traces, the newest first; `text` is searched in ID, file, name, kind, operator, notes and tags."""
         return self._connection.every(
             CatalogueEntry,
             self._path,
@@ -62,12 +62,12 @@ class Traces:
         )
 
     def get(self, trace: str) -> TraceDetails:
-        """A trace's description, figures and events."""
+        """Returns a trace's record, key figures and events."""
         return self._connection.get(TraceDetails, f"{self._path}/{trace}")
 
     def find(self, wanted: str) -> CatalogueEntry:
-        """The one that `wanted` names: `last`, or the beginning of a number or of a file's name, as on the command
-        line. Raises TraceError when there is none, or when several begin so."""
+        """Returns the trace for `wanted`: `last`, or the beginning of an ID or file name, as on the command line.
+        Raises TraceError if no trace or several match."""
         if wanted == LAST:
             newest = next((entry for entry in self.list() if not entry.missing), None)
             if newest is None:
@@ -76,34 +76,34 @@ class Traces:
         found = [one for one in self.list(wanted[:100]) if one.id.startswith(wanted) or one.file.startswith(wanted)]
         exact = [entry for entry in found if entry.id == wanted]
         if not found:
-            raise TraceError(f"trace {wanted!r}: none of the service has a number or name that begins so")
+            raise TraceError(f"trace {wanted!r}: no trace of the service has this ID or name")
         if len(found) > 1 and not exact:
             names = ", ".join(entry.file for entry in found[:MOST_NAMED])
-            raise TraceError(f"trace {wanted!r}: {len(found)} traces of the service begin so: {names}; give more of it")
+            raise TraceError(f"trace {wanted!r}: {len(found)} of the service match: {names}; give more characters")
         return exact[0] if exact else found[0]
 
     def archive(self) -> ArchiveStatus:
-        """The state of the archive. Raises ServiceError (`no-archive`) where there is none."""
+        """Returns the state of the archive. Raises ServiceError (`no-archive`) if there is none."""
         return self._connection.get(ArchiveStatus, f"{self._robot}/archive")
 
     def archived(self, trace: str) -> TraceArchive:
-        """Where a trace is, and how far it is on its way to the archive or back."""
+        """Returns where a trace is stored, and its transfer to or from the archive."""
         return self._connection.get(TraceArchive, f"{self._path}/{trace}/archive")
 
     def send_to_archive(self, trace: str, *, drop: bool = False) -> TraceArchive:
-        """Has a trace sent now; with `drop`, the service's local copy goes when the archive has it. Does not wait."""
+        """Archives a trace now; with `drop`, the service then deletes its local copy. Does not wait."""
         request = Request("POST", f"{self._path}/{trace}/archive", ArchiveOrder(drop=drop), repeatable=True)
         return self._connection.ask(TraceArchive, request)
 
     def fetch(self, trace: str, progress: Progress = lambda _transfer: None) -> TraceArchive:
-        """Has a trace fetched from the archive, and waits until the service has it; `progress` is called meanwhile.
+        """Fetches a trace from the archive, and waits until the service has it; calls `progress` meanwhile.
 
-        Raises ServiceError when it cannot be fetched. While the archive is away, this waits.
+        Raises ServiceError if it cannot be fetched. While the archive cannot be reached, this waits.
         """
         request = Request("POST", f"{self._path}/{trace}/fetch", repeatable=True)
         found = self._connection.ask(TraceArchive, request)
         while not found.local:
-            if found.transfer is None:  # somebody else was told that it failed
+            if found.transfer is None:  # the failure was reported to another client
                 found = self._connection.ask(TraceArchive, request)
             else:
                 progress(found.transfer)
@@ -116,7 +116,7 @@ class Traces:
         return found
 
     def _details(self, trace: str) -> TraceDetails:
-        """The same as `get`, after the service has fetched the trace from the archive, where it has to."""
+        """Like `get`, but first fetches the trace from the archive if necessary."""
         try:
             return self.get(trace)
         except ServiceError as error:
@@ -126,7 +126,7 @@ class Traces:
             return self.get(trace)
 
     def _download(self, trace: str, name: str, target: Path, progress: Progress) -> None:
-        """Downloads a file of a trace, which the service fetches from the archive before, where it has to."""
+        """Downloads a file of a trace, which is first fetched from the archive if necessary."""
         path = f"{self._path}/{trace}/{name}"
         try:
             self._connection.download(path, target)
@@ -137,10 +137,10 @@ class Traces:
             self._connection.download(path, target)
 
     def download(self, trace: str, target: Path, progress: Progress = lambda _transfer: None) -> Path:
-        """The file as it was recorded: to `target`, or under its own name where that is a folder. `progress` is called
-        while the service fetches it from the archive.
+        """Downloads the recorded file to `target`; to a folder, under its own name. Calls `progress` while the service
+        fetches it from the archive.
 
-        Returns the file. Raises TraceError when another one is there, or it cannot be written.
+        Returns the file. Raises TraceError if another file exists there, or it cannot be written.
         """
         target = Path(target)
         if target.is_dir():
@@ -153,7 +153,7 @@ class Traces:
             try:
                 self._download(trace, "data.mcap", fetched, progress)
                 if fetched.read_bytes() != target.read_bytes():
-                    raise TraceError(f"{target}: is there already, and is not trace {trace}; nothing was written over")
+                    raise TraceError(f"{target}: exists and is not trace {trace}; nothing was overwritten")
             finally:
                 fetched.unlink(missing_ok=True)
         except OSError as error:
@@ -161,7 +161,7 @@ class Traces:
         return target
 
     def download_csv(self, trace: str, target: Path) -> Path:
-        """Time and signals as plain CSV, in s, rad and V. Raises TraceError when it cannot be written."""
+        """Downloads time and signals as plain CSV, in s, rad and V. Raises TraceError if it cannot be written."""
         try:
             self._download(trace, "data.csv", target, lambda _transfer: None)
         except OSError as error:
@@ -176,15 +176,15 @@ class Traces:
         return self._connection.get(TraceSignals, path, points=points, start=start, end=end)
 
     def upload(self, file: Path) -> CatalogueEntry:
-        """Takes in a trace from elsewhere: .mcap of this project, or plain .csv. Raises TraceError for another file,
-        ServiceError where the service has it already (`trace-exists`)."""
+        """Uploads a trace: .mcap of this project, or plain .csv. Raises TraceError for another file, ServiceError if
+        the service has it already (`trace-exists`)."""
         file = Path(file)
         try:
             with file.open("rb") as stream:
                 suffix = ".mcap" if stream.read(len(MCAP)) == MCAP else file.suffix.lower()
             kind = KINDS.get(suffix)
             if kind is None:
-                raise TraceError(f"{file}: is no trace: {' or '.join(KINDS)} are taken")
+                raise TraceError(f"{file}: is no trace: {' or '.join(KINDS)} are accepted")
             size = file.stat().st_size
             with file.open("rb") as stream:
                 pieces = iter(lambda: stream.read(PART), b"")
@@ -195,11 +195,11 @@ class Traces:
             raise TraceError(f"{file}: cannot be read: {error.strerror or error}") from error
 
     def upload_unless_there(self, file: Path, number: str) -> CatalogueEntry:
-        """The same, for a trace whose number is known: one that the service has is not sent again."""
+        """Uploads a trace with a known ID, unless the service has it already."""
         return self.known(number) or self.upload(file)
 
     def known(self, number: str) -> CatalogueEntry | None:
-        """The entry of a trace; None if the robot has none of this number."""
+        """Returns the entry of a trace; None if the robot has none with this ID."""
         try:
             return self.get(number).entry
         except ServiceError as error:
@@ -208,14 +208,14 @@ class Traces:
             return None
 
     def change(self, trace: str, *, tags: Sequence[str] | None = None, notes: str | None = None) -> CatalogueEntry:
-        """New tags or notes; what is None stays."""
+        """Changes tags or notes; a value of None stays unchanged."""
         body = TraceChange(tags=None if tags is None else tuple(tags), notes=notes)
         return self._connection.ask(CatalogueEntry, Request("PATCH", f"{self._path}/{trace}", body))
 
     def delete(self, trace: str) -> None:
-        """Deletes a trace for good. Refused while a model or a job refers to it."""
+        """Deletes a trace permanently. Refused while a model or a job refers to it."""
         self._connection.do(Request("DELETE", f"{self._path}/{trace}"))
 
     def gains(self, trace: str) -> Sequence[MeasuredGain]:
-        """The actual proportional gains that a trace shows."""
+        """Returns the actual proportional gains, as computed from a trace."""
         return self._connection.get(tuple[MeasuredGain, ...], f"{self._path}/{trace}/gain")

@@ -1,4 +1,5 @@
-"""The WebSocket below a live stream. The library is imported when a stream is opened: other clients do without it."""
+"""The WebSocket of a live stream. Its library is imported only when a stream is opened, so other clients do not need
+it."""
 
 from __future__ import annotations
 
@@ -12,20 +13,20 @@ if TYPE_CHECKING:
     from websockets.exceptions import ConnectionClosed
 
 CLOSE_WITHIN = 2.0
-"""Time (s) that the service has to confirm the end."""
+"""Longest wait (s) for the service to confirm the end."""
 
 
 class WebSocket:
-    """An open connection for texts."""
+    """An open connection for text messages."""
 
     def __init__(self, url: str, token: str | None, within: float, largest: int, proxy: str | None) -> None:
         """Opens the connection.
 
         Args:
-            within: time (s) that the service has to answer.
-            largest: limit (bytes) of a text.
+            within: longest wait (s) for the service's answer.
+            largest: size limit (bytes) of a message.
 
-        Raises ServiceNotReachedError, also when the service refuses this client; MissingExtraError.
+        Raises ServiceNotReachedError, also if the service refuses this client; MissingExtraError.
         """
         require_extra("live", "the live stream", "websockets")
         from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidProxy, InvalidURI
@@ -58,7 +59,7 @@ class WebSocket:
             raise self._lost(error) from error
 
     def receive(self, timeout: float | None) -> str | bytes | None:
-        """The next text; None when none came within `timeout` s. Raises ServiceNotReachedError."""
+        """Returns the next text; None if none comes within `timeout` s. Raises ServiceNotReachedError."""
         try:
             return self._socket.recv(timeout)
         except TimeoutError:
@@ -67,7 +68,7 @@ class WebSocket:
             raise self._lost(error) from error
 
     def close(self) -> None:
-        """Ends the connection."""
+        """Closes the connection."""
         self._closed_last.close()
 
     def _lost(self, error: ConnectionClosed) -> ServiceNotReachedError:

@@ -1,1 +1,1 @@
-"""The configuration: which robot, on which port, with which limits, where traces go."""
+"""The configuration: robots, ports, limits, and the folder of traces."""

@@ -1,7 +1,7 @@
-"""The documents: the site that Sphinx has built (`make docs`), or else the same pages made from their Markdown here.
+"""The documentation: the site built by Sphinx (`make docs`) or, without it, pages rendered here from the same Markdown.
 
-What is made here has no search, no outputs of notebooks and no pages that are generated from the code. It needs nothing
-that is not installed, and no time: a page is made when it is asked for.
+Pages rendered here have no search, no notebook output and no pages generated from the code. They need no build and no
+further packages: each is rendered when it is requested.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 _HERE = Path(__file__).parents[2]
 PLACES = (_HERE / "docs" / "_site", _HERE / "ma2000" / "docs_site")
-"""Of the built site, in the source tree and in an installed package (hatch_build.py)."""
+"""Folders of the built site: in the source tree, and in an installed package (hatch_build.py)."""
 SOURCES = (_HERE, _HERE / "ma2000" / "documents")
-"""Roots that the Markdown lies below as in the repository: the source tree, and an installed package."""
+"""Roots of the Markdown files: the source tree, and an installed package."""
 INDEX = "index.html"
 STYLE = Path(__file__).with_name("documents.css")
 BROUGHT = {
@@ -30,7 +30,7 @@ BROUGHT = {
     "reference/changes": "CHANGELOG.md",
     "explanation/contributing": "CONTRIBUTING.md",
 }
-"""Pages of the site whose text lies elsewhere in the repository; that of the protocol stays in its package."""
+"""Pages of the site whose source lies elsewhere in the repository."""
 PICTURES = {".png": "image/png", ".svg": "image/svg+xml"}
 LINK = re.compile(r"(\[[^\]]*)(\]\(<?)([^)\s>]+)(>?\))")
 CODE = re.compile(r"(^[ ]*```.*?^[ ]*```)", re.DOTALL | re.MULTILINE)
@@ -40,18 +40,18 @@ TITLE = re.compile(r"^# (.+)$", re.MULTILINE)
 
 
 def site_index() -> Path | None:
-    """First page of the built site; None where it is not built."""
+    """First page of the built site; None if it is not built."""
     return next((place / INDEX for place in PLACES if (place / INDEX).is_file()), None)
 
 
 def documents() -> Documents:
-    """The pages as they are made here."""
+    """Returns the pages that are rendered here."""
     return Documents(next((root for root in SOURCES if (root / "docs" / "index.md").is_file()), _HERE))
 
 
 def brought(docname: str, text: str, root: Path = _HERE) -> str:
-    """The text of a page with its links as they are from the place of `docname` in the site, and without the names of
-    files as texts of links: the title of the page takes their place."""
+    """Returns the text of a page with links relative to `docname` in the site. File names as link texts are removed, so
+    that page titles replace them."""
     origin = (root / BROUGHT.get(docname, f"docs/{docname}.md")).parent
     place = (root / "docs" / docname).parent
     home = {(root / path).resolve(): name for name, path in BROUGHT.items()}
@@ -77,17 +77,17 @@ def brought(docname: str, text: str, root: Path = _HERE) -> str:
 
 @dataclass(frozen=True)
 class Documents:
-    """The pages below the folder `docs` of a root, as HTML."""
+    """HTML of the pages below a root's folder `docs`."""
 
     root: Path
 
     @cached_property
     def folder(self) -> Path:
-        """Where the pages and their pictures lie."""
+        """The folder of the pages and their pictures."""
         return (self.root / "docs").resolve()
 
     def file(self, address: str) -> tuple[bytes, str] | None:
-        """Content and media type of what an address below the site's own names; None where there is nothing."""
+        """Returns content and media type for an address of the site; None if it does not exist."""
         address = address or INDEX
         if address == STYLE.name:
             return STYLE.read_bytes(), "text/css; charset=utf-8"
@@ -97,7 +97,7 @@ class Documents:
                 return None
             if path.suffix in PICTURES and path.is_file():
                 return path.read_bytes(), PICTURES[path.suffix]
-        except (ValueError, OSError):  # no name that a file can have
+        except (ValueError, OSError):  # not a possible file name
             return None
         docname = path.relative_to(self.folder).with_suffix("").as_posix()
         if path.suffix != ".html" or docname not in self.names:
@@ -105,7 +105,7 @@ class Documents:
         return self._page(docname).encode(), "text/html; charset=utf-8"
 
     def write(self, folder: Path) -> Path:
-        """Writes all of it into a folder; returns the first page. Raises OSError."""
+        """Writes the whole site into a folder and returns its first page. Raises OSError."""
         pictures = (path.relative_to(self.folder).as_posix() for path in self.folder.glob("images/*"))
         for address in (STYLE.name, *pictures, *(f"{name}.html" for name in self.names)):
             found = self.file(address)
@@ -117,7 +117,7 @@ class Documents:
 
     @cached_property
     def names(self) -> frozenset[str]:
-        """Names of the pages: their places below the folder, without ending."""
+        """Names of the pages: their paths below the folder, without suffix."""
         paths = (path.relative_to(self.folder) for path in self.folder.rglob("*.md"))
         return frozenset(path.with_suffix("").as_posix() for path in paths if path.parts[0] != "_site")
 
@@ -131,7 +131,7 @@ class Documents:
         return found[1].replace("`", "") if found else docname
 
     def _below(self, docname: str) -> Iterator[str]:
-        """Names of the pages that a page's table of contents names."""
+        """Yields the pages in a page's table of contents."""
         for tree in TREE.findall(self._text(docname)):
             for entry in tree.splitlines():
                 path = (self.folder / docname).parent / entry
@@ -141,7 +141,7 @@ class Documents:
 
     @cached_property
     def _contents(self) -> tuple[tuple[str, str, tuple[tuple[str, str], ...]], ...]:
-        """(name, title, pages below it) of every part of the site."""
+        """Returns (name, title, pages below it) of every part of the site."""
         parts = [(name, tuple(self._below(name))) for name in self._below("index")]
         return tuple((name, self._title(name), tuple((p, self._title(p)) for p in pages)) for name, pages in parts)
 
@@ -183,7 +183,7 @@ class Documents:
         for place, token in enumerate(tokens):
             if token.type == "heading_open":
                 token.attrSet("id", _anchor(tokens[place + 1], taken))
-            if style := token.attrGet("style"):  # the service's policy allows none inside a page
+            if style := token.attrGet("style"):  # the service's policy forbids inline styles
                 del token.attrs["style"]
                 token.attrSet("class", str(style).rpartition(":")[2])
             for child in _links(token):
@@ -194,7 +194,7 @@ class Documents:
         return str(parser.renderer.render(tokens, parser.options, {}))
 
     def _lead(self, link: Token, docname: str) -> None:
-        """Makes a link lead to the page or the picture; one to what the site does not have leads nowhere."""
+        """Points a link to its page or picture; a link outside the site loses its target."""
         target, hash_sign, anchor = str(link.attrGet("href") or "").partition("#")
         if not target or re.match(r"[a-z][a-z+.-]*:", target):
             return
@@ -207,7 +207,7 @@ class Documents:
             link.attrSet("title", f"in the source tree: docs/{name}" if not name.startswith("..") else name[3:])
 
     def _name_links(self, children: list[Token], docname: str) -> None:
-        """Ends what leads nowhere as it begins, and gives a link without text the title of its page."""
+        """Closes links without target, and gives a link without text the title of its page."""
         open_links: list[Token] = []
         for place in range(len(children) - 1, -1, -1):
             token = children[place]
@@ -234,7 +234,7 @@ def _links(token: Token) -> list[Token]:
 
 
 def _anchor(heading: Token, taken: set[str]) -> str:
-    """Anchor of a heading as forges and MyST make it: lower case, spaces as dashes, no other signs, each once."""
+    """Anchor of a heading as in GitHub and MyST: lower case, dashes for spaces, no other punctuation, unique."""
     text = "".join(child.content for child in heading.children or ())
     first = re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-")
     anchor, number = first, 0

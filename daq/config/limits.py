@@ -8,9 +8,9 @@ from daq.contracts.machine import Machine
 
 
 def merged_limits(machine: Machine, given: Limits) -> Limits:
-    """The machine's limits, with those that `given` sets replaced, joint by joint. Raises SpecError.
+    """Returns the machine's limits, replaced by those in `given`, joint by joint. Raises SpecError.
 
-    To take a limit away, write a machine file without it.
+    To remove a limit, use a machine file without it.
     """
     changes: dict[str, object] = {name: getattr(given, name) for name in given.model_fields_set - {"joints"}}
     if given.joints:

@@ -1,4 +1,4 @@
-"""Writes a machine as the TOML file from which it can be loaded again, in the short form."""
+"""Writes a machine as a TOML file in the short form, from which it can be loaded again."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from daq.contracts.toml_places import places_of
 from daq.contracts.written_numbers import NUMBERS, UNSTATED, number_text, read_number
 
 WIDTH = 118
-"""Most characters of a line; a longer table has a line for each number."""
+"""Most characters per line; a longer table gets one line per number."""
 _NUMBER = {"value", "unit", "source"}
 
 
 OTHER_UNITS = {"rad": ("deg", 180.0 / math.pi), "s": ("ms", 1e3), "m": ("mm", 1e3)}
-"""Units in which a number may be shorter, and how many of them are one."""
+"""Units that may be shorter to write, with their factors."""
 ALIKE = ("drive", "friction", "sensor")
-"""Parts that a joint may take over from another."""
+"""Parts of a joint that may be copied from another by `like`."""
 
 
 def machine_text(
     machine: Machine, comments: Mapping[str, Sequence[str]] | None = None, drives: Mapping[int, str] | None = None
 ) -> str:
-    """A machine file: what is the default is left out, and the source of numbers stands behind them.
+    """Returns the text of a machine file. Defaults are left out; sources are comments after their numbers.
 
-    comments: lines to be kept, by the part of the file that they stand before: `""` for its top, `controller`,
-    `limits`, or `joints.1` and so on. drives: names of the library, by joint (from 1), that are written in place of its
-    drive, friction and sensor; if all joints have one, the controller is that of the servos.
+    comments: whole-line comments to keep, by the part that they precede: `""` for the top, `controller`, `limits`, or
+    `joints.1` and so on. drives: names from the library by joint (from 1), written in place of drive, friction and
+    sensor; if all joints have one, the controller is that of the servos.
     """
     named = drives or {}
     kept = {} if comments is None else comments
@@ -68,7 +68,7 @@ def machine_text(
 
 
 def _after(lines: list[str], comments: Sequence[str]) -> list[str]:
-    """A table's lines, with comments between the empty line before it and its head."""
+    """Returns a table's lines, with comments between the blank line before it and its heading."""
     return [*lines[:1], *comments, *lines[1:]] if not lines[0] else [*comments, *lines]
 
 
@@ -109,7 +109,7 @@ def _drive(drive: dict[str, Any]) -> dict[str, Any]:
 
 
 def _table(name: str, table: dict[str, Any], above: str) -> list[str]:
-    """A table in a line, if it fits and one source is behind all of its numbers; else with a line for each."""
+    """Writes a table on one line, if it fits and all its numbers have one source; otherwise one line per number."""
     sources = {one["source"] for value in table.values() for one in _numbers(value)}
     assumed = {bool(one.get("assumed")) for value in table.values() for one in _numbers(value)}
     if len(sources) < 2 and len(assumed) < 2:
@@ -124,7 +124,7 @@ def _table(name: str, table: dict[str, Any], above: str) -> list[str]:
 
 
 def _entry(key: str, value: Any) -> list[str]:
-    """A list of numbers with different sources has a line for each."""
+    """Writes an entry; a list of numbers with different sources gets one line per number."""
     numbers = _numbers(value)
     comments = [_comment(one) for one in numbers]
     line = f"{key} = {_value(value)}"
@@ -148,7 +148,7 @@ def _value(value: Any, *, sourced: bool = False) -> str:
 
 
 def _short(number: dict[str, Any]) -> str:
-    """The number's text: in a smaller unit where it is shorter so, and read back as the same."""
+    """Writes a number, in a smaller unit if that is shorter and reads back as the same value."""
     plain = number_text(number)
     unit, factor = OTHER_UNITS.get(number["unit"], ("", 0.0))
     if not unit or number["value"] == 0.0:
@@ -182,14 +182,14 @@ def _is_default(value: Any) -> bool:
 
 
 def _is_plain_zero(number: dict[str, Any]) -> bool:
-    """Whether nobody says more of a number than that it is 0."""
+    """Whether a number is 0 without any other property."""
     return bool(number["value"] == 0.0) and not set(number) - _NUMBER - {"assumed"}
 
 
 def tidied(text: str, origin: str) -> str:
-    """A machine file in the short form; lines of comments stay before the part that they stand at.
+    """Returns a machine file in the short form; whole-line comments stay before their parts.
 
-    Raises SpecError for a file that is no machine's.
+    Raises SpecError for a file that is not a machine file.
     """
     machine = parse_machine(text, origin)
     places = places_of(text)

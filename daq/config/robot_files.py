@@ -1,4 +1,4 @@
-"""Files that a configuration names and this layer reads."""
+"""Reads files that a configuration names."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from firmware_protocol.memory_map import MemoryMap, default_memory_map, open_pla
 
 
 def load_memory_map(path: Path | None) -> MemoryMap:
-    """The memory map of a file, or the one that ships. Raises SpecError with one line."""
+    """Returns the memory map of a file, or the packaged one. Raises a one-line SpecError."""
     if path is None:
         return default_memory_map()
     text = read_text(path, f"memory map {path}")
     try:
-        parse_toml(text, str(path))  # bounds how long and how deep it may be
+        parse_toml(text, str(path))  # limits its length and nesting
     except SpecError as error:
         raise SpecError(f"{path}: {why}") if (why := open_places(text)) else error from None
     try:

@@ -1,4 +1,4 @@
-"""What a section of the configuration has that a plug-in adds."""
+"""Base class of configuration sections that plug-ins add."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from daq.contracts.frozen import FrozenRecord
 
 
 class Section(FrozenRecord):
-    """A section that a plug-in adds: `Plugin.settings` names the class. Every key has a default."""
+    """A section added by a plug-in: `Plugin.settings` names the class. Every key has a default."""
 
     SHOWN: ClassVar[frozenset[str]] = frozenset()
-    """Keys whose wrong values an error shows. Those of any other key may be secrets."""
+    """Keys whose wrong values errors may show. Values of all other keys may be secrets."""
 
     def digested(self) -> dict[str, Any]:
-        """Returns what the audit log computes a digest of: it changes with the section."""
+        """Returns the data for the section's digest in the audit log, which changes with the section."""
         return self.model_dump(mode="json")

@@ -1,4 +1,4 @@
-"""Strict TOML configuration. An unknown key is an error, and every error names key, value and what is allowed."""
+"""Strict TOML configuration. An unknown key is an error; each error names the key, its value and what is allowed."""
 
 from __future__ import annotations
 
@@ -42,49 +42,49 @@ SERVER_VARIABLE = "DAQ_SERVER"
 
 RobotName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")]
 MOST_ROBOTS = 32
-"""Largest number of robots of one service: an assumption. Each has a process of its own, and a dozen threads."""
+"""Most robots of one service (an assumption). Each has its own process and a dozen threads."""
 
 
 class RobotSettings(FrozenRecord):
-    """The arm: its name in files and addresses, its machine file, its port."""
+    """The arm: its name, its machine file, its port."""
 
     name: RobotName = "ma2000"
     """Name of the arm in files and addresses."""
     machine: str = "ma2000"
-    """A machine of the package, or a machine file."""
+    """Name of a packaged machine, or path of a machine file."""
     port: str | None = None
-    """URL of the port; without one, runs use a mock."""
+    """URL of the port; without it, runs use a mock."""
     memory_map: Path | None = None
-    """File of the memory map; without one, that of the package, whose addresses are mostly assumed."""
+    """File of the memory map; None for the packaged one, whose addresses are mostly assumptions."""
     limits: Limits | None = None
-    """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
+    """Each limit given here replaces the machine file's. None keeps all."""
     owners: tuple[Annotated[str, Field(min_length=1, max_length=64)], ...] = ()
-    """Names of those with the role owner who are responsible for this arm; none for all of them."""
+    """Names of the users with role owner who are responsible for this arm; empty for all of them."""
     review: Literal["off", "operator", "owner"] = "off"
-    """Whose approval each experiment needs before it moves this arm, a real one: nobody's, that of an operator who did
-    not submit it, or that of an owner of the arm who did not."""
+    """Whose approval each experiment needs before it moves a real arm: nobody's, another operator's (not the
+    submitter's), or another owner's."""
 
 
 class FleetRobotSettings(FrozenRecord):
     """Table `[robots.NAME]`: one of several robots (docs/fleet.md)."""
 
     machine: str = "ma2000"
-    """A machine of the package, or a machine file."""
+    """Name of a packaged machine, or path of a machine file."""
     port: str | None = None
-    """URL of its port; without one, runs use a mock."""
+    """URL of its port; without it, runs use a mock."""
     memory_map: Path | None = None
-    """File of its memory map; without one, that of the package."""
+    """File of its memory map; None for the packaged one."""
     limits: Limits | None = None
-    """Each limit that is given here replaces the machine file's; the others stay. None keeps all."""
+    """Each limit given here replaces the machine file's. None keeps all."""
     owners: tuple[Annotated[str, Field(min_length=1, max_length=64)], ...] = ()
-    """Names of those with the role owner who are responsible for this arm; none for all of them."""
+    """Names of the users with role owner who are responsible for this arm; empty for all of them."""
     review: Literal["off", "operator", "owner"] = "off"
-    """Whose approval each experiment needs before it moves this arm, a real one: nobody's, that of an operator who did
-    not submit it, or that of an owner of the arm who did not."""
+    """Whose approval each experiment needs before it moves a real arm: nobody's, another operator's (not the
+    submitter's), or another owner's."""
     traces: Path | None = None
-    """Folder of its traces; None for the folder of its name in that of `[traces]`."""
+    """Folder of its traces; None for a subfolder of `[traces]` with its name."""
     unattended: TrueOrFalse = False
-    """Whether the queue may move this arm, a real one, while no operator has confirmed being present."""
+    """Whether the queue may move a real arm without an operator who has confirmed being present."""
 
     @field_validator("traces")
     @classmethod
@@ -93,14 +93,14 @@ class FleetRobotSettings(FrozenRecord):
 
 
 class TraceSettings(FrozenRecord):
-    """Where traces are kept, and how large they may be."""
+    """Folder of traces, and limits of their size."""
 
     folder: Path = Path("traces")
-    """Folder that runs write to, and that commands read."""
+    """Folder to which runs are written and from which commands read."""
     limits: TraceLimits = TraceLimits()
-    """Limits for files that are read, whatever their origin."""
+    """Limits for reading files of any origin."""
     warn_at: Annotated[float, Field(gt=0, le=1)] = 0.9
-    """Share of the disk of the traces, and of `archive.keep_size`, from which the service warns."""
+    """Used share of the disk of the traces, or of `archive.keep_size`, at which the service warns."""
 
     @field_validator("folder")
     @classmethod
@@ -109,7 +109,7 @@ class TraceSettings(FrozenRecord):
 
 
 class Settings(BaseSettings):
-    """Everything that can be configured. Environment variables (`DAQ_ROBOT__PORT=…`) override the file."""
+    """The whole configuration. Environment variables (`DAQ_ROBOT__PORT=…`) override the file."""
 
     model_config = SettingsConfigDict(
         env_prefix="DAQ_",
@@ -120,13 +120,13 @@ class Settings(BaseSettings):
     )
 
     robot: RobotSettings = RobotSettings()
-    """The only robot, unless there are several."""
+    """The only robot, unless `robots` is given."""
     robots: Annotated[dict[RobotName, FleetRobotSettings], Field(max_length=MOST_ROBOTS)] = {}
-    """Several robots, by name, in place of `robot`. `of_robot` has the settings of one of them."""
+    """Several robots by name, in place of `robot`. `of_robot` returns the settings of one."""
     traces: TraceSettings = TraceSettings()
     server: ServiceSettings = ServiceSettings()
     operator: Annotated[str, Field(max_length=100)] | None = None
-    """Who runs the experiments; recorded in every trace."""
+    """Person who runs the experiments; recorded in every trace."""
 
     @classmethod
     def settings_customise_sources(
@@ -137,23 +137,23 @@ class Settings(BaseSettings):
         dotenv_settings: PydanticBaseSettingsSource,
         file_secret_settings: PydanticBaseSettingsSource,
     ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """The environment, then the file's values (given to the constructor)."""
+        """The environment, then the file's values (passed to the constructor)."""
         del settings_cls, dotenv_settings, file_secret_settings
         assert isinstance(env_settings, EnvSettingsSource)
         env_settings.env_vars = {k: v for k, v in env_settings.env_vars.items() if k.upper() != SERVER_VARIABLE}
         return env_settings, init_settings
 
     def section(self, kind: type[S]) -> S:
-        """The section of a plug-in that is of this class."""
+        """Returns the section of a plug-in with this class."""
         return next((section for section in self.sections() if isinstance(section, kind)), kind())
 
     def sections(self) -> tuple[Section, ...]:
-        """The sections of plug-ins."""
+        """Returns the sections of plug-ins."""
         return tuple(value for _, value in self if isinstance(value, Section))
 
     @property
     def port(self) -> str:
-        """The configured port, or the mock when none is configured."""
+        """The configured port; the mock if none is configured."""
         return self.robot.port or MOCK_URL
 
     @property
@@ -162,9 +162,9 @@ class Settings(BaseSettings):
         return tuple(self.robots) or (self.robot.name,)
 
     def of_robot(self, name: str | None = None) -> Settings:
-        """The settings of one robot, as if it were the only one. Without a name, there must be no other.
+        """Returns the settings of one robot, as if it were the only one. Without a name, there must be only one.
 
-        Raises SpecError with the names that there are.
+        Raises SpecError with the existing names.
         """
         if name is None and len(self.names) > 1:
             raise SpecError(f"several robots are configured: say which one with --robot: {', '.join(self.names)}")
@@ -186,11 +186,11 @@ class Settings(BaseSettings):
         )
 
     def each_robot(self) -> tuple[Settings, ...]:
-        """The settings of every robot."""
+        """Returns the settings of every robot."""
         return tuple(self.of_robot(name) for name in self.names)
 
     def machine(self) -> Machine:
-        """The machine file, with this configuration's limits in it. Raises SpecError."""
+        """Returns the machine, with this configuration's limits. Raises SpecError."""
         machine = load_machine(self.robot.machine)
         if self.robot.limits is None:
             return machine
@@ -199,33 +199,33 @@ class Settings(BaseSettings):
 
 @cache
 def settings_type() -> type[Settings]:
-    """`Settings` with the sections that plug-ins add. One that cannot be loaded is left out with a warning."""
+    """Returns `Settings` with the sections of plug-ins. A section that cannot be loaded is left out with a warning."""
     found: dict[str, Any] = {}
     for plugin in plugins():
         for name, reference in plugin.settings.items():
             try:
                 kind = named(reference)
                 found[name] = (kind, kind())
-            except Exception as error:  # noqa: BLE001 - somebody else's module may raise anything
+            except Exception as error:  # noqa: BLE001  # another package's module may raise any error
                 log.warning("section [%s] (%s) is left out: %s", name, reference, error)
     return create_model("Settings", __base__=Settings, **found)
 
 
 def config_files(explicit: Path | None = None) -> list[Path]:
-    """Candidates for the configuration file, in order: the one requested, ./daq.toml, that of a user who has a home."""
+    """Returns the candidates for the configuration file in order: the requested one, ./daq.toml, the user's."""
     if explicit is not None:
         return [explicit]
     if "DAQ_CONFIG" in os.environ:
         return [Path(os.environ["DAQ_CONFIG"])]
-    with suppress(RuntimeError):  # somebody of whom the system knows neither a name nor a home
+    with suppress(RuntimeError):  # the user has no home folder
         return [Path(LOCAL_FILE), Path(platformdirs.user_config_dir(APP)) / "config.toml"]
     return [Path(LOCAL_FILE)]
 
 
 def load_settings(explicit: Path | None = None) -> tuple[Settings, Path | None]:
-    """The settings, and the file they came from (None: nothing is configured).
+    """Returns the settings and their file (None if there is none).
 
-    Raises SpecError with one line: the file, the key, its value, what is allowed.
+    Raises a one-line SpecError: the file, the key, its value, what is allowed.
     """
     asked_for = explicit is not None or "DAQ_CONFIG" in os.environ
     for path in config_files(explicit):
@@ -244,7 +244,7 @@ def _parse(path: Path) -> Settings:
     tables |= {f"robots.{name}": table for name, table in robots.items()} if isinstance(robots, dict) else {}
     for name, table in tables.items():
         given = table.get("unattended") if isinstance(table, dict) else None
-        if isinstance(given, str):  # only the environment, which holds nothing but text, may give text
+        if isinstance(given, str):  # only environment variables may give text, since they have no other type
             allowed = "must be true or false, without quotation marks"
             raise SpecError(f"{what}: {name}.unattended = {shown(given)}: {allowed}")
     return _validated(data, str(path))
@@ -254,7 +254,7 @@ def _validated(data: dict[str, Any], origin: str) -> Settings:
     try:
         settings = settings_type()(**data)
     except SettingsError as error:
-        # An environment variable of a whole section must hold JSON; its name is in the error's text.
+        # An environment variable for a whole section must contain JSON; the error names the variable.
         raise SpecError(f"environment: {error}; write single keys, such as DAQ_ROBOT__PORT") from error
     except RecursionError:
         raise SpecError("environment: a section is nested too deeply; write keys, such as DAQ_ROBOT__PORT") from None
@@ -271,7 +271,7 @@ def _validated(data: dict[str, Any], origin: str) -> Settings:
 
 
 def _require_apart(settings: Settings, what: str) -> None:
-    """Raises SpecError for several robots that one table is about, or that share a port or a folder."""
+    """Raises SpecError for several robots that share a table, a port or a folder."""
     if not settings.robots:
         return
     if "robot" in settings.model_fields_set:
@@ -292,15 +292,15 @@ def _require_apart(settings: Settings, what: str) -> None:
 
 
 def _is_secret(where: tuple[int | str, ...]) -> bool:
-    """Whether a wrong value may be a secret, or an address with one in it: who writes a key of the archive into the
-    wrong place shall not find it in a log."""
+    """Whether a wrong value may be a secret, or an address that contains one. It must not appear in a log, even if it
+    is under the wrong key."""
     field = settings_type().model_fields.get(str(where[0])) if where else None
     kind = None if field is None else field.annotation
     return isinstance(kind, type) and issubclass(kind, Section) and where[-1] not in kind.SHOWN
 
 
 def _variable_of(where: tuple[int | str, ...]) -> str | None:
-    """The environment variable that overrides the file at this key; None where there is none."""
+    """The environment variable that overrides the file at this key; None if there is none."""
     name = "DAQ_" + "__".join(str(part) for part in where).upper()
     found = next((one for one in os.environ if one.upper() == name != SERVER_VARIABLE), None)
     return None if found is None else f"environment {found}"

@@ -1,4 +1,4 @@
-"""Writes settings as the TOML file from which they can be loaded again."""
+"""Writes settings as a TOML file, from which they can be loaded again."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ if TYPE_CHECKING:
 
 
 def settings_text(settings: Settings) -> str:
-    """A daq.toml that loads to these settings. A setting without a value becomes a comment, for TOML has no null."""
+    """Returns a daq.toml that loads to these settings. A setting without value becomes a comment, since TOML has no
+    null."""
     data = settings.model_dump(mode="json")
-    if settings.robots:  # each has a table of its own
+    if settings.robots:  # each robot has its own table
         del data["robot"], data["server"]["unattended"]
     else:
         del data["robots"]
@@ -21,7 +22,7 @@ def settings_text(settings: Settings) -> str:
 
 
 def tables_text(data: dict[str, Any]) -> str:
-    """Values and tables as TOML; what is None becomes a comment."""
+    """Returns values and tables as TOML; None becomes a comment."""
     lines = _lines("", {key: value for key, value in data.items() if not isinstance(value, dict)})
     for name, table in data.items():
         if isinstance(table, dict):
@@ -41,7 +42,7 @@ def _lines(name: str, table: dict[str, Any]) -> list[str]:
 
 
 def toml_value(value: Any) -> str:
-    """A value as TOML. Strings, numbers and booleans are written as in JSON, but for DEL, which TOML wants escaped."""
+    """Formats a value as TOML: as in JSON, except that TOML requires DEL to be escaped."""
     if isinstance(value, list):
         return f"[{', '.join(map(toml_value, value))}]"
     if isinstance(value, dict):

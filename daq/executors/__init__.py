@@ -1,4 +1,4 @@
-"""Where jobs are computed: processes of this computer, or what a plug-in has in their place."""
+"""Executors that compute jobs: processes of this computer, or those of a plug-in."""
 
 from daq.executors.each import done_in_any_order
 from daq.executors.local import LocalWorkers, cores

@@ -1,4 +1,4 @@
-"""Many jobs through an executor: a few at a time, each answered once, whatever happens to a worker."""
+"""Runs many jobs with an executor, a few at a time. Each is answered once, even if workers die."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from daq.contracts.progress import Cancel, Never, stop_if
 from daq.executors.workers import BlamedError, OtherVersionError, Workers
 
 MOST_ALONE = 2
-"""How often a job is computed alone after a worker died: one that ends so twice is to blame itself."""
+"""How often a job is run alone after its worker died. A job that kills its worker this often is at fault itself."""
 AHEAD = 2
-"""Jobs that wait at the executor for each that it computes, so that no worker waits for the next."""
+"""Jobs submitted per running job, so that no worker waits for its next one."""
 LOOK_EVERY = 0.5
-"""Time (s) between two looks whether to end, while nothing comes."""
+"""Time (s) between two checks for cancellation while no answer comes."""
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
 
 def growing(tasks: deque[Task]) -> Iterator[Task]:
-    """The tasks of a queue, which whoever takes the answers may add to."""
+    """Yields the tasks of a queue, to which the consumer may add."""
     return _Growing(tasks)
 
 
@@ -43,11 +43,11 @@ def done_in_any_order(
 ) -> Iterator[tuple[Task, Future[Answer]]]:
     """Calls the function with every task, and yields each task once, with its future, when it is done.
 
-    Where a worker dies, it is not known whose fault that is: all tasks that were given and are lost are computed again,
-    one at a time. A task that ends the worker each time then yields a `BrokenExecutor` exception.
+    If a worker dies, the cause may be any of the lost tasks, so all of them are run again, one at a time. A task that
+    kills its worker each time yields a `BrokenExecutor` exception.
 
-    Raises CancelledError when asked to end; OtherVersionError for a worker of another version; ReachError where a
-    scheduler is lost.
+    Raises CancelledError if cancelled; OtherVersionError for a worker of another version; ReachError if a scheduler is
+    lost.
     """
     return _Rounds(workers, function, tasks).run(cancel or Never())
 
@@ -58,9 +58,9 @@ class _Rounds:
         self._function = function
         self._waiting = iter(tasks)
         self._done: SimpleQueue[tuple[Any, int, Future[Any]]] = SimpleQueue()
-        """A task, how often it was computed alone, and its end."""
+        """A task, how often it was run alone, and its future."""
         self._lost: deque[tuple[Any, int]] = deque()
-        """Tasks whose worker died, and how often each was computed alone."""
+        """Tasks whose worker died, and how often each was run alone."""
         self._given = 0
 
     def run(self, cancel: Cancel) -> Iterator[tuple[Any, Future[Any]]]:
@@ -82,7 +82,7 @@ class _Rounds:
                 stop_if(cancel)
 
     def _give_next(self) -> bool:
-        """Gives what may be computed now. Returns whether anything is."""
+        """Submits the tasks that may run now. Returns whether any is running."""
         if self._lost:
             if not self._given:
                 task, alone = self._lost.popleft()
@@ -90,7 +90,7 @@ class _Rounds:
             return True
         count = self._workers.count()
         while self._given < AHEAD * count:
-            task = next(self._waiting, self)  # itself: there is none
+            task = next(self._waiting, self)  # `self` is the marker for no task
             if task is self:
                 break
             self._give(task, 0)

@@ -1,4 +1,4 @@
-"""Worker processes of this computer, which end with the process that started them."""
+"""Worker processes of this computer, which end with their parent."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from daq.executors.workers import Workers
 
 
 def cores() -> int:
-    """Number of cores that this process may use."""
+    """Number of cores available to this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class LocalWorkers(Workers):
-    """Processes that are spawned, not forked, because the process that starts them may have threads.
+    """Processes that are spawned, not forked, because the parent may have threads.
 
-    When one of them dies, what all of them compute is lost, and the next job starts new ones.
+    If one of them dies, the jobs of all are lost, and the next job starts new processes.
     """
 
     def __init__(self, count: int, initializer: Callable[[], None] | None = None) -> None:
@@ -42,7 +42,7 @@ class LocalWorkers(Workers):
         return self._count
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **named: Any) -> Future[Any]:
-        """As any executor does."""
+        """As in `concurrent.futures.Executor`."""
         with self._lock, _without_main(function):
             try:
                 return self._pool.submit(function, *args, **named)
@@ -52,7 +52,7 @@ class LocalWorkers(Workers):
                 return self._pool.submit(function, *args, **named)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """As any executor does."""
+        """As in `concurrent.futures.Executor`."""
         self._pool.shutdown(wait, cancel_futures=cancel_futures)
 
     def abandon(self) -> None:
@@ -65,8 +65,8 @@ class LocalWorkers(Workers):
 
 @contextmanager
 def _without_main(function: Callable[..., Any]) -> Iterator[None]:
-    """Keeps processes that are started meanwhile from running the caller's script again, unless it defines the
-    function. A script then needs no `if __name__ == "__main__":`, without which each process would start others."""
+    """Prevents new processes from running the caller's script again, unless it defines the function. A script then
+    needs no `if __name__ == "__main__":`, without which each process would start others."""
     main = sys.modules["__main__"]
     if getattr(function, "__module__", None) == "__main__":
         yield
@@ -80,6 +80,6 @@ def _without_main(function: Callable[..., Any]) -> Iterator[None]:
 
 
 def begin_worker() -> None:
-    """Sets up a worker process: it ends with its parent, and silently at Ctrl-C."""
+    """Sets up a worker process: it ends with its parent, and ignores Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     end_with_parent()

@@ -1,4 +1,4 @@
-"""Makes a process end when the process that started it ends."""
+"""Ends a process when its parent ends."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import threading
 from multiprocessing import parent_process
 
 PR_SET_PDEATHSIG = 1
-"""Option of prctl(2): the signal that the kernel sends at the parent's death."""
+"""Option of prctl(2): the signal that the kernel sends when the parent dies."""
 
 
 def end_with_parent() -> None:
-    """Makes this process end at once when its parent ends, for whatever reason."""
+    """Makes this process end at once when its parent ends, for any reason."""
     parent = parent_process()
     if parent is None:
         return
@@ -22,7 +22,7 @@ def end_with_parent() -> None:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent.pid:  # the parent ended before this call
             os._exit(1)
-    # Linux sends the signal also when only the thread ends that started this process; other systems send none at all.
+    # Linux sends the signal even if only the thread that started this process ends; other systems send none at all.
     threading.Thread(target=_wait_for_its_end, name="parent-watch", daemon=True).start()
 
 

@@ -1,4 +1,4 @@
-"""What every executor is: that of `concurrent.futures`, which knows how many jobs it computes at once."""
+"""Base class of executors: a `concurrent.futures.Executor` that knows its number of parallel jobs."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from daq.contracts.errors import DaqError
 
 
 class OtherVersionError(DaqError):
-    """A worker has another version of this program or of Python than the one that gives it jobs."""
+    """A worker's version of this program or of Python differs from its parent's."""
 
     exit_code = exit_codes.REFUSED
 
 
 class BlamedError(BrokenExecutor):
-    """Several workers that had this job have died. It is to blame if nothing else was computed beside it."""
+    """Several workers died with this job. The job is the cause if nothing else ran beside it."""
 
 
 class Workers(Executor):
-    """An executor that outlives the death of its workers.
+    """An executor that survives the death of its workers.
 
-    A job whose worker has died ends with a `BrokenExecutor` exception, unless the executor has computed it again; the
-    executor itself takes further jobs.
+    A job whose worker died ends with a `BrokenExecutor` exception, unless the executor has run it again; the executor
+    itself accepts further jobs.
     """
 
     @abstractmethod
     def count(self) -> int:
-        """How many jobs are computed at once now."""
+        """Number of jobs that run in parallel now."""
 
     def abandon(self) -> None:
-        """Ends at once, and gives up what is being computed."""
+        """Ends at once and discards running jobs."""
         self.shutdown(wait=False, cancel_futures=True)
 
 
 @contextlib.contextmanager
 def ending(workers: Workers) -> Iterator[Workers]:
-    """Ends the workers after the block: at once where it raises, as at Ctrl-C."""
+    """Ends the workers after the block; at once if it raises, as at Ctrl-C."""
     try:
         yield workers
     except BaseException:

@@ -69,7 +69,7 @@ class Connection:
         """Writes new requests, all in one write. Raises LinkLostError; ProtocolError if a frame cannot carry a request.
 
         before_stop: number of stops written when these requests were allowed. Raises StopCameFirstError, and writes
-        nothing, if another stop has been written since. This check is made last, under the write lock.
+            nothing, if another stop has been written since. This check is made last, under the write lock.
         """
         with self._write_lock:
             self.check()

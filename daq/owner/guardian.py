@@ -49,7 +49,7 @@ class Guardian:
     `freeze`.
 
     freeze: sends STOP to the controller and returns the result. It is called on any thread, and must return within
-    `stop_socket.ANSWER_TIMEOUT`.
+            `stop_socket.ANSWER_TIMEOUT`.
     parent: descriptor of the parent's pipe. Any byte is a stop; the end of the pipe means that the parent is gone.
 
     Python's own handler writes signals to the wake-up pipe at once, whatever the main thread is doing. Enter and leave

@@ -1,1 +1,1 @@
-"""The four ways of teaching of the original: drive-through, lead by the nose, off-line steps, continuous path."""
+"""The original's four ways of teaching: jogging (drive-through), hand guiding, off-line steps, continuous path."""

@@ -1,4 +1,4 @@
-"""The arm as teaching uses it: an interface that the motor controller and a test's substitute implement."""
+"""The interface of an arm for teaching, implemented by the motor controller and by a test double."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ class TeachingError(DaqError):
 
 
 class TeachableArm(Protocol):
-    """An arm, one control period at a time. Every method may raise StoppedError (the arm was stopped) and
-    TeachingError (a fault, a lost link): it is frozen then."""
+    """An arm, one control period at a time. Every method may raise StoppedError (the arm was stopped) and TeachingError
+    (a fault, a lost link), after which the arm is frozen."""
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """Joints (from 1) in every sample, in its order."""
+        """Joints (from 1) in every sample, in order."""
         ...
 
     @property
     def every(self) -> int:
-        """Control periods from one sample to the next: more than one where the line to the arm is slow."""
+        """Control periods from one sample to the next: more than one on a slow line."""
         ...
 
     @property
     def lateness(self) -> float:
-        """Time (s) by which the last sample came later than the quickest ones."""
+        """Delay (s) of the last sample compared with the quickest ones."""
         ...
 
     def driven(self) -> AbstractContextManager[None]:
-        """Set points are taken only within this context. Leaving it ends the work, unless the arm has been stopped; an
-        exception freezes the arm before anything else is done."""
+        """Set points are accepted only within this context. Leaving it ends the work, unless the arm was stopped. An
+        exception first freezes the arm."""
         ...
 
     def next_sample(self) -> SampleRow:
-        """Waits for the next control period and returns it; every period comes once, or every n-th (`every`)."""
+        """Waits for the next sample and returns it. Every period, or every n-th (`every`), is returned once."""
         ...
 
     def set_points(self, postures: Mapping[int, int]) -> None:
@@ -60,9 +60,9 @@ class TeachableArm(Protocol):
         ...
 
     def freeze_for_stop(self, cause: str) -> StoppedError:
-        """Freezes the arm on request; returns the error to raise, which states the result."""
+        """Freezes the arm on request. Returns the error to raise, which states the result."""
         ...
 
     def freeze_for_fault(self, cause: str) -> TeachingError:
-        """Freezes the arm because of a fault; returns the error to raise, which states the result."""
+        """Freezes the arm because of a fault. Returns the error to raise, which states the result."""
         ...

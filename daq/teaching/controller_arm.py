@@ -1,4 +1,4 @@
-"""The motor controller as an arm that can be taught: all joints, one control period at a time, in SI units."""
+"""Adapts the motor controller to the interface for teaching: all joints, one control period at a time, in SI units."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from daq.trajectories.set_points import control_period
 
 
 def require_period(controller: Controller, machine: Machine) -> None:
-    """Raises SafetyError for a controller with another period than the machine file's, as a run does: speeds are
-    counted in set points a period."""
+    """Raises SafetyError if the controller's period differs from the machine file's: speeds are planned as set points
+    per period."""
     planned = control_period(machine)
     if abs(controller.period_s - planned) > PERIOD_TOLERANCE * planned:
         raise SafetyError(
@@ -32,12 +32,12 @@ def require_period(controller: Controller, machine: Machine) -> None:
 
 
 class ControllerArm:
-    """A `TeachableArm` over the driver, in the states of `ArmControl` like every run.
+    """A `TeachableArm` over the driver, with the states of `ArmControl` as in every run.
 
-    ended:        gives the reason of an external request to end; None while there is none
-    every_period: True delivers each period once, in order; False the newest, which a slow line can do
+    ended:        returns the reason of an external request to end; None if there is none
+    every_period: True delivers each period once, in order; False the newest, which a slow line supports
 
-    Raises SafetyError for a machine file of another machine, and for a controller of another period than its.
+    Raises SafetyError if the machine file does not match the controller, or its period differs.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class ControllerArm:
 
     @contextmanager
     def driven(self) -> Iterator[None]:
-        """Armed and running within, idle afterwards."""
+        """The arm is armed and running within the block, and idle afterwards."""
         with self._control.frozen_on_error():
             self._step(Event.ARM)
             self._step(Event.START)
@@ -74,7 +74,7 @@ class ControllerArm:
             self._step(Event.DISARM)
 
     def next_sample(self) -> SampleRow:
-        """The next control period; none is left out, unless only the newest are wanted."""
+        """Returns the next sample; skips none, unless only the newest are wanted."""
         self._require_going_on()
         try:
             known = self._every_period and self._last is not None
@@ -88,7 +88,7 @@ class ControllerArm:
         return self._rows.row(snapshot)
 
     def set_points(self, postures: Mapping[int, int]) -> None:
-        """Joint → posture units 0–999, taken together; only while driven."""
+        """Sends joint → posture units 0–999, applied together; only while driven."""
         self._require_going_on()
         if not self._control.may_send:
             raise TeachingError(f"set points are sent only while the arm is driven: it is {self._control.arm.state}")
@@ -122,5 +122,5 @@ class ControllerArm:
     def _step(self, event: Event) -> None:
         try:
             self._control.handle(event)
-        except StoppedError as error:  # stopped meanwhile: the error still states the result of the stop
+        except StoppedError as error:  # a stop came meanwhile; the error contains its result
             raise self.freeze_for_stop(self._ended() or self._control.halted or error.cause) from error

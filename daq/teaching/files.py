@@ -1,4 +1,4 @@
-"""Writes files of taught programs and paths atomically, and syncs them to the disk before it returns."""
+"""Writes files of taught programs and paths atomically."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from daq.traces import disk
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Writes a text file. Raises SpecError with one line; the old file then stays."""
+    """Writes a text file and syncs it to the disk. Raises a one-line SpecError; the old file then stays."""
     try:
         with replacing(path) as part:
             part.write_bytes(text.encode())

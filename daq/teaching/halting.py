@@ -1,4 +1,4 @@
-"""Early end of teaching: the arm is frozen first; then one line states the reason and the result of the freeze."""
+"""Ends teaching early: freezes the arm, then returns one line with the reason and the result of the freeze."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from daq.teaching.arm import TeachingError
 
 
 def freeze_for_stop(control: ArmControl, cause: str) -> StoppedError:
-    """Freezes the arm on request. A second request does no harm: the board confirms its state."""
+    """Freezes the arm on request. A repeated request is harmless: the board confirms its state."""
     return StoppedError(cause, f"the arm has been stopped: {cause}{_frozen(control, Event.STOP, cause)}")
 
 

@@ -1,4 +1,4 @@
-"""Drive-through: the joints move while a key is held, as with the teach pendant of the original (section 6.4)."""
+"""Jogging (drive-through): joints move while a key is held, as with the original teach pendant (section 6.4)."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from daq.teaching.arm import TeachableArm
 from daq.trajectories.set_points import control_period, make_plan
 
 JOG_SPEED = 0.35
-"""Highest speed of jogging in rad/s (20 °/s): an assumption. A joint's own limit may be lower."""
+"""Highest jog speed in rad/s (20 °/s; an assumption). A joint's own limit may be lower."""
 SLIDE_JOG_SPEED = 0.07
-"""The same of a joint that slides, in m/s: an assumption, what a joint that turns at JOG_SPEED moves at 0.2 m."""
+"""The same for a prismatic joint, in m/s (an assumption: the speed at a radius of 0.2 m and JOG_SPEED)."""
 DEAD_MAN = 0.3
-"""Time (s) for which a command moves the arm: an assumption. While the key is held, commands come more often."""
+"""Time (s) for which a command moves the arm (an assumption). While the key is held, commands come more often."""
 
 
 @dataclass(frozen=True)
 class JogCommand:
-    """Joints to be driven, with their velocities (rad/s, m/s), and when they were given (s, on the samples' clock)."""
+    """Joints to drive, with their velocities (rad/s, m/s), and the time of the command (s, on the samples' clock)."""
 
     velocities: Mapping[int, float]
     time: float
@@ -36,7 +36,7 @@ class JogCommand:
 
 @dataclass(frozen=True)
 class JogStep:
-    """Set points for after a sample (joint → posture units), the positions (rad, m) that they stand for, and why joints
+    """Set points to send after a sample (joint → posture units), the corresponding positions (rad, m), and why joints
     that should move do not."""
 
     postures: Mapping[int, int] = field(default_factory=dict)
@@ -45,29 +45,29 @@ class JogStep:
 
 
 def top_speed(machine: Machine, limits: Limits, joint: int) -> float:
-    """Highest speed (rad/s; m/s of a joint that slides) at which `joint` may be jogged."""
+    """Highest speed (rad/s; m/s for a prismatic joint) at which `joint` may be jogged."""
     own, usual = limits.joint(joint).speed, SLIDE_JOG_SPEED if slides(machine, joint) else JOG_SPEED
     return usual if own is None else min(usual, own)
 
 
 def require_step_speed(machine: Machine, joints: Iterable[int], speed: float) -> None:
-    """Raises SpecError where `speed` is too fast for a joint that slides: a usual speed in rad/s is five times too fast
-    in m/s."""
+    """Raises SpecError if `speed` is too fast for a prismatic joint: a usual value in rad/s is five times too fast in
+    m/s."""
     for joint in joints:
         if slides(machine, joint) and speed > SLIDE_JOG_SPEED:
-            line = f"speed = {speed:g} m/s: joint {joint} slides: allowed are up to {SLIDE_JOG_SPEED:g} m/s"
+            line = f"speed = {speed:g} m/s: joint {joint} is prismatic: allowed are up to {SLIDE_JOG_SPEED:g} m/s"
             raise SpecError(f"step: {line}")
 
 
 class Jogger:
-    """Computes one set point per sample. Pure except for the angles it has accepted and the tick of the last sample.
+    """Computes one set point per sample. Its only state is the accepted angles and the tick of the last sample.
 
-    every: control periods from one sample to the next: more than one where the line is slow. A step is as long as the
-           time between the last two samples, so that the joint has its speed, and never longer than so many periods:
-           after a gap it goes on where it was.
+    every: control periods from one sample to the next; more than one on a slow line. A step covers the time between the
+           last two samples, but at most `every` periods. So the joint has the commanded speed, and after a gap it
+           continues from where it was.
 
-    Needs all joints of the machine in every sample, since floor and reach depend on all. Raises SpecError without
-    them, and for commands that are faster than allowed.
+    Every sample must contain all joints of the machine, since floor and reach depend on all. Raises SpecError if not,
+    and for commands that are too fast.
     """
 
     def __init__(self, machine: Machine, limits: Limits, joints: tuple[int, ...], every: int = 1) -> None:
@@ -82,10 +82,10 @@ class Jogger:
         self._driven: dict[int, float] = {}
 
     def step(self, row: SampleRow, command: JogCommand | None) -> JogStep:
-        """The step to send after `row`. Nothing moves without a command, or when it is older than DEAD_MAN.
+        """Returns the step to send after `row`. Without a command, or after DEAD_MAN, nothing moves.
 
-        A step of several periods that would leave the limits is replaced by one of one period: so the joint comes as
-        near to its limit as on a fast line.
+        A step of several periods that would exceed the limits is replaced by a step of one period, so that the joint
+        comes as close to its limit as on a fast line.
         """
         periods = self._periods_to(row)
         if command is None or row.host_time - command.time > DEAD_MAN:
@@ -96,16 +96,16 @@ class Jogger:
         return self._moved(here, command, 1) if step.refused and periods > 1 else step
 
     def accept(self, step: JogStep) -> None:
-        """Notes that the step has been sent: the next one continues from it."""
+        """Notes that the step was sent: the next one continues from it."""
         self._driven.update(step.angles)
 
     def _periods_to(self, row: SampleRow) -> int:
-        """Control periods from the sample before to this one, which a step makes up for; at most `every`."""
+        """Returns the control periods since the previous sample, at most `every`."""
         before, self._last = self._last, row.tick
         return self._every if before is None else max(1, min(self._every, row.tick - before))
 
     def _moved(self, here: Floats, command: JogCommand, periods: int) -> JogStep:
-        """The step of so many periods from set points `here` (rad, m), or why there is none."""
+        """Returns the step of `periods` periods from set points `here` (rad, m), or why there is none."""
         there = here.copy()
         moving = tuple(joint for joint, velocity in command.velocities.items() if velocity)
         for joint in moving:
@@ -128,7 +128,7 @@ class Jogger:
                 raise SpecError(f"jog: joint {joint}: velocity of {velocity} {unit}: allowed are up to ±{top:g} {unit}")
 
     def _angles(self, row: SampleRow) -> Floats:
-        """Set points of all joints: those sent last, else those that the controller holds."""
+        """Set points of all joints: the last ones sent, otherwise those that the controller holds."""
         held = zip(self._joints, row.set_point, strict=True)
         return np.array([self._driven.get(joint, angle) for joint, angle in held])
 
@@ -141,10 +141,10 @@ def jog(
     ended: Callable[[], bool],
     tell: Callable[[str], None],
 ) -> None:
-    """Lets `commands` drive the arm until `ended`. `commands` gives the newest command after each sample, `tell` takes
+    """Lets `commands` drive the arm until `ended`. `commands` returns the newest command after each sample; `tell` gets
     lines for the operator.
 
-    Raises StoppedError when somebody stopped the arm, TeachingError when a guard tripped; it is frozen then.
+    Raises StoppedError if the arm was stopped, TeachingError if a guard tripped; the arm is frozen then.
     """
     jogger = Jogger(machine, limits, arm.joints, arm.every)
     guards = RunningGuards(machine, limits, arm.joints, moving=arm.joints, every=arm.every)

@@ -1,4 +1,4 @@
-"""Lead by the nose: the led joints go limp, a hand moves the arm, and the measured positions form the path."""
+"""Hand guiding: the guided joints go limp, a person moves the arm, and the measured positions form the path."""
 
 from __future__ import annotations
 
@@ -18,17 +18,19 @@ from daq.trajectories.set_points import control_period
 from firmware_protocol.units import counts_to_posture
 
 STILL_WITHIN = 8
-"""Largest error (ADC counts) at which the gains of a led joint are restored: an assumption; the joint is then pulled by
-half a degree. No led joint may have moved further in that time either: set points that follow it leave no error."""
+"""Largest error (ADC counts) at which the gains of a guided joint are restored (an assumption); the joint then moves by
+up to half a degree. No guided joint may have moved further in that time either, since set points that follow it leave
+no error."""
 STILL_FOR = 0.2
-"""Time (s) for which the error must stay that small: an assumption. A hand that reverses is still for a moment."""
+"""Time (s) for which the error must stay that small (an assumption). A hand that reverses direction is still for a
+moment."""
 SHORTEST = 2
-"""Least number of samples of a path."""
+"""Fewest samples of a path."""
 FEWEST_STILL = 3
-"""Least number of samples that show a led joint at rest, where a slow line gives few in that time: an assumption."""
+"""Fewest samples that show a guided joint at rest, for slow lines with few samples in that time (an assumption)."""
 PATIENCE = 10.0
-"""Time (s) that a led arm has to come to rest before its gains come back: an assumption. On a slow line, with
-every n-th sample, n times as long."""
+"""Time (s) for a guided arm to come to rest before its gains are restored (an assumption). With only every n-th sample
+on a slow line, n times as long."""
 
 
 def lead_by_nose(
@@ -39,14 +41,14 @@ def lead_by_nose(
     ended: Callable[[], bool],
     keep: Callable[[RecordedPath], None],
 ) -> None:
-    """Records the positions of `joints` (rad, once a period) while they are led by hand, until `ended`.
+    """Records the positions of `joints` (rad, once per period) while they are guided by hand, until `ended`.
 
-    The gains of the led joints are 0 meanwhile: **the arm must be held, it may sink under its weight.** Their set
-    points follow the hand, so that nothing pulls when the gains come back; they come back when the arm is at rest.
-    Joints not led hold their place and are watched. `keep` receives what was recorded, however it ended.
+    The gains of the guided joints are 0 meanwhile: **hold the arm, it may sink under its weight.** Their set points
+    follow the hand, so that nothing jerks when the gains are restored, which happens when the arm is at rest. The other
+    joints hold their position and are guarded. `keep` gets the recorded path, however it ended.
 
-    Raises StoppedError when somebody stopped the arm, TeachingError when a guard tripped. The led joints then stay
-    limp, and the error says so: a joint that may be moving, or frozen elsewhere, is never made stiff.
+    Raises StoppedError if the arm was stopped, TeachingError if a guard tripped. The guided joints then stay limp,
+    which the error states: a joint that may be moving, or frozen elsewhere, must not become stiff.
     """
     missing = [joint for joint in joints if joint not in arm.joints]
     if missing or not joints:
@@ -77,7 +79,7 @@ def _lead(
     rows: list[SampleRow],
     limp: dict[int, Gain],
 ) -> None:
-    """Fills `rows`; `limp` holds at every moment the joints without drive, with the gains that they had."""
+    """Fills `rows`. At every moment `limp` contains the joints without drive and their previous gains."""
     guards = RestGuards(machine, limits, arm.joints, led=joints, every=arm.every)
     before = arm.gains()
     if not before:
@@ -125,8 +127,8 @@ def _require_calm(arm: TeachableArm, guards: RestGuards, row: SampleRow) -> None
 
 
 def _restore(arm: TeachableArm, machine: Machine, guards: RestGuards, limp: dict[int, Gain]) -> None:
-    """Set points := present posture; when the controller has taken them and the arm stays at rest, the gains. Empties
-    `limp` joint by joint."""
+    """Sets the set points to the present posture. Once the controller has used them and the arm stays at rest, restores
+    the gains. Removes each restored joint from `limp`."""
     joints = tuple(limp)
     period = control_period(machine)
     between = arm.every * period

@@ -1,4 +1,4 @@
-"""Carries a taught program out on the real driver; its motions are followed and guarded like those of an experiment."""
+"""Carries out a taught program on the real driver; its motions are followed and guarded like those of an experiment."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from daq.trajectories.set_points import Plan
 
 
 class _AlarmReporter:
-    """Observer of a taught motion: reports alarms only."""
+    """Observer of a taught motion that reports only alarms."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         self._tell = tell
 
     def row(self, row: SampleRow) -> None:
-        """Ignored."""
+        """Ignores the row."""
 
     def event(self, time: float, kind: EventKind, message: str, tick: int | None, joint: int | None = None) -> None:
         """Reports an alarm in one line."""
@@ -63,12 +63,12 @@ class FollowingPerformer:
         self._arm = ControllerArm(controller, control, machine, ended, every_period=False)
         self._guarded = partial(RunningGuards, machine, limits, self._arm.joints, every=self._arm.every)
         self._guards = self._guarded(moving=self._arm.joints)
-        """Guards for periods in which nothing is sent. Joints that moved last may still approach their set points."""
+        """Guards for periods without set points. Joints that moved last may still approach their set points."""
         self._step(Event.ARM)
 
     def follow(self, plan: Plan) -> None:
-        """Plays a plan to its end. Raises StoppedError or TeachingError when it does not get there; the arm is then
-        frozen. A restart of the board is noticed before anything is sent, because it has changed the set points."""
+        """Plays a plan to its end. Raises StoppedError or TeachingError if it does not finish; the arm is frozen then.
+        Checks for a restart of the board before sending anything, because a restart changes the set points."""
         self.observe(1)
         self._step(Event.START)
         ending = self._follower.follow(plan, lambda _index: None)
@@ -80,8 +80,8 @@ class FollowingPerformer:
         self._step(Event.FINISHED)
 
     def observe(self, periods: int) -> None:
-        """Waits this many control periods under the guards. Raises StoppedError on a request to end, also in between,
-        and TeachingError for a fault, a restart or a lost link; the arm is then frozen."""
+        """Waits this many control periods under the guards. Raises StoppedError on a request to end, and TeachingError
+        for a fault, a restart or a lost link; the arm is frozen then."""
         until: int | None = None
         for _ in range(periods):
             row = self._arm.next_sample()
@@ -96,21 +96,21 @@ class FollowingPerformer:
         self._require_going_on()
 
     def input_is_on(self, line: int) -> bool:
-        """State of a process input."""
+        """Reads a process input."""
         return bool(self._controller.process().inputs >> line & 1)
 
     def set_output(self, line: int, *, on: bool) -> None:
-        """Switches a process output; raises StoppedError, and switches nothing, when the arm has been stopped."""
+        """Switches a process output. If the arm was stopped, switches nothing and raises StoppedError."""
         self._require_going_on()
         self._controller.write_outputs(1 << line, on << line)
 
     def set_gripper(self, *, closed: bool) -> None:
-        """Switches the gripper; raises StoppedError, and switches nothing, when the arm has been stopped."""
+        """Switches the gripper. If the arm was stopped, switches nothing and raises StoppedError."""
         self._require_going_on()
         self._controller.set_gripper(closed=closed)
 
     def finish(self) -> None:
-        """After the last instruction. Raises StoppedError when the arm has been stopped before."""
+        """Ends the program. Raises StoppedError if the arm was stopped before."""
         self._require_going_on()
         self._step(Event.DISARM)
 

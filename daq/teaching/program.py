@@ -1,4 +1,4 @@
-"""A taught program: steps, paths, waits and process signals, one after the other, in a plain file."""
+"""A taught program: steps, paths, waits and process signals in order, in a text file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Angles = Annotated[dict[JointNumber, Angle], Field(min_length=1)]
 
 
 class Absolute(FrozenRecord):
-    """Joints to these angles (rad), all arriving together; `speed` (rad/s) is the fastest joint's (SAMOVE's RATE)."""
+    """Moves joints to these angles (rad), arriving together; `speed` (rad/s) is the fastest joint's (SAMOVE's RATE)."""
 
     kind: Literal["absolute"] = "absolute"
     angles: Angles
@@ -34,7 +34,7 @@ class Absolute(FrozenRecord):
 
 
 class Relative(FrozenRecord):
-    """Joints by these angles (rad) from where the instruction before left them, all arriving together."""
+    """Moves joints by these angles (rad) from the end of the previous instruction, arriving together."""
 
     kind: Literal["relative"] = "relative"
     angles: Angles
@@ -42,7 +42,7 @@ class Relative(FrozenRecord):
 
 
 class PlayPath(FrozenRecord):
-    """A recorded path, `rate` times as fast as it was led, after a slow move to its start (CONTPATH)."""
+    """Plays a recorded path, `rate` times as fast as it was recorded, after a slow move to its start (CONTPATH)."""
 
     kind: Literal["path"] = "path"
     path: RecordedPath
@@ -65,7 +65,7 @@ class SetOutput(FrozenRecord):
 
 
 class AwaitInput(FrozenRecord):
-    """Waits until process input `line` (0–7) is on or off; the program ends in an error after `longest` s."""
+    """Waits until process input `line` (0–7) is on or off; the program fails after `longest` s."""
 
     kind: Literal["input"] = "input"
     line: Line
@@ -96,7 +96,7 @@ class Program(FrozenRecord):
 
 
 def parse_program(text: str, origin: str = "program") -> Program:
-    """A program from JSON, or from TOML when `origin` ends in `.toml`. Raises SpecError with one line."""
+    """Parses a program from JSON, or from TOML if `origin` ends in `.toml`. Raises a one-line SpecError."""
     try:
         if origin.endswith(".toml"):
             return Program.model_validate(parse_toml(text, origin))
@@ -107,27 +107,27 @@ def parse_program(text: str, origin: str = "program") -> Program:
 
 
 def program_text(program: Program) -> str:
-    """The program as JSON; `parse_program` gives it back to the bit."""
+    """Returns the program as JSON; `parse_program` restores it to the bit."""
     return program.model_dump_json(indent=2) + "\n"
 
 
 def load_program(path: Path) -> Program:
-    """The program of a file. Raises SpecError with one line."""
+    """Loads a program. Raises a one-line SpecError."""
     return parse_program(read_text(path, f"program {path}"), str(path))
 
 
 def save_program(program: Program, path: Path) -> None:
-    """Writes the program as JSON, whole or not at all. Raises SpecError with one line."""
+    """Writes the program as JSON, completely or not at all. Raises a one-line SpecError."""
     write_whole(path, program_text(program))
 
 
 def is_program_name(text: str) -> bool:
-    """Whether a program may be called so."""
+    """Whether a text is a valid program name."""
     return re.fullmatch(NAME, text) is not None
 
 
 def require_program_file(path: Path) -> None:
-    """Raises SpecError where a program could not be saved as `path`, whose stem is its name; called before it
+    """Raises SpecError if a program cannot be saved as `path`, whose stem is its name. Called before the program
     exists."""
     if not is_program_name(path.stem):
         rule = "a name has 1 to 64 letters, digits, _ . or -, and begins with a letter or digit"

@@ -30,7 +30,7 @@ from daq.trajectories.set_points import Plan, control_period
 
 @dataclass(frozen=True)
 class PlannedInstruction:
-    """An instruction (`number` from 1) with the plans that carry it out, none where nothing moves."""
+    """An instruction (`number` from 1) with its plans; empty if nothing moves."""
 
     number: int
     instruction: Instruction
@@ -41,7 +41,7 @@ class Performer(Protocol):
     """Carries out a program's instructions."""
 
     def follow(self, plan: Plan) -> None:
-        """Plays a plan to its end. Raises a DaqError when it does not get there."""
+        """Plays a plan to its end. Raises a DaqError if it does not finish."""
         ...
 
     def observe(self, periods: int) -> None:
@@ -49,7 +49,7 @@ class Performer(Protocol):
         ...
 
     def input_is_on(self, line: int) -> bool:
-        """State of a process input."""
+        """Reads a process input."""
         ...
 
     def set_output(self, line: int, *, on: bool) -> None:
@@ -62,9 +62,9 @@ class Performer(Protocol):
 
 
 def plan_program(program: Program, machine: Machine, start: Sequence[float]) -> list[PlannedInstruction]:
-    """Plans of every instruction, each from where the one before ends; `start` in rad, all joints of the machine.
+    """Plans every instruction, each from the end of the previous one; `start` in rad, all joints of the machine.
 
-    Raises SpecError naming the instruction when it cannot be planned, or the program is for another machine.
+    Raises SpecError, which names the instruction, if it cannot be planned, or if the program is for another machine.
     """
     if program.machine != machine.name:
         raise SpecError(f"program {program.name}: it is for machine {program.machine!r}, this is {machine.name!r}")
@@ -82,8 +82,8 @@ def plan_program(program: Program, machine: Machine, start: Sequence[float]) -> 
 
 
 def check_program(planned: Sequence[PlannedInstruction], machine: Machine, limits: Limits) -> list[str]:
-    """All violations of the program, one line each. The first motion may come back from outside the limits, where the
-    arm may have been led."""
+    """Returns all violations of the program, one line each. The first motion may return from outside the limits, where
+    the arm may have been guided by hand."""
     lines = []
     first = True
     for item in planned:
@@ -97,8 +97,8 @@ def check_program(planned: Sequence[PlannedInstruction], machine: Machine, limit
 def run_program(
     planned: Sequence[PlannedInstruction], machine: Machine, performer: Performer, tell: Callable[[str], None]
 ) -> None:
-    """Carries a planned and checked program out. Raises TeachingError when an awaited input does not come, and
-    whatever the performer raises."""
+    """Carries out a planned and checked program. Raises TeachingError if an awaited input does not come, and the
+    performer's errors."""
     period = control_period(machine)
     for item in planned:
         tell(f"instruction {item.number} of {len(planned)}: {item.instruction.kind}")

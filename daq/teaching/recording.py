@@ -1,4 +1,4 @@
-"""A path recorded while the arm was led, and how it is played back."""
+"""A path recorded by hand guiding, and its playback."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from daq.contracts.frozen import FrozenRecord
 from daq.teaching.files import write_whole
 
 SLOWEST_RATE = 0.01
-"""Lowest playback rate: a minute of path then takes more than an hour and a half."""
+"""Lowest playback rate: one minute of path then takes more than 1.5 hours."""
 FASTEST_RATE = 10.0
-"""Highest playback rate; in practice the limits of the arm are lower."""
+"""Highest playback rate; usually the limits of the arm are lower."""
 
 
 class RecordedPath(FrozenRecord):
@@ -40,12 +40,12 @@ class RecordedPath(FrozenRecord):
 
     @property
     def duration(self) -> float:
-        """Length in s."""
+        """Duration (s)."""
         return self.times[-1]
 
     def thinned(self, within: float) -> RecordedPath:
-        """The same path with as few points as keep it within `within` rad of every recorded one (Douglas–Peucker in
-        time): points at rest and on straight lines are left out."""
+        """Returns the same path with as few points as keep it within `within` rad of every recorded one
+        (Douglas–Peucker in time): points at rest and on straight lines are left out."""
         positions = np.array(self.positions)
         times = np.array(self.times)
         kept = {0, len(times) - 1}
@@ -70,10 +70,11 @@ class RecordedPath(FrozenRecord):
 
 
 def playback(path: RecordedPath, rate: float = 1.0, name: str | None = None) -> ExperimentSpec:
-    """The experiment that plays a path `rate` times as fast as it was led: a slow move to its start, then the path.
+    """Returns the experiment that plays a path at `rate` times the recorded speed: a slow move to its start, then the
+    path.
 
-    It is planned, checked, watched and recorded as any other; there is no limit of 60 s. Raises SpecError for a rate
-    outside SLOWEST_RATE to FASTEST_RATE.
+    It is planned, checked, guarded and recorded like any experiment; the limit of 60 s does not apply. Raises SpecError
+    for a rate outside SLOWEST_RATE to FASTEST_RATE.
     """
     if not SLOWEST_RATE <= rate <= FASTEST_RATE:
         raise SpecError(f"rate of {rate}: allowed are {SLOWEST_RATE:g} to {FASTEST_RATE:g}")
@@ -82,5 +83,5 @@ def playback(path: RecordedPath, rate: float = 1.0, name: str | None = None) -> 
 
 
 def save_path(path: RecordedPath, file: FilePath) -> None:
-    """Writes a path as JSON, whole or not at all. Raises SpecError with one line."""
+    """Writes a path as JSON, completely or not at all. Raises a one-line SpecError."""
     write_whole(file, path.model_dump_json(indent=1) + "\n")

@@ -1,1 +1,1 @@
-"""Trace files: MCAP, written so that a crash loses at most a second; reading, listing, checking, plotting, and CSV."""
+"""Trace files: written as MCAP so that a crash loses about a second; reads, lists, checks and plots them; CSV."""

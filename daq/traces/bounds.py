@@ -1,4 +1,4 @@
-"""The largest values that signals may have: far beyond any rig, and small enough for arithmetic."""
+"""Bounds of all signals: far beyond any machine, but small enough for safe arithmetic."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace, TraceEvent, TraceRecord
 
 LARGEST_POSITION = 1e9
-"""Largest position (rad or m). A shaft at 10 000 rpm takes eleven days to turn as far, and a float64 resolves 1e-7 rad
+"""Largest position (rad or m). A shaft at 10 000 rpm turns this far in eleven days; a float64 still resolves 1e-7 rad
 there."""
 LARGEST_VELOCITY = 1e6
-"""Largest velocity (rad/s or m/s). The fastest rotors, of dental drills and turbochargers, turn at 5e4 rad/s."""
+"""Largest velocity (rad/s or m/s). The fastest rotors (dental drills, turbochargers) reach 5e4 rad/s."""
 LARGEST_DRIVE = 1e9
-"""Largest drive (V, N·m or N). The largest testing machines press with 1e9 N."""
+"""Largest drive (V, N·m or N). The largest testing machines exert 1e9 N."""
 LARGEST_TIME = 4e9
-"""Largest time (s), of either sign: time counts from the start of a record or, in the files of some loggers, from
-1970."""
+"""Largest absolute time (s): counted from the start of a record or, in the files of some loggers, from 1970."""
 SMALLEST_STEP = 1e-9
 """Smallest difference (s) between two times; MCAP's time stamps count ns."""
 LARGEST_TICK = 2**53
-"""Largest tick (control periods), of either sign: the whole numbers that a float64 holds exactly; 285 years of 1 µs."""
+"""Largest absolute tick (control periods): the range of integers that a float64 represents exactly, 285 years of 1
+µs."""
 LARGEST_JOINT = 99
-"""Largest number of a joint that an event may name."""
+"""Largest joint number of an event."""
 SHORTEST_PERIOD, LONGEST_PERIOD = 1e-6, 86400.0
 """Bounds (s) of a control period: a loop at 1 MHz, one sample a day."""
 
@@ -41,36 +41,36 @@ LARGEST = {
     "velocity": (LARGEST_VELOCITY, "rad/s or m/s"),
     "drive": (LARGEST_DRIVE, "V, N·m or N"),
 }
-"""The largest magnitude of each signal, and its unit."""
+"""Largest absolute value of each signal, and its unit."""
 
 
 def first_outside(name: str, values: NDArray[np.float64] | NDArray[np.int64]) -> tuple[int, ...] | None:
-    """Index of the first value that is not finite or beyond its bound; None when all are within."""
+    """Index of the first value that is not finite or exceeds its bound; None if there is none."""
     largest = LARGEST[name][0]
     wrong = ~((values >= -largest) & (values <= largest))
     return tuple(int(index) for index in np.argwhere(wrong)[0]) if wrong.any() else None
 
 
 def allowed(name: str) -> str:
-    """The bound of a signal, for an error."""
+    """The bound of a signal, for an error message."""
     largest, unit = LARGEST[name]
     return f"allowed is ±{largest:.3g} {unit}"
 
 
 def first_short_step(time: NDArray[np.float64]) -> int | None:
-    """Row of the first time that does not come at least SMALLEST_STEP after the one before; None when all do."""
+    """Row of the first time that is less than SMALLEST_STEP after the previous one; None if there is none."""
     wrong = ~(np.diff(time) >= SMALLEST_STEP)
     return int(np.argmax(wrong)) + 1 if wrong.any() else None
 
 
 def check_trace(trace: Trace, origin: str) -> None:
-    """Raises TraceError for the first value of a trace that no rig can have measured."""
+    """Raises TraceError for the first value of a trace that no real machine can have produced."""
     check_signals({name: getattr(trace, name) for name in LARGEST}, origin)
     check_record(trace.record, trace.events, origin)
 
 
 def check_signals(signals: Mapping[str, NDArray[Any] | None], origin: str) -> None:
-    """The same for columns by name; columns that are None or have no bound are skipped."""
+    """Checks columns by name in the same way; columns that are None or have no bound are skipped."""
     for name in LARGEST:
         values = signals.get(name)
         outside = None if values is None else first_outside(name, values)
@@ -81,11 +81,11 @@ def check_signals(signals: Mapping[str, NDArray[Any] | None], origin: str) -> No
     row = None if time is None else first_short_step(time)
     if time is not None and row is not None:
         step = f"{float(time[row])!r} s after {float(time[row - 1])!r} s"
-        raise TraceError(f"{origin}: sample {row}: time = {step}, it has to increase by {SMALLEST_STEP:g} s at least")
+        raise TraceError(f"{origin}: sample {row}: time = {step}, it must increase by at least {SMALLEST_STEP:g} s")
 
 
 def check_record(record: TraceRecord, events: tuple[TraceEvent, ...], origin: str) -> None:
-    """Raises TraceError for a control period, or the time, tick or joint of an event, that no rig can have."""
+    """Raises TraceError for an impossible control period, or an impossible time, tick or joint of an event."""
     if record.period is not None and not SHORTEST_PERIOD <= record.period <= LONGEST_PERIOD:
         line = f"period = {record.period:g} s, allowed is {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
         raise TraceError(f"{origin}: {line}")

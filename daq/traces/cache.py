@@ -1,10 +1,10 @@
-"""A trace's columns cached beside its file, so that opening it again needs no decoding. The cache may be deleted.
+"""Caches a trace's columns beside its file, so that reopening it needs no decoding. The cache may be deleted.
 
-The cache holds the limits that the trace was read within, and the size and the CRC-32 over every byte of the trace file
-it was made from, and is used only when the file still has both and the limits are the same. So a changed file is
-noticed whatever its times say: damage of up to 32 bits in a row always, any other change except in
-one case of 2³². A cryptographic hash would take four times as long, most of the 0.2 s that opening again may take, and
-would protect against nobody: anyone who can forge the trace can also write the cache.
+The cache stores the limits used for reading, and the size and CRC-32 of the whole trace file. It is used only if the
+file and the limits still match. Changes are therefore detected whatever the file's times are: damage of up to 32
+consecutive bits always, any other change except in one case of 2³². A cryptographic hash would take four times as long,
+most of the 0.2 s for reopening. It would give no protection either, since anyone who can forge the trace can also write
+the cache.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from daq.traces import layout
 
 FOLDER = ".cache"
 WORTH_IT = 1_000_000
-"""Size of a trace file (bytes) below which decoding it is as fast as a cache."""
+"""Size of a trace file (bytes) below which decoding is as fast as a cache."""
 
 _VERSION = 2
-"""Format version; to be raised when a reader interprets files differently, which makes earlier caches invalid."""
+"""Format version. Increase it when a reader interprets files differently, to invalidate earlier caches."""
 _PIECE = 1 << 19
-"""Size (bytes) of the pieces that are read: they stay in the processor's cache while their checksum is computed."""
+"""Size (bytes) of each read: small enough to stay in the processor's cache while its checksum is computed."""
 
 
 def cache_path(path: Path) -> Path:
@@ -37,7 +37,8 @@ def cache_path(path: Path) -> Path:
 
 
 def key_of(path: Path, limits: TraceLimits) -> str:
-    """Identifies a trace file and the limits for reading it; only a cache of this key is used. Raises OSError."""
+    """Returns the key of a trace file and the limits for reading it; a cache is used only with an equal key. Raises
+    OSError."""
     size = crc = 0
     with path.open("rb", buffering=0) as stream:
         while piece := stream.read(_PIECE):
@@ -47,7 +48,7 @@ def key_of(path: Path, limits: TraceLimits) -> str:
 
 
 def load(path: Path, key: str) -> Trace | None:
-    """The trace of a file whose key is `key`; None when there is no cache, or it is of something else or damaged."""
+    """Returns the cached trace; None if there is no cache with this key, or if it is damaged."""
     try:
         with cache_path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
             if str(stored["key"]) != key:
@@ -64,7 +65,7 @@ def load(path: Path, key: str) -> Trace | None:
 
 
 def store(path: Path, key: str, trace: Trace) -> bool:
-    """Writes the cache of a trace; False where the folder cannot be written to, which is no error."""
+    """Writes the cache of a trace. Returns False if the folder is not writable, which is no error."""
     head = {
         "record": trace.record.model_dump(mode="json"),
         "joints": trace.joints,

@@ -19,10 +19,10 @@ from daq.traces.reader import TOO_LARGE
 from daq.traces.scan import UNREADABLE, scan
 
 State = Literal["finished", "recording", "unfinished", "unreadable"]
-"""`recording`: a living process writes it; `unfinished`: left by a crash, `salvage` finishes it."""
+"""`recording`: a running process is writing it. `unfinished`: left by a crash; `salvage` finishes it."""
 
 LAST = "last"
-"""Name of the newest finished trace, in place of its number."""
+"""Name of the newest finished trace, usable in place of its ID."""
 
 
 class TraceSummary(FrozenRecord):
@@ -31,18 +31,18 @@ class TraceSummary(FrozenRecord):
     path: Path
     state: State
     size: int
-    """Size (bytes); 0 where it is unknown."""
+    """Size (bytes); 0 if unknown."""
     trace_id: str | None = None
     created: datetime | None = None
     source: str | None = None
     robot: str | None = None
     kind: str | None = None
-    """Kind of trajectory, where the trace is of an experiment."""
+    """Kind of trajectory, if the trace is of an experiment."""
     name: str | None = None
     joints: tuple[int, ...] = ()
-    """Joints that were recorded."""
+    """Recorded joints."""
     moved: tuple[int, ...] | None = None
-    """Joints that the experiment moves; None where that is not known."""
+    """Joints that the experiment moves; None if unknown."""
     outcome: Outcome | None = None
     samples: int | None = None
     duration: float | None = None
@@ -53,9 +53,9 @@ class TraceSummary(FrozenRecord):
 
 
 def list_traces(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> tuple[TraceSummary, ...]:
-    """Summaries of all traces in a folder, the oldest first, unreadable ones with their problem.
+    """Returns summaries of all traces in a folder, the oldest first; unreadable files have a `problem`.
 
-    Raises TraceError when the folder cannot be read.
+    Raises TraceError if the folder cannot be read.
     """
     folder = Path(folder)
     try:
@@ -67,12 +67,12 @@ def list_traces(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> tup
         try:
             summaries.append(summary_of(path, limits))
         except FileNotFoundError:
-            continue  # finished, salvaged or deleted meanwhile
+            continue  # it was finished, salvaged or deleted meanwhile
     return tuple(sorted(summaries, key=lambda summary: (_moment(summary), summary.path.name)))
 
 
 def summary_of(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> TraceSummary:
-    """What one file says about itself. Raises FileNotFoundError when it is not there."""
+    """Returns the summary of one file. Raises FileNotFoundError if it does not exist."""
     path = Path(path)
     size = 0
     unfinished = path.name.endswith(layout.PART_SUFFIX)
@@ -101,9 +101,9 @@ def summary_of(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> TraceS
 
 
 def find_trace(folder: Path, wanted: str, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Path:
-    """The trace that `wanted` names: a path, `last`, or the beginning of a trace's number or of a file's name.
+    """Returns the trace for `wanted`: a path, `last`, or the beginning of a trace's ID or of a file name.
 
-    Raises TraceError when there is none, or when several begin so.
+    Raises TraceError if no trace or several traces match.
     """
     if os.path.isfile(wanted):  # Path.is_file raises for a name that is too long
         return Path(wanted)
@@ -119,15 +119,13 @@ def find_trace(folder: Path, wanted: str, limits: TraceLimits = DEFAULT_TRACE_LI
         for summary in summaries
         if wanted and (summary.path.name.startswith(wanted) or (summary.trace_id or "").startswith(wanted))
     ]
-    if not found and os.path.isdir(wanted):  # a bag, or a data set of lerobot
+    if not found and os.path.isdir(wanted):  # a bag, or a LeRobot data set
         return Path(wanted)
     if not found:
-        raise TraceError(
-            f"trace {wanted!r}: is not a file, and the folder {folder} has none with such a number or name"
-        )
+        raise TraceError(f"trace {wanted!r}: is not a file, and the folder {folder} has no trace with this ID or name")
     if len(found) > 1:
         names = ", ".join(path.name for path in found[:4])
-        raise TraceError(f"trace {wanted!r}: {len(found)} traces in {folder} begin so: {names}; give more of it")
+        raise TraceError(f"trace {wanted!r}: {len(found)} traces in {folder} match: {names}; give more characters")
     return found[0]
 
 
@@ -166,7 +164,7 @@ def _summary(
 
 
 def _metadata(path: Path, limits: TraceLimits) -> tuple[Texts, Texts | None]:
-    """Metadata at the start and the end of a finished trace, through its index. Raises TraceError, OSError."""
+    """Reads the metadata at the start and the end of a finished trace through its index. Raises TraceError, OSError."""
     with disk.open_regular(path) as stream:
         try:
             found = indexed_metadata(stream, limits)
@@ -179,7 +177,7 @@ def _metadata(path: Path, limits: TraceLimits) -> tuple[Texts, Texts | None]:
 
 
 def _scanned_metadata(path: Path, data: bytes, limits: TraceLimits) -> dict[str, Texts]:
-    """The same metadata, read from the whole file, which also shows any damage. Raises TraceError."""
+    """Reads the same metadata from the whole file, which also detects damage. Raises TraceError."""
     found = scan(data, str(path), limits)
     if found.damage is not None:
         raise TraceError(f"{path}: is damaged after byte {found.good_bytes} of {len(data)}: {found.damage}")
@@ -187,7 +185,7 @@ def _scanned_metadata(path: Path, data: bytes, limits: TraceLimits) -> dict[str,
 
 
 def _beginning(path: Path, limits: TraceLimits) -> Texts:
-    """Metadata at the start of a file that has no end yet. Raises TraceError, OSError."""
+    """Reads the metadata at the start of an unfinished file. Raises TraceError, OSError."""
     with disk.open_regular(path) as stream:
         name, metadata = first_metadata(stream, limits, str(path))
     if name != layout.START_METADATA:

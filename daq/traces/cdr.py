@@ -1,6 +1,6 @@
-"""Messages in CDR, as ROS 2 encodes them: little-endian, every field on its natural boundary after a 4-byte header.
+"""Encodes and decodes messages in CDR, as ROS 2 does: little-endian, each field aligned after a 4-byte header.
 
-Only what traces hold is written and read here; bags of others are read with the library rosbags (`ros_bag.py`).
+Covers only the messages of this project's traces; other bags are read with the library rosbags (`ros_bag.py`).
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from daq.contracts.sample import SampleRow
 from daq.contracts.trace import EventKind, TraceEvent
 
 HEADER = b"\x00\x01\x00\x00"
-"""Begins every message: plain CDR, little-endian, no options."""
+"""Start of every message: plain CDR, little-endian, no options."""
 
 _BILLION = 1_000_000_000
 _LAST_SECOND = 2**31 - 1
-"""The last second that a stamp of ROS 2 can name, in January 2038; stamps of later messages stay at it."""
+"""The last second of ROS 2 time stamps, in January 2038; later messages get this stamp."""
 _INFO, _WARN, _ERROR = 20, 30, 40
 _LEVELS: dict[EventKind, int] = {
     **dict.fromkeys(("limit", "pause", "retry", "missing", "missed_set_point", "stop"), _WARN),
@@ -26,47 +26,47 @@ _LEVELS: dict[EventKind, int] = {
 
 
 class CdrWriter:
-    """Appends one field after the other."""
+    """Appends fields in order."""
 
     def __init__(self) -> None:
         self._body = bytearray()
 
     def number(self, code: str, value: float) -> None:
-        """A number, with the code of its type in the module `struct`."""
+        """Appends a number, with its type code of the module `struct`."""
         size = struct.calcsize(code)
         self._body += bytes(-len(self._body) % size) + struct.pack(f"<{code}", value)
 
     def text(self, text: str) -> None:
-        """A text: its length, UTF-8, and the zero that ends it."""
+        """Appends a text: its length, UTF-8 and a terminating zero."""
         data = text.encode()
         self.number("I", len(data) + 1)
         self._body += data + b"\0"
 
     def texts(self, texts: Sequence[str]) -> None:
-        """A sequence of texts."""
+        """Appends a sequence of texts."""
         self.number("I", len(texts))
         for text in texts:
             self.text(text)
 
     def optional(self, code: str, value: int | None) -> None:
-        """A sequence of one number, or of none."""
+        """Appends a sequence of one number, or an empty one."""
         self.number("I", 0 if value is None else 1)
         if value is not None:
             self.number(code, value)
 
     def stamp(self, utc_ns: int) -> None:
-        """A moment as builtin_interfaces/Time."""
+        """Appends a time as builtin_interfaces/Time."""
         second, nanosecond = stamp(utc_ns)
         self.number("i", second)
         self.number("I", nanosecond)
 
     def message(self) -> bytes:
-        """The whole message."""
+        """Returns the complete message."""
         return HEADER + bytes(self._body)
 
 
 class CdrReader:
-    """Reads one field after the other. Raises ValueError where the message ends before a field does."""
+    """Reads fields in order. Raises ValueError if the message ends within a field."""
 
     def __init__(self, message: bytes) -> None:
         if message[: len(HEADER)] != HEADER:
@@ -75,7 +75,7 @@ class CdrReader:
         self._position = len(HEADER)
 
     def number(self, code: str) -> int | float:
-        """A number, with the code of its type in the module `struct`."""
+        """Reads a number, with its type code of the module `struct`."""
         size = struct.calcsize(code)
         padding = -(self._position - len(HEADER)) % size
         (value,) = struct.unpack(f"<{code}", self._raw(padding + size)[padding:])
@@ -83,21 +83,21 @@ class CdrReader:
         return found
 
     def text(self) -> str:
-        """A text. Raises ValueError where no zero ends it, or it is not UTF-8."""
+        """Reads a text. Raises ValueError if it is not terminated by a zero, or not UTF-8."""
         data = self._raw(int(self.number("I")))
         if not data.endswith(b"\0"):
             raise ValueError("a text has no end")
         return data[:-1].decode()
 
     def optional(self, code: str) -> int | None:
-        """A sequence of one number, or of none."""
+        """Reads a sequence of at most one number."""
         count = self.number("I")
         if count not in (0, 1):
             raise ValueError(f"a sequence of at most one number has {count}")
         return int(self.number(code)) if count else None
 
     def end(self) -> None:
-        """Raises ValueError where bytes follow."""
+        """Raises ValueError if bytes remain."""
         if self._position != len(self._message):
             raise ValueError(f"a message has {len(self._message) - self._position} bytes after its last field")
 
@@ -109,14 +109,14 @@ class CdrReader:
 
 
 def stamp(utc_ns: int) -> tuple[int, int]:
-    """Seconds and nanoseconds since 1970, as ROS 2 stamps messages: it counts seconds in 32 bits."""
+    """Returns seconds and nanoseconds since 1970 as in ROS 2 stamps, which count seconds in 32 bits."""
     if utc_ns // _BILLION > _LAST_SECOND:
         return _LAST_SECOND, _BILLION - 1
     return utc_ns // _BILLION, utc_ns % _BILLION
 
 
 class JointStates:
-    """Encodes rows as sensor_msgs/JointState. The effort is there only where the drive is a torque or a force."""
+    """Encodes rows as sensor_msgs/JointState. `effort` is filled only if the drive is a torque or a force."""
 
     def __init__(self, names: tuple[str, ...], effort: bool) -> None:
         fixed = CdrWriter()
@@ -128,7 +128,7 @@ class JointStates:
         self._effort = effort
 
     def message(self, row: SampleRow, utc_ns: int) -> bytes:
-        """All joints of a row."""
+        """Encodes all joints of a row."""
         count, velocities = self._count, len(row.velocity)
         efforts = row.drive if self._effort else ()
         packer = _joint_states_packer(len(self._fixed), count, velocities, len(efforts))
@@ -147,7 +147,7 @@ class JointStates:
 
 @cache
 def _joint_states_packer(fixed: int, *counts: int) -> struct.Struct:
-    """Packs header, stamp, `fixed` bytes, and sequences of so many float64, each with its count before it."""
+    """Packs header, stamp, `fixed` bytes, and sequences of float64, each with its count before it."""
     code, position = f"<4siI{fixed}s", 8 + fixed
     for count in counts:
         code += f"{-position % 4}xI"
@@ -159,7 +159,7 @@ def _joint_states_packer(fixed: int, *counts: int) -> struct.Struct:
 
 
 def event_message(event: TraceEvent, utc_ns: int) -> bytes:
-    """An event as ma2000_daq/Event."""
+    """Encodes an event as ma2000_daq/Event."""
     writer = CdrWriter()
     writer.stamp(utc_ns)
     writer.number("d", event.time)
@@ -171,10 +171,10 @@ def event_message(event: TraceEvent, utc_ns: int) -> bytes:
 
 
 def event_of(message: bytes) -> TraceEvent:
-    """The event in a ma2000_daq/Event. Raises ValueError for anything else."""
+    """Decodes an event from ma2000_daq/Event. Raises ValueError for any other message."""
     reader = CdrReader(message)
     reader.number("i")
-    reader.number("I")  # the stamp, which follows from the time
+    reader.number("I")  # skip the stamp, which follows from the time
     found: dict[str, object] = {"time": reader.number("d"), "kind": reader.text(), "message": reader.text()}
     found |= {"tick": reader.optional("q"), "joint": reader.optional("i")}
     reader.end()
@@ -182,7 +182,7 @@ def event_of(message: bytes) -> TraceEvent:
 
 
 def log_message(event: TraceEvent, utc_ns: int) -> bytes:
-    """An event as rcl_interfaces/Log, which tools of ROS 2 show among what nodes log."""
+    """Encodes an event as rcl_interfaces/Log, which ROS 2 tools show as a log message."""
     writer = CdrWriter()
     writer.stamp(utc_ns)
     writer.number("B", _LEVELS.get(event.kind, _INFO))

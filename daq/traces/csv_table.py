@@ -1,4 +1,4 @@
-"""Traces as CSV and other text with columns, with a TOML file beside it for what columns cannot hold."""
+"""Traces as CSV and other text tables, with a TOML file for data that columns cannot hold."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ from daq.traces.mapping.units import NONE, drive_of, factor
 from daq.traces.naming import trace_id_of
 
 SIGNALS = ("set_point", "position", "drive", "velocity")
-"""Signals that a joint may have; a column is named by the signal, `_` and the joint's number. `position` is needed, or
-`velocity` in its place: the position is then the integral of the velocity, from 0."""
+"""Signals of a joint. A column is named by the signal, `_` and the joint number. `position` is required, or `velocity`
+instead: the position is then its integral from 0."""
 
-FILE_TIME = "Its date is the last change of its file."
-"""Note in a trace whose description states no `created`."""
+FILE_TIME = "The date is that of the file's last change."
+"""Note in a trace whose description has no `created`."""
 
 SLOWEST = 1.0
-"""Time from row to row (s) from which times may be in ms: a moving joint is sampled more often."""
+"""Time (s) between rows from which times may be in ms: a moving joint is sampled faster."""
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-9][0-9]?)")
 
 
 def export_csv(trace: Trace, path: Path) -> Path:
-    """Writes `time` and the signals that the trace has, and the TOML beside it. Numbers read back exactly.
+    """Writes `time` and the trace's signals to a CSV file, and a TOML file beside it. Numbers can be read back exactly.
 
-    The same trace gives the same bytes. Raises TraceError when a file cannot be written.
+    The same trace gives the same bytes. Raises TraceError if a file cannot be written.
     """
     path = Path(path)
     header = ["time"]
@@ -69,21 +69,22 @@ def export_csv(trace: Trace, path: Path) -> Path:
 
 
 def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: Choice | None = None) -> Trace:
-    """The trace in a CSV file and, where there is one, the TOML beside it; the choice goes before that.
+    """Reads the trace in a CSV file and the TOML beside it, if there is one. `choice` takes precedence over the TOML.
 
-    Columns that have this program's names are read strictly. Of other columns a choice, the TOML or the format says
-    what each is (`daq.traces.mapping`). A last row without a line end may have lost digits, so it is left out, and the
-    notes say so.
-    Raises TraceError with one line that names the row (from 1, the header is row 1) and the column of what is wrong:
-    a missing or unknown column, text, NaN, time that does not increase, rows of unequal length; or says which options
-    settle what the columns are.
+    Columns with this program's names are parsed strictly. The meaning of other columns comes from `choice`, the TOML or
+    a known format (`daq.traces.mapping`). A last row without a line end may lack digits, so it is left out, with a note
+    in the trace.
+
+    Raises TraceError with one line that names the row (from 1, the header) and column of the error: a missing or
+    unknown column, text, NaN, time that does not increase, rows of unequal length. If the meaning of columns is open,
+    the error names the options that settle it.
     """
     path = Path(path)
     data = read_file(path, limits.file_bytes, "file_bytes")
     description, described = Description.read(path, limits)
     choice = description.over(choice or Choice())
     if choice.topic or choice.set_points or choice.received:
-        raise TraceError(f"{path}: topics and times of reception are for bags; this is none")
+        raise TraceError(f"{path}: topics and times of reception exist only in bags")
     whole, said = _whole_rows(data)
     if choice.map or choice.where or not _has_own_names(*head_of(path, whole)):
         return _noted(mapped_trace(path, text_table(path, whole, limits), choice, description, limits), said)
@@ -93,7 +94,7 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
 
 @dataclass(frozen=True)
 class _Own:
-    """A file with this program's names of columns. said: what is to be noted of it."""
+    """A file with this program's column names. said: notes about it."""
 
     path: Path
     choice: Choice
@@ -102,12 +103,12 @@ class _Own:
     said: list[str]
 
     def trace(self, header: list[str], table: Floats, rows: array[int], begins: Decimal) -> Trace:
-        """The trace in it. Raises TraceError."""
+        """Returns the trace. Raises TraceError."""
         path, description, said = self.path, self.description, self.said
         if said and not len(table):
             raise TraceError(f"{path}: {' '.join(said)} No row is left")
         if begins:
-            said.append(f"Its times count from its first row, which is at {begins} {description.time_unit or 's'}.")
+            said.append(f"Times count from the first row, which is at {begins} {description.time_unit or 's'}.")
         table[:, 0] *= factor("time", description.time_unit or "s")
         joints = _joints(path, header, description)
         _check_bounds(path, header, table, rows)
@@ -129,7 +130,7 @@ class _Own:
         return _noted(Trace(record, joints, table[:, 0], **signals), said)
 
     def _chosen(self, joints: tuple[int, ...], signals: dict[str, Floats]) -> dict[str, Any]:
-        """What a choice changes in the record; the drive is left out, or put into the unit of a trace."""
+        """Applies a choice to the record: leaves the drive out, or converts it to a unit of traces."""
         names, unit = self.choice.joints, self.choice.drive_unit
         if names is not None and len(names) != len(joints):
             raise TraceError(f"{self.path}: --joints {','.join(names)}: it has {len(joints)} joints without names")
@@ -144,7 +145,7 @@ class _Own:
 
 
 def _signals(path: Path, header: list[str], table: Floats, joints: tuple[int, ...]) -> dict[str, Any]:
-    """Signals (n, j) by name. Raises TraceError where a joint lacks one that another has."""
+    """Returns the signals (n, j) by name. Raises TraceError if a joint lacks a signal that another has."""
     signals: dict[str, Any] = {}
     for name in SIGNALS:
         having = [joint for joint in joints if f"{name}_{joint}" in header]
@@ -157,7 +158,8 @@ def _signals(path: Path, header: list[str], table: Floats, joints: tuple[int, ..
 
 
 def text_table(path: Path, data: bytes, limits: TraceLimits) -> Table:
-    """A text file's columns by name; a file that an expression names is looked for beside it. Raises TraceError."""
+    """Returns a text file's columns by name; a file named in an expression is looked for beside it. Raises
+    TraceError."""
 
     def beside(file: str) -> Columns:
         other = path.parent / file
@@ -167,12 +169,12 @@ def text_table(path: Path, data: bytes, limits: TraceLimits) -> Table:
 
 
 def _has_own_names(separator: str, header: list[str]) -> bool:
-    """Whether a file speaks as this program does, with commas and the time first, so that it is read strictly."""
+    """Whether a file has this program's column names, with commas and the time first, so that it is parsed strictly."""
     return separator == "," and header[:1] == ["time"] and any(_COLUMN.fullmatch(name) for name in header)
 
 
 def _noted(trace: Trace, said: list[str]) -> Trace:
-    """The trace with more notes; of a file that lacks something the outcome is not `complete`."""
+    """Returns the trace with more notes. If the file lacks data, the outcome is not `complete`."""
     record = trace.record
     update: dict[str, Any] = {"notes": " ".join([record.notes, *said]).strip()}
     if any(line.startswith(INCOMPLETE) for line in said) and record.outcome in (None, "complete"):
@@ -181,14 +183,14 @@ def _noted(trace: Trace, said: list[str]) -> Trace:
 
 
 def _whole_rows(data: bytes) -> tuple[bytes, list[str]]:
-    """The rows that end with a line end, and what was left out behind them."""
+    """Returns the rows that end with a line end, and notes about the rest."""
     rows, said = data.rstrip(b"\0"), []
     if len(rows) < len(data):
         said.append(f"{INCOMPLETE}its last {len(data) - len(rows)} bytes are zeros, as a power cut leaves them.")
     end = max(rows.rfind(b"\n"), rows.rfind(b"\r")) + 1
     if end and rows[end:].strip():
         line = "its last row has no line end, so it may be cut off, and was left out"
-        said.append(f"{INCOMPLETE}{line}; where it is whole, end it with a line end.")
+        said.append(f"{INCOMPLETE}{line}; if it is complete, end it with a line end.")
         rows = rows[:end]
     return rows, said
 
@@ -212,8 +214,8 @@ def _joints(path: Path, header: list[str], description: Description) -> tuple[in
 
 
 def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats, array[int], Decimal]:
-    """Header, numbers (rows, columns), all finite, the row of the file that each stands in, and the time from which
-    times count. Raises TraceError."""
+    """Returns the header, the numbers (rows, columns; all finite), the file row of each, and the time from which times
+    count. Raises TraceError."""
     try:
         rows = csv.reader(io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig", newline=""))
         header = [name.strip() for name in next(rows, [])]
@@ -237,8 +239,8 @@ def _check_header(path: Path, header: list[str]) -> None:
 def _numbers(
     path: Path, header: list[str], rows: Iterable[list[str]], limits: TraceLimits
 ) -> tuple[Floats, array[int], Decimal]:
-    """The numbers (rows, columns), all finite, and the row of the file of each; blank rows are left out. Times since
-    1970 count from the first row: the time there, else 0.
+    """Returns the numbers (rows, columns; all finite) and the file row of each; blank rows are left out. Times since
+    1970 are counted from the first row, whose time is returned (else 0).
 
     Raises TraceError.
     """
@@ -258,7 +260,7 @@ def _numbers(
         if not places and values[0] >= EPOCH:
             begins = Decimal(row[0])
         if begins:
-            values[0] = float(Decimal(row[0]) - begins)  # before a float64 rounds it
+            values[0] = float(Decimal(row[0]) - begins)  # subtracted before a float64 rounds it
         found.extend(values)
         places.append(number)
         if len(found) > most * len(header):
@@ -267,14 +269,15 @@ def _numbers(
 
 
 def _records_of_a_row(header: list[str]) -> int:
-    """Number of messages that a row becomes in a trace: one per joint, and one for all of them."""
+    """Number of messages for a row in a trace: one per joint, plus one."""
     return 1 + len({name.rpartition("_")[2] for name in header[1:]})
 
 
 def _check_bounds(path: Path, header: list[str], table: Floats, rows: array[int]) -> None:
-    """Raises TraceError for the first value that no rig can have measured, and for time that does not increase.
+    """Raises TraceError for the first value that no real machine can have produced, and for time that does not
+    increase.
 
-    `rows` tells where in the file each row of the table stands.
+    `rows`: file row of each row of the table.
     """
     for column, name in enumerate(header):
         signal = name.rpartition("_")[0] or name
@@ -288,7 +291,7 @@ def _check_bounds(path: Path, header: list[str], table: Floats, rows: array[int]
         before, value = table[row - 1, 0], table[row, 0]
         raise TraceError(
             f"{path}: row {rows[row]}, column 'time': {value} does not increase after {before}"
-            f"{'' if value <= before else f' by {bounds.SMALLEST_STEP:g} s at least'}"
+            f"{'' if value <= before else f' by at least {bounds.SMALLEST_STEP:g} s'}"
         )
 
 

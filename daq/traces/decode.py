@@ -24,13 +24,13 @@ _EVENT_DECODERS: dict[tuple[str, str], Callable[[bytes], TraceEvent]] = {
     (layout.EVENT_SCHEMA, "cdr"): cdr.event_of,
     (layout.FORMAT_1_EVENT_SCHEMA, "json"): layout.event_of_format_1,
 }
-"""Reader of the events, by schema and encoding."""
+"""Readers of events, by schema and encoding."""
 
 
 @dataclass(frozen=True)
 class Decoded:
-    """The samples of each joint, in the order of `joints`, with the same ticks; when their set points were taken, where
-    the file tells; and the events."""
+    """Samples of each joint, in the order of `joints`, with the same ticks; when their set points were used, if the
+    file contains it; and the events."""
 
     samples: tuple[Samples, ...]
     taken: NDArray[Any] | None
@@ -38,12 +38,12 @@ class Decoded:
 
     @property
     def of_periods(self) -> tuple[NDArray[Any], ...]:
-        """Messages of every topic that has one in each recorded period."""
+        """Messages of every topic that has one message per recorded period."""
         return self.samples if self.taken is None else (*self.samples, self.taken)
 
 
 def decode(found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> Decoded:
-    """Everything in the chunks of a scan. Raises ValueError or struct.error when they are not those of a trace."""
+    """Decodes all chunks of a scan. Raises ValueError or struct.error if they are not those of a trace."""
     decoder = _Decoder(found, joints, limits)
     parts = [decoder.chunk(chunk) for chunk in found.chunks]
     empty = np.empty(0, layout.JOINT_SAMPLE_DTYPE)
@@ -56,10 +56,10 @@ def decode(found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> Decoded
 
 
 def cut_to_what_decodes(found: Scan, joints: tuple[int, ...], limits: TraceLimits, origin: str) -> None:
-    """Shortens a scan to the chunks before the first that does not follow the ones before it.
+    """Shortens a scan to the chunks before the first one that is inconsistent with its predecessors.
 
-    A recording ends no chunk inside a row, and time increases from row to row.
-    Raises TraceError when the channels are not those of a trace.
+    A recording never ends a chunk within a row, and time increases from row to row. Raises TraceError if the channels
+    are not those of a trace.
     """
     try:
         decoder = _Decoder(found, joints, limits)
@@ -80,7 +80,7 @@ def cut_to_what_decodes(found: Scan, joints: tuple[int, ...], limits: TraceLimit
 
 
 class _Decoder:
-    """Raises ValueError when the channels are not those of a trace."""
+    """Decodes chunks. Raises ValueError if the channels are not those of a trace."""
 
     def __init__(self, found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> None:
         self._known = frozenset(found.channels)
@@ -97,7 +97,7 @@ class _Decoder:
 
     @property
     def tells_taken(self) -> bool:
-        """Whether the file tells when set points were taken."""
+        """Whether the file contains when set points were used."""
         return self._taken is not None
 
     def chunk(self, chunk: bytes) -> Decoded:
@@ -123,7 +123,8 @@ def _require_same_ticks(samples: tuple[NDArray[Any], ...]) -> None:
 
 
 def _channels(found: Scan) -> dict[str, int]:
-    """Channel of each topic. Raises ValueError where a joint's schema is not ours, or a topic has two channels."""
+    """Returns the channel of each topic. Raises ValueError if a joint has an unknown schema, or a topic two
+    channels."""
     channels: dict[str, int] = {}
     for channel in found.channels.values():
         schema = found.schemas.get(channel.schema_id)
@@ -139,7 +140,7 @@ def _channels(found: Scan) -> dict[str, int]:
 
 
 def _event_decoder(found: Scan, channel: int | None) -> Callable[[bytes], TraceEvent]:
-    """What reads the messages of the events' channel. Raises ValueError for a channel of other messages."""
+    """Returns the decoder of the event channel. Raises ValueError for a channel of other messages."""
     if channel is None:
         return cdr.event_of
     schema = found.schemas.get(found.channels[channel].schema_id)

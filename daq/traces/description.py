@@ -1,4 +1,4 @@
-"""The TOML beside a file of another program: what its columns or messages cannot say of a trace."""
+"""The TOML beside an imported file: properties of a trace that its columns or messages lack."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ from daq.traces.mapping.units import drive_of
 from daq.traces.recording import software
 
 EARLY = 0.9
-"""Share of a control period after which a sample can come, its clock's jitter included."""
+"""Smallest time between samples as a share of the control period, including clock jitter."""
 MAP = "[map]"
 """The table of a mapping, which `remember` writes at the end of the file."""
 
 
 class Description(FrozenRecord):
-    """What a TOML file may say of the file beside it.
+    """Properties that a TOML file may give for the file beside it.
 
-    machine:   the name of a shipped machine or a path from the TOML's folder
-    joints:    numbers of the joints of a CSV file with this program's names, else names; all joints when None
+    machine:   name of a packaged machine, or a path relative to the TOML's folder
+    joints:    joint numbers of a CSV file with this program's names, otherwise names; None for all joints
     joint_names: of a CSV file with this program's names, in the order of its joints
-    time_unit: of a CSV file with this program's names; s when None
+    time_unit: of a CSV file with this program's names; None for s
     topic, set_points, times: of a bag, as in `Choice`
-    where, map: of a table with names of its own, as in `Choice`
+    where, map: of a table with other column names, as in `Choice`
     """
 
     source: Literal["mock", "real", "imported"] = "imported"
@@ -65,7 +65,7 @@ class Description(FrozenRecord):
 
     @classmethod
     def read(cls, path: Path, limits: TraceLimits) -> tuple[Self, tuple[bytes, ...]]:
-        """The description beside `path`, and the bytes of its file; without one a description that says nothing.
+        """Returns the description beside `path`, and the bytes of its file; without a file, an empty description.
 
         Raises TraceError.
         """
@@ -77,7 +77,7 @@ class Description(FrozenRecord):
 
     @classmethod
     def of(cls, path: Path, data: bytes) -> Self:
-        """The description in a TOML file. Raises TraceError."""
+        """Parses the description in a TOML file. Raises TraceError."""
         try:
             description = cls.model_validate(parse_toml(data.decode("utf-8-sig"), str(path)))
         except ValidationError as error:
@@ -93,7 +93,7 @@ class Description(FrozenRecord):
         return description
 
     def over(self, choice: Choice) -> Choice:
-        """The choice, with what this file says wherever the choice leaves it open."""
+        """Returns the choice, completed by this description."""
         names = tuple(name for name in self.joints or () if isinstance(name, str)) or None
         return replace(
             choice,
@@ -107,7 +107,8 @@ class Description(FrozenRecord):
         )
 
     def load_machine(self, path: Path) -> Machine | None:
-        """The machine that the description of the file `path` names; None where it names none. Raises TraceError."""
+        """Returns the machine that the description of the file `path` names; None if it names none. Raises
+        TraceError."""
         if self.machine is None:
             return None
         named = self.machine in shipped_machines()
@@ -117,14 +118,14 @@ class Description(FrozenRecord):
             raise TraceError(f"{toml_path(path)}: machine: {error}") from error
 
     def check_period(self, time: Floats, origin: str) -> None:
-        """Raises TraceError for a control period that is longer than the time from row to row, as one in ms is."""
+        """Raises TraceError for a control period that is longer than the time between rows, such as one given in ms."""
         usual = float(np.median(np.diff(time))) if len(time) > 1 else math.inf
         if self.period is not None and usual < EARLY * self.period:
             raise TraceError(f"{origin}: period = {self.period:g} s, and its rows are {usual:g} s apart; write it in s")
 
     def record(self, path: Path, machine: Machine | None, identity: str) -> TraceRecord:
-        """The record of the trace in the file `path`. `identity` follows from what the files hold, so that a model
-        fitted to the trace goes on naming it. Where no date is stated, it is that of the file's last change.
+        """Returns the record of the trace in the file `path`. `identity` depends on the contents of the files, so that
+        the references of fitted models stay valid. Without a stated date, the date of the file's last change is used.
 
         Raises TraceError.
         """
@@ -145,7 +146,7 @@ class Description(FrozenRecord):
 
 
 def _last_change(path: Path) -> datetime:
-    """When a file was last changed, within the years that a trace can be of. Raises TraceError."""
+    """Time of a file's last change, limited to the years that a trace can have. Raises TraceError."""
     try:
         changed = os.stat(path).st_mtime
     except OSError as error:
@@ -154,14 +155,14 @@ def _last_change(path: Path) -> datetime:
 
 
 def toml_path(path: Path) -> Path:
-    """The TOML beside a file. Raises TraceError for what can be no file's name, such as `.` and `/`."""
+    """Path of the TOML beside a file. Raises TraceError for a path that cannot be a file, such as `.` and `/`."""
     if not path.name:
         raise TraceError(f"{path}: is a folder; name a .csv file")
     return path.with_suffix(".toml")
 
 
 def read_file(path: Path, most: int, limit: str) -> bytes:
-    """The content of a file of at most so many bytes, set by that limit. Raises TraceError."""
+    """Returns the content of a file of at most `most` bytes, which `limit` sets. Raises TraceError."""
     try:
         with disk.open_regular(path) as stream:
             return disk.read_at_most(stream, most, str(path), limit)
@@ -170,9 +171,8 @@ def read_file(path: Path, most: int, limit: str) -> bytes:
 
 
 def remember(path: Path, choice: Choice, used: Mapping[str, str]) -> Path:
-    """Writes into the TOML beside a file how it was imported, so that it is read so from now on. What else the TOML
-    says stays; a mapping or a choice that it has gives way. Raises TraceError.
-    """
+    """Writes into the TOML beside a file how it was imported, so that later reads do the same. Replaces a mapping or
+    choice in the TOML; keeps everything else. Raises TraceError."""
     toml = toml_path(path)
     try:
         text = toml.read_text("utf-8") if toml.exists() else ""
@@ -196,5 +196,5 @@ def remember(path: Path, choice: Choice, used: Mapping[str, str]) -> Path:
 
 
 def toml_text(value: object) -> str:
-    """A TOML value: as in JSON, except that TOML requires DEL to be escaped."""
+    """Formats a TOML value: as in JSON, except that TOML requires DEL to be escaped."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")

@@ -1,4 +1,4 @@
-"""Operating-system calls that make a trace survive a crash: locks, syncs, atomic renames."""
+"""Operating-system calls by which a trace survives a crash: locks, syncs, atomic renames."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from daq.contracts.whole_file import sync_folder
 
 
 def open_regular(path: Path) -> IO[bytes]:
-    """Opens a regular file to read. Raises OSError, also for a pipe, whose opening would wait for its writer."""
+    """Opens a regular file for reading. Raises OSError, also for a pipe, since opening one would wait for its
+    writer."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):
@@ -31,17 +32,18 @@ def size_of(stream: IO[bytes]) -> int:
 
 
 def read_at_most(stream: IO[bytes], most: int, origin: str, limit: str = "file_bytes") -> bytes:
-    """The content of a file. Raises TraceError when it has more than `most` bytes, without reading them; OSError."""
+    """Returns the content of a file. Raises TraceError, without reading it, if it has more than `most` bytes;
+    OSError."""
     size = size_of(stream)
     if size > most:
         raise TraceError(f"{origin}: has {size} bytes; up to {most} are read (traces.limits.{limit})")
-    return stream.read(size)  # the present size: a read of `most` bytes would allocate as many
+    return stream.read(size)  # the actual size: `most` would allocate as many bytes
 
 
 def create_locked(path: Path) -> IO[bytes]:
-    """A new file, locked for this process until it is closed or the process ends.
+    """Creates a new file, locked for this process until it is closed or the process ends.
 
-    Raises TraceError when the file exists, or another process took it while it was being created; OSError otherwise.
+    Raises TraceError if the file exists, or another process took it during creation; OSError for other failures.
     """
     try:
         stream = path.open("xb")
@@ -49,7 +51,7 @@ def create_locked(path: Path) -> IO[bytes]:
         raise TraceError(f"{path}: exists already; a trace is never written over") from None
     try:
         take_lock(stream, waits=True)
-    except OSError:  # the file system has no locks: nothing is left there
+    except OSError:  # the file system has no locks: delete the file again
         stream.close()
         path.unlink()
         raise
@@ -60,9 +62,9 @@ def create_locked(path: Path) -> IO[bytes]:
 
 
 def is_being_written(path: Path) -> bool:
-    """Whether a living process is writing this file. Raises OSError when it cannot be opened.
+    """Whether a running process is writing this file. Raises OSError if it cannot be opened.
 
-    Where the file system refuses locks none is: a writer begins with one.
+    False if the file system does not support locks: a writer begins with one.
     """
     with open_regular(path) as stream:
         try:
@@ -72,7 +74,7 @@ def is_being_written(path: Path) -> bool:
 
 
 def is_still_at(stream: IO[bytes], path: Path) -> bool:
-    """Whether `path` still names the open file."""
+    """Whether `path` still refers to the open file."""
     try:
         named = path.stat()
     except FileNotFoundError:
@@ -87,11 +89,11 @@ def sync(stream: IO[bytes]) -> None:
 
 
 def rename(old: Path, new: Path) -> None:
-    """Gives a file its final name, and syncs the name to the disk."""
+    """Renames a file to its final name, and syncs the name to the disk."""
     old.replace(new)
     sync_folder(new.parent)
 
 
 def reason(error: OSError) -> str:
-    """The operating system's words for what went wrong."""
+    """The operating system's message for an error."""
     return error.strerror or str(error)

@@ -1,4 +1,4 @@
-"""The metadata at the beginning and the end of a file, read without what lies between them."""
+"""Reads the metadata at the beginning and the end of a file, without the data in between."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ _FOOTER_BYTES = HEAD.size + 20
 _END_BYTES = _FOOTER_BYTES + len(MCAP0_MAGIC)
 _CRC_BYTES = 4
 _LARGEST_INDEX = 64 << 20
-"""Largest index (bytes) that is read. Ten hours of six joints have an index of 10 MB."""
+"""Largest index (bytes) that is read; ten hours of six joints have an index of 10 MB."""
 
 
 def first_metadata(stream: IO[bytes], limits: TraceLimits, origin: str) -> tuple[str, Texts]:
-    """Name and content of the first metadata record, read without the rest of the file. Raises TraceError."""
+    """Returns name and content of the first metadata record, without reading the rest of the file. Raises
+    TraceError."""
     opcode: int = Opcode.HEADER
     try:
         if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
@@ -40,9 +41,9 @@ def first_metadata(stream: IO[bytes], limits: TraceLimits, origin: str) -> tuple
 
 
 def indexed_metadata(stream: IO[bytes], limits: TraceLimits) -> dict[str, Texts]:
-    """Metadata of a finished file by name, found through its index.
+    """Returns the metadata of a finished file by name, found through its index.
 
-    Raises ValueError or another of UNREADABLE when it has no index or a damaged one, OSError.
+    Raises ValueError or another of UNREADABLE if the index is missing or damaged, OSError.
     """
     found: dict[str, Texts] = {}
     for entry in _metadata_index(stream):
@@ -87,7 +88,7 @@ def _metadata_index(stream: IO[bytes]) -> list[fields.IndexEntry]:
 
 
 def _record(stream: IO[bytes], most: int) -> tuple[int, bytes]:
-    """Opcode and body of the next record. Raises ValueError, struct.error."""
+    """Returns opcode and body of the next record. Raises ValueError, struct.error."""
     opcode, length = HEAD.unpack(stream.read(HEAD.size))
     if length > most:
         raise ValueError(f"metadata have more than {most} bytes (traces.limits.metadata_bytes)")

@@ -1,4 +1,4 @@
-"""Opens a file of any kind as the trace in it."""
+"""Opens a file of any known kind as a trace."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ from daq.traces.reader import read_trace
 
 
 def open_trace(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: Choice | None = None) -> Trace:
-    """The trace in a file of this project, in text with columns, or in what a plug-in reads. The TOML beside a file
-    says what is taken of it where the choice does not. Raises TraceError, MissingExtraError.
-    """
+    """Returns the trace in a trace file, a text table, or a recording that a plug-in reads. `choice` takes precedence
+    over the TOML beside the file. Raises TraceError, MissingExtraError."""
     kind = kind_of(path, limits)
     if kind == "csv":
         return import_csv(path, limits, choice)
     if kind == "trace":
         if choice is not None and choice != Choice(numbering=choice.numbering):
-            raise TraceError(f"{path}: is a trace already, of which nothing is chosen")
+            raise TraceError(f"{path}: is a trace of this program; options of an import do not apply")
         return read_trace(path, limits)
     made: Trace = named(kind.read)(path, limits, choice or Choice())
     return made

@@ -1,4 +1,4 @@
-"""Decompresses a chunk into the number of bytes that it declares, never more."""
+"""Decompresses a chunk to exactly its declared size."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import zstandard
 from daq.traces.fields import CompressedChunk
 
 INFLATE_ERRORS = (zstandard.ZstdError, RuntimeError)
-"""Errors that the libraries raise on damaged bytes; lz4 raises RuntimeError."""
+"""Errors that the libraries raise for damaged bytes; lz4 raises RuntimeError."""
 
 _LEAST_WINDOW = 8 << 20
-"""Window (bytes) that a zstd stream may refer back to and every decoder must support (RFC 8878, 3.1.1.1.2)."""
+"""Largest back-reference (bytes) of a zstd stream that every decoder must support (RFC 8878, 3.1.1.1.2)."""
 _SIZE_UNKNOWN = -1
-"""What zstandard returns where a frame's header does not state its size."""
+"""Result of zstandard if a frame's header does not state its size."""
 
 
 def inflate(chunk: CompressedChunk) -> bytes:
-    """The records of a chunk, with their checksum compared. No more than `chunk.size` bytes are ever made.
+    """Returns the records of a chunk and checks its checksum. Never allocates more than `chunk.size` bytes.
 
-    Raises ValueError or one of INFLATE_ERRORS when the chunk is not what it declares.
+    Raises ValueError or one of INFLATE_ERRORS if the chunk differs from its declaration.
     """
     if chunk.compression == "zstd":
         data = _zstd(chunk)
@@ -30,7 +30,7 @@ def inflate(chunk: CompressedChunk) -> bytes:
     elif chunk.compression == "":
         data = _plain(chunk)
     else:
-        raise ValueError(f"a chunk is compressed by {chunk.compression[:20]!r}; zstd, lz4 and none are read")
+        raise ValueError(f"a chunk is compressed by {chunk.compression[:20]!r}; allowed are zstd, lz4 and none")
     if len(data) != chunk.size:
         raise _other_size(chunk)
     if chunk.crc not in (0, zlib.crc32(data)):
@@ -46,9 +46,9 @@ def _plain(chunk: CompressedChunk) -> bytes:
 
 def _zstd(chunk: CompressedChunk) -> bytes:
     decompressor = zstandard.ZstdDecompressor(max_window_size=max(_LEAST_WINDOW, chunk.size))
-    if chunk.size == 0:  # zstandard takes a limit of 0 for none
+    if chunk.size == 0:  # zstandard takes a limit of 0 as no limit
         return bytes(decompressor.stream_reader(chunk.data).read(1)) if len(chunk.data) else b""
-    # zstandard takes the size in the frame's head before the one it is given, so the two have to agree first.
+    # zstandard prefers the size in the frame's header to the size it is given, so require that they agree.
     if zstandard.frame_content_size(chunk.data) not in (_SIZE_UNKNOWN, chunk.size):
         raise _other_size(chunk)
     return decompressor.decompress(chunk.data, max_output_size=chunk.size)

@@ -1,4 +1,4 @@
-"""Which file is what, by its content: a trace, a table, or a recording that a plug-in reads."""
+"""Recognises the kind of a file by its content: a trace, a table, or a recording that a plug-in reads."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from daq.traces import disk, layout
 from daq.traces.ends import first_metadata
 
 Kind = Literal["trace", "csv"] | Importer
-"""What reads a file: the reader of traces, `import_csv`, or an importer."""
+"""Reader of a file: the reader of traces, `import_csv`, or an importer."""
 FIRST = 16
-"""Number of bytes at a file's beginning by which importers know theirs."""
+"""Number of bytes at the start of a file by which importers recognise it."""
 
 
 def kind_of(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Kind:
-    """What a file is by its first bytes; by its name where these say nothing, as those of a damaged or absent file."""
+    """Returns the kind of a file by its first bytes or, if they are not conclusive (damaged or missing file), by its
+    name."""
     first = first_bytes(path)
     if first.startswith(MCAP0_MAGIC) and is_trace(path, limits):
         return "trace"
@@ -34,14 +35,14 @@ def kind_of(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Kind:
 
 
 def first_bytes(path: Path) -> bytes:
-    """The first bytes of a file; none of one that cannot be read."""
+    """Returns the first bytes of a file; empty if it cannot be read."""
     with suppress(OSError), disk.open_regular(path) as stream:
         return stream.read(FIRST)
     return b""
 
 
 def is_trace(file: Path, limits: TraceLimits) -> bool:
-    """Whether a file begins as a trace of this project. Raises OSError."""
+    """Whether a file begins like a trace of this project. Raises OSError."""
     try:
         with disk.open_regular(file) as stream:
             return first_metadata(stream, limits, str(file))[0] == layout.START_METADATA

@@ -1,4 +1,4 @@
-"""What a trace file looks like inside: topics, schemas, metadata records, and the bytes of one joint's sample.
+"""Contents of a trace file: topics, schemas, metadata records, and the bytes of one joint's sample.
 
 docs/traces.md describes the same for readers in other languages.
 """
@@ -22,17 +22,18 @@ from daq.traces.cdr import HEADER
 
 SUFFIX = ".mcap"
 PART_SUFFIX = ".mcap.part"
-"""A trace that is being recorded, or whose recording ended without a close."""
+"""A trace that is being recorded, or that was never closed."""
 
 PROFILE = "ros2"
-"""MCAP's profile of what a recording writes: every topic is in CDR and has a schema in ROS 2's language."""
+"""MCAP's profile of recordings: every topic is in CDR, with a schema in ROS 2's language."""
 
 JOINT_STATES_TOPIC = "/joint_states"
 EVENTS_TOPIC = "/events"
 LOG_TOPIC = "/rosout"
-"""The events once more, where tools of ROS 2 look for what is logged."""
+"""A copy of the events where ROS 2 tools look for log messages."""
 JOINT_TOPIC = "/samples/joint_"
-"""Topic of one joint, followed by its number, from 1. No part of a topic's name in ROS 2 may begin with a digit."""
+"""Prefix of a joint's topic, followed by its number, from 1. In ROS 2, no part of a topic name may begin with a
+digit."""
 
 JOINT_SCHEMA = "ma2000_daq/msg/JointSample"
 JOINT_STATES_SCHEMA = "sensor_msgs/msg/JointState"
@@ -41,7 +42,7 @@ LOG_SCHEMA = "rcl_interfaces/msg/Log"
 
 FORMAT_1_JOINT_TOPIC = "/joint/"
 FORMAT_1_EVENT_SCHEMA = "foxglove.Log"
-"""What traces of format 1 had instead: other names of topics, and events in JSON."""
+"""The counterpart in traces of format 1, which had other topic names and events in JSON."""
 
 START_METADATA = "daq.record"
 """Metadata record at the start: `record` (TraceRecord as JSON), `joints` and `signals` (separated by spaces)."""
@@ -49,11 +50,11 @@ END_METADATA = "daq.outcome"
 """Metadata record at the end: `outcome`, `counters` (JSON), `samples`, `duration` (s), `remark`."""
 
 OPTIONAL_SIGNALS = ("set_point", "error", "drive", "velocity")
-"""Signals a sample may lack (NaN)."""
+"""Signals that a sample may lack (NaN)."""
 RECORDED_SIGNALS = ("tick", "host_time", "status", "set_point", "position", "error", "drive", "power_raw")
-"""Signals that a recording of the controller has."""
+"""Signals in a recording of the controller."""
 SLOW_LINE_SIGNALS = (*RECORDED_SIGNALS, "taken")
-"""The same where only every n-th period has a sample."""
+"""Signals if only every n-th period is sampled."""
 
 ALL_SIGNALS = (
     "time",
@@ -87,23 +88,23 @@ JOINT_SAMPLE_DTYPE = np.dtype(
         ("status", "<u4"),
     ]
 )
-"""schemas/JointSample.msg in CDR: a 4-byte header, then every field on its natural boundary, without padding."""
+"""schemas/JointSample.msg in CDR: a 4-byte header, then aligned fields without padding."""
 
 
 @cache
 def schema(name: str) -> bytes:
-    """The definition of a message and of those in it, as it is written into every trace."""
+    """Returns the definition of a message and its nested messages, as written into every trace."""
     return (resources.files("daq.traces") / "schemas" / f"{name.rpartition('/')[2]}.msg").read_bytes()
 
 
 def nanoseconds(moment: datetime) -> int:
-    """UTC in ns since 1970, exact to the microsecond that `moment` carries."""
+    """Converts UTC to ns since 1970, exact to the microsecond of `moment`."""
     whole = int(moment.replace(microsecond=0).timestamp())
     return whole * 1_000_000_000 + moment.microsecond * 1000
 
 
 def joint_sample(row: SampleRow, column: int) -> bytes:
-    """The sample of one joint: `column` is its index in the row."""
+    """Encodes the sample of one joint; `column` is its index in the row."""
     return _JOINT_SAMPLE.pack(
         HEADER,
         row.time,
@@ -120,14 +121,14 @@ def joint_sample(row: SampleRow, column: int) -> bytes:
 
 
 def event_of_format_1(message: bytes) -> TraceEvent:
-    """The event in a foxglove.Log, with its own fields beside. Raises ValueError for anything else."""
+    """Decodes the event in a foxglove.Log with additional fields. Raises ValueError for any other text."""
     fields = json_object(message)
     own = {key: fields[key] for key in ("time", "message", "tick", "joint") if key in fields}
     return TraceEvent.model_validate(own | {"kind": fields.get("name")})
 
 
 def json_object(text: str | bytes) -> dict[str, Any]:
-    """A JSON object, nested at most 200 deep and without NaN. Raises ValueError."""
+    """Parses a JSON object, nested at most 200 deep and without NaN. Raises ValueError."""
     found = from_json(text, allow_inf_nan=False)
     if not isinstance(found, dict):
         raise ValueError("it is no JSON object")  # noqa: TRY004  # what is wrong is the text, not a type here
@@ -135,5 +136,5 @@ def json_object(text: str | bytes) -> dict[str, Any]:
 
 
 def compact(data: object) -> bytes:
-    """JSON without spaces; refuses NaN, which JSON does not know."""
+    """Returns JSON without spaces; rejects NaN, which JSON lacks."""
     return json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()

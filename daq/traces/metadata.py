@@ -1,4 +1,4 @@
-"""Reads a trace's own description from its metadata, which another program may have written."""
+"""Reads a trace's record from its metadata, which another program may have written."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from firmware_protocol.invalid import first_invalid
 
 _JOINT = re.compile(r"[1-9][0-9]?")
 _NUMBER = re.compile(r"[A-Za-z0-9_-]{1,64}")
-"""Permitted number of a trace, which becomes part of file names and addresses."""
+"""Permitted ID of a trace, which becomes part of file names and addresses."""
 _SHOWN = 40
-"""Number of characters of a wrong text that an error message shows."""
+"""Most characters of a wrong text in an error message."""
 _MOST_SAMPLES = 2**31 - 1
-"""Largest number of samples: the largest integer that every supported database holds; more than a year at 50 Hz."""
+"""Most samples: the largest integer of all supported databases; more than a year at 50 Hz."""
 
 
 class NewerTraceError(TraceError):
@@ -28,9 +28,9 @@ class NewerTraceError(TraceError):
 
 
 def record_of(start: dict[str, str], end: dict[str, str] | None, origin: str) -> TraceRecord:
-    """What a trace says about itself, from the metadata at its start and (if it has one) at its end.
+    """Returns the record of a trace, from the metadata at its start and (if it has one) its end.
 
-    Raises TraceError, naming the version where it is newer than this one.
+    Raises TraceError, which names the version if it is newer than this one.
     """
     try:
         fields = layout.json_object(start["record"])
@@ -47,16 +47,16 @@ def record_of(start: dict[str, str], end: dict[str, str] | None, origin: str) ->
     except (ValueError, RecursionError) as error:
         raise TraceError(f"{origin}: its metadata is not that of a trace: {one_line(error)}") from error
     if not _NUMBER.fullmatch(record.trace_id):
-        raise TraceError(f"{origin}: its number {record.trace_id[:_SHOWN]!r} is not letters, digits, - and _")
+        raise TraceError(f"{origin}: its ID {record.trace_id[:_SHOWN]!r} must be letters, digits, - and _")
     if record.created.tzinfo is None:
         raise TraceError(f"{origin}: created = {record.created.isoformat()} has no time zone")
     return record
 
 
 def joints_of(start: dict[str, str], limits: TraceLimits, origin: str) -> tuple[int, ...]:
-    """The joints that a trace has, in the order of its columns. Raises TraceError."""
+    """Returns the joints of a trace, in the order of its columns. Raises TraceError."""
     text = start.get("joints", "")
-    # The text is looked at before it is split: it may be a list of millions.
+    # Check the length before splitting: the text may list millions.
     words = text.split() if len(text) <= 3 * limits.joints else [text[:_SHOWN]]
     joints = tuple(int(word) for word in words if _JOINT.fullmatch(word))
     if not 1 <= len(joints) <= limits.joints or len(joints) != len(words) or len(set(joints)) != len(joints):
@@ -68,28 +68,28 @@ def joints_of(start: dict[str, str], limits: TraceLimits, origin: str) -> tuple[
 
 
 def signals_of(start: dict[str, str], origin: str) -> frozenset[str]:
-    """Names of the signals that a trace has. Raises TraceError."""
+    """Returns the names of a trace's signals. Raises TraceError."""
     if "signals" not in start:
         raise TraceError(f"{origin}: its metadata is not that of a trace: 'signals' is missing")
     return frozenset(start["signals"].split())
 
 
 def extent_of(end: dict[str, str], origin: str) -> tuple[int, float]:
-    """Number of samples, and time (s) between the first and the last, as the trace's end states them.
+    """Returns the number of samples, and the time (s) between the first and the last, from the metadata at the end.
 
     Raises TraceError.
     """
     try:
         samples, duration = int(end["samples"][:_SHOWN]), float(end["duration"][:_SHOWN])
     except (KeyError, ValueError) as error:
-        raise TraceError(f"{origin}: its metadata is not that of a trace: samples or duration are no number") from error
+        raise TraceError(f"{origin}: its metadata is not that of a trace: samples or duration: not a number") from error
     if not 0 <= samples <= _MOST_SAMPLES or not 0 <= duration < math.inf:
         raise TraceError(f"{origin}: its metadata is not that of a trace: {samples} samples in {duration} s")
     return samples, duration
 
 
 def one_line(error: Exception) -> str:
-    """The error in one line, with the field for pydantic's errors."""
+    """Returns the error in one line, with the field for pydantic's errors."""
     if isinstance(error, ValidationError):
         first = first_invalid(error)
         return f"{'.'.join(str(part)[:_SHOWN] for part in first.place)}: {first.message}"

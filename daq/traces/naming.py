@@ -1,4 +1,4 @@
-"""Names of trace files: date and time, kind of experiment, first digits of the trace's number."""
+"""Names of trace files: date and time, kind of experiment, first digits of the trace's ID."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ KIND_LENGTH = 40
 
 
 def new_trace_id() -> str:
-    """Twelve random hexadecimal digits."""
+    """Returns twelve random hexadecimal digits."""
     return secrets.token_hex(ID_DIGITS // 2)
 
 
 def trace_id_of(*contents: bytes) -> str:
-    """Twelve hexadecimal digits that depend only on the contents of files, not on where they lie."""
+    """Returns twelve hexadecimal digits that depend only on the contents of files, not on their paths."""
     digest = hashlib.sha256()
     for content in contents:
         digest.update(len(content).to_bytes(8, "big") + content)
@@ -30,7 +30,7 @@ def trace_id_of(*contents: bytes) -> str:
 
 
 def trace_path(folder: Path, record: TraceRecord) -> Path:
-    """Where a trace belongs, as `2026-11-21T05-14-42Z_ramp_ab12cd.mcap`: sorted by name is sorted by time."""
+    """Path of a trace, as `2026-11-21T05-14-42Z_ramp_ab12cd.mcap`: the order by name is the order in time."""
     moment = record.created.astimezone(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
     kind: str = record.source
     if record.spec is not None:
@@ -40,10 +40,10 @@ def trace_path(folder: Path, record: TraceRecord) -> Path:
 
 
 def part_path(path: Path) -> Path:
-    """The name of a trace while it is recorded."""
+    """Name of a trace during recording."""
     return path.with_name(path.name + PART_SUFFIX.removeprefix(SUFFIX))
 
 
 def finished_path(part: Path) -> Path:
-    """The name that a part file gets when it is finished."""
+    """Final name of a part file."""
     return part.with_name(part.name.removesuffix(PART_SUFFIX) + SUFFIX)

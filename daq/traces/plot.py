@@ -1,6 +1,6 @@
-"""Draws a trace for print: its figure as a file; also as one HTML page.
+"""Draws a trace for print: as a figure file or as an HTML page.
 
-matplotlib and Jinja2 are imported when a plot is made, so that nothing else waits for them.
+matplotlib and Jinja2 are imported only when a plot is made.
 """
 
 from __future__ import annotations
@@ -17,11 +17,10 @@ SUFFIXES = (".png", ".svg", ".pdf", ".html")
 
 
 def plot_trace(trace: Trace, path: Path, joints: tuple[int, ...] | None = None) -> Path:
-    """Draws a trace into a PNG, SVG, PDF or self-contained HTML file, by the suffix of `path`. Returns `path`.
+    """Draws a trace to a PNG, SVG, PDF or self-contained HTML file, by the suffix of `path`. Returns `path`.
 
-    `joints` are drawn; None draws those that the experiment moves, or all where there is no experiment.
-    Raises TraceError for another suffix, a joint that the trace does not have, a trace without samples, or a file that
-    cannot be written.
+    `joints`: joints to draw; None for those that the experiment moves, or all without an experiment. Raises TraceError
+    for another suffix, a missing joint, a trace without samples, or a file that cannot be written.
     """
     path = Path(path)
     if path.suffix not in SUFFIXES:
@@ -37,7 +36,7 @@ def plot_trace(trace: Trace, path: Path, joints: tuple[int, ...] | None = None) 
 
 
 def picture(trace: Trace, kind: str, joints: tuple[int, ...] | None = None) -> bytes:
-    """The figure as `png`, `svg` or `pdf`."""
+    """Returns the figure as `png`, `svg` or `pdf`."""
     import matplotlib as mpl
 
     with mpl.rc_context(STYLE):
@@ -48,7 +47,7 @@ def picture(trace: Trace, kind: str, joints: tuple[int, ...] | None = None) -> b
 
 
 def html_page(trace: Trace, joints: tuple[int, ...] | None = None) -> bytes:
-    """One HTML file that needs nothing else: the figure, what the trace says about itself, and its events."""
+    """Returns a self-contained HTML page: the figure, the trace's metadata and its events."""
     from jinja2 import Environment, PackageLoader
 
     svg = picture(trace, "svg", joints).decode()

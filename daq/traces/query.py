@@ -1,4 +1,4 @@
-"""Which traces are meant: words, and terms such as kind:ramp and since:2026-11-01."""
+"""Search queries for traces: words, and terms such as kind:ramp and since:2026-11-01."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ SOURCES = ("mock", "real", "imported")
 
 
 class TraceQuery(FrozenRecord):
-    """The filters of a search; None does not filter. Every one of `words` must be in the trace's number, file, name,
-    kind, operator or notes, in any case. `until` is the first moment that no longer counts."""
+    """The filters of a search; None does not filter. Each of `words` must be in the trace's ID, file, name, kind,
+    operator or notes, ignoring case. `until` is exclusive."""
 
     words: tuple[str, ...] = ()
     kind: str | None = None
@@ -28,7 +28,7 @@ class TraceQuery(FrozenRecord):
     until: datetime | None = None
 
     def matches(self, summary: TraceSummary) -> bool:
-        """Whether a trace is meant. What is not known of it meets no filter."""
+        """Whether a trace matches. An unknown value matches no filter."""
         for name in ("kind", "source", "outcome", "robot"):
             wanted = getattr(self, name)
             if wanted is not None and getattr(summary, name) != wanted:
@@ -46,14 +46,14 @@ class TraceQuery(FrozenRecord):
 
 
 def parse_query(text: str) -> TraceQuery:
-    """A query as a person types it, such as `ramp outcome:complete since:2026-11-01`. Raises SpecError."""
+    """Parses a query such as `ramp outcome:complete since:2026-11-01`. Raises SpecError."""
     words: list[str] = []
     terms: dict[str, object] = {}
     for part in text.split():
         name, colon, value = part.partition(":")
         if not colon or name not in TERMS:
             if colon and name.isidentifier():
-                raise SpecError(f"query: {shown(part)}: no such term; there are {', '.join(TERMS)}, and plain words")
+                raise SpecError(f"query: {shown(part)}: unknown term; allowed are {', '.join(TERMS)}, and plain words")
             words.append(part)
         elif name in terms:
             raise SpecError(f"query: {name}: is given twice")
@@ -72,7 +72,7 @@ def _value(name: str, value: str) -> object:
 
 
 def _moment(name: str, value: str) -> datetime:
-    """A day (until: its end) or a moment, in UTC unless it says its time zone."""
+    """Parses a day (for `until`, its end) or a time, in UTC unless it has a time zone."""
     try:
         if len(value) == len("2026-11-01"):
             day = datetime.combine(date.fromisoformat(value), datetime.min.time(), UTC)

@@ -1,4 +1,4 @@
-"""Opening a trace: finished, interrupted, or still without an end."""
+"""Reads a trace: finished, interrupted, or unfinished."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from daq.traces.decode import Decoded, decode
 from daq.traces.metadata import joints_of, one_line, record_of, signals_of
 from daq.traces.scan import Scan, scan
 
-TOO_LARGE = "does not fit into the memory that is free here"
+TOO_LARGE = "does not fit into the free memory"
 
 
 def read_trace(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
-    """The trace in a file. The outcome of one that was never closed (`.mcap.part`) is unknown: None.
+    """Reads the trace in a file. The outcome of a file that was never closed (`.mcap.part`) is None.
 
-    Raises TraceError with one line when the file cannot be read, is no MCAP file, is damaged, exceeds a limit, is not
-    a trace of this project, or was made by a newer version of it.
+    Raises a one-line TraceError if the file cannot be read, is no MCAP file, is damaged, exceeds a limit, is not a
+    trace of this project, or was made by a newer version of it.
     """
     path = Path(path)
     try:
@@ -47,12 +47,12 @@ def read_trace(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
 
 
 def _decoded(path: Path, limits: TraceLimits) -> Trace:
-    """The trace from the file itself. Raises TraceError, OSError."""
+    """Reads the trace from the file, without the cache. Raises TraceError, OSError."""
     with disk.open_regular(path) as stream:
         data = disk.read_at_most(stream, limits.file_bytes, str(path))
     found = scan(data, str(path), limits)
     if path.name.endswith(layout.PART_SUFFIX):
-        # Even where only the final name is missing: the writer never confirmed that everything was written.
+        # Even if only the final name is missing, the writer never confirmed that everything was written.
         found.metadata.pop(layout.END_METADATA, None)
     elif found.damage:
         raise TraceError(f"{path}: is damaged after byte {found.good_bytes} of {len(data)}: {found.damage}")
@@ -60,7 +60,7 @@ def _decoded(path: Path, limits: TraceLimits) -> Trace:
 
 
 def trace_of(found: Scan, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Trace:
-    """The trace in what a scan found. Raises TraceError."""
+    """Builds the trace from a scan. Raises TraceError."""
     start, end = found.metadata.get(layout.START_METADATA), found.metadata.get(layout.END_METADATA)
     if start is None:
         raise TraceError(f"{origin}: is an MCAP file, but not a trace: it has no metadata {layout.START_METADATA!r}")
@@ -72,7 +72,7 @@ def trace_of(found: Scan, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMIT
         raise TraceError(f"{origin}: is not laid out as a trace: {one_line(error)}") from error
     count = len(decoded.samples[0])
     if end is not None and end.get("samples", str(count)) != str(count):
-        raise TraceError(f"{origin}: has {count} samples, and says at its end that they are {end['samples'][:20]}")
+        raise TraceError(f"{origin}: has {count} samples, but its metadata states {end['samples'][:20]}")
     named = signals_of(start, origin)
     if set_points_taken.SIGNAL in named and decoded.taken is None and count:
         raise TraceError(f"{origin}: is not laid out as a trace: it has no topic {set_points_taken.TOPIC}")
@@ -83,7 +83,7 @@ def trace_of(found: Scan, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMIT
 
 
 def _signals(names: frozenset[str], decoded: Decoded) -> dict[str, Any]:
-    """The columns of a trace by name: time, position, and the others that it has."""
+    """Returns the columns of a trace by name: time, position, and the other recorded signals."""
     first = decoded.samples[0]
 
     def columns(name: str) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""The MCAP side of writing: rows, events and metadata into a stream. Independent of files, threads and disks."""
+"""The MCAP part of recording: writes rows, events and metadata to a stream, without files or threads."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from daq.traces.cdr import JointStates
 from daq.traces.scan import Scan
 
 ONE_CHUNK_A_FLUSH = 1 << 40
-"""Chunk size (bytes) that is never reached: chunks end only at `flush`, never inside a row."""
+"""Chunk size (bytes) that is never reached: chunks end only at `flush`, never within a row."""
 
 
 def open_mcap(stream: IO[bytes], profile: str = layout.PROFILE) -> Writer:
-    """The MCAP writer for all traces: zstd, one chunk per flush, checksums over chunks and the data section."""
+    """Opens the MCAP writer of all traces: zstd, one chunk per flush, checksums over chunks and the data section."""
     writer = Writer(stream, chunk_size=ONE_CHUNK_A_FLUSH, compression=CompressionType.ZSTD, enable_data_crcs=True)
     writer.start(profile, software())
     return writer
 
 
 def profile_of(found: Scan) -> str:
-    """The profile for a copy: traces of format 1 have topics in JSON, which are not of ROS 2."""
+    """Returns the profile for a copy: traces of format 1 have topics in JSON, which ROS 2 lacks."""
     return layout.PROFILE if all(one.message_encoding == "cdr" for one in found.channels.values()) else ""
 
 
 def outcome_metadata(
     outcome: Outcome | None, counters: Mapping[str, float], samples: int, duration: float, remark: str = ""
 ) -> dict[str, str]:
-    """The metadata record at the end of a trace."""
+    """Returns the metadata record at the end of a trace."""
     return {
         "outcome": outcome or "",
         "counters": layout.compact(dict(counters)).decode(),
@@ -47,9 +47,9 @@ def outcome_metadata(
 
 
 class Recording:
-    """One trace on its way into `stream`: the start metadata at once, then rows and events, then `finish`.
+    """Writes a trace to `stream`: the start metadata at once, then rows and events, then `finish`.
 
-    Raises TraceError when `record` has no time zone or a time has no stamp, and OSError whenever the stream does.
+    Raises TraceError if `record` has no time zone or a time cannot be stamped; OSError if the stream does.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Recording:
             self._taken = self._channel(set_points_taken.TOPIC, set_points_taken.SCHEMA)
 
     def _channel(self, topic: str, schema: str, joint: str | None = None) -> int:
-        """Registers a topic; `joint` is the name of the joint that it is of."""
+        """Registers a topic; `joint` is the name of its joint."""
         number = self._schemas.get(schema)
         if number is None:
             number = self._mcap.register_schema(schema, "ros2msg", layout.schema(schema))
@@ -105,8 +105,8 @@ class Recording:
     def row(self, row: SampleRow) -> None:
         """Adds one control period.
 
-        Messages are published at the board's time and logged at the host's monotonic one, both counted from the
-        record's start: a UTC clock that is set back meanwhile does not shift them.
+        Messages are published at the board's time and logged at the host's monotonic time, both counted from the start
+        of the record. So a UTC clock that is set back does not shift them.
         """
         first = self._first = self._first or row
         published = self._stamp(row.time)
@@ -121,21 +121,21 @@ class Recording:
         self.last_time = row.time
 
     def event(self, event: TraceEvent) -> None:
-        """Adds an event, and the same for tools that show a log."""
+        """Adds an event, and a copy for tools that show a log."""
         moment = self._stamp(event.time)
         self._mcap.add_message(self._event, moment, cdr.event_message(event, moment), moment, self._events)
         self._mcap.add_message(self._log, moment, cdr.log_message(event, moment), moment, self._events)
         self._events += 1
 
     def _stamp(self, time: float) -> int:
-        """UTC in ns since 1970 of a time (s) that counts from the record's start."""
+        """Converts a time (s) from the start of the record to UTC in ns since 1970."""
         stamp = self._start_ns + round(time * 1e9)
         if not 0 <= stamp < 1 << 64:
             raise TraceError(f"time {time:g} s after the start of the record is before 1970 or after 2554")
         return stamp
 
     def flush(self) -> None:
-        """Ends the chunk: what was added so far can be read back once the stream's bytes are."""
+        """Ends the chunk: everything added so far can be read back once the stream is written."""
         self._mcap.flush()  # type: ignore[no-untyped-call]
 
     def finish(self, outcome: Outcome | None, counters: Mapping[str, float]) -> None:
@@ -147,5 +147,5 @@ class Recording:
 
 
 def software() -> str:
-    """This software and its version, for `TraceRecord.software`."""
+    """Name and version of this software, for `TraceRecord.software`."""
     return f"ma2000-daq/{version('ma2000-daq')}"

@@ -10,15 +10,15 @@ from daq.contracts.errors import TraceError
 from daq.traces import disk
 
 BYTES_A_SAMPLE = 400
-"""Size (bytes) of one joint's sample, estimated generously (docs/traces.md gives the measured figure)."""
+"""Size (bytes) of one joint's sample, estimated generously (docs/traces.md gives the measured size)."""
 RESERVE = 20_000_000
-"""Space (bytes) that stays free for other programs."""
+"""Space (bytes) left free for other programs."""
 
 
 def require_room(folder: Path, samples: int, joints: int) -> None:
-    """Makes the folder, writes and syncs a test file there, and compares the free space with what the trace may need.
+    """Makes the folder, writes and syncs a test file, and compares the free space with the need of the trace.
 
-    Raises TraceError with one line.
+    Raises a one-line TraceError.
     """
     needed = samples * joints * BYTES_A_SAMPLE + RESERVE
     try:

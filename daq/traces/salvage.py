@@ -1,6 +1,6 @@
-"""Finishes traces that a crash or a power cut left without an end. What was synced is kept; none counts as complete.
+"""Finishes traces that a crash or a power cut left unfinished. Synced data are kept; the outcome is never complete.
 
-No file keeps the next one from being salvaged, whatever is in it, and no byte of what could not be read is deleted.
+A bad file does not prevent the salvage of the next one, and unreadable bytes are never deleted.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from daq.traces.recording import open_mcap, outcome_metadata, profile_of
 from daq.traces.scan import Scan, messages, scan
 
 NO_SCHEMA = 0
-"""MCAP's number of the schema of a channel that has none."""
+"""MCAP's schema number of a channel without schema."""
 SALVAGE_SUFFIX = ".salvage"
-"""Suffix of the new file until it is complete. One that is found was left by an interrupted salvage and is made
-again."""
+"""Suffix of the new file until it is complete. An existing one was left by an interrupted salvage and is
+overwritten."""
 UNREADABLE_SUFFIX = ".unreadable"
-"""Suffix of a part file that holds no trace: it is renamed, never deleted."""
+"""Suffix of a part file without a trace: it is renamed, never deleted."""
 DAMAGED_SUFFIX = ".damaged"
-"""Suffix of a salvaged part file that holds something which is not in the trace and may still be useful."""
+"""Suffix of a salvaged part file that contains more than the trace, which may still be useful."""
 
 
 @dataclass(frozen=True)
 class Salvaged:
-    """One part file. `path` is the trace made from it, or None with the `problem` that kept it from being made.
+    """Result for one part file. `path`: the trace made from it, or None, in which case `problem` states why.
 
-    `kept` is where the part file is now: None when all of it is in the trace.
+    `kept`: present path of the part file; None if all of it is in the trace.
     """
 
     part: Path
@@ -53,7 +53,7 @@ class Salvaged:
 
 @dataclass(frozen=True)
 class _Readable:
-    """Content of one part file: its records, the trace in them, and the counters at its end."""
+    """Content of one part file: its records, the trace, and the counters at its end."""
 
     found: Scan
     trace: Trace
@@ -61,7 +61,7 @@ class _Readable:
 
 
 class PutAsideError(TraceError):
-    """A part file from which no trace can be made; it is at `kept` now."""
+    """No trace can be made from a part file; it was renamed to `kept`."""
 
     def __init__(self, problem: str, kept: Path) -> None:
         super().__init__(f"{problem}; it was renamed to {kept.name}")
@@ -69,13 +69,13 @@ class PutAsideError(TraceError):
 
 
 class _NoTraceError(TraceError):
-    """A part file from which no trace can be made, by this version or a later one."""
+    """Neither this version nor a later one can make a trace from the part file."""
 
 
 def salvage_folder(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> tuple[Salvaged, ...]:
-    """Salvages every part file in a folder that no living process is writing. One that cannot be salvaged says why.
+    """Salvages every part file in a folder that no running process is writing. A failure is in the file's `problem`.
 
-    Raises TraceError when the folder cannot be read.
+    Raises TraceError if the folder cannot be read.
     """
     try:
         parts = sorted(entry for entry in Path(folder).iterdir() if entry.name.endswith(layout.PART_SUFFIX))
@@ -87,7 +87,7 @@ def salvage_folder(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> 
             if not disk.is_being_written(part):
                 found.append(salvage(part, limits))
         except FileNotFoundError:
-            continue  # meanwhile salvaged by another process, or finished by its writer
+            continue  # another process salvaged it meanwhile, or its writer finished it
         except OSError as error:
             found.append(Salvaged(part, None, problem=f"{part}: cannot be read: {disk.reason(error)}", kept=part))
         except PutAsideError as error:
@@ -100,12 +100,13 @@ def salvage_folder(folder: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> 
 def salvage(part: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Salvaged:
     """Makes a finished trace, marked `interrupted`, from a part file, and removes the part file once that is safe.
 
-    Everything up to the first damage is kept. The part file is renamed and kept if bytes follow that were not read, or
-    if it holds metadata or records of other programs, which are not copied. A salvage that was interrupted gives the
-    same trace when it is run again.
-    Raises PutAsideError when no trace can be made from it: it has been renamed, so that it is not tried again. Raises
-    TraceError when a living process is writing the file, when another trace has its name, when a newer version wrote
-    it, or when reading or writing fails; the part file is then as it was.
+    Everything before the first damage is kept. The part file is renamed and kept if unread bytes follow, or if it
+    contains metadata or records of other programs, which are not copied. Repeating an interrupted salvage gives the
+    same trace.
+
+    Raises PutAsideError if no trace can be made: the file was renamed, so that it is not tried again. Raises TraceError
+    if a running process is writing the file, another trace has its name, a newer version wrote it, or reading or
+    writing fails; the part file is then unchanged.
     """
     part = Path(part)
     if not part.name.endswith(layout.PART_SUFFIX):
@@ -124,7 +125,7 @@ def salvage(part: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Salvaged:
                 raise
             except MemoryError as error:
                 raise TraceError(f"{part}: {TOO_LARGE}; it is unchanged") from error
-            except Exception as error:  # noqa: BLE001  # whatever a file does, the next one is salvaged
+            except Exception as error:  # noqa: BLE001  # an error in one file must not prevent the salvage of the next
                 problem = " ".join(f"{part}: cannot be salvaged ({type(error).__name__}: {error})".split())
             raise PutAsideError(problem, _put_aside(part, UNREADABLE_SUFFIX))
     except OSError as error:
@@ -153,7 +154,7 @@ def _salvage_locked(part: Path, data: bytes, limits: TraceLimits) -> Salvaged:
     except BaseException:
         unfinished.unlink(missing_ok=True)
         raise
-    # A power cut may leave zeros after the synced part, which hold nothing to keep.
+    # A power cut may leave zeros after the synced part; they need not be kept.
     kept = _put_aside(part, DAMAGED_SUFFIX) if found.others or any(data[found.good_bytes :]) else None
     if kept is None:
         part.unlink()
@@ -162,7 +163,7 @@ def _salvage_locked(part: Path, data: bytes, limits: TraceLimits) -> Salvaged:
 
 
 def _readable(part: Path, data: bytes, limits: TraceLimits) -> _Readable:
-    """The readable content. Raises NewerTraceError when a newer version may read it, else _NoTraceError."""
+    """Returns the readable content. Raises NewerTraceError if a newer version may read it, else _NoTraceError."""
     try:
         found = scan(data, str(part), limits)
         end = found.metadata.pop(layout.END_METADATA, None)
@@ -175,7 +176,7 @@ def _readable(part: Path, data: bytes, limits: TraceLimits) -> _Readable:
 
 
 def _trace_before_damage(found: Scan, origin: str, limits: TraceLimits) -> Trace:
-    """The trace in a scan, which is cut before the first chunk that does not belong to it. Raises TraceError."""
+    """Returns the trace in a scan, cut before the first chunk that does not belong to it. Raises TraceError."""
     if layout.START_METADATA not in found.metadata:
         raise TraceError(f"{origin}: holds no trace")
     try:
@@ -189,7 +190,7 @@ def _trace_before_damage(found: Scan, origin: str, limits: TraceLimits) -> Trace
 
 
 def _put_aside(part: Path, suffix: str) -> Path:
-    """Renames a part file to a name that no file has. Raises OSError."""
+    """Renames a part file to an unused name. Raises OSError."""
     aside = part.with_name(part.name + suffix)
     number = 1
     while aside.exists():
@@ -200,7 +201,7 @@ def _put_aside(part: Path, suffix: str) -> Path:
 
 
 def _counters(start: Texts, end: Texts | None, part: Path) -> dict[str, float]:
-    """The link's counters, where the recording got as far as writing them."""
+    """Returns the link's counters, if the recording had written them."""
     try:
         return record_of(start, end, str(part)).counters
     except TraceError:
@@ -208,7 +209,7 @@ def _counters(start: Texts, end: Texts | None, part: Path) -> dict[str, float]:
 
 
 def _refuse_another(path: Path, record: TraceRecord, limits: TraceLimits) -> None:
-    """Raises TraceError for a file of the final name, unless an earlier salvage of the same part file made it."""
+    """Raises TraceError if a file has the final name, unless an earlier salvage of this part file made it."""
     if not path.exists():
         return
     there = read_trace(path, limits).record
@@ -217,7 +218,7 @@ def _refuse_another(path: Path, record: TraceRecord, limits: TraceLimits) -> Non
 
 
 def _copy(found: Scan, writer: Writer) -> None:
-    """Copies everything but the end, message by message, which gives the copy the index that the part file lacks."""
+    """Copies everything but the end, message by message, so that the copy has an index, unlike the part file."""
     writer.add_metadata(layout.START_METADATA, found.metadata[layout.START_METADATA])
     for attachment in found.attachments:
         writer.add_attachment(
@@ -242,7 +243,7 @@ def _copy(found: Scan, writer: Writer) -> None:
 
 
 def _check_copy(path: Path, trace: Trace, limits: TraceLimits) -> None:
-    """Reads the copy back before the original is removed. Raises TraceError when it does not hold the same samples."""
+    """Reads the copy back before the original is removed. Raises TraceError if the samples differ."""
     found = scan(path.read_bytes(), str(path), limits)
     copy = trace_of(found, str(path), limits)
     same = all(np.array_equal(getattr(copy, name), getattr(trace, name)) for name in layout.ALL_SIGNALS)

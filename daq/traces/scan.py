@@ -1,7 +1,7 @@
-"""Walks through the records of an MCAP file that may end anywhere, be damaged anywhere, or be made to do harm.
+"""Reads the records of an MCAP file that may be cut off, damaged or malicious.
 
-mcap's own StreamReader reads the same records, but takes the rest of a cut record for a whole one, and parses
-the index of every message, which costs more than all the rest of opening a trace.
+mcap's own StreamReader accepts a record that is cut off, and parses the index of every message, which takes longer than
+all other steps of opening a trace.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from daq.traces.inflate import INFLATE_ERRORS, inflate
 HEAD = struct.Struct("<BQ")
 """Opcode and length (bytes) of every record."""
 UNREADABLE = (ValueError, struct.error, *INFLATE_ERRORS)
-"""Errors that reading damaged bytes may raise."""
+"""Errors raised for damaged bytes."""
 
-NOT_IN_CHUNKS = "a chunk holds something else than schemas, channels and whole messages"
+NOT_IN_CHUNKS = "a chunk contains more than schemas, channels and whole messages"
 
 _DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
 _REBUILT = frozenset(
@@ -38,7 +38,7 @@ _REBUILT = frozenset(
         Opcode.SUMMARY_OFFSET,
     )
 )
-"""Records whose content follows from the others."""
+"""Records whose content follows from other records."""
 _MESSAGE = struct.Struct("<BQHIQQ")
 _CRC = struct.Struct("<I")
 _OURS = (layout.START_METADATA, layout.END_METADATA)
@@ -46,7 +46,7 @@ _OURS = (layout.START_METADATA, layout.END_METADATA)
 
 @dataclass(frozen=True)
 class Message:
-    """One message of a chunk, times in ns."""
+    """One message of a chunk; times in ns."""
 
     channel: int
     sequence: int
@@ -57,15 +57,15 @@ class Message:
 
 @dataclass
 class Scan:
-    """What a file holds up to its end or its first damage.
+    """Content of a file up to its end or its first damage.
 
-    chunks:          messages and all, uncompressed, in the order of the file
-    chunk_starts:    where in the file each of them lies
+    chunks:          uncompressed chunks, in file order
+    chunk_starts:    position of each chunk in the file
     good_bytes:      length of the readable part
-    damage:          what is wrong after it; None when the file is whole
+    damage:          what is wrong after it; None if the file is whole
     records:         number of records outside of chunks
-    others:          number of records with content that is not kept here: metadata and records of other programs
-    chunks_indexed:  number of chunks that the index tells of; None without an index
+    others:          number of records whose content is not stored here: metadata and records of other programs
+    chunks_indexed:  number of chunks in the index; None without an index
     """
 
     schemas: dict[int, Schema] = field(default_factory=dict)
@@ -87,9 +87,9 @@ class Scan:
 
 
 def scan(data: bytes | memoryview, origin: str, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Scan:
-    """Reads everything readable. What exceeds a limit counts as damage from there on.
+    """Reads all readable records. A record that exceeds a limit counts as the first damage.
 
-    Raises TraceError when `data` is empty or does not begin as an MCAP file.
+    Raises TraceError if `data` is empty or does not begin like an MCAP file.
     """
     if len(data) == 0:
         raise TraceError(f"{origin}: is empty")
@@ -120,7 +120,7 @@ def scan(data: bytes | memoryview, origin: str, limits: TraceLimits = DEFAULT_TR
 
 
 def messages(chunk: bytes) -> Iterator[Message]:
-    """The messages of an uncompressed chunk. Raises ValueError when a record does not end with the chunk."""
+    """Yields the messages of an uncompressed chunk. Raises ValueError if a record does not end within the chunk."""
     position, end = 0, len(chunk)
     while position < end:
         opcode, following = _record_at(chunk, position)
@@ -131,10 +131,10 @@ def messages(chunk: bytes) -> Iterator[Message]:
 
 
 def payloads(chunk: bytes, by_channel: dict[int, list[bytes]], most: int) -> tuple[int, set[int]]:
-    """Appends the data of each message to the list of its channel, where there is one: the fast way to all samples.
+    """Appends the data of each message to its channel's list, if there is one. This is the fast path to all samples.
 
-    Returns how many records the chunk has and which channels its messages are of. Raises ValueError or struct.error
-    when a record does not end with the chunk, or there are more than `most`.
+    Returns the number of records, and the channels of the messages. Raises ValueError or struct.error if a record does
+    not end within the chunk, or there are more than `most`.
     """
     unpack, head, message = _MESSAGE.unpack_from, HEAD.size, _MESSAGE.size
     position, end, count = 0, len(chunk), 0
@@ -164,7 +164,7 @@ def payloads(chunk: bytes, by_channel: dict[int, list[bytes]], most: int) -> tup
 
 
 def _record_at(chunk: bytes, position: int) -> tuple[int, int]:
-    """Opcode of the record at `position`, and where the next one begins. Raises ValueError, struct.error."""
+    """Returns the opcode of the record at `position`, and where the next begins. Raises ValueError, struct.error."""
     opcode, length = HEAD.unpack_from(chunk, position)
     following = position + HEAD.size + int(length)
     if following > len(chunk):
@@ -218,7 +218,7 @@ class _Walk:
         while position < len(chunk):
             opcode, following = _record_at(chunk, position)
             if opcode == Opcode.MESSAGE:
-                break  # definitions come before the messages that need them, in every chunk that has any
+                break  # in every chunk, definitions come before the messages that need them
             if opcode not in _DEFINITIONS:
                 raise ValueError(NOT_IN_CHUNKS)
             self._defined_in_chunks += 1
@@ -270,6 +270,7 @@ class _Walk:
 
 
 def require(value: int, most: int, line: str, limit: str) -> None:
-    """Raises ValueError, naming the setting, when a value exceeds its limit. `line` has a place for the limit."""
+    """Raises ValueError, which names the setting, if a value exceeds its limit. `line` has a placeholder for the
+    limit."""
     if value > most:
         raise ValueError(f"{line.format(most)} (traces.limits.{limit})")

@@ -1,6 +1,6 @@
-"""The topic that tells from which control period on the set points of each sample were used.
+"""The topic with the control period from which the set points of each sample were used.
 
-Only records of slow lines have it: on a fast line every period has a sample, which shows its set points itself.
+Only records of slow lines have it. On a fast line every period is sampled, and a sample itself shows its set points.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ _MESSAGE = struct.Struct("<4s2q")
 
 
 def message(row: SampleRow) -> bytes:
-    """The message that belongs to a sample."""
+    """Encodes the message of a sample."""
     return _MESSAGE.pack(HEADER, row.tick, row.taken)
 
 
 def channel_in(found: Scan) -> int | None:
-    """The topic's channel; None where a file does not tell. Raises ValueError for a topic of other messages."""
+    """Returns the topic's channel; None if there is none. Raises ValueError for a topic of other messages."""
     channel = next((channel for channel in found.channels.values() if channel.topic == TOPIC), None)
     if channel is None:
         return None
@@ -44,7 +44,7 @@ def channel_in(found: Scan) -> int | None:
 
 
 def read(messages: list[bytes]) -> NDArray[Any]:
-    """Messages of the topic, (n,) of `DTYPE`. Raises ValueError where one has another length."""
+    """Decodes messages of the topic, (n,) of `DTYPE`. Raises ValueError if one has another length."""
     if any(len(message) != DTYPE.itemsize for message in messages):
         raise ValueError(f"a message of {TOPIC} does not have {DTYPE.itemsize} bytes")
     return np.frombuffer(b"".join(messages), DTYPE)

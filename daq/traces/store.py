@@ -24,11 +24,10 @@ from daq.traces.writer import ROWS_A_CHUNK
 
 
 def write_trace(trace: Trace, path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Path:
-    """Writes `trace` to a new file at `path`, so that it is there whole or not at all. Returns `path`.
+    """Writes `trace` to a new file at `path`, completely or not at all. Returns `path`.
 
-    It is read back within `limits` before it gets its name: what no command reads is not kept.
-
-    Raises TraceError when the file exists or cannot be written, or no reader would take the trace.
+    The file is read back within `limits` before it gets its name, so every stored trace is readable. Raises TraceError
+    if the file exists or cannot be written, or cannot be read back.
     """
     path = Path(path)
     check_trace(trace, f"trace {trace.record.trace_id}")
@@ -58,7 +57,7 @@ def write_trace(trace: Trace, path: Path, limits: TraceLimits = DEFAULT_TRACE_LI
 
 
 def _check_copy(part: Path, trace: Trace, limits: TraceLimits) -> None:
-    """Raises TraceError where a file does not read back as the trace that was written to it."""
+    """Raises TraceError if a file does not read back as the trace that was written to it."""
     data = part.read_bytes()
     if len(data) > limits.file_bytes:
         raise TraceError(f"{part}: would have more than {limits.file_bytes} bytes (traces.limits.file_bytes)")
@@ -80,7 +79,7 @@ def _signals(trace: Trace) -> tuple[str, ...]:
 
 
 def _rows(trace: Trace) -> Iterator[SampleRow]:
-    """Rows in which a signal that the trace does not have is NaN, or 0 where it is an integer."""
+    """Yields rows, in which a missing signal is NaN, or 0 for integers."""
     absent = (math.nan,) * len(trace.joints)
     columns = {
         name: None if getattr(trace, name) is None else getattr(trace, name).tolist()

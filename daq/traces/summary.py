@@ -1,4 +1,4 @@
-"""The figures of a trace, joint by joint."""
+"""Key figures of a trace for each joint."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from daq.contracts.figures import JointFigureSet
 from daq.contracts.trace import Floats, Trace
 
 RISE_FROM, RISE_TO = 0.1, 0.9
-"""Shares of the step between which rise time is measured, as is usual in control."""
+"""Shares of the step between which rise time is measured, as usual in control."""
 
 
 def joint_figures(trace: Trace) -> list[JointFigureSet]:
-    """Figures of every joint of a trace; none for one without samples."""
+    """Returns the key figures of every joint of a trace; an empty list for a trace without samples."""
     return [_figures(trace, joint, trace.column(joint)) for joint in trace.joints] if len(trace) else []
 
 

@@ -1,4 +1,4 @@
-"""Traces as Parquet and netCDF files."""
+"""Writes traces as Parquet and netCDF files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def export_table(trace: Trace, path: Path) -> Path:
 
 
 def _for_netcdf(arrays: xr.Dataset) -> xr.Dataset:
-    """The same in the types of netCDF 3, which scipy writes: whole numbers beyond 32 bits as float64, lists as text."""
+    """Converts to the types of netCDF 3, which scipy writes: integers beyond 32 bits to float64, lists to text."""
     bounds = np.iinfo(np.int32)
     large = {
         name: variable.astype(np.float64)

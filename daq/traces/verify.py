@@ -1,4 +1,4 @@
-"""Verifies a trace: checksums, ticks, gaps, events, outcome, and whether its signals agree."""
+"""Verifies a trace: checksums, ticks, gaps, events, outcome, and the consistency of its signals."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from daq.traces.reader import TOO_LARGE, trace_of
 from daq.traces.scan import Scan, scan
 
 Level = Literal["error", "warning", "note"]
-"""error: do not trust it; warning: know it before you use it; note: for information."""
+"""error: do not trust it; warning: usable, but read this first; note: for information."""
 
 MISSING_COUNTER = "missing_samples"
 COUNTS_OFF = 1.0
 """Tolerance (ADC counts) between set point − position and the error: one rounding between posture units and counts."""
 PERIODS_OFF = 0.01
-"""Tolerance (control periods) between time and tick · period; time is the board's own."""
+"""Tolerance (control periods) between time and tick · period; both are from the board's clock."""
 
 
 class Finding(FrozenRecord):
@@ -45,14 +45,14 @@ class Verification(FrozenRecord):
 
     @property
     def trustworthy(self) -> bool:
-        """Whether nothing that was found is an error."""
+        """Whether no finding is an error."""
         return all(finding.level != "error" for finding in self.findings)
 
 
 def verify(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Verification:
-    """Checks all that can be checked from a trace file alone; never uses the cache.
+    """Checks everything that a trace file alone allows; never uses the cache.
 
-    Raises TraceError only when the file cannot be read from the disk, or exceeds the limits or the memory.
+    Raises TraceError only if the file cannot be read from the disk, or exceeds the limits or the memory.
     """
     path = Path(path)
     try:
@@ -68,7 +68,7 @@ def verify(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS) -> Verificati
 
 
 def _findings_of_csv(path: Path, limits: TraceLimits) -> Iterator[Finding]:
-    yield Finding(level="note", check="file", message="is CSV: it has no checksums, so no number of it can be checked")
+    yield Finding(level="note", check="file", message="is CSV, without checksums: its numbers cannot be checked")
     try:
         trace = import_csv(path, limits)
     except TraceError as error:
@@ -84,7 +84,7 @@ def _findings(path: Path, data: bytes, limits: TraceLimits) -> Iterator[Finding]
         found = scan(data, str(path), limits)
         yield from _file(path, data, found)
         if path.name.endswith(layout.PART_SUFFIX):
-            found.metadata.pop(layout.END_METADATA, None)
+            found.metadata.pop(layout.END_METADATA, None)  # an unfinished file: its writer never confirmed the end
         trace = trace_of(found, str(path), limits)
     except TraceError as error:
         yield Finding(level="error", check="trace", message=str(error))
@@ -139,7 +139,7 @@ def _ticks(trace: Trace) -> Iterator[Finding]:
         yield Finding(level="warning", check="gaps", message=message)
     if trace.taken is not None and (trace.taken > trace.tick).any():
         row = int(np.argmax(trace.taken > trace.tick))
-        message = f"the set points of tick {trace.tick[row]} are said to have been taken in tick {trace.taken[row]}"
+        message = f"the set points of tick {trace.tick[row]} are recorded as used from tick {trace.taken[row]}"
         yield Finding(level="error", check="set_points", message=message)
     counted = trace.record.counters.get(MISSING_COUNTER)
     if counted is not None and counted < trace.missing:
@@ -155,7 +155,7 @@ def _ticks(trace: Trace) -> Iterator[Finding]:
     if trace.host_time is not None:
         lateness = (trace.host_time - trace.host_time[0]) - (trace.time - trace.time[0])
         spread = float(np.quantile(lateness, 0.99) - np.quantile(lateness, 0.01)) * 1e3
-        message = f"arrival against the board's clock: {spread:.2f} ms between the 1st and the 99th percentile"
+        message = f"arrival jitter: {spread:.2f} ms (1st to 99th percentile)"
         yield Finding(level="note", check="arrival", message=message)
 
 
@@ -180,7 +180,7 @@ def _signals(trace: Trace) -> Iterator[Finding]:
     for column, joint in enumerate(trace.joints):
         count = _rad_per_count(trace.record.machine, joint)
         if count is None:
-            message = f"joint {joint}: its sensor is not known, so error = set point − position was not checked"
+            message = f"joint {joint}: its sensor is unknown, so error = set point − position was not checked"
             yield Finding(level="note", check="error", message=message)
             continue
         off = np.abs(trace.set_point[:, column] - trace.position[:, column] - trace.error[:, column]) / count
@@ -195,7 +195,7 @@ def _signals(trace: Trace) -> Iterator[Finding]:
 
 
 def _rad_per_count(machine: Machine | None, joint: int) -> float | None:
-    """Size of a sensor's count in rad (m), None where no sensor is known."""
+    """Size of a sensor's count in rad (m); None if the sensor is unknown."""
     if machine is None or joint > len(machine.joints):
         return None
     sensor = machine.joint(joint).sensor

@@ -1,4 +1,4 @@
-"""Records a trace outside the acquisition loop: a bounded queue feeds one thread that writes and syncs."""
+"""Records a trace outside the acquisition loop: a bounded queue feeds a thread that writes and syncs."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ from daq.traces.naming import part_path
 from daq.traces.recording import Recording
 
 SYNC_INTERVAL = 0.8
-"""Time (s) between syncs. At most 1.2 s of a record may be lost, which leaves a slow disk 0.4 s for one sync."""
+"""Time (s) between syncs. At most 1.2 s of a record may be lost, so a slow disk has 0.4 s for one sync."""
 QUEUE_LENGTH = 16384
-"""Samples and events that may wait for the disk: five minutes at 50 Hz."""
+"""Most samples and events that wait for the disk: five minutes at 50 Hz."""
 ROWS_A_CHUNK = 2000
-"""Rows after which a chunk ends even before the next sync (faster than real time many rows come between two)."""
+"""Rows after which a chunk ends before the next sync. Faster than real time, there may be many rows between two
+syncs."""
 WORTH_WAKING = 256
-"""Samples and events that wait before the thread is woken ahead of the next sync: a change of threads for each would
-cost as much as writing it."""
+"""Waiting samples and events at which the thread is woken before the next sync. Waking it for each would take as long
+as writing it."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +40,14 @@ class _Close:
 
 
 class TraceWriter:
-    """Writes a trace to `path`; until it is closed the file is called `path` + `.part`.
+    """Writes a trace to `path`; until it is closed the file is named `path` + `.part`.
 
-    `sample` and `event` only put into a queue. When the disk is full, fails, or falls behind by a whole queue, the
-    next call raises TraceError, `failure` holds it, and what was synced before stays in the part file, from where it
-    is salvaged. `patience` is how long (s) a call may wait for room in the queue: 0 for acquisition in real time.
+    `sample` and `event` only put data into a queue. If the disk is full, fails, or is a whole queue behind, the next
+    call raises TraceError, which is also in `failure`. Everything synced before stays in the part file and can be
+    salvaged. `patience`: longest wait (s) of a call for room in the queue; 0 for acquisition in real time.
 
-    Raises TraceError when the file cannot be made or exists already. A `with` block that ends without `close` closes
-    the trace as interrupted.
+    Raises TraceError if the file cannot be made or exists. A `with` block that ends without `close` closes the trace as
+    interrupted.
     """
 
     def __init__(
@@ -97,25 +98,26 @@ class TraceWriter:
 
     @property
     def failure(self) -> TraceError | None:
-        """The first error; None while there is none."""
+        """The first error; None if there is none."""
         return self._failure
 
     def sample(self, row: SampleRow) -> None:
-        """Records one control period. Raises TraceError when writing has failed or the row cannot follow the last."""
+        """Records one control period. Raises TraceError if writing failed, or if the row cannot follow the previous
+        one."""
         self._check(row)
         self._last = row
         self._put(row)
 
     def event(self, event: TraceEvent) -> None:
-        """Records an event. Raises TraceError when writing has failed or the event's time is not finite."""
+        """Records an event. Raises TraceError if writing failed or the event's time is not finite."""
         if not math.isfinite(event.time):
             raise TraceError(f"{self.path}: event {event.kind!r} has time {event.time}, which is not finite")
         self._put(event)
 
     def close(self, outcome: Outcome, counters: Mapping[str, float] | None = None) -> Path:
-        """Writes everything that waits, finishes the file and gives it its name. Returns `path`.
+        """Writes all waiting data, finishes the file and renames it to `path`, which it returns.
 
-        Raises TraceError when that failed; the part file then stays for `salvage`.
+        Raises TraceError if that failed; the part file then stays for `salvage`.
         """
         if self._closed:
             raise TraceError(f"{self.path}: is closed already")
@@ -168,7 +170,7 @@ class TraceWriter:
                 self._changed.notify_all()
 
     def _fail(self, what: str) -> TraceError:
-        """Keeps the first failure; later calls raise it."""
+        """Stores the first failure; later calls raise it."""
         if self._failure is None:
             self._failure = TraceError(f"{self.path}: cannot be written: {what}; what came before is in {self.part}")
         return self._failure
@@ -185,7 +187,7 @@ class TraceWriter:
             raise
 
     def _refuse_what_waits(self) -> None:
-        """Lets go of what waits, so that an acquisition that waits for room gets the error at its next call."""
+        """Empties the queue, so that an acquisition that waits for room gets the error at its next call."""
         with self._changed:
             self._waiting = []
             self._changed.notify_all()
@@ -233,7 +235,7 @@ class TraceWriter:
 
     def _finish(self, close: _Close) -> None:
         if self._failure is not None:
-            # Samples were refused: those accepted are kept, but the trace must not count as finished.
+            # Samples were refused. The accepted ones are kept, but the trace must not count as finished.
             return self._sync()
         self._recording.finish(close.outcome, close.counters)
         disk.sync(self._stream)
@@ -245,5 +247,5 @@ class TraceWriter:
         try:
             self._stream.close()
         except OSError:
-            # What could not be written has been reported; closing only tries the same bytes again.
+            # The write error has been reported; closing would only try the same bytes again.
             return

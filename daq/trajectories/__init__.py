@@ -1,1 +1,1 @@
-"""Turns a specified motion into set points for every control period. Pure: nothing here moves an arm."""
+"""Plans motions as set points for every control period. Pure: nothing here moves an arm."""

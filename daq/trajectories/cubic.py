@@ -14,7 +14,7 @@ PEAK_SPEED = 1.5
 
 
 def cubic(move: Cubic, amplitudes: Floats, period: float) -> Piece:
-    """Through amplitudes (k,) rad in `duration`, all joints together."""
+    """Moves through amplitudes (k,) rad in `duration`, all joints together."""
     require_sampled(move.duration, period, "cubic: duration")
     fraction = rest_to_rest(sample_times(move.duration, period) / move.duration)
     marks = (Mark(0, "ramp_start", "cubic starts"), Mark(len(fraction), "ramp_end", "cubic ends"))
@@ -22,6 +22,6 @@ def cubic(move: Cubic, amplitudes: Floats, period: float) -> Piece:
 
 
 def rest_to_rest(fraction: Floats) -> Floats:
-    """Part of the way done after `fraction` of the time: 3s² − 2s³, the cubic whose rates are zero at both ends."""
+    """Fraction of the motion after `fraction` of the time: 3s² − 2s³, the cubic with zero speed at both ends."""
     s = np.clip(fraction, 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)

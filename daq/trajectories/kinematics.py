@@ -1,4 +1,4 @@
-"""Where the ends of the links are: forward kinematics of the Denavit–Hartenberg chain (section 3.2 of the source)."""
+"""Forward kinematics of the Denavit–Hartenberg chain: positions of the link ends (section 3.2 of the source)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from daq.contracts.trace import Floats
 
 def link_ends(machine: Machine, angles: Floats) -> Floats:
     """Origins of the links' frames, (n, joints, 3) in m in the base frame, for angles (n, joints) in rad (m on a
-    prismatic joint). The product of the transformations (3.7), carried as a rotation and an origin."""
+    prismatic joint). Computes the product of the transformations (3.7) as rotation and origin."""
     count = len(angles)
     rotation = np.broadcast_to(np.eye(3), (count, 3, 3))
     origin = np.zeros((count, 3))
@@ -26,7 +26,7 @@ def link_ends(machine: Machine, angles: Floats) -> Floats:
 
 
 def _transformation(joint: Joint, value: Floats) -> tuple[Floats, Floats]:
-    """Rotation (n, 3, 3) and origin (n, 3) of a joint's frame in the one before it."""
+    """Rotation (n, 3, 3) and origin (n, 3) of a joint's frame in the previous one."""
     geometry = joint.geometry
     revolute = joint.kind == "revolute"
     theta = geometry.theta.value + (value if revolute else np.zeros_like(value))

@@ -1,4 +1,4 @@
-"""A slow move of the whole arm from one posture to another: to a start, to a taught step, back again."""
+"""Plans a slow move of the whole arm between postures: to a start, to a taught step, back again."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from daq.trajectories.piece import Piece, sample_times, smooth_piece
 from daq.trajectories.set_points import Mark, Plan, control_period, make_plan, representable_angles
 
 MOVE_SPEED = 0.25
-"""Highest speed of a slow move in rad/s: an assumption, under half that of the source's ramp."""
+"""Highest speed of a slow move in rad/s (an assumption, less than half that of the source's ramp)."""
 SLIDE_SPEED = 0.05
-"""The same of a joint that slides, in m/s: an assumption, what a joint that turns at MOVE_SPEED moves at 0.2 m."""
+"""The same for a prismatic joint, in m/s (an assumption: the speed at a radius of 0.2 m and MOVE_SPEED)."""
 
 NO_WAY = 1e-9
 """Distance (rad, or m) below which nothing moves: a millionth of an ADC count."""
 
 
 def slow_speeds(machine: Machine, joints: Sequence[int]) -> Floats:
-    """Highest speeds (rad/s, m/s) of joints in a slow move: the assumed ones, or their own limits where these are
-    lower."""
+    """Highest speeds (rad/s, m/s) of joints in a slow move: the assumed ones, or the joints' limits if lower."""
     speeds = []
     for joint in joints:
         usual, limit = SLIDE_SPEED if slides(machine, joint) else MOVE_SPEED, machine.limits.joint(joint).speed
@@ -33,10 +32,11 @@ def slow_speeds(machine: Machine, joints: Sequence[int]) -> Floats:
 
 
 def plan_move(machine: Machine, start: Sequence[float], target: Sequence[float], speed: float | None = None) -> Plan:
-    """From `start` to `target` (rad, m; all joints of the machine), cubic in time, all joints arriving together.
+    """Plans a move from `start` to `target` (rad, m; all joints of the machine), cubic in time, all joints arriving
+    together.
 
-    The joint that takes longest reaches `speed` (rad/s, m/s; None: its `slow_speeds`) half-way. Where both are the same
-    posture the plan is that one set point. Raises SpecError for angles outside the sensors' ranges.
+    The slowest joint reaches `speed` (rad/s, m/s; None: its `slow_speeds`) half-way. If both postures are equal, the
+    plan has one set point. Raises SpecError for angles outside the sensors' ranges.
     """
     begin, end = representable_angles(machine, start), representable_angles(machine, target)
     every = range(1, len(begin) + 1)
@@ -49,7 +49,7 @@ def plan_move(machine: Machine, start: Sequence[float], target: Sequence[float],
 
 
 def move_piece(way: Floats, period: float, speeds: Floats) -> Piece:
-    """Through `way` (k,) rad or m at no more than `speeds` (k,) rad/s or m/s; nothing when there is no way to go."""
+    """Moves through `way` (k,) rad or m at no more than `speeds` (k,) rad/s or m/s; an empty piece if `way` is 0."""
     longest = float(np.abs(way).max(initial=0.0))
     if longest < NO_WAY:
         return smooth_piece(np.zeros((0, len(way))))

@@ -1,4 +1,4 @@
-"""Experiments that a diagnosis may ask for: presets, and slow reversals at a second posture."""
+"""Experiments that a diagnosis may propose: presets, and slow reversals at a second posture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The 4-3-4 trajectory of a pick-and-place task, over lift-off and set-down points (section 3.7.2 of the source)."""
+"""The 4-3-4 trajectory of a pick-and-place task, with lift-off and set-down points (section 3.7.2 of the source)."""
 
 from __future__ import annotations
 
@@ -13,24 +13,25 @@ from daq.trajectories.piece import Piece, periods_in, require_sampled, sample_ti
 from daq.trajectories.set_points import Mark
 
 LEAST_LIFT = 0.25
-"""Share of the last link's length that is the least height of the lift-off and set-down points (Paul 1972, in section
+"""Least height of the lift-off and set-down points, as a share of the last link's length (Paul 1972, in section
 3.7.2)."""
 ORDERS = (4, 3, 4)
-"""Orders of the polynomials of picking (3.54), travelling (3.45) and placing (3.54)."""
+"""Orders of the polynomials for picking (3.54), travelling (3.45) and placing (3.54)."""
 CLOSE = 1e-6
-"""Distance (m) within which the arm's end must reach a lifted point: a thousandth of the sensors' resolution."""
+"""Largest distance (m) of the arm's end from a lifted point: a thousandth of the sensors' resolution."""
 ITERATIONS = 50
 LARGEST_TURN = 0.2
-"""Largest change (rad) of a joint in one step of the iteration."""
+"""Largest change (rad) of a joint per iteration."""
 
 
 def pick_and_place(
     move: PickAndPlace, machine: Machine, joints: tuple[int, ...], start: Floats, amplitudes: Floats, period: float
 ) -> Piece:
-    """From `start` (all joints of the machine, rad) through `amplitudes` (k,) rad of `joints`, lifted at both ends.
+    """Moves from `start` (all joints of the machine, rad) through `amplitudes` (k,) rad of `joints`, lifted at both
+    ends.
 
-    Raises SpecError for a lift of less than LEAST_LIFT, for one that these joints cannot make, and for durations that
-    set points cannot show.
+    Raises SpecError for a lift below LEAST_LIFT, for a lift that these joints cannot make, and for durations too short
+    for the control period.
     """
     durations = np.array([move.pick, move.travel, move.place])
     for name, duration in zip(("pick", "travel", "place"), durations.tolist(), strict=True):
@@ -57,17 +58,18 @@ def pick_and_place(
 
 
 def polynomials(knots: Floats, durations: Floats) -> list[Floats]:
-    """Coefficients, lowest order first, of the three polynomials in each one's own time from 0 to 1.
+    """Coefficients, lowest order first, of the three polynomials, each over its own time from 0 to 1.
 
-    `knots` (4, k): initial, lift-off, set-down and final point; `durations` (3,) s. At rest without acceleration at
-    both ends, position, velocity and acceleration continuous in between: 14 conditions for 5 + 4 + 5 coefficients.
+    `knots` (4, k): initial, lift-off, set-down and final point; `durations` (3,) s. Speed and acceleration are 0 at
+    both ends; position, velocity and acceleration are continuous in between: 14 conditions for 5 + 4 + 5 coefficients.
     """
     sizes = [order + 1 for order in ORDERS]
     first = np.concatenate([[0], np.cumsum(sizes)])
     rows, wanted = [], []
 
     def row(*parts: tuple[int, float, int, float]) -> Floats:
-        """Sum over (piece, at 0 or 1, derivative, sign) of that piece's derivative in s."""
+        """Row of the equation system: the sum of derivatives, each given as (piece, at 0 or 1, derivative, sign), in
+        s."""
         made = np.zeros(first[-1])
         for piece, at, derivative, sign in parts:
             monomials = np.polynomial.polynomial.polyvander(np.array([at]), sizes[piece] - 1)[0]
@@ -84,7 +86,7 @@ def polynomials(knots: Floats, durations: Floats) -> list[Floats]:
         rows += [row((0, 0.0, derivative, 1.0)), row((2, 1.0, derivative, 1.0))]
         rows += [row((p, 1.0, derivative, 1.0), (p + 1, 0.0, derivative, -1.0)) for p in (0, 1)]
         wanted += [np.zeros(knots.shape[1])] * 4
-    # Durations that differ by orders of magnitude would give columns of very different sizes.
+    # Durations of different orders of magnitude would give columns of very different sizes.
     matrix = np.stack(rows)
     sizes_of_rows = np.abs(matrix).max(axis=1, keepdims=True)
     found = np.linalg.solve(matrix / sizes_of_rows, np.stack(wanted) / sizes_of_rows)
@@ -92,7 +94,7 @@ def polynomials(knots: Floats, durations: Floats) -> list[Floats]:
 
 
 def evaluate(pieces: list[Floats], durations: Floats, time: Floats, derivative: int = 0) -> Floats:
-    """The pieces one after the other, or their derivative with time, at `time` (n,) s: (n, k)."""
+    """Evaluates the pieces in order, or their time derivative, at `time` (n,) s: (n, k)."""
     begins = np.concatenate([[0.0], np.cumsum(durations)])
     which = np.clip(np.searchsorted(begins, time, side="right") - 1, 0, 2)
     found = np.empty((len(time), pieces[0].shape[1]))
@@ -105,7 +107,7 @@ def evaluate(pieces: list[Floats], durations: Floats, time: Floats, derivative: 
 
 
 def last_link(machine: Machine) -> float:
-    """Length (m) of the last link that has one. Raises SpecError for a machine without any."""
+    """Length (m) of the last link with a length. Raises SpecError for a machine without one."""
     lengths = [max(abs(joint.geometry.a.value), abs(joint.geometry.d.value)) for joint in machine.joints]
     length = next((length for length in reversed(lengths) if length > 0), 0.0)
     if length == 0:
@@ -114,9 +116,9 @@ def last_link(machine: Machine) -> float:
 
 
 def lift_posture(machine: Machine, posture: Floats, joints: tuple[int, ...], height: float) -> Floats:
-    """The posture (all joints, rad) near `posture` whose end is `height` m above it, moving `joints` alone.
+    """Returns the posture (all joints, rad) near `posture` whose end is `height` m higher, moving only `joints`.
 
-    Newton's method on the forward kinematics, least squares where joints are too many. Raises SpecError where these
+    Uses Newton's method on the forward kinematics, and least squares for redundant joints. Raises SpecError if these
     joints cannot lift the end straight up by that much.
     """
     columns = [joint - 1 for joint in joints]
@@ -141,7 +143,7 @@ def _end(machine: Machine, posture: Floats) -> Floats:
 
 
 def _slope(machine: Machine, posture: Floats, column: int, step: float = 1e-6) -> Floats:
-    """(3,) m/rad: how the end moves with one joint."""
+    """(3,) m/rad: derivative of the end's position with respect to one joint."""
     ahead, behind = posture.copy(), posture.copy()
     ahead[column] += step
     behind[column] -= step

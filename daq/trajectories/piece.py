@@ -1,4 +1,4 @@
-"""A piece of motion: what every kind of trajectory comes down to before it is put on an arm."""
+"""A piece of motion: the common form of all trajectories before they become a plan."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from daq.trajectories.set_points import Booleans, Mark
 TIME_TOLERANCE = 1e-9
 """Deviation (periods) within which a duration counts as a whole number of periods."""
 LONGEST = 4 * 3600.0
-"""Longest plan (s); a longer one is taken for a typing error."""
+"""Longest plan (s); a longer one is assumed to be a typing error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +22,8 @@ class Piece:
     """Motion of k joints relative to its start, without the start itself.
 
     offsets: (m, k) rad from the start of the piece, at 1, 2, … m control periods after it
-    jumps:   (m,) True where a set point jumps on purpose
-    marks:   their `index` counts from the start of the piece: 0 is the last set point before it
+    jumps:   (m,) True if a set point jumps intentionally
+    marks:   their `index` counts from the start of the piece; 0 is the last set point before it
     """
 
     offsets: Floats
@@ -37,7 +37,7 @@ def smooth_piece(offsets: Floats, marks: tuple[Mark, ...] = ()) -> Piece:
 
 
 def periods_in(duration: float, period: float) -> int:
-    """Control periods until `duration` (s) is over, at least one. Raises SpecError when it is longer than LONGEST."""
+    """Number of control periods until `duration` (s) is over, at least 1. Raises SpecError if longer than LONGEST."""
     if duration > LONGEST:
         hours = duration / 3600
         raise SpecError(f"experiment: it would take {hours:.3g} h, at most {LONGEST / 3600:.0f} h are allowed")
@@ -45,9 +45,9 @@ def periods_in(duration: float, period: float) -> int:
 
 
 def require_sampled(duration: float, period: float, what: str, least: int = 1) -> None:
-    """Raises SpecError for a time shorter than `least` control periods: set points cannot show it.
+    """Raises SpecError for a time shorter than `least` control periods, which set points cannot represent.
 
-    An oscillation needs at least two (Nyquist), any other motion one; with less it would be a step.
+    An oscillation needs at least two (Nyquist), any other motion one; a shorter motion would be a step.
     """
     if duration < (least - TIME_TOLERANCE) * period:
         shortest = f"{least * period * 1e3:g} ms" + (" (two control periods)" if least == 2 else " (a control period)")
@@ -58,5 +58,5 @@ def require_sampled(duration: float, period: float, what: str, least: int = 1) -
 
 
 def sample_times(duration: float, period: float) -> Floats:
-    """(m,) s: the ends of the control periods of a motion, the last one at or after its end."""
+    """(m,) s: the ends of the control periods of a motion; the last is at or after its end."""
     return np.arange(1, periods_in(duration, period) + 1, dtype=np.float64) * period

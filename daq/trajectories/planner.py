@@ -1,4 +1,4 @@
-"""From an experiment's specification to its set points."""
+"""Plans the set points of an experiment from its specification."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ Relative = Ramp | Step | Staircase | SlowRamp | Sine | Multisine | Cubic | Via |
 
 
 def start_angles(spec: ExperimentSpec, machine: Machine) -> tuple[float, ...]:
-    """Where the arm has to be before the record (rad, all joints): `spec.start`, else the first point of a path, else
-    the machine's rest posture. Raises SpecError when a joint has none of these, or does not exist."""
+    """Returns the start of the record (rad, all joints): `spec.start`, otherwise the first point of a path, otherwise
+    the machine's rest posture. Raises SpecError for a joint that has none of these, or does not exist."""
     _require_joints(spec, machine)
     start = dict(spec.start)
     if isinstance(spec.trajectory, Path):
@@ -67,11 +67,11 @@ def start_angles(spec: ExperimentSpec, machine: Machine) -> tuple[float, ...]:
 
 
 def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
-    """Set points of the whole experiment from `start` (rad, all joints of the machine): settle, motion, hold, and with
-    repeats a slow way back between them.
+    """Plans the set points of a whole experiment from `start` (rad, all joints of the machine): settle, motion, hold
+    and, for repeats, slow returns in between.
 
-    Joints that the experiment does not move keep their posture. The only check here is that it can be written
-    down as set points; `daq.safety.check_plan` says whether it may be carried out. Raises SpecError.
+    Joints that the experiment does not move keep their posture. The only check here is that set points can represent
+    the motion; `daq.safety.check_plan` checks whether it may be carried out. Raises SpecError.
     """
     _require_joints(spec, machine)
     period = control_period(machine)
@@ -93,7 +93,7 @@ def plan(spec: ExperimentSpec, machine: Machine, start: Several[float]) -> Plan:
 
 
 def _require_motion(spec: ExperimentSpec, machine: Machine, motion: Piece, unit: Floats) -> None:
-    """Raises SpecError for amplitudes that no set point can show. A recorded path may be of an arm at rest."""
+    """Raises SpecError for amplitudes too small for a set point. A recorded path may be of an arm at rest."""
     moved = np.abs(motion.offsets).max(axis=0, initial=0.0)
     if isinstance(spec.trajectory, Path) or not moved.any() or (moved >= unit / 2).any():
         return
@@ -165,7 +165,7 @@ def _angles(given: Amplitude, joints: tuple[int, ...]) -> Floats:
 
 
 def _of_one_joint(piece: Piece, joints: tuple[int, ...]) -> Piece:
-    """Names the joint in the marks of a piece that moves one joint only."""
+    """Adds the joint to the marks of a piece that moves only one joint."""
     if len(joints) > 1:
         return piece
     return replace(piece, marks=tuple(replace(mark, joint=joints[0]) for mark in piece.marks))

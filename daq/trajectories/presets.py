@@ -1,10 +1,10 @@
-"""Named experiments: the source's ramp, the set that tells hidden effects apart, and a trace to hold out.
+"""Named experiments: the source's ramp, the diagnostic set, which distinguishes hidden effects, and a held-out trace.
 
-The diagnostic set has five parts, each for effects that the others confuse: A excites one joint at a time, B reverses
-slowly (friction), C makes small steps (quantiser, dead zone, backlash), D goes fast and saturates every drive (gain
-against viscous friction against sensor gain, supply limit), E repeats ramps and slow reversals at a second posture
-(load, posture-dependent effects). Amplitudes and times are choices, made for the MA2000's joints 1–3 at P = 2: its
-drives saturate at 63.5 ADC counts (4.2°) of error, and its set points pause at 127 (8.4°).
+The diagnostic set has five parts, each for effects that the others confuse. A excites one joint at a time. B reverses
+slowly (friction). C makes small steps (quantiser, dead zone, backlash). D is fast and saturates every drive (gain
+against viscous friction against sensor gain, supply limit). E repeats ramps and slow reversals at a second posture
+(load, posture-dependent effects). Amplitudes and times are choices for the MA2000's joints 1–3 at P = 2: its drives
+saturate at 63.5 ADC counts (4.2°) of error, and its set points pause at 127 (8.4°).
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ MAJOR = (1, 2, 3)
 
 @dataclass(frozen=True)
 class Preset:
-    """A named experiment, with one line that says what it is for."""
+    """A named experiment, with a line about its purpose."""
 
     description: str
     spec: ExperimentSpec = field(repr=False)
 
 
 def preset(name: str) -> Preset:
-    """The preset of that name. Raises SpecError with the names there are."""
+    """Returns the preset of this name. Raises SpecError with the existing names."""
     if name not in PRESETS:
-        raise SpecError(f"preset {name!r}: there is none of that name; there are {', '.join(PRESETS)}")
+        raise SpecError(f"preset {name!r}: unknown; allowed are {', '.join(PRESETS)}")
     return PRESETS[name]
 
 
@@ -54,7 +54,7 @@ def _segment(move: Simple, *joints: int) -> Segment:
 
 
 def _there_and_back(degrees: tuple[float, ...], duration: float, rest: float, *joints: int) -> list[Segment]:
-    """A ramp out, a rest, a ramp back, a rest; `degrees` has one value per joint."""
+    """Moves out in a ramp, rests, returns in a ramp and rests; `degrees` has one value per joint."""
     segments = []
     for sign in (1.0, -1.0):
         amplitude = {j: sign * math.radians(a) for j, a in zip(joints or MAJOR, degrees, strict=True)}
@@ -106,8 +106,8 @@ def _second_posture() -> list[Segment]:
 
 
 def _pseudo_random() -> list[Segment]:
-    """A maximum-length sequence of 255 signs, each held for 80 ms, that all joints follow 85 signs apart: their set
-    points jump between ±2° and have next to no correlation with each other."""
+    """A maximum-length sequence of 255 signs, each held for 80 ms; the joints are 85 signs apart. Their set points jump
+    between ±2° and are nearly uncorrelated."""
     signs = _maximum_length()
     third = len(signs) // len(MAJOR)
     segments: list[Segment] = []
@@ -123,7 +123,7 @@ def _pseudo_random() -> list[Segment]:
 
 
 def _maximum_length() -> list[int]:
-    """±1 from a register of 8 bits with feedback from bits 8, 6, 5 and 4: every state but 0 once (Golomb 1967)."""
+    """±1 from an 8-bit shift register with feedback from bits 8, 6, 5 and 4: every state but 0 once (Golomb 1967)."""
     register, signs = 0b01011010, []
     for _ in range(255):
         signs.append(1 if register & 1 else -1)
@@ -133,7 +133,7 @@ def _maximum_length() -> list[int]:
 
 
 def _sweep() -> list[Segment]:
-    """Through most of the range of each joint, in smooth moves of 4 s; joints turn back at different moments."""
+    """Moves through most of each joint's range in smooth moves of 4 s; joints reverse at different times."""
     postures = ((120.0, 90.0, -120.0), (0.0, 150.0, 0.0), (-120.0, 60.0, 120.0), (0.0, -60.0, 110.0), (0.0, 0.0, 0.0))
     segments: list[Segment] = []
     now: tuple[float, ...] = (0.0, 0.0, 0.0)
@@ -145,7 +145,7 @@ def _sweep() -> list[Segment]:
 
 
 def _held_out() -> list[Segment]:
-    """Like the diagnostic set, but with other sizes and speeds and at a third posture."""
+    """Like the diagnostic set, but with other sizes and speeds, at a third posture."""
     there = (-25.0, 20.0, 30.0)
     slow = SlowRamp(amplitude=_by_joint(3.0, 4.0, -4.0), speed=math.radians(4.5), reversals=1)
     return [
@@ -176,7 +176,7 @@ PARTS = {
 PRESETS: dict[str, Preset] = {
     "ramp": Preset("the ramp of the 1991 thesis: joints 1-3 through 21.6° in 0.65 s", ExperimentSpec(name="ramp")),
     "diagnostic": Preset(
-        "parts a to e one after the other, about 55 s: tells hidden effects apart",
+        "parts a to e in order, about 55 s: distinguishes hidden effects",
         _sequence("diagnostic", [segment for _, segments in PARTS.values() for segment in segments]),
     ),
     **{
@@ -184,15 +184,15 @@ PRESETS: dict[str, Preset] = {
         for letter, (description, segments) in PARTS.items()
     },
     "pseudo-random": Preset(
-        "pseudo-random steps between ±2° for 20 s: what differs only in fast motion, as inductance and a delay",
+        "pseudo-random steps between ±2° for 20 s: for effects of fast motion, such as inductance and delay",
         _sequence("pseudo-random", _pseudo_random()),
     ),
     "sweep": Preset(
-        "21 s through most of each joint's range: what differs only over position, as a bent or shifted potentiometer",
+        "21 s through most of each joint's range: for effects of position, such as a bent or shifted potentiometer",
         _sequence("sweep", _sweep()),
     ),
     "held-out": Preset(
-        "17 s that no fit has seen, to judge a model by: tones, ramps, slow reversals, steps at a third posture",
+        "17 s held out to check a model: tones, ramps, slow reversals, steps at a third posture",
         _sequence("held-out", _held_out()),
     ),
 }

@@ -1,4 +1,4 @@
-"""A plan: the set points of every joint at every control period, before anything is sent."""
+"""A plan: the set points of every joint at every control period."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MarkKind = Literal["start", "ramp_start", "ramp_end", "reversal", "note", "end"]
 
 @dataclass(frozen=True)
 class Mark:
-    """Something worth an event in the trace, at set point `index`. `joint` is None where all joints share it."""
+    """A mark that becomes an event in the trace, at set point `index`. `joint` is None if it concerns all joints."""
 
     index: int
     kind: MarkKind
@@ -31,7 +31,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class JointPreview:
-    """Motion of one joint: angles in rad, speed in rad/s between set points; intended steps are left out."""
+    """Motion of one joint: angles in rad, speed in rad/s between set points; intended jumps are left out."""
 
     joint: int
     moves: bool
@@ -45,7 +45,7 @@ class JointPreview:
 
 @dataclass(frozen=True)
 class PlanPreview:
-    """A plan in a few numbers, to look at before anything moves."""
+    """Key figures of a plan, for a check before anything moves."""
 
     duration: float
     period: float
@@ -61,13 +61,13 @@ class PlanPreview:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Set points of all joints of a machine, one row per control period, the first being where the arm stands.
+    """Set points of all joints of a machine, one row per control period; the first row is the arm's present posture.
 
     period:   s
-    moving:   joints (from 1) that the plan moves; the others keep their posture throughout
+    moving:   joints (from 1) that the plan moves; the others keep their posture
     angles:   (n, joints) rad, as planned
-    postures: (n, joints) posture units, as they are to be sent; not clipped, so a check can see what is outside 0–999
-    jumps:    (n,) True where a set point jumps on purpose (step, staircase) and is judged by its size, not its speed
+    postures: (n, joints) posture units to be sent; not clipped, so that checks can find values outside 0–999
+    jumps:    (n,) True if a set point jumps intentionally (step, staircase); its size is checked, not its speed
     """
 
     period: float
@@ -87,7 +87,7 @@ class Plan:
 
     @property
     def time(self) -> Floats:
-        """(n,) s: when each set point is due."""
+        """(n,) s: time of each set point."""
         return np.arange(len(self), dtype=np.float64) * self.period
 
     def marks_at(self, index: int) -> tuple[Mark, ...]:
@@ -95,7 +95,7 @@ class Plan:
         return tuple(mark for mark in self.marks if mark.index == index)
 
     def preview(self) -> PlanPreview:
-        """The plan in a few numbers."""
+        """Key figures of the plan."""
         change = np.abs(np.diff(self.angles, axis=0))
         smooth = np.where(self.jumps[1:, None], 0.0, change)
         steps = np.where(self.jumps[1:, None], change, 0.0)
@@ -123,7 +123,8 @@ def make_plan(
     jumps: Booleans | None = None,
     marks: tuple[Mark, ...] = (),
 ) -> Plan:
-    """A plan from angles (n, joints) in rad. Raises SpecError when they are not finite or do not fit the machine."""
+    """Returns a plan from angles (n, joints) in rad. Raises SpecError if they are not finite or do not fit the
+    machine."""
     if angles.ndim != 2 or angles.shape[1] != len(machine.joints) or not len(angles):
         raise SpecError(f"plan: angles of shape {angles.shape}, expected (n, {len(machine.joints)})")
     if not np.isfinite(angles).all():
@@ -136,7 +137,7 @@ def make_plan(
 
 
 def control_period(machine: Machine) -> float:
-    """Control period (s). Raises SpecError for a machine without a controller: nothing takes its set points."""
+    """Control period (s). Raises SpecError for a machine without a controller, which accepts no set points."""
     if isinstance(machine.controller, NoController):
         raise SpecError(f"machine {machine.name}: it has no controller, so it cannot be given set points")
     period = machine.controller.period.value
@@ -146,14 +147,14 @@ def control_period(machine: Machine) -> float:
 
 
 def postures_of(machine: Machine, joint: int, angles: Floats) -> Integers:
-    """Posture units of joint `joint` for angles (n,) rad: the wire's rounding, half up, without its range check."""
+    """Posture units of joint `joint` for angles (n,) rad, rounded half up as on the wire, without its range check."""
     calibration = machine.calibration(joint)
     units = (angles - calibration.angle_at_zero_rad) / calibration.rad_per_posture_unit
     return np.floor(units + 0.5).astype(np.int64)
 
 
 def representable_angles(machine: Machine, angles: Sequence[float]) -> Floats:
-    """The angles (rad) of the postures nearest to `angles`, one per joint: what set points can represent.
+    """Angles (rad) of the postures nearest to `angles`, one per joint, which set points can represent.
 
     A reading in the last fraction of the range counts as the highest posture, as on the wire. Raises SpecError for a
     wrong number of joints, an angle that is not finite or one outside the sensor's range.

@@ -1,22 +1,14 @@
-"""Shapes of motion: each a piece of set points relative to where it starts (section 6.5 of the source).
+"""Shapes of motion: each returns a piece of set points relative to its start (section 6.5 of the source).
 
-Step: the whole amplitude in one set point.
-
-Pause: no motion for a while, as a piece of a sequence and as settle and hold.
-
-Sine about the start posture, one joint lagging behind the other.
-
-Slow ramp with reversals: at low and constant speed friction is nearly all that the drive works against.
-
-Staircase: equal steps up through the amplitude and down again.
-
-Cubic segments through via points (section 3.7.1 of the source).
-
-A recorded or designed path: absolute angles at given times, straight lines in between.
-
-Pieces one after the other, each from where the one before ended.
-
-Multisine: many frequencies at once, with phases drawn from a seed.
+- Step: the whole amplitude in one set point.
+- Pause: no motion; a part of a sequence, and used for settle and hold.
+- Sine about the start posture; each joint lags behind the previous one.
+- Slow ramp with reversals: at low constant speed, the drive works almost only against friction.
+- Staircase: equal steps up through the amplitude and down again.
+- Cubic segments through via points (section 3.7.1).
+- A recorded or designed path: absolute angles at given times, linear in between.
+- Sequence: pieces in order, each from the end of the previous one.
+- Multisine: many frequencies at once, with phases from a seed.
 """
 
 from __future__ import annotations
@@ -36,15 +28,15 @@ from daq.trajectories.set_points import Mark
 
 
 def step(amplitudes: Floats) -> Piece:
-    """One jump through amplitudes (k,) rad."""
+    """Jumps once through amplitudes (k,) rad."""
     marks = (Mark(0, "ramp_start", "step"), Mark(1, "ramp_end", "step made"))
     return Piece(amplitudes[None, :].copy(), np.array([True]), marks)
 
 
 def pause(duration: float, joints: int, period: float, what: str = "pause: duration") -> Piece:
-    """`joints` joints standing still for `duration` s; no set points at all when it is 0.
+    """Keeps `joints` joints still for `duration` s; no set points at all if it is 0.
 
-    Raises SpecError for one of less than a control period, which errors call `what`.
+    Raises SpecError for less than a control period; errors call the duration `what`.
     """
     if duration > 0:
         require_sampled(duration, period, what)
@@ -54,8 +46,8 @@ def pause(duration: float, joints: int, period: float, what: str = "pause: durat
 def sine(move: Sine, amplitudes: Floats, period: float) -> Piece:
     """`cycles` of a sine of amplitudes (k,) rad.
 
-    A lag is a later start: a joint stands still until its own sine begins, and again after it, so that no set point
-    jumps. With a negative phase the last joint of the list goes first.
+    A lag is a later start: a joint stands still before and after its own sine, so that no set point jumps. With a
+    negative phase, the last joint in the list is first.
     """
     require_sampled(move.period, period, "sine: period", least=2)
     require_sampled(move.cycles * move.period, period, "sine: cycles × period")
@@ -69,9 +61,9 @@ def sine(move: Sine, amplitudes: Floats, period: float) -> Piece:
 
 
 def slow_ramp(move: SlowRamp, amplitudes: Floats, period: float) -> Piece:
-    """Out to amplitudes (k,) rad and back, turning `reversals` times.
+    """Moves out to amplitudes (k,) rad and back, reversing `reversals` times.
 
-    The joint with the largest amplitude goes at `speed`; the others in proportion, so that all turn together.
+    The joint with the largest amplitude moves at `speed`, the others in proportion, so that all reverse together.
     """
     largest = float(np.abs(amplitudes).max())
     leg = max(largest / move.speed, period)
@@ -87,11 +79,11 @@ def slow_ramp(move: SlowRamp, amplitudes: Floats, period: float) -> Piece:
 
 
 def staircase(move: Staircase, amplitudes: Floats, period: float) -> Piece:
-    """`steps` steps through amplitudes (k,) rad, `dwell` s on each, the last one down ending where it began."""
+    """`steps` steps through amplitudes (k,) rad, `dwell` s on each; the last step down ends at the start."""
     up = np.arange(1, move.steps + 1) / move.steps
     levels = np.concatenate([up, up[-2::-1], [0.0]]) if move.back else up
     require_sampled(move.dwell, period, "staircase: dwell")
-    periods_in(len(levels) * move.dwell, period)  # too long is refused before it fills the memory
+    periods_in(len(levels) * move.dwell, period)  # reject a long motion before it fills the memory
     dwell = periods_in(move.dwell, period)
     jumps = np.zeros(len(levels) * dwell, dtype=np.bool_)
     jumps[::dwell] = True
@@ -103,12 +95,12 @@ def staircase(move: Staircase, amplitudes: Floats, period: float) -> Piece:
 
 
 def via(move: Via, points: Floats, period: float) -> Piece:
-    """Through `points` (m, k) rad from the start, at the move's times; at rest at both ends.
+    """Moves through `points` (m, k) rad from the start, at the move's times; at rest at both ends.
 
-    The source asks each segment for the positions and speeds of (3.46) to (3.51) and leaves the speeds at the via
-    points open; here they are those that make the acceleration continuous, too: the clamped cubic spline.
+    The source determines positions and speeds of each segment by (3.46) to (3.51), but leaves the speeds at the via
+    points open. Here they make the acceleration continuous too: a clamped cubic spline.
     """
-    from scipy.interpolate import CubicSpline  # imported here, because few motions need it
+    from scipy.interpolate import CubicSpline  # imported here because few motions need it
 
     knots = np.array([0.0, *move.times])
     for number, (before, after) in enumerate(pairwise(knots.tolist()), start=1):
@@ -124,9 +116,9 @@ def via(move: Via, points: Floats, period: float) -> Piece:
 
 
 def path(move: Path, joints: tuple[int, ...], start: Floats, within: Floats, period: float) -> Piece:
-    """The path from start (k,) rad, which must lie within `within` (k,) rad of its first point.
+    """Follows the path from start (k,) rad, which must lie within `within` (k,) rad of its first point.
 
-    Raises SpecError when it does not: the arm has to be brought there first.
+    Raises SpecError if it does not: the arm must first be moved there.
     """
     for number, row in enumerate(move.positions, start=1):
         if len(row) != len(joints):
@@ -136,7 +128,7 @@ def path(move: Path, joints: tuple[int, ...], start: Floats, within: Floats, per
         if abs(points[0, column] - start[column]) > within[column]:
             raise SpecError(
                 f"joint {joint}: the path starts at {math.degrees(points[0, column]):.2f}°, "
-                f"the arm stands at {math.degrees(start[column]):.2f}°: bring it there first"
+                f"the arm stands at {math.degrees(start[column]):.2f}°: move it there first"
             )
     time = sample_times(move.times[-1], period)
     columns = [np.interp(time, move.times, points[:, column]) for column in range(len(joints))]
@@ -145,7 +137,7 @@ def path(move: Path, joints: tuple[int, ...], start: Floats, within: Floats, per
 
 
 def join_pieces(pieces: Iterable[Piece], joints: int, period: float) -> Piece:
-    """One piece from several on the same `joints` joints. Raises SpecError when it grows longer than LONGEST."""
+    """Joins pieces on the same `joints` joints. Raises SpecError if the result is longer than LONGEST."""
     offsets = [np.zeros((0, joints))]
     jumps = [np.zeros(0, dtype=np.bool_)]
     marks: list[Mark] = []
@@ -156,30 +148,31 @@ def join_pieces(pieces: Iterable[Piece], joints: int, period: float) -> Piece:
         jumps.append(piece.jumps)
         marks.extend(replace(mark, index=mark.index + length) for mark in piece.marks)
         length += len(piece.offsets)
-        periods_in(length * period, period)  # too long is refused before it fills the memory
+        periods_in(length * period, period)  # reject a long motion before it fills the memory
         if len(piece.offsets):
             reached = offsets[-1][-1]
     return Piece(np.concatenate(offsets), np.concatenate(jumps), tuple(marks))
 
 
 def spread(piece: Piece, columns: list[int], joints: int) -> Piece:
-    """Extends a piece to `joints` joints: its own go to `columns`, the others stand still."""
+    """Extends a piece to `joints` joints: its own become `columns`, the others stand still."""
     offsets = np.zeros((len(piece.offsets), joints))
     offsets[:, columns] = piece.offsets
     return replace(piece, offsets=offsets)
 
 
 LEAST_PART = 0.01
-"""Least share of its period that the lowest sine must complete within the duration; less would not be visible."""
+"""Least share of its period that the lowest sine must complete within the duration, to be visible."""
 FADE = 0.1
-"""Fraction of the duration over which the sum is faded in, and out again, by half a cosine."""
+"""Fraction of the duration for fading the sum in, and again for fading it out, by half a cosine."""
 
 
 def multisine(move: Multisine, joints: tuple[int, ...], amplitudes: Floats, period: float) -> Piece:
-    """`tones` sines evenly spaced in frequency, faded in and out, the largest set point at amplitudes (k,) rad.
+    """Sum of `tones` sines, evenly spaced in frequency and faded in and out; the largest set point is at amplitudes
+    (k,) rad.
 
-    Every joint has phases of its own, drawn from the seed and the joint's number, so that leaving a joint out does not
-    change the others.
+    Every joint has its own phases, drawn from the seed and the joint's number, so leaving out a joint does not change
+    the others.
     """
     require_sampled(move.duration, period, "multisine: duration")
     require_sampled(1.0 / move.highest, period, f"multisine: period of the highest frequency, {move.highest:g} Hz", 2)
@@ -206,10 +199,10 @@ def _fade(fraction: Floats) -> Floats:
 
 
 def ramp(move: Ramp, amplitudes: Floats, period: float) -> Piece:
-    """The straight line sampled at each control period; amplitudes (k,) in rad.
+    """A straight line sampled at each control period; amplitudes (k,) in rad.
 
-    All increments are equal but the last, which is what is left where the duration is no whole number of periods
-    (0.65 s is 32.5): so the speed is that of the line, amplitude / duration.
+    All increments are equal, except that the last is shorter if the duration is not a whole number of periods (0.65 s
+    is 32.5). The speed is therefore amplitude / duration.
     """
     require_sampled(move.duration, period, "ramp: duration")
     fraction = np.minimum(sample_times(move.duration, period) / move.duration, 1.0)

@@ -1,4 +1,4 @@
-"""Bytes to and from a controller: over a serial port, a pseudo-terminal, TCP, or a mock that it starts itself."""
+"""Transports bytes to and from a controller: by serial port, pseudo-terminal, TCP, or a mock that it starts itself."""
 
 from daq.transport.channel import ByteChannel, ChannelError
 from daq.transport.discovery import FoundPort, ports

@@ -1,4 +1,4 @@
-"""A stream of bytes to one controller, and its only implementation: an open file descriptor."""
+"""A byte stream to one controller, implemented by an open file descriptor."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from daq.transport.url import TransportError
 
 READ_SIZE = 4096
 WRITE_TIMEOUT_S = 0.5
-"""Time after which a port that accepts no byte counts as failed; the largest frame needs 5 ms."""
+"""Time (s) after which a port that accepts no bytes counts as failed; the largest frame needs 5 ms."""
 
 
 class ChannelError(TransportError):
-    """The connection has ended: the cable, the bridge or its process is gone."""
+    """The connection ended: the cable, the bridge or its process is gone."""
 
 
 class ByteChannel(Protocol):
-    """Bytes out, bytes in. One thread reads at a time; any thread may write or close."""
+    """Writes and reads bytes. One thread reads at a time; any thread may write or close."""
 
     @property
     def description(self) -> str:
@@ -29,23 +29,24 @@ class ByteChannel(Protocol):
         ...
 
     def read(self, timeout_s: float) -> bytes:
-        """What has arrived; empty when nothing has within `timeout_s`. Raises ChannelError at the end."""
+        """Returns the bytes that have arrived; empty if none come within `timeout_s`. Raises ChannelError at the
+        end."""
         ...
 
     def write(self, data: bytes) -> None:
-        """Hands all of `data` to the operating system. Raises ChannelError when it does not take it."""
+        """Passes all of `data` to the operating system. Raises ChannelError if it does not accept them."""
         ...
 
     def close(self) -> None:
-        """Ends the connection; a read that waits raises ChannelError. May be called twice."""
+        """Closes the connection; a waiting read raises ChannelError. May be called twice."""
         ...
 
 
 class DescriptorChannel:
-    """Channel over a descriptor in non-blocking mode; `release` gives back whatever owns it.
+    """A channel over a descriptor in non-blocking mode; `release` frees its owner.
 
-    Reading the descriptor itself costs two system calls a read. pyserial's read(n) waits for n bytes, and how
-    many will come is not known here.
+    Reading the descriptor directly takes two system calls per read. pyserial's read(n) would wait for n bytes, but the
+    number to come is unknown.
     """
 
     def __init__(self, descriptor: int, description: str, release: Callable[[], None]) -> None:
@@ -68,7 +69,7 @@ class DescriptorChannel:
         return self._description
 
     def read(self, timeout_s: float) -> bytes:
-        """What has arrived; empty at the time-out."""
+        """Returns the bytes that have arrived; empty after the time-out."""
         with self._in_use:
             if self._closed:
                 raise ChannelError(f"{self._description}: closed")
@@ -87,7 +88,7 @@ class DescriptorChannel:
         return data
 
     def write(self, data: bytes) -> None:
-        """All of `data`, or ChannelError."""
+        """Writes all of `data`, or raises ChannelError."""
         rest = memoryview(data)
         with self._writing:
             while rest:
@@ -101,7 +102,7 @@ class DescriptorChannel:
                     raise ChannelError(f"{self._description}: connection lost ({error.strerror})") from error
 
     def close(self) -> None:
-        """Ends the connection, once no thread reads or writes the descriptor any more."""
+        """Closes the connection, once no thread uses the descriptor any more."""
         self._closed = True
         if not self._released:
             with contextlib.suppress(OSError):

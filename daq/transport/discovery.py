@@ -1,4 +1,4 @@
-"""Which ports there are: what `daq ports` lists."""
+"""Lists the serial ports, for `daq ports`."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def ports(found_by: Callable[[], Iterable[ListPortInfo]] = list_ports.comports) 
 
 
 def appeared(before: Iterable[FoundPort], after: Iterable[FoundPort]) -> FoundPort | None:
-    """The one port that is there after a cable was plugged in, and was not before; None where there is none. Raises
-    TransportError for several."""
+    """Returns the port that appeared when a cable was plugged in; None if there is none. Raises TransportError for
+    several."""
     known = {port.url for port in before}
     new = [port for port in after if port.url not in known]
     if len(new) > 1:

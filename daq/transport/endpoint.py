@@ -1,4 +1,4 @@
-"""From a port URL to an open channel: an endpoint outlives its channels and can open new ones."""
+"""Opens channels from a port URL. An endpoint outlives its channels and can open new ones."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ CONNECT_TIMEOUT_S = 3.0
 
 
 class Endpoint(Protocol):
-    """A place where a controller is reached."""
+    """An address at which a controller is reached."""
 
     @property
     def url(self) -> str:
-        """Port URL as the user wrote it."""
+        """Port URL as given by the user."""
         ...
 
     @property
     def lock_step(self) -> bool:
-        """Whether the time of the controller stands still until the host asks for more."""
+        """Whether the controller's time stands still between requests of the host."""
         ...
 
     @property
@@ -47,25 +47,26 @@ class Endpoint(Protocol):
 
     @property
     def control(self) -> str | None:
-        """URL of the mock's control port, where faults are switched; None for anything but mock://."""
+        """URL of the mock's control port, for switching faults; None for all but mock://."""
         ...
 
     def waited(self) -> float:
-        """Time (s) for which the clock of a mock's board has stood still, since the mock got no processor; else 0."""
+        """Time (s) for which the clock of a mock's board has stood still because the mock got no processor time; else
+        0."""
         ...
 
     def connect(self) -> ByteChannel:
-        """A new channel. Raises TransportError: one line that says who, what, and what to do."""
+        """Opens a new channel. Raises TransportError: one line with the device, the cause, and advice."""
         ...
 
     def close(self) -> None:
-        """Gives back what the endpoint owns (a mock's process). May be called twice."""
+        """Frees what the endpoint owns (a mock's process). May be called twice."""
         ...
 
 
 def open_endpoint(url: str) -> Endpoint:
-    """The endpoint of a URL; a mock is started, in this process where it is one in lock-step without a terminal.
-    Nothing is sent. Raises TransportError."""
+    """Returns the endpoint of a URL. Starts a mock; in lock-step without a terminal, in this process. Sends nothing.
+    Raises TransportError."""
     port = parse_port_url(url)
     if isinstance(port, MockPort):
         if port.lock_step and not port.through_pty:
@@ -75,7 +76,7 @@ def open_endpoint(url: str) -> Endpoint:
 
 
 class PortEndpoint:
-    """A serial port or a TCP server: nothing to own between two channels."""
+    """A serial port or a TCP server. It owns nothing between two channels."""
 
     control: str | None = None
 
@@ -87,22 +88,22 @@ class PortEndpoint:
         self._terminal: Terminal | None = None
 
     def waited(self) -> float:
-        """No clock of an arm stands still."""
+        """Returns 0: an arm's clock never stands still."""
         return 0.0
 
     def connect(self) -> ByteChannel:
-        """A new channel, to what the first one led to."""
+        """Opens a new channel to the same device as the first."""
         if isinstance(self._port, SerialPort):
             require_same(self._port.device, self._terminal)
             self._terminal = terminal_at(self._port.device) or self._terminal
         return connect(self._port)
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Does nothing."""
 
 
 class MockEndpoint:
-    """A mock's process and the address where it listens."""
+    """A mock's process and the address at which it listens."""
 
     def __init__(self, url: str, port: MockPort, process: MockProcess) -> None:
         self.url = url
@@ -112,11 +113,11 @@ class MockEndpoint:
         self._process = process
 
     def waited(self) -> float:
-        """As the mock has told."""
+        """Returns the time that the mock reports."""
         return self._process.waited()
 
     def connect(self) -> ByteChannel:
-        """A new channel to the same process. Raises TransportError when it has ended."""
+        """Opens a new channel to the same process. Raises TransportError if it has ended."""
         self._process.check_running()
         port = parse_port_url(self._process.url)
         return connect(port)
@@ -127,7 +128,7 @@ class MockEndpoint:
 
 
 def connect(port: PortUrl) -> ByteChannel:
-    """A channel to a serial port or TCP server. Raises TransportError."""
+    """Opens a channel to a serial port or TCP server. Raises TransportError."""
     match port:
         case SerialPort():
             return _connect_serial(port)
@@ -169,7 +170,7 @@ def _connect_tcp(port: TcpPort) -> ByteChannel:
         connection = socket.create_connection((port.host, port.port), CONNECT_TIMEOUT_S)
     except ConnectionRefusedError as error:
         raise TransportError(f"nothing listens at {where}: is the bridge, or the mock, running there?") from error
-    except (OSError, UnicodeError) as error:  # a host name that cannot be one is a UnicodeError
+    except (OSError, UnicodeError) as error:  # an invalid host name raises UnicodeError
         raise TransportError(f"{where} cannot be reached: {error}") from error
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return DescriptorChannel(connection.fileno(), where, connection.close)

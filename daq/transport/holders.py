@@ -1,4 +1,4 @@
-"""Other programs that have a serial port open too, and so take bytes that were meant for this one."""
+"""Finds other programs that have a serial port open, and so take bytes meant for this one."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ PROBING_DAEMONS = "ModemManager and brltty open new ports by themselves: see `sy
 
 
 def other_holders(device: str) -> list[str]:
-    """Number and name of each program with this device open that is neither this process nor one that it descends from
-    or started; only one's own programs are seen, unless this is root. Empty where the system does not tell."""
+    """Name and PID of every other process that has the device open. This process, its ancestors and its descendants are
+    left out. Without root, only the user's own processes are visible. Empty if the system does not report it."""
     found: list[str] = []
     with suppress(OSError):
         wanted = os.stat(device).st_rdev
@@ -25,7 +25,8 @@ def other_holders(device: str) -> list[str]:
 
 
 def shared_port_advice(device: str) -> str:
-    """What to do where a port does not answer because another program reads from it too; empty for no serial port."""
+    """Returns advice for a port that does not answer because another program may read from it; empty if it is no serial
+    port."""
     if not device.startswith("/dev/"):
         return ""
     if others := other_holders(device):
@@ -34,7 +35,7 @@ def shared_port_advice(device: str) -> str:
 
 
 def _holds(process: Path, wanted: int) -> bool:
-    with suppress(OSError):  # it has ended meanwhile, or belongs to somebody else
+    with suppress(OSError):  # the process has ended, or belongs to another user
         for opened in (process / "fd").iterdir():
             with suppress(OSError):
                 if opened.stat().st_rdev == wanted:
@@ -43,13 +44,13 @@ def _holds(process: Path, wanted: int) -> bool:
 
 
 def _ours(parents: dict[int, int]) -> set[int]:
-    """This process, those that it descends from, and those that it started. `parents`: each process's."""
+    """PIDs of this process, its ancestors and its descendants. `parents`: PID to parent PID."""
     children: dict[int, list[int]] = {}
     for process, parent in parents.items():
         children.setdefault(parent, []).append(process)
     ours, ancestor = {os.getpid()}, parents.get(os.getpid(), 0)
     descendants = [os.getpid()]
-    for process in descendants:  # it grows
+    for process in descendants:  # the list grows while it is walked (breadth-first)
         descendants += children.get(process, ())
     while ancestor > 1 and ancestor not in ours:
         ours.add(ancestor)
@@ -58,7 +59,7 @@ def _ours(parents: dict[int, int]) -> set[int]:
 
 
 def _parent(process: Path) -> int:
-    """0 where it has ended meanwhile."""
+    """Returns the parent's PID; 0 if the process has ended."""
     with suppress(OSError, ValueError, IndexError):
         return int((process / "stat").read_text().rpartition(")")[2].split()[1])
     return 0

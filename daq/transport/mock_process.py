@@ -1,4 +1,4 @@
-"""A mock controller as a child process: started, found by the line it prints, and ended with its owner."""
+"""Runs a mock controller as a child process, found by the line that it prints; it ends with its owner."""
 
 from __future__ import annotations
 
@@ -16,35 +16,36 @@ from daq.contracts.processor import processor_time
 from daq.transport.url import SERVOS, MockPort, TransportError
 
 START_TIMEOUT_S = 30.0
-"""Longest time for a mock to start: the first import of the physics engine from a cold disk takes seconds. The time in
-which it waits for a processor does not count, up to STARVED_TIMEOUT_S."""
+"""Longest time (s) for a mock to start: the first import of the physics engine from a cold disk takes seconds. Time
+that it waits for a processor does not count, up to STARVED_TIMEOUT_S."""
 STARVED_TIMEOUT_S = 300.0
-"""Longest time for a mock to start on a computer that gives it no processor: whoever waits wants to know by then."""
+"""Longest time (s) for a mock to start on a computer that gives it no processor time, after which the user needs an
+answer."""
 END_TIMEOUT_S = 3.0
 LAST_WORDS = 500
-"""Characters of the mock's error output that are shown when it does not start."""
+"""Most characters shown of the mock's error output if it does not start."""
 
 
 @dataclass
 class MockProcess:
-    """A running mock. It ends when its standard input does, so it never outlives its owner, however that ends."""
+    """A running mock. It ends when its standard input ends, so it never outlives its owner."""
 
     url: str
     """Port URL of its line."""
     control: str | None
-    """URL of its control port, where faults are switched."""
+    """URL of its control port, for switching faults."""
     _process: Child = field(repr=False)
     _waited_us: int = 0
 
     def waited(self) -> float:
-        """Time (s) for which the clock of its board has stood still, since it got no processor."""
+        """Time (s) for which its board's clock has stood still for lack of processor time."""
         while told := _available(self._process.output):
             lines = [json.loads(line) for line in told.splitlines()]
             self._waited_us = max([self._waited_us, *(line.get("waited_us", 0) for line in lines)])
         return self._waited_us * 1e-6
 
     def check_running(self) -> None:
-        """Raises TransportError when the process has ended."""
+        """Raises TransportError if the process has ended."""
         if self._process.code is not None:
             raise TransportError(f"the mock controller has ended (exit code {self._process.code})")
 
@@ -56,10 +57,10 @@ class MockProcess:
 
 
 def start_mock(port: MockPort, *, waits: bool = False) -> MockProcess:
-    """Starts a mock and waits until it listens. One that `waits` lets the time of its board stand still while it gets
-    no processor: for a host that asks it how long (`waited`).
+    """Starts a mock and waits until it listens. With `waits`, the mock stops its board's clock while it gets no
+    processor time; the host can then read for how long (`waited`).
 
-    Raises TransportError with the mock's own words when it does not start; MissingExtraError.
+    Raises TransportError with the mock's error output if it does not start; MissingExtraError.
     """
     if port.dialect != SERVOS:
         require_extra("robot", "the mock controller", "mujoco")
@@ -75,7 +76,7 @@ def start_mock(port: MockPort, *, waits: bool = False) -> MockProcess:
             return MockProcess(ready["url"], ready.get("control"), process)
         except (ValueError, KeyError, TypeError) as error:
             seconds = time.monotonic() - begun
-            # one that ends closes its output a moment before
+            # A process that ends closes its output a moment before.
             code = process.wait(0.0 if seconds >= START_TIMEOUT_S else END_TIMEOUT_S)
             MockProcess("", None, process).close()
             complaints.seek(0)
@@ -85,7 +86,7 @@ def start_mock(port: MockPort, *, waits: bool = False) -> MockProcess:
 
 
 def _available(output: IO[bytes]) -> bytes:
-    """Whole lines that have come. The process writes a line at once, so that none is cut."""
+    """Returns the complete lines that have arrived. The process writes whole lines."""
     try:
         return os.read(output.fileno(), PIECE)
     except BlockingIOError:
@@ -93,7 +94,8 @@ def _available(output: IO[bytes]) -> bytes:
 
 
 def _silent(code: int | None, seconds: float) -> str:
-    """Why a mock may have said nothing in this time. `code`: its exit code; None where it was still starting."""
+    """Returns why a mock may have printed nothing in this time. `code`: its exit code; None if it was still
+    starting."""
     if code is None:
         return f"it was not ready after {seconds:.0f} s; see what keeps this computer busy, and try again"
     if code < 0:
@@ -102,7 +104,7 @@ def _silent(code: int | None, seconds: float) -> str:
 
 
 def _first_line(output: IO[bytes], process: int) -> bytes:
-    """The first line that a process prints; what there is when it ends or its time has passed."""
+    """Returns the first line that a process prints, or the output so far when it ends or its time is over."""
     begun = time.monotonic()
     waiting = select.poll()
     waiting.register(output, select.POLLIN)
@@ -113,7 +115,7 @@ def _first_line(output: IO[bytes], process: int) -> bytes:
         left = begun + min(patience, STARVED_TIMEOUT_S) - time.monotonic()
         if left <= 0:
             break
-        if not waiting.poll(left * 1000):  # it may have waited for a processor meanwhile
+        if not waiting.poll(left * 1000):  # the process may have waited for a processor meanwhile
             continue
         byte = os.read(output.fileno(), 1)
         if not byte:

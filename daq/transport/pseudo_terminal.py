@@ -1,4 +1,4 @@
-"""Identity of pseudo-terminals. Their numbers are reused: the name of a mock that has ended may soon belong to a
+"""Identifies pseudo-terminals. Their names are reused: the name of a dead mock's terminal may soon belong to a
 shell."""
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from daq.transport.url import TransportError
 
 NUMBERED = re.compile(r"/dev/pts/[0-9]+")
-"""Names of numbered pseudo-terminals. A symbolic link is excluded: its owner keeps it pointing to the right one."""
+"""Names of numbered pseudo-terminals. A symbolic link does not match: its owner keeps it up to date."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Terminal:
 
     number: device number, which the system reuses
     made:   time of creation (ns)
-    holder: process at its other end, by number and start (clock ticks); None where that cannot be known
+    holder: process at its other end, as PID and start time (clock ticks); None if unknown
     """
 
     number: int
@@ -30,15 +30,16 @@ class Terminal:
 
 
 def terminal_at(device: str) -> Terminal | None:
-    """The pseudo-terminal of this name; None for any other device, and where there is none."""
+    """Returns the pseudo-terminal of this name; None for any other device, or if it does not exist."""
     made = _made(device)
     return None if made is None else Terminal(*made, _holder(device))
 
 
 def require_same(device: str, before: Terminal | None) -> None:
-    """Raises TransportError where `device` has become another program's terminal since `before`.
+    """Raises TransportError if `device` has become another program's terminal since `before`.
 
-    A new one of the same program will do: a mock whose cable was pulled and put back has made it.
+    A new terminal of the same program is accepted: a mock makes one when its simulated cable is unplugged and plugged
+    in.
     """
     now = _made(device)
     if before is None or now in (None, (before.number, before.made)):
@@ -49,7 +50,7 @@ def require_same(device: str, before: Terminal | None) -> None:
 
 
 def _made(device: str) -> tuple[int, int] | None:
-    """Number and time of creation; asked before every stop, so without a search for who holds it."""
+    """Device number and time of creation. Called before every stop, so it does not search for the holder."""
     if NUMBERED.fullmatch(device) is None:
         return None
     try:
@@ -60,12 +61,12 @@ def _made(device: str) -> tuple[int, int] | None:
 
 
 def _holder(device: str) -> tuple[int, int] | None:
-    """The process that holds a pseudo-terminal's other end, as Linux tells it of one's own processes."""
+    """The process at the other end of a pseudo-terminal, as Linux reports it for the user's own processes."""
     index = int(device.rpartition("/")[2])
     for process in Path("/proc").iterdir():
         if not process.name.isdecimal():
             continue
-        with suppress(OSError):  # it has ended meanwhile, or belongs to somebody else
+        with suppress(OSError):  # the process has ended, or belongs to another user
             for opened in (process / "fd").iterdir():
                 if opened.readlink().name == "ptmx" and _index(process / "fdinfo" / opened.name) == index:
                     return int(process.name), _start(process)
@@ -78,6 +79,6 @@ def _index(about: Path) -> int | None:
 
 
 def _start(process: Path) -> int:
-    """Start time (clock ticks) of a process, since its number is reused too (proc(5), field 22, counted after its
+    """Start time (clock ticks) of a process, since its PID is reused too (proc(5), field 22, counted after its
     name)."""
     return int((process / "stat").read_text().rpartition(")")[2].split()[19])

@@ -1,4 +1,4 @@
-"""How long to wait between attempts to connect again: doubling, up to a limit. Pure."""
+"""Delays between attempts to reconnect: doubled up to a limit. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Port URLs: what the user writes to say where the controller is. Parsing is pure; each mistake gets one line.
+"""Parses port URLs, which name the way to a controller. Pure; each mistake gets a one-line error.
 
 serial:///dev/ttyUSB0?baud=115200
 serial:///dev/ttyUSB0?baud=1000000&dialect=dynamixel&ids=1,2
@@ -17,7 +17,7 @@ from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
 
 DEFAULT_BAUD = 115200
-"""Line rate where the URL names none (bits per second; ten bits carry a byte)."""
+"""Line rate without `baud` in the URL (bits per second; ten bits per byte)."""
 BAUD_RATES = (
     *(1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400),
     *(250000, 460800, 500000, 921600, 1000000),  # of these, a clock of 16 MHz gives 250000, 500000, 1000000 exactly
@@ -26,23 +26,23 @@ BAUD_RATES = (
 BITS_PER_BYTE = 10
 """Bits that a byte takes on the line: start bit, eight data bits, stop bit."""
 FRAMED = "framed"
-"""The dialect of PROTOCOL.md, where the URL names none."""
+"""The dialect of PROTOCOL.md, used if the URL names none."""
 SERVOS = "dynamixel"
-"""The dialect for which a mock of its own ships."""
+"""The dialect with a separate mock."""
 
 
 class TransportError(DaqError):
-    """A port that cannot be named, found, opened or owned."""
+    """A port cannot be named, found, opened or owned."""
 
     exit_code = exit_codes.NOT_REACHED
 
 
 class PortBusyError(TransportError):
-    """Another program has the port."""
+    """Another program uses the port."""
 
 
 class PortUrlError(TransportError):
-    """A port URL that cannot be understood."""
+    """A port URL is invalid."""
 
     exit_code = exit_codes.WRONG_INPUT
 
@@ -55,12 +55,12 @@ class SerialPort:
     baud: int = DEFAULT_BAUD
     dialect: str = FRAMED
     ids: tuple[int, ...] = ()
-    """Numbers on the bus of joints 1, 2, …, for dialects that need them."""
+    """IDs on the bus of joints 1, 2, …, for dialects that need them."""
 
 
 @dataclass(frozen=True)
 class TcpPort:
-    """A bridge behind a TCP server. `baud` is the line rate behind it, from which time-outs follow."""
+    """A bridge behind a TCP server. `baud`: rate of the serial line behind it, which determines time-outs."""
 
     host: str
     port: int
@@ -74,8 +74,8 @@ class TcpPort:
 class MockPort:
     """A mock controller that is started for this connection and ends with it.
 
-    `arguments` are those of its command line, beyond where it listens. With a `baud` in the URL its bytes take their
-    time on the line.
+    `arguments`: its command-line arguments, except the address. With a `baud` in the URL, its bytes take as long as on
+    a serial line.
     """
 
     arguments: tuple[str, ...] = ()
@@ -108,19 +108,19 @@ MOCK_VALUES = (
     "secret",
     "fault",
 )
-"""Options of mock:// that are handed to the mock with their value."""
+"""Options of mock:// that are passed to the mock with their value."""
 REPEATABLE = ("modify", "fault")
 SERVO_VALUES = ("ids", "supply", "load", "coulomb", "secret")
-"""Options of mock://?dialect=dynamixel that are handed to the mock of servos with their value."""
+"""Options of mock://?dialect=dynamixel that are passed to the mock of servos with their value."""
 
 
 def serial_url(device: str) -> str:
-    """The URL of a serial device at this path."""
+    """Returns the URL of a serial device at this path."""
     return f"serial://{quote(device)}"
 
 
 def parse_port_url(text: str) -> PortUrl:
-    """The port that a URL names. Raises TransportError with one line: what is wrong and what is allowed."""
+    """Returns the port that a URL names. Raises TransportError with one line: what is wrong and what is allowed."""
     if "://" not in text:
         hint = f"; for a device write {serial_url(text)}" if text.startswith("/") else ""
         raise PortUrlError(f"port {text!r}: must begin with serial://, tcp:// or mock://{hint}")
@@ -191,13 +191,13 @@ def _mock_servos(text: str, options: list[tuple[str, str]]) -> MockPort:
     given = _single(text, options, ("dialect", "baud", "pty", *SERVO_VALUES))
     dialect, ids = _dialect(text, given)
     arguments = [f"--{name}={given[name]}" for name in SERVO_VALUES if name in given]
-    arguments.append("--torque")  # nobody could switch it on: this mock ends with its first connection
+    arguments.append("--torque")  # nobody could switch the torque on: this mock ends with its first connection
     through_pty = _flag(text, "pty", given.get("pty"))
     return MockPort(tuple(arguments), _baud(text, given), through_pty=through_pty, dialect=dialect, ids=ids)
 
 
 def _dialect(text: str, options: Mapping[str, str]) -> tuple[str, tuple[int, ...]]:
-    """The dialect, and the joints' numbers on its bus."""
+    """Returns the dialect, and the joints' IDs on its bus."""
     dialect, ids = options.get("dialect", FRAMED), options.get("ids", "")
     numbers = ids.split(",") if ids else []
     if not all(number.isdecimal() and len(number) <= 5 for number in numbers):

@@ -1,1 +1,1 @@
-"""What every subcommand shares: the command itself, its context, its output, and the questions to a person."""
+"""Common parts of all subcommands: the command itself, its context, output, and questions to a person."""

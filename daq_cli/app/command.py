@@ -1,4 +1,4 @@
-"""The `daq` command: its global options, and the exit code and message of every error."""
+"""The `daq` command: its global options, and exit codes and messages of all errors."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ WRONG_NAMES = frozenset(
         errno.EROFS,
     }
 )
-"""Errors of the operating system that a wrong file name causes; every other one is a fault of the computer."""
+"""Operating-system errors that a wrong file name causes; all others are faults of the computer."""
 LONGEST_LINE = 800
-"""Most characters of an error that are printed: a command line may hold a megabyte."""
+"""Most characters of a printed error: a command line may contain a megabyte."""
 
 SERVER_VARIABLE = "DAQ_SERVER"
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
-"""The exception of typer for a command line that it does not understand, which has no public name."""
+"""typer's exception for an invalid command line, which has no public name."""
 
 app = typer.Typer(
     name="daq",
     cls=LazyGroup,
     help="Run experiments on a TQ MA2000 robot arm, or on its mock, and keep every trace.",
     no_args_is_help=True,
-    rich_markup_mode=None,  # importing rich costs more than everything else that `daq --help` does
+    rich_markup_mode=None,  # importing rich takes longer than everything else in `daq --help`
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -81,7 +81,7 @@ def options(
         bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and end.")
     ] = False,
 ) -> None:
-    """Options that go before the subcommand."""
+    """Options before the subcommand."""
     del version
     by_default = getattr(context.get_parameter_source("server"), "name", "") == "ENVIRONMENT"
     if server is not None and port is not None:
@@ -106,14 +106,14 @@ def options(
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point: a user's error ends in one line on standard error and a documented exit code. arguments: as typed
-    behind `daq`; None for those of this process"""
+    """Entry point: a user error ends in one line on standard error and a documented exit code. arguments: as typed
+    after `daq`; None for those of this process."""
     _print_whatever_files_are_called()
-    # What it says of a home that cannot be written to is no news of a figure, which it draws all the same.
+    # matplotlib warns of a home that is not writable, but draws the figure.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
         exit_code = app(arguments, prog_name="daq", standalone_mode=False)
-        _flush()  # now, while what keeps it from being written is still an error
+        _flush()  # now, while a failure to write still raises an error
     except DaqError as error:
         fail(str(error), error.exit_code)
     except ProtocolError as error:
@@ -125,11 +125,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except MemoryError:
         fail("the computer has not enough memory for this", exit_codes.PROGRAM_FAULT)
     except BrokenPipeError:
-        # `daq traces ls | head`: the reader has closed the pipe. Python would complain at exit.
+        # `daq traces ls | head`: the reader closed the pipe. Python would report an error at exit.
         _drop_output()
         raise SystemExit(exit_codes.PROGRAM_FAULT) from None
     except OSError as error:
-        # No other code has handled this: a name that is too long, a folder that may not be read, a full disk.
+        # No other code has handled this error: a name that is too long, an unreadable folder, a full disk.
         file = "" if error.filename is None else f"{error.filename}: "
         _drop_output()
         code = exit_codes.WRONG_INPUT if error.errno in WRONG_NAMES else exit_codes.PROGRAM_FAULT
@@ -138,13 +138,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if (line := _line_of_database(error)) is None:
             raise
         fail(line, exit_codes.WRONG_INPUT)
-    # typer hands back either an exit code or what the command returned.
+    # typer returns either an exit code or the command's result.
     raise SystemExit(exit_code if isinstance(exit_code, int) else 0)
 
 
 def _line_of_database(error: Exception) -> str | None:
-    """Returns an error of a service's database in one line; None for any other error. A command that has none of these
-    errors never imports their library."""
+    """Returns an error of a service's database in one line; None for any other error. Does not import the database
+    library if the command has not."""
     library = sys.modules.get("sqlalchemy.exc")
     if library is None or not isinstance(error, library.DatabaseError):
         return None
@@ -154,14 +154,14 @@ def _line_of_database(error: Exception) -> str | None:
 
 
 def _flush() -> None:
-    """Raises OSError. Python has no standard output where the shell has closed it (`>&-`)."""
+    """Writes buffered output. Raises OSError. Python has no standard output if the shell closed it (`>&-`)."""
     out: io.TextIOBase | None = sys.stdout  # type: ignore[assignment]
     if out is not None:
         out.flush()
 
 
 def _drop_output() -> None:
-    """Discards output that could not be written, which Python would try again at exit, with a message of its own."""
+    """Discards output that could not be written; Python would try it again at exit and report an error."""
     try:
         _flush()
     except OSError:
@@ -169,15 +169,15 @@ def _drop_output() -> None:
 
 
 def _print_whatever_files_are_called() -> None:
-    """Lets a command print file names that are not UTF-8, and degree signs on terminals that lack them."""
+    """Makes output accept file names that are not UTF-8, and degree signs on terminals that lack them."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="surrogateescape" if sys.stdout.encoding.lower() == "utf-8" else "replace")
 
 
 def _show_usage_error(error: Any) -> NoReturn:
-    """Ends with one line on what is wrong with the command line and where help is; without any words, with the help
-    itself."""
-    if getattr(error, "message", ""):  # typer has pydantic look at some values, and passes on its words
+    """Ends with one line about the error in the command line and its help; without an error message, prints the
+    help."""
+    if getattr(error, "message", ""):  # for some values typer passes on pydantic's message
         error.message = message_of({"msg": error.message})
     message = error.format_message().strip().removesuffix(".")
     if type(error).__name__ == "NoArgsIsHelpError":
@@ -188,8 +188,8 @@ def _show_usage_error(error: Any) -> NoReturn:
 
 
 def fail(message: str, exit_code: int) -> NoReturn:
-    """Ends with one line on standard error. A long one is cut in its middle, because what is allowed stands at its
-    end."""
+    """Ends with one line on standard error. A long line is shortened in its middle, because its end states what is
+    allowed."""
     line = " ".join(message.split())
     if len(line) > LONGEST_LINE:
         line = f"{line[: LONGEST_LINE // 2]} … {line[-LONGEST_LINE // 2 :]}"

@@ -1,4 +1,4 @@
-"""What a shell offers after the tab key. It asks at every press, so nothing heavy is imported here."""
+"""Shell completion. It runs at every press of the tab key, so nothing heavy is imported here."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import typer
 
 PRESETS = ("ramp", "diagnostic", *(f"diagnostic-{letter}" for letter in "abcde"), "pseudo-random", "sweep", "held-out")
-"""Names of `daq.trajectories.presets`, which would load numpy; a test keeps the two alike."""
+"""Names of `daq.trajectories.presets`, which would import numpy; a test keeps both equal."""
 JOINTS = ("1-3", "1", "2", "3", "4", "5", "6", "1-2", "2-3", "1-6")
 SUFFIXES = (".mcap", ".csv")
 CONFIGURATION = "daq.toml"
@@ -22,7 +22,7 @@ def presets(incomplete: str) -> list[str]:
 
 
 def joints(incomplete: str) -> list[str]:
-    """The selections of joints that are typed most."""
+    """Usual selections of joints."""
     return [text for text in JOINTS if text.startswith(incomplete)]
 
 
@@ -36,8 +36,7 @@ def effects(incomplete: str) -> list[str]:
 
 
 def traces(ctx: typer.Context, incomplete: str) -> Iterator[str]:
-    """`last`, the files of the folder of traces with the newest first, and the files of the folder that the word
-    names."""
+    """`last`, the files in the folder of traces (newest first), and the files in the folder that the word names."""
     if "last".startswith(incomplete):
         yield "last"
     folder = Path(ctx.params.get("folder") or _configured_folder())
@@ -48,7 +47,7 @@ def traces(ctx: typer.Context, incomplete: str) -> Iterator[str]:
 
 
 def _configured_folder() -> str:
-    """The folder of traces in ./daq.toml, read directly: loading the settings takes a third of a second."""
+    """The folder of traces in ./daq.toml, read directly: loading the settings takes 0.3 s."""
     try:
         section = tomllib.loads(Path(os.environ.get("DAQ_CONFIG", CONFIGURATION)).read_text("utf-8-sig"))["traces"]
         return str(Path(section["folder"]).expanduser())

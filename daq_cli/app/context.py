@@ -1,4 +1,4 @@
-"""What every subcommand needs: the settings, the port, the service, and how results are printed."""
+"""Context of every subcommand: the settings, the port, the service, and printing of results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from daq_cli.app.printable import printable as printable  # noqa: PLC0414 - others take it from here
+from daq_cli.app.printable import printable as printable  # noqa: PLC0414  # re-exported
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -28,17 +28,17 @@ YesOption = Annotated[bool, typer.Option("--yes", help="Consent to moving a real
 
 
 LABEL = 7
-"""Widest indentation of what follows a label, columns."""
+"""Widest indentation (columns) of text after a label."""
 _TIED = "\xa0"
-"""A blank at which no line ends."""
+"""A space at which no line ends."""
 _BEFORE_UNIT = re.compile(r"(?<=[\d±]) (?=\S)|(?<=\S) (?=±)")
 
 
 @cache
 def console() -> Console:
-    """The console for people: progress, questions and remarks on standard error. Results go to standard output.
+    """Returns the console for people: progress, questions and remarks on standard error. Results go to standard output.
 
-    Text is printed as it is: square brackets in a path or a message are no markup.
+    Text is printed literally: square brackets are not markup.
     """
     from rich.console import Console
 
@@ -46,7 +46,7 @@ def console() -> Console:
 
 
 def print_table(table: Table) -> None:
-    """Prints a table of results on standard output, as wide as the terminal; brackets in its text are no markup."""
+    """Prints a table on standard output, as wide as the terminal; brackets in its text are not markup."""
     from rich.console import Console
 
     from daq_cli.app.narrow_table import print_fitting
@@ -55,10 +55,10 @@ def print_table(table: Table) -> None:
 
 
 def print_prose(text: str, label: str = "", *, err: bool = False) -> None:
-    """Prints sentences on standard output, broken at words to the terminal's width.
+    """Prints sentences on standard output, wrapped to the terminal's width.
 
     Args:
-        label: begins the first line; the others begin below its first word's end. A number keeps its unit beside it.
+        label: begins the first line; later lines are indented to its width. Numbers are not separated from their units.
         err: prints on standard error.
     """
     width = shutil.get_terminal_size().columns
@@ -70,38 +70,38 @@ def print_prose(text: str, label: str = "", *, err: bool = False) -> None:
 
 @dataclass
 class Invocation:
-    """One call of `daq`: the options before the subcommand. Settings are read when they are first needed."""
+    """One call of `daq`: the options before the subcommand. Settings are read on first use."""
 
     config_file: Path | None = None
     port_option: str | None = None
     server: str | None = None
-    """URL of a service that has the robot; None for a robot at this computer."""
+    """URL of the service that owns the robot; None for a local robot."""
     server_by_default: bool = False
-    """Whether `server` comes from DAQ_SERVER, and not from the command line."""
+    """Whether `server` comes from DAQ_SERVER and not from the command line."""
     robot_option: str | None = None
-    """The name of one of several robots."""
+    """Name of one of several robots."""
     _mock_announced: bool = field(default=False, repr=False)
 
     @property
     def stops_here(self) -> bool:
-        """Whether a stop goes to what this computer moves, too: always, unless the command line names a service."""
+        """Whether a stop includes robots that this computer moves: always, unless the command line names a service."""
         return self.server is None or self.server_by_default
 
     @cached_property
     def configuration(self) -> Settings:
-        """The whole configuration, with all robots. Raises SpecError."""
+        """The whole configuration with all robots. Raises SpecError."""
         from daq.config.settings import load_settings
 
         return load_settings(self.config_file)[0]
 
     @cached_property
     def settings(self) -> Settings:
-        """The settings of the robot that the command line names, or of the only one. Raises SpecError."""
+        """The settings of the robot named on the command line, or of the only one. Raises SpecError."""
         return self.configuration.of_robot(self.robot_option)
 
     @property
     def port(self) -> str:
-        """The port of the command line or the configuration; the mock by default, which is announced once."""
+        """The port of the command line or the configuration; by default the mock, which is announced once."""
         if self.port_option is not None:
             return self.port_option
         if self.settings.robot.port is None and not self._mock_announced:
@@ -111,7 +111,7 @@ class Invocation:
 
     @property
     def memory_map_text(self) -> str | None:
-        """Text of the configured memory map; None for the one that ships. Raises SpecError."""
+        """Text of the configured memory map; None for the packaged one. Raises SpecError."""
         path = self.settings.robot.memory_map
         if path is None:
             return None
@@ -123,19 +123,20 @@ class Invocation:
 
     @property
     def trace_folder(self) -> Path:
-        """The configured folder of traces. That of a service's robot is here only if a robot has its name here."""
+        """The configured folder of traces. For a service's robot, it is that of a local robot with the same name, if
+        any."""
         if self.server is not None and self.robot_option not in self.configuration.names:
             return self.configuration.traces.folder
         return self.settings.traces.folder
 
     @property
     def trace_limits(self) -> TraceLimits:
-        """The largest trace that is read."""
+        """Limits for reading traces."""
         return self.configuration.traces.limits
 
 
 def invocation(context: typer.Context) -> Invocation:
-    """The invocation of this call, made from the global options."""
+    """Returns this call's invocation, made from the global options."""
     found = context.find_object(Invocation)
     assert found is not None
     return found
@@ -144,5 +145,5 @@ def invocation(context: typer.Context) -> Invocation:
 def print_json(data: Any) -> None:
     """Prints data on standard output as one JSON document."""
     text = json.dumps(data, indent=2, ensure_ascii=False, default=str)
-    # A file's name that is no UTF-8 has surrogates in Python: written as JSON's own escapes, they read back.
+    # File names that are not UTF-8 contain surrogates in Python; JSON's escapes preserve them.
     sys.stdout.write(text.encode("utf-8", "backslashreplace").decode() + "\n")

@@ -1,4 +1,4 @@
-"""Traces as CSV, which never overwrite a TOML file that belongs to something else."""
+"""Writes traces as CSV, without overwriting a TOML file of another kind."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from daq.contracts.trace import Trace
 
 WRITTEN = frozenset({"source", "joints", "created"})
-"""Fields of every TOML file that was written beside a CSV; another one, such as a configuration, lacks some of them."""
+"""Fields of every TOML file written beside a CSV. Other TOML files, such as configurations, lack some of them."""
 
 
 def write_csv(trace: Trace, path: Path) -> Path:
-    """Writes the CSV and the TOML beside it. Raises SpecError as `check_csv` does, TraceError when they cannot be
+    """Writes the CSV and the TOML beside it. Raises SpecError as `check_csv` does, TraceError if they cannot be
     written."""
     from daq.traces.csv_table import export_csv
 
@@ -25,8 +25,8 @@ def write_csv(trace: Trace, path: Path) -> Path:
 
 
 def check_csv(path: Path) -> None:
-    """Raises SpecError for another kind of file, such as the trace itself, and when the TOML beside it would replace
-    another one, such as a machine or a configuration."""
+    """Raises SpecError for another kind of file, such as the trace itself, or if the TOML would replace another kind of
+    TOML, such as a machine file or a configuration."""
     from pydantic import ValidationError
 
     from daq.traces.description import Description, toml_path

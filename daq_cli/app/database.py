@@ -1,4 +1,4 @@
-"""The service's own database, for commands that look into it on its computer."""
+"""Opens the service's database, for commands that use it directly on its computer."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def service_database(call: Invocation) -> Store:
-    """Returns the database that the configuration names, brought up to date. Raises StoreError."""
+    """Returns the configured database, migrated to the newest schema. Raises StoreError."""
     from server.store.address import address_of
     from server.store.engine import Store
 
@@ -22,7 +22,7 @@ def service_database(call: Invocation) -> Store:
 
 
 def computers_user() -> str:
-    """Returns the name of the user who runs this program; `unknown`, if they have no name here."""
+    """Returns the name of the user who runs this program; `unknown` if the system has none."""
     try:
         return getpass.getuser()
     except (OSError, KeyError):

@@ -1,4 +1,4 @@
-"""The first act of `daq stop`: asks every process that moves a robot, before the command line is loaded."""
+"""First step of `daq stop`: stops every local robot before the command line is loaded."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ _asked: list[StopAttempt] | None = None
 
 
 def ask(arguments: Sequence[str] = ()) -> None:
-    """Stops every robot that this user's processes move, and keeps the answers for the subcommand. `arguments`: those
-    behind `stop`, which may name one robot."""
+    """Stops every robot that this user's processes move, and stores the answers for the subcommand. `arguments`: those
+    after `stop`, which may name one robot."""
     global _asked  # noqa: PLW0603 - one process, one command line, one stop
-    _asked = request_stop(_named(arguments)) or None  # nobody by this name: the subcommand looks for what is meant
+    _asked = request_stop(_named(arguments)) or None  # no robot of this name: the subcommand handles that
 
 
 def attempts(robot: str | None = None) -> list[StopAttempt]:
-    """The answers to the early stop; stops now when there was none (`daq --config … stop`)."""
+    """Returns the answers to the early stop; stops now if there was none (`daq --config … stop`)."""
     return request_stop(robot) if _asked is None else _asked
 
 
 def told() -> list[str]:
-    """One line for each robot of the early stop: for a command line that cannot be loaded."""
+    """One line per robot of the early stop, for a command line that cannot be loaded."""
     return [line_of(answer_of(attempt)) for attempt in _asked or []]
 
 
 def answer_of(attempt: StopAttempt) -> StopAnswer:
-    """The answer to a stop, also of a process that gave none."""
+    """Returns the answer to a stop; for a process that gave none, a text that states this."""
     silent = "the process that moves it did not answer"
     return attempt.answer or StopAnswer(robot=attempt.robot, delivered=False, confirmed=False, text=silent)
 
 
 def line_of(answer: StopAnswer) -> str:
-    """What became of a stop, for a person."""
+    """Returns the result of a stop in one line, for a person."""
     if answer.confirmed:
         line = f"{answer.robot}: stopped, confirmed by the board: set points frozen at tick {answer.tick}"
         return f"{line}. {answer.text}" if answer.text else line

@@ -1,4 +1,4 @@
-"""Single keys of a terminal, read without waiting."""
+"""Reads single keys of a terminal without waiting."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LEFT, RIGHT = "\x1b[D", "\x1b[C"
 
 @contextmanager
 def open_keyboard() -> Iterator[Keyboard]:
-    """The terminal's keys, one by one; its mode is put back at the end. Raises SpecError without a terminal.
+    """Opens the terminal's keys; restores its mode at the end. Raises SpecError without a terminal.
 
     Ctrl-C stays a signal: it must stop the arm whatever this program does.
     """
@@ -33,13 +33,13 @@ def open_keyboard() -> Iterator[Keyboard]:
 
 
 class Keyboard:
-    """Reads keys that have been pressed since the last look."""
+    """Reads the keys pressed since the last read."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
 
     def pressed(self) -> str:
-        """Everything typed since the last look; empty when nothing was."""
+        """Returns everything typed since the last read; empty if nothing was."""
         if not select.select([self._descriptor], [], [], 0)[0]:
             return ""
         return os.read(self._descriptor, 1024).decode("utf-8", "replace")

@@ -1,4 +1,4 @@
-"""Subcommands that are imported when they are used, so that `daq --help` starts fast."""
+"""Imports subcommands on first use, so that `daq --help` starts fast."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from daq_cli.app.subcommands import subcommand, subcommands
 
 
 class LazyGroup(typer.core.TyperGroup):
-    """Lists subcommands by name and one line; imports the one that is called."""
+    """Lists subcommands with one line each; imports only the one that is called."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Names in the order of the table."""
+        """Names in the table's order."""
         del ctx
         return list(subcommands())
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Returns the command that was imported; of any other one its name and line."""
+        """Returns an imported command; for all others, only name and help line."""
         found = super().get_command(ctx, cmd_name)
         if found is None and (known := subcommand(cmd_name)) is not None:
             return typer.core.TyperCommand(cmd_name, help=known.line)
         return found
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Writes the commands below their headings, each with its whole line."""
+        """Writes the commands under their headings, each with its full help line."""
         del ctx
         known = subcommands().values()
         for group in get_args(Group):
@@ -38,7 +38,7 @@ class LazyGroup(typer.core.TyperGroup):
                     formatter.write_dl(rows)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Imports the command that `args` names."""
+        """Imports the command named in `args`."""
         if args and (known := subcommand(args[0])) is not None:
             command = typer.main.get_command(import_module(known.module).app)
             command.name = args[0]
@@ -48,7 +48,7 @@ class LazyGroup(typer.core.TyperGroup):
 
 
 def _without_rich(command: Any) -> None:
-    """Makes the help of every level look alike; none of it loads rich."""
+    """Gives help the same layout on every level, without loading rich."""
     command.rich_markup_mode = None
     for sub in getattr(command, "commands", {}).values():
         _without_rich(sub)

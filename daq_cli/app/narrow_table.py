@@ -1,4 +1,4 @@
-"""Tables of results that fit the terminal without cutting a word."""
+"""Prints tables that fit the terminal without cutting words."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 BESIDE = 2
-"""Columns between two cells: rich's padding of one on either side."""
+"""Columns between two cells: rich pads each side by one."""
 INDENT = "  "
 _JOINTS = re.compile(r"(?<=[./_-])(?=[^\W\d])")
-"""Where a name may go on in the next line: after a dot, a slash or an underline."""
+"""Where a name may be broken: after a dot, a slash or an underscore."""
 _UNIT = re.compile(r"[^._/-]+/[^._/-]+")
-"""Two words with a slash between them, as N·m·s/rad: a unit, which stays in one line."""
+"""Two words with a slash between them, such as N·m·s/rad: a unit, which is not broken."""
 _BLANKS = re.compile(r"(?<![\d±])\s+|(?<=\d)\s+(?=[\d(])")
-"""Where a line may end: not between a number and its unit."""
+"""Where a line may be broken: not between a number and its unit."""
 
 
 def print_fitting(table: Table, console: Console) -> None:
-    """Prints a table without a box as wide as the console. A name goes on in a second line after a dot or an underline,
-    prose after a word; a table that is wider still is printed row by row."""
+    """Prints a table without a box, as wide as the console. Names are broken after a dot or an underscore, prose after
+    a word. A table that is still too wide is printed row by row."""
     for column in table.columns:
         column.header = printable(column.header) if isinstance(column.header, str) else column.header
         column._cells = [printable(cell) if isinstance(cell, str) else cell for cell in column._cells]
@@ -51,7 +51,7 @@ def print_fitting(table: Table, console: Console) -> None:
 
 
 def _shrunk(natural: list[int], least: list[int], texts: list[bool], room: int) -> list[int] | None:
-    """Widths that fit together, the widest columns of text shrunk first; None where the least ones do not fit."""
+    """Widths that fit, shrinking the widest text columns first; None if the minimum widths do not fit."""
     if sum(least) > room:
         return None
     widths = list(natural)
@@ -62,7 +62,7 @@ def _shrunk(natural: list[int], least: list[int], texts: list[bool], room: int) 
 
 
 def _least(column: list[str]) -> int:
-    """Width of the longest piece that is not broken, with the indent of all but the first of a cell."""
+    """Width of the longest unbreakable part, including the indent of all but the first part of a cell."""
     pieces = ([piece for word in _words(cell) for piece in _parts(word)] for cell in column)
     indented = (INDENT * (place > 0) + piece for cell in pieces for place, piece in enumerate(cell))
     return max(map(cell_len, indented), default=0)
@@ -77,7 +77,7 @@ def _parts(word: str) -> list[str]:
 
 
 def _broken(cell: object, width: int) -> Any:
-    """The cell with line breaks after joints of its names, where a word is longer than the width."""
+    """Breaks words that are longer than the width at the joints of their names."""
     text = _text(cell)
     lines = [""]
     for word in _words(text):

@@ -1,4 +1,4 @@
-"""Files of results: their folder is checked before the computation, and a file is written whole or not at all."""
+"""Result files: the folder is checked before the computation, and a file is written completely or not at all."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from daq.contracts.errors import SpecError
 
 
 def check_folder(path: Path, what: str) -> None:
-    """Raises SpecError, which begins with `what`, when `path` could not be written. Called before anything is
-    computed."""
+    """Raises SpecError, which begins with `what`, if `path` cannot be written. Called before the computation."""
     folder = path.absolute().parent
     if not folder.is_dir():
         raise SpecError(f"{what} {path}: there is no folder {folder}; make it first")
@@ -25,7 +24,7 @@ def check_folder(path: Path, what: str) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Does what `daq.contracts.whole_file` does. Raises SpecError when the file cannot be written."""
+    """Like `daq.contracts.whole_file.replacing`, but raises SpecError if the file cannot be written."""
     try:
         with whole_file.replacing(path) as part:
             yield part

@@ -1,4 +1,4 @@
-"""The progress of a long computation on standard error; Ctrl-C ends it."""
+"""Shows the progress of a long computation on standard error; Ctrl-C ends it."""
 
 from __future__ import annotations
 
@@ -13,6 +13,5 @@ if TYPE_CHECKING:
 
 
 def shown_progress(what: str) -> AbstractContextManager[Progress]:
-    """A progress bar with a line on the present step, which vanishes at the end. Without a terminal nothing is
-    shown."""
+    """A progress bar with a line about the current step, removed at the end. Without a terminal, nothing is shown."""
     return progress_bar(what, console())

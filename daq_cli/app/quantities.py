@@ -1,4 +1,4 @@
-"""Angles, lengths, gains and start postures as people type them."""
+"""Parses angles, lengths, gains and start postures from the command line."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _UNITS = {"rad": 1.0, "m": 1.0, "mm": 1e-3, "deg": math.radians(1.0), "°": math
 
 
 class Length(float):
-    """Metres that were typed as `0.03m` or `30mm`: for joints that slide, and no others."""
+    """A length in m, typed as `0.03m` or `30mm`: only for prismatic joints."""
 
 
 def parse_angle(text: str, what: str) -> float:
-    """Radians from `21.6`, `21.6deg` or `0.377rad`; degrees when no unit is written. Of `0.03m` or `30mm`, a `Length`.
-    Raises SpecError."""
+    """Returns radians from `21.6`, `21.6deg` or `0.377rad`; without a unit, degrees. For `0.03m` or `30mm`, returns a
+    `Length`. Raises SpecError."""
     match = re.fullmatch(rf"\s*({_NUMBER})\s*(deg|°|rad|mm|m)?\s*", text)
     if match is None:
         raise SpecError(
@@ -35,8 +35,8 @@ def parse_angle(text: str, what: str) -> float:
 
 
 def require_units(what: str, typed: float | Mapping[int, float], machine: Machine, joints: Sequence[int]) -> None:
-    """Raises SpecError where a length was typed for a joint that turns, or an angle for one that slides: read as the
-    other, 21.6 degrees would be 377 mm. One value is of all `joints`; 0 is both."""
+    """Raises SpecError if a length was typed for a revolute joint, or an angle for a prismatic one: 21.6 degrees would
+    be read as 377 mm. One value applies to all `joints`; 0 is valid for both."""
     from daq.contracts.joint_text import slides
 
     for joint, value in typed.items() if isinstance(typed, Mapping) else [(joint, typed) for joint in joints]:
@@ -49,7 +49,7 @@ def require_units(what: str, typed: float | Mapping[int, float], machine: Machin
 
 
 def parse_per_joint_angles(text: str, what: str) -> float | dict[int, float]:
-    """One angle, or one a joint as `1=21.6,2=-10`; degrees when no unit is written. Raises SpecError."""
+    """Returns one angle, or one per joint from `1=21.6,2=-10`; without a unit, degrees. Raises SpecError."""
     if "=" not in text:
         return parse_angle(text, what)
     return {joint: parse_angle(value, f"{what} of joint {joint}") for joint, value in _pairs(text, what)}
@@ -67,7 +67,7 @@ def parse_gains(text: str) -> dict[int, tuple[int, int, int]]:
 
 
 def parse_numbers(text: str, what: str, count: int) -> tuple[float, ...]:
-    """So many finite numbers, separated by commas. Raises SpecError."""
+    """Returns `count` finite numbers, separated by commas. Raises SpecError."""
     words = [word.strip() for word in text.split(",")]
     if len(words) != count or not all(re.fullmatch(_NUMBER, word) and math.isfinite(float(word)) for word in words):
         needed = "a number" if count == 1 else f"{count} numbers, separated by commas"

@@ -1,4 +1,4 @@
-"""Ctrl-C, Ctrl-Z and SIGTERM while an arm moves: each of them stops the arm."""
+"""Ctrl-C, Ctrl-Z and SIGTERM stop the arm while it moves."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from types import FrameType, TracebackType
 from typing import Self
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTSTP)
-"""Signals that stop the arm. SIGTSTP is Ctrl-Z: an arm must not go on moving while its program is suspended."""
+"""Signals that stop the arm. SIGTSTP is Ctrl-Z: an arm must not move on while its program is suspended."""
 PRESSES_TO_LEAVE = 3
-"""Number of presses of Ctrl-C that end the program even when the acquisition process does not answer."""
+"""Presses of Ctrl-C that end the program even if the owner process does not answer."""
 
 
 class StopKeys:
-    """Within the block, every such signal calls the function given to `stops`; an earlier signal calls it when it is
-    given."""
+    """Within the block, every such signal calls the function passed to `stops`; a signal that came before calls it at
+    once."""
 
     def __init__(self) -> None:
         self._stop: Callable[[], None] | None = None
@@ -25,7 +25,7 @@ class StopKeys:
         self._before: dict[int, object] = {}
 
     def stops(self, stop: Callable[[], None]) -> None:
-        """Sets the function that a signal calls: it must be quick, and may be called repeatedly."""
+        """Sets the function that a signal calls. It must be quick, and may be called repeatedly."""
         self._stop = stop
         if self._presses:
             stop()
@@ -50,7 +50,8 @@ class StopKeys:
 
 
 class StopThread(ABC):
-    """A thread that does what a stop key asks for, where that takes longer than a signal handler may: at a service."""
+    """A thread that carries out a stop key's request if that may take longer than a signal handler may: at a
+    service."""
 
     def __init__(self) -> None:
         self.pressed = False
@@ -62,11 +63,11 @@ class StopThread(ABC):
         return self
 
     def press(self) -> None:
-        """A key that stops was pressed. Called by a signal handler, so it is quick, and may be called again."""
-        if not self.pressed:  # a signal that interrupts this one finds its lock taken, and need not wake again
+        """Notes a stop key. Called by a signal handler, so it is quick, and may be called again."""
+        if not self.pressed:  # a signal within this one would find the lock taken, and need not wake the thread again
             self.pressed = True
             self._wake.set()
 
     @abstractmethod
     def _wait(self) -> None:
-        """The thread: waits for `_wake`."""
+        """The thread's function: waits for `_wake`."""

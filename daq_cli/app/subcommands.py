@@ -1,4 +1,4 @@
-"""The subcommands, the core's and those of plug-ins: read before typer is imported, which may be what is missing."""
+"""The subcommands of the core and of plug-ins. Read before typer is imported, which may be missing."""
 
 from __future__ import annotations
 
@@ -119,18 +119,18 @@ CORE = {
         ),
     )
 }
-"""The core's, by name, in the order of the help."""
+"""Subcommands of the core by name, in the order of the help."""
 WITH_A_VALUE = frozenset(["--config", "--port", "--robot", "--server"])
-"""Options before the subcommand that are followed by their value."""
+"""Options before the subcommand that have a value."""
 
 
 def subcommands() -> dict[str, Command]:
-    """All of them, by name: the core's first, which no plug-in replaces."""
+    """Returns all subcommands by name; a plug-in cannot replace one of the core."""
     return {**CORE, **{name: command for name, command in _added().items() if name not in CORE}}
 
 
 def subcommand(name: str) -> Command | None:
-    """The one of a name. Plug-ins are looked for only where the core has none."""
+    """Returns the subcommand of a name. Plug-ins are searched only if the core has none."""
     return CORE.get(name) or _added().get(name)
 
 
@@ -139,7 +139,7 @@ def _added() -> dict[str, Command]:
 
 
 def called(arguments: Sequence[str]) -> str:
-    """The subcommand that is called; empty where there is none."""
+    """Returns the name of the called subcommand; empty if there is none."""
     left = iter(arguments)
     for word in left:
         if word in WITH_A_VALUE:
@@ -150,6 +150,6 @@ def called(arguments: Sequence[str]) -> str:
 
 
 def extra_of(name: str) -> Extra:
-    """The extra that a subcommand needs here. With `--server`, `robot` suffices for those of models."""
+    """Returns the extra that a subcommand needs here. With `--server`, `robot` suffices for model commands."""
     found = subcommand(name)
     return "robot" if found is None else found.needs

@@ -1,4 +1,4 @@
-"""`daq calibrate`: measures what the machine really does."""
+"""`daq calibrate`: measures properties of the machine."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def gain(
     else:
         path = robot.find_trace(place, trace)
     measured = read_trace(path, robot.call.trace_limits)
-    # The counts and radians of a trace belong to the calibration with which it was made, not to the present one.
+    # Counts and radians of a trace belong to its own calibration, not to the present one.
     machine = measured.record.machine or robot.machine
     found = [one for one in gains_from_trace(measured, machine) if one.joint in wanted]
     if json:

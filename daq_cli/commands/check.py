@@ -1,4 +1,4 @@
-"""`daq check`: what records say that cannot be, before anything is computed from them."""
+"""`daq check`: finds impossible contents of records before they are used."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def check(
     folder: TraceFolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Show what traces hold and lack, and check units, signs, columns, times and readings. The exit code is 2 where
-    any is doubted."""
+    """Show the contents of traces, and check units, signs, columns, times and readings. The exit code is 2 if a record
+    is doubted."""
     from model.machine_model.model import base_model
     from model.record_check.check import check_records
     from model.record_check.fields import field_reports

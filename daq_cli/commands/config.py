@@ -15,14 +15,14 @@ app = typer.Typer(add_completion=False, help="Show and check the configuration."
 
 @app.command()
 def show(context: typer.Context, json: JsonOption = False) -> None:
-    """Show every setting as a daq.toml, without passwords, and the places where a configuration was looked for."""
+    """Show every setting as a daq.toml, without passwords, and where a configuration was looked for."""
     from daq.config.settings import config_files, load_settings
     from daq.config.toml_text import settings_text
 
     call = invocation(context)
     settings, path = load_settings(call.config_file)
     if settings.server.database is not None:
-        from server.store.address import masked_settings  # here: it needs the extra `server`
+        from server.store.address import masked_settings  # imported here, since it needs the extra `server`
 
         settings = masked_settings(settings)
     if json:
@@ -42,7 +42,7 @@ def copy(
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Copy what ships, in order to change the copy: the memory map, the machine file, or the documents' examples."""
+    """Copy a packaged file, to change the copy: the memory map, the machine file, or the documentation's examples."""
     from importlib import resources
 
     files = {
@@ -68,7 +68,7 @@ def _copy_file(text: str, path: Path, what: str) -> None:
 
     check_folder(path, what)
     if path.exists():
-        raise SpecError(f"{path}: is there already; name another file with -o")
+        raise SpecError(f"{path}: exists; name another file with -o")
     with replacing(path) as part:
         part.write_text(text, "utf-8")
 
@@ -84,7 +84,7 @@ def _copy_examples(folder: Path) -> None:
     if not files:
         raise SpecError("the examples are not in this installation: they are in the source distribution")
     if folder.exists():
-        raise SpecError(f"{folder}: is there already; name another folder with -o")
+        raise SpecError(f"{folder}: exists; name another folder with -o")
     try:
         with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.absolute().parent) as beside:
             part = Path(beside) / folder.name
@@ -98,7 +98,7 @@ def _copy_examples(folder: Path) -> None:
 
 @app.command()
 def check(context: typer.Context, json: JsonOption = False) -> None:
-    """Check the configuration, the machine file, the memory map and the port; an error is one line."""
+    """Check the configuration, the machine file, the memory map and the port. An error is printed as one line."""
     from daq.config.robot_files import load_memory_map
     from daq.config.settings import load_settings
     from daq.link.dialects import dialect_of
@@ -110,7 +110,7 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     call = invocation(context)
     settings, path = load_settings(call.config_file)
     if settings.server.database is not None:
-        from server.store.address import parse_address  # here: it needs the extra `server`
+        from server.store.address import parse_address  # imported here, since it needs the extra `server`
 
         parse_address(settings.server.database)
     for plugin in plugins():

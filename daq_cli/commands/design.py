@@ -1,4 +1,4 @@
-"""`daq design`: proposes experiments that determine a model's parameters best, or judges given ones."""
+"""`daq design`: proposes experiments that determine a model's parameters best, or evaluates given ones."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def _report(
 
 
 def _fitted(model: str, parameters: str | None) -> FitResult | None:
-    """Returns the result of the fit that made the model, if its parameters are those to be determined."""
+    """Returns the result of the fit that made the model, if it has the requested parameters."""
     from model.fitting.result import is_result, load_result
 
     if not model.endswith(".json") or parameters is not None or not is_result(Path(model)):

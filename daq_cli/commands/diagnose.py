@@ -52,7 +52,7 @@ app = typer.Typer(add_completion=False)
 
 
 def _spec_file(path: Path | None) -> Path | None:
-    """Refuses a file of another kind, or one that cannot be written, before anything is computed."""
+    """Rejects an unsuitable or unwritable file before the computation."""
     if path is not None:
         if path.suffix != ".json":
             raise SpecError(f"--next {path}: an experiment is written as .json")
@@ -113,7 +113,8 @@ def diagnose(
         t.set_point is not None for t in fitted_to
     )
     if method is None and (acquire or next_file is not None) and simulated:
-        options = options.model_copy(update={"method": Comparison.OUTPUT_ERROR.value})  # it alone asks for experiments
+        # only this method proposes experiments
+        options = options.model_copy(update={"method": Comparison.OUTPUT_ERROR.value})
     if not json:
         say_what_is_lacking(begin, [*fitted_to, *held])
     check_made_for(begin.machine, [*fitted_to, *held], [*traces, *(holdout or [])])
@@ -148,8 +149,7 @@ def diagnose(
 
 
 def _save(found: Diagnosis, out: Path | None, next_file: Path | None) -> None:
-    """Writes the model and the experiment that is asked for, if requested, before the report is made, which may
-    fail."""
+    """Writes the model and the proposed experiment, if requested, before the report, which may fail."""
     from model.machine_model.model_file import save_model
 
     if out is not None and found.computed:
@@ -195,7 +195,7 @@ def _options(effects: str | None, joints: str | None, most: int | None, method: 
 def _beginning(
     robot: RobotAccess, traces: Sequence[Trace], names: Sequence[str], model: str | None, load: float | None
 ) -> Model:
-    """Returns the model to be examined, with the load that the arm carried. `names`: the traces on the command line."""
+    """Returns the model to examine, with the load that the arm carried. `names`: the traces on the command line."""
     from model.discrepancy.carried_load import with_load
     from model.machine_model.model import base_model
 

@@ -1,4 +1,4 @@
-"""`daq docs`: the site of the documents, in the browser."""
+"""`daq docs`: opens the documentation in the browser."""
 
 from __future__ import annotations
 
@@ -32,14 +32,15 @@ def docs(
 
 
 def _written() -> Path:
-    """First page of the documents, made anew in this user's cache, or beside the temporary files where that fails."""
+    """First page of the documentation, rendered into this user's cache or, if that fails, beside the temporary
+    files."""
     import platformdirs
 
     from daq.config.documents import documents
 
     try:
         return documents().write(platformdirs.user_cache_path("ma2000-daq") / "documents")
-    except (OSError, RuntimeError):  # or a user without a home
+    except (OSError, RuntimeError):  # also a user without a home folder
         try:
             return documents().write(Path(tempfile.mkdtemp(prefix="ma2000-documents-")))
         except OSError as error:

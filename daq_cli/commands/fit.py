@@ -197,7 +197,7 @@ def _fit_motion(
 
 
 def _save(found: FitResult, out: Path, *, quiet: bool) -> None:
-    """Writes the model and prints its file, before the comparison is made, which may fail."""
+    """Writes the model and prints its file name before the comparison, which may fail."""
     with replacing(out) as part:
         found.save(part)
     if not quiet:

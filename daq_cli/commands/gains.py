@@ -38,7 +38,7 @@ def set_gains(
     """Write gains and read them back. Refused for a joint off its set point, which would jump there."""
     wanted = parse_gains(gains)
     for joint, gain in wanted.items():
-        SetGains(joint, *gain)  # raises outside its range: all or nothing is written
+        SetGains(joint, *gain)  # raises for a value outside its range, so that all gains are written or none
     consent = ConsentPrompt(yes, what="its gains will change", refused="its gains change")
     found = robot_of(context).set_gains(wanted, consent)
     for joint in wanted:

@@ -1,4 +1,4 @@
-"""`daq mock`: a mock controller that others can connect to, as a process of its own."""
+"""`daq mock`: runs a mock controller, to which other programs can connect, as a separate process."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ app = typer.Typer(add_completion=False)
 def mock(context: typer.Context) -> None:
     """Start the mock controller; `daq mock --help` lists its own options. `daq mock dynamixel` starts a bench of
     servos instead, with options of its own."""
-    # The mock is reached through a port, never by a call: this process becomes it.
+    # The mock is reached only through a port, so this process becomes the mock.
     sys.stdout.flush()
     servos = context.args[:1] == ["dynamixel"]
     module, arguments = ("mock_controller.servos", context.args[1:]) if servos else ("mock_controller", context.args)

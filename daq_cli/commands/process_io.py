@@ -21,7 +21,7 @@ WhileStoppedOption = Annotated[
 
 
 class NotSwitchedError(DaqError):
-    """The value that the controller reads back differs from the one that was written."""
+    """The value read back differs from the value written."""
 
     exit_code = exit_codes.NOT_REACHED
 

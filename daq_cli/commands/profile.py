@@ -1,4 +1,4 @@
-"""`daq profile`: profile likelihoods, which show what traces bound on both sides, on one, or not at all."""
+"""`daq profile`: profile likelihoods, which show whether traces bound a parameter on both sides, one side, or none."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ PICTURES = (".png", ".svg", ".pdf")
 
 
 def _file(path: Path | None) -> Path | None:
-    """Refuses a file of another kind, or one that cannot be written, before anything is computed."""
+    """Rejects an unsuitable or unwritable file before the computation."""
     if path is not None:
         if path.suffix not in (".csv", *PICTURES):
             raise SpecError(f"--output {path}: profiles are written as .csv, or as a picture ({', '.join(PICTURES)})")
@@ -85,8 +85,8 @@ def profile(
 ) -> None:
     """Show how much worse the best fit becomes when a parameter is moved and all others are fitted again.
 
-    Unlike an interval from a covariance, a profile shows a parameter that the traces bound on one side alone, or not at
-    all. With a model or a machine the fit is made first.
+    Unlike an interval from a covariance, a profile shows if the traces bound a parameter on one side only, or not at
+    all. If a model or a machine is given, it is fitted first.
     """
     from daq_cli.app.progress import shown_progress
     from model.fitting.options import FitOptions
@@ -125,7 +125,7 @@ def profile(
 def _fitted(
     name: str, effects: str | None, traces: Sequence[Trace], options: FitOptions, profiled: Sequence[str]
 ) -> FitResult:
-    """The fit that is profiled: a saved one as it is, unless options of a fit are given; else a new one."""
+    """Returns the fit to profile: a saved one unchanged, unless fit options are given; otherwise a new one."""
     from daq_cli.app.progress import shown_progress
     from model.fitting.choice import chosen_unknowns
     from model.fitting.fit import fit
@@ -138,7 +138,7 @@ def _fitted(
         for one in profiled:
             saved.parameter(one)
         return saved
-    if saved is not None:  # what the options leave open is as it was in that fit
+    if saved is not None:  # options that are not given are those of the saved fit
         given = options.model_dump(exclude_defaults=True)
         options = saved.options.model_copy(update={key: getattr(options, key) for key in given})
     begin = read_model(name) if saved is None else saved.model
@@ -162,7 +162,7 @@ def _print(found: Sequence[Profile]) -> None:
 
 
 def _write(fitted: FitResult, found: Sequence[Profile], path: Path) -> None:
-    """Raises SpecError when the file cannot be written."""
+    """Raises SpecError if the file cannot be written."""
     if path.suffix in PICTURES:
         from model.reports.profile_report import save_profiles
 

@@ -23,7 +23,7 @@ app = typer.Typer(
 
 @app.command()
 def show(context: typer.Context, json: JsonOption = False) -> None:
-    """Show whether experiments are started, why not, and which wait."""
+    """Show whether experiments are started, why not, and which ones wait."""
     with robot_of(context).service("queue") as robot:
         status, waiting = robot.queue.status(), robot.queue.waiting()
     if json:
@@ -41,7 +41,7 @@ def approve(
     experiment: Annotated[str, typer.Argument(help="Number of a waiting experiment, as `queue show` prints it.")],
     yes: Annotated[bool, typer.Option("--yes", help="Approve without being asked.")] = False,
 ) -> None:
-    """Approve an experiment of somebody else, exactly as it is shown, so that it may move a real arm."""
+    """Approve another person's experiment exactly as shown, so that it may move a real arm."""
     from daq.contracts.errors import SpecError
     from daq_cli.app.consent import can_be_asked
 
@@ -68,7 +68,7 @@ def withdraw(
 
 @app.command()
 def pause(context: typer.Context) -> None:
-    """Let no further experiment start; a running one goes on."""
+    """Prevent further experiments from starting; a running one continues."""
     with robot_of(context).service("queue") as robot:
         _print_status(robot.queue.pause())
 
@@ -85,7 +85,7 @@ def resume(context: typer.Context, yes: YesOption = False) -> None:
 
 @app.command()
 def schedules(context: typer.Context, json: JsonOption = False) -> None:
-    """List what the server runs again and again, the newest first. `daq run … --daily 02:00` adds to it."""
+    """List schedules, the newest first. `daq run … --daily 02:00` adds one."""
     with robot_of(context).service("queue") as robot:
         found = list(robot.schedules.list())
     if json:
@@ -115,7 +115,7 @@ def _name(experiment: Experiment | Schedule) -> str:
 
 
 def _review(experiment: Experiment | Schedule) -> str:
-    """Returns what a line says about an experiment's approval."""
+    """Returns the part of a line about an experiment's approval."""
     if experiment.needs_approval_of is not None:
         who = "an operator" if experiment.needs_approval_of == "operator" else "an owner of the robot"
         return f", not approved yet by {who} who did not submit it"

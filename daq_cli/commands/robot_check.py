@@ -1,4 +1,4 @@
-"""`daq robot check`: whether a controller keeps what the line protocol promises, as far as reading shows it."""
+"""`daq robot check`: checks the line protocol's guarantees, as far as reading can show them."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from daq.driver import Controller
 
 PERIODS = 25
-"""Number of control periods that are followed."""
+"""Number of control periods that are read."""
 AT_REST_COUNTS = 12
-"""ADC counts by which two readings of an arm at rest may differ: noise, and what the arm still creeps."""
+"""Largest difference (ADC counts) between two readings of an arm at rest: noise and slow creep."""
 
 app = typer.Typer(add_completion=False, help="Check what a controller promises.", no_args_is_help=True)
 
@@ -31,7 +31,7 @@ def robot() -> None:
 
 @dataclass(frozen=True)
 class Checked:
-    """One promise, whether it is kept, and what was seen."""
+    """One guarantee, whether it holds, and what was observed."""
 
     promise: str
     kept: bool
@@ -140,9 +140,9 @@ def _settings(controller: Controller) -> Iterator[Checked]:
     except RequestRefusedError as error:
         if error.reason != Refusal.NOT_CAPABLE:
             raise
-        return  # the bridge's own map leaves them out
+        return  # the bridge's memory map lacks them
     yield Checked("reports inputs, outputs and gripper", process.gripper in (0, 1), f"{process}")
 
 
 CHECKS: tuple[Callable[[Controller], Iterator[Checked]], ...] = (_identity, _samples, _refusals, _settings)
-"""What is checked, in order."""
+"""The checks in order."""

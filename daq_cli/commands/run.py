@@ -1,4 +1,4 @@
-"""`daq run`: one subcommand for each kind of trajectory, with options made from the fields of that kind."""
+"""`daq run`: one subcommand per kind of trajectory, with options made from its fields."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ EXECUTION: dict[str, tuple[Any, Any]] = {
 
 
 def _option(name: str, field: FieldInfo) -> tuple[Any, Any]:
-    """Type and default of the option that stands for a field of a trajectory."""
+    """Type and default of the option for a field of a trajectory."""
     default = field.get_default()
     if name == "amplitude":
         return Annotated[
@@ -153,7 +153,7 @@ def _trajectory(kind: type[BaseModel], values: dict[str, Any]) -> dict[str, Any]
 
 
 def spec_from_options(trajectory: dict[str, Any], values: dict[str, Any], operator: str | None) -> ExperimentSpec:
-    """The experiment that the common options describe. Raises SpecError."""
+    """Returns the experiment that the common options describe. Raises SpecError."""
     data: dict[str, Any] = {"trajectory": trajectory, "joints": parse_joints(values["joints"])}
     if values["start"] is not None:
         start = parse_per_joint_angles(values["start"], "start")
@@ -171,7 +171,7 @@ def spec_from_options(trajectory: dict[str, Any], values: dict[str, Any], operat
 
 
 def _require_units(trajectory: dict[str, Any], start: str | None, machine: Machine, joints: tuple[int, ...]) -> None:
-    """Raises SpecError where what was typed has the unit of another kind of joint."""
+    """Raises SpecError if a typed unit is that of another kind of joint."""
     for name in ("amplitude", "speed"):
         if name in trajectory:
             require_units(name, trajectory[name], machine, joints)
@@ -182,7 +182,7 @@ def _require_units(trajectory: dict[str, Any], start: str | None, machine: Machi
 
 
 def _command(kind: type[BaseModel]) -> Callable[..., None]:
-    """The function behind `daq run KIND`: typer reads its signature, which is made from the kind's fields."""
+    """Returns the function of `daq run KIND`. typer reads its signature, which is made from the kind's fields."""
 
     def command(context: typer.Context, **values: Any) -> None:
         operator = invocation(context).configuration.operator
@@ -240,7 +240,7 @@ def by_name(
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Run an experiment that has a name, such as `diagnostic`; without a name, list them."""
+    """Run an experiment by name, such as `diagnostic`; without a name, list the names."""
     from daq.trajectories.presets import PRESETS, preset
 
     if not name:

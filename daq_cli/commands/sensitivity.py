@@ -34,7 +34,7 @@ PICTURES = (".png", ".svg", ".pdf")
 
 
 def _file(path: Path | None) -> Path | None:
-    """Refuses a file of another kind, or one that cannot be written, before anything is computed."""
+    """Rejects an unsuitable or unwritable file before the computation."""
     if path is not None:
         if path.suffix not in (".csv", *PICTURES):
             raise SpecError(f"--output {path}: curves are written as .csv, or as a picture ({', '.join(PICTURES)})")
@@ -67,7 +67,8 @@ def sensitivity(
     """Show how each joint's reading changes along a trace when a parameter is off by its expected deviation.
 
     The change is exact to first order, and each parameter changes alone. A parameter whose curve stays within the noise
-    of a reading cannot be found from this trace; two whose curves have one shape cannot be told apart.
+    of a reading cannot be determined from this trace. Two parameters with curves of the same shape cannot be
+    distinguished.
     """
     from daq_cli.app.progress import shown_progress
     from daq_cli.models.parameter_table import print_rows
@@ -100,7 +101,7 @@ def sensitivity(
 
 
 def _write(found: SensitivityCurves, machine: Machine, path: Path) -> None:
-    """Raises SpecError when the file cannot be written."""
+    """Raises SpecError if the file cannot be written."""
     if path.suffix in PICTURES:
         from model.reports.sensitivity_report import save_curves
 

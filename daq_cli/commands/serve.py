@@ -28,7 +28,7 @@ def serve(
     from server import logs
 
     require_extra("server", "daq serve", "uvicorn", "fastapi", "sqlalchemy", "prometheus_client")
-    logs.begin()  # first, so that errors of the configuration are lines of the log, too
+    logs.begin()  # first, so that errors of the configuration are logged too
     call = invocation(context)
     settings = call.configuration
     section = settings.server.model_copy(
@@ -38,9 +38,9 @@ def serve(
         settings = settings.model_copy(update={"robot": settings.robot.model_copy(update={"port": call.port})})
     elif call.port_option is not None:
         raise SpecError("--port: several robots are configured, each with a port of its own: robots.NAME.port")
-    for own in settings.each_robot():  # an invalid port is refused now, instead of being retried
+    for own in settings.each_robot():  # reject an invalid port now, instead of retrying it
         parse_port_url(own.port)
-    gc.disable()  # collections would be a tenth of the start, and find nothing; `keep_steady` lets them begin
+    gc.disable()  # collections would take a tenth of the start and find nothing; `keep_steady` enables them again
     from server.serve import serve as run
 
     run(settings.model_copy(update={"server": section}), _announce)

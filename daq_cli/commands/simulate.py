@@ -60,7 +60,7 @@ def simulate(
 ) -> None:
     """Simulate traces from their recorded set points, and show the difference between measured and simulated.
 
-    Nothing is fitted. A machine is taken as its file describes it, with the friction stated there.
+    Nothing is fitted. A machine is used as its file describes it, including the friction stated there.
     """
     from daq_cli.app.progress import shown_progress
     from daq_cli.models.parameter_table import print_rows

@@ -22,7 +22,7 @@ app = typer.Typer(add_completion=False)
 def stop(
     context: typer.Context,
     robot: Annotated[
-        str | None, typer.Option("--robot", help="Stop this robot alone. A name that nobody has stops all.")
+        str | None, typer.Option("--robot", help="Stop only this robot. An unknown name stops all.")
     ] = None,
     json: JsonOption = False,
 ) -> None:

@@ -1,4 +1,4 @@
-"""`daq token`: manages the tokens with which people and programs use the service from other computers."""
+"""`daq token`: manages the tokens by which people and programs use the service from other computers."""
 
 from __future__ import annotations
 

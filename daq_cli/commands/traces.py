@@ -89,7 +89,7 @@ def list_all(
 
 
 def joints_text(joints: tuple[int, ...]) -> str:
-    """Writes joints as `1-3` if they are consecutive, else as `1,3`."""
+    """Formats joints as `1-3` if they are consecutive, else as `1,3`."""
     if len(joints) > 1 and joints == tuple(range(joints[0], joints[-1] + 1)):
         return f"{joints[0]}-{joints[-1]}"
     return ",".join(map(str, joints))
@@ -233,7 +233,7 @@ def import_(
 
 
 def _mapping(texts: list[str]) -> dict[str, str]:
-    """What is said of each signal. Raises SpecError."""
+    """Returns the mapping of each signal. Raises SpecError."""
     pairs = [text.partition("=") for text in texts]
     for signal, _, columns in pairs:
         if not columns.strip():
@@ -242,7 +242,7 @@ def _mapping(texts: list[str]) -> dict[str, str]:
 
 
 def _print_imported(robot: RobotAccess, file: Path) -> None:
-    """What was read, whether the check of records doubts it, and the next command, as remarks."""
+    """Prints what was read, doubts of the record check, and the next command, as remarks."""
     from daq.traces.files import open_trace
 
     trace = open_trace(file, robot.call.trace_limits)
@@ -267,7 +267,7 @@ def _print_imported(robot: RobotAccess, file: Path) -> None:
         from model.machine_model.model import base_model
         from model.record_check.check import check_records
         from model.record_check.finding import doubts_in, lines_of
-    except ImportError:  # a plain installation reads traces and computes nothing
+    except ImportError:  # a plain installation reads traces but computes nothing
         return
     doubts = lines_of(doubts_in(check_records(base_model(machine), [trace])))
     for line in doubts or ["nothing is doubted"]:
@@ -283,7 +283,7 @@ def _has(trace: Trace, signal: str) -> bool:
 def check(
     context: typer.Context, trace: TraceArgument = "last", folder: FolderOption = None, json: JsonOption = False
 ) -> None:
-    """Check a trace, from its checksums to its signals; the exit code is 5 when it cannot be trusted."""
+    """Check a trace, from its checksums to its signals. The exit code is 5 if it cannot be trusted."""
     from daq.traces.verify import verify
 
     found = verify(_path(context, trace, folder), robot_of(context).call.trace_limits)
@@ -321,7 +321,7 @@ def archive(
 
 @app.command()
 def fetch(context: typer.Context, trace: TraceArgument = "last", json: JsonOption = False) -> None:
-    """Have a server fetch a trace from its archive, and wait for it."""
+    """Make a server fetch a trace from its archive, and wait for it."""
     from daq_cli.robot.remote.traces import fetch_progress
 
     with robot_of(context).service("traces fetch") as robot:
@@ -361,7 +361,7 @@ def _print_place(found: TraceArchive, *, as_json: bool) -> None:
 
 @app.command()
 def salvage(context: typer.Context, folder: FolderOption = None, json: JsonOption = False) -> None:
-    """Finish the traces that a crash left without an end; they are marked as interrupted."""
+    """Finish the traces that a crash left unfinished; they are marked as interrupted."""
     from daq.traces.salvage import salvage_folder
 
     robot = robot_of(context)
@@ -385,5 +385,5 @@ def _salvage_line(result: Salvaged) -> str:
     if result.kept is None:
         return line
     if result.dropped_bytes == 0:
-        return f"{line}; what another program had put into it is in {result.kept.name}"
+        return f"{line}; data of another program are in {result.kept.name}"
     return f"{line} up to its damage; the {result.dropped_bytes} bytes after it are in {result.kept.name}"

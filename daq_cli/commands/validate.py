@@ -58,7 +58,7 @@ def validate(
     despite_doubts: DespiteDoubtsOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Validate a model by distortion: Σλ² says whether expected parameter deviations explain the model's errors.
+    """Validate a model by distortion: Σλ² states whether expected parameter deviations explain the model's errors.
 
     The time-domain form shows how every parameter would have to vary with time, and with what that correlates.
     """
@@ -137,7 +137,7 @@ def _print_result(
 
 
 def _print_joints(fidelity: Fidelity, machine: Machine) -> None:
-    """What is left of each joint's records beside its noise, a line each."""
+    """Prints the residual of each joint compared with its noise, one line each."""
     from rich.table import Table
 
     from model.units import joint_unit, shown_unit, with_unit
@@ -155,7 +155,7 @@ def _print_joints(fidelity: Fidelity, machine: Machine) -> None:
 
 
 def _print_details(fidelity: Fidelity, three: Fidelity, in_time: Sequence[TimeDomain], machine: Machine) -> None:
-    """Every parameter, and how each would have to vary with time."""
+    """Prints every parameter, and how each would have to vary with time."""
     from model.reports.validation_report import distortion_table
 
     shown = ("parameter", "value", "doubles the error at", "σ needed", "τ′ expected", "λ²", "unit")

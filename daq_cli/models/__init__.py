@@ -1,1 +1,1 @@
-"""What the commands on models share: their input, their tables, and the text of a diagnosis."""
+"""Common parts of the model commands: their input, their tables, and the text of a diagnosis."""

@@ -1,5 +1,4 @@
-"""`daq diagnose --acquire`: runs the experiment that the diagnosis asks for and diagnoses again, until it asks for
-none."""
+"""`daq diagnose --acquire`: runs the proposed experiment and diagnoses again, until none is proposed."""
 
 from __future__ import annotations
 
@@ -26,10 +25,10 @@ Diagnose = Callable[["Sequence[Trace]", "ExperimentChooser"], "Diagnosis"]
 
 @dataclass(frozen=True)
 class LoopEnd:
-    """The end of a diagnosis with experiments of its own.
+    """The end of a diagnosis with further experiments.
 
-    found: the latest answer. traces: those that it is based on. failure: why an experiment could not be run, or its
-    trace not used; None where none failed. A failure loses nothing that was found before.
+    found: the latest answer. traces: the traces that it is based on. failure: why an experiment could not be run, or
+    its trace not used; None if none failed. Earlier answers stay valid after a failure.
     """
 
     found: Diagnosis
@@ -48,16 +47,15 @@ def diagnose_and_acquire(
     *,
     design: bool = False,
 ) -> LoopEnd:
-    """Diagnoses, runs the experiment asked for, and diagnoses again, as long as `next_to_run` names one.
+    """Diagnoses, runs the proposed experiment, and diagnoses again, as long as `next_to_run` returns one.
 
-    `budget` is the robot time in s, `machine` that of the examined model. Experiments are planned for the configured
-    machine, within its present limits; with `design`, motions are designed for the question, too. Raises SpecError for
-    another machine, and what connecting raises, before anything is computed; a later failure is returned with the
-    answer.
+    `budget`: robot time (s); `machine`: that of the examined model. Experiments are planned for the configured machine,
+    within its present limits; with `design`, motions may be designed for the candidates. Raises SpecError for another
+    machine, and errors of connecting, before the computation. A later failure is returned with the answer.
     """
     arm = robot.machine
     _check_same_machine(arm, machine)
-    robot.require_reached()  # before minutes are spent on what it is to do
+    robot.require_reached()  # before spending minutes on a computation
     runs: list[Acquired] = []
     every = list(traces)
     failure: DaqError | None = None
@@ -90,7 +88,7 @@ def _run(
 
 
 def _check_same_machine(arm: Machine, machine: Machine) -> None:
-    """Raises SpecError when the configured arm is another machine than that of the traces, or has other sensors."""
+    """Raises SpecError if the configured arm is another machine than the traces', or has other sensors."""
     if arm.name != machine.name:
         raise SpecError(
             f"--acquire: the traces were made on {machine.name}, the configured robot is {arm.name}; "

@@ -1,4 +1,4 @@
-"""A diagnosis as text for a terminal: the verdict first, then where, what, added, shown, asked."""
+"""A diagnosis as terminal text: first the verdict, then place, cause, change, evidence and proposed experiment."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ if TYPE_CHECKING:
 WIDTH = 80
 INDENT = 9
 FITTED = 5
-"""Fitted candidates that are listed; those that the step names always are."""
+"""Most fitted candidates listed; those named by the step are always listed."""
 PROBED = 2
-"""Probed candidates that are listed: few, because their estimates are not comparable with those of fits."""
+"""Most probed candidates listed: few, because their estimates are not comparable with those of fits."""
 COLUMN = 10
-"""Width of the column of evidence."""
+"""Width of the evidence column."""
 
 
 def answer_text(found: Diagnosis) -> str:
-    """The whole answer."""
+    """Returns the whole answer."""
     verdict = found.verdict.replace("-", " ").upper()
-    doubted = found.verdict == "check-the-record"  # what is doubted follows
+    doubted = found.verdict == "check-the-record"  # the doubts follow
     lines = [verdict] if doubted else _filled(verdict, headline(found), len(verdict) + 2)
     for line in lines_of(doubts_in(found.record)):
         lines += ["", *_filled("CHECK", line)]
@@ -69,7 +69,7 @@ def answer_text(found: Diagnosis) -> str:
 
 
 def _record_notes(found: Diagnosis) -> list[str]:
-    """What the check of the records notes, a paragraph each."""
+    """Notes of the record check, one paragraph each."""
     notes = [finding for finding in found.record if finding.consequence == "note"]
     return [line for note in lines_of(notes) for line in ("", *_filled("record", note))]
 
@@ -90,9 +90,10 @@ def _step(step: Step, earlier: Sequence[Step], stated: Mapping[str, Parameter]) 
 
 
 def candidates_lines(step: Step, earlier: Sequence[Step] = ()) -> list[str]:
-    """The list of a step, a line each; empty where nothing was tried (what the controller's own numbers prove).
+    """Lists the candidates of a step, one line each; empty if none was tried (effects that the controller's own data
+    prove).
 
-    earlier: the steps before; a probe of a candidate that they fitted is not listed again.
+    earlier: the previous steps; a probe of a candidate that they fitted is not listed again.
     """
     if not step.candidates:
         return []
@@ -115,7 +116,7 @@ def _candidate(candidate: Candidate) -> str:
 
 
 def _without_steps(found: Diagnosis) -> list[str]:
-    """The proof of an answer in which nothing was added: what is left, what was tried against it, the errors."""
+    """The evidence of an answer without steps: what remains, which candidates were tried, the errors."""
     unknown = found.verdict == "unknown-effect"
     place = found.summary if unknown else "" if found.where is None else found.where.summary
     lines = _filled("where", place) if place else []
@@ -125,14 +126,14 @@ def _without_steps(found: Diagnosis) -> list[str]:
 
 
 def _left(found: Diagnosis) -> list[str]:
-    """What none of the known effects explains; the summary of an unknown effect says it already."""
+    """The residual that no known effect explains; empty if the summary of an unknown effect states it."""
     if found.verdict == "unknown-effect":
         return _filled("left", found.summary) if found.steps else []
     return _filled("left", sentence(what_is_left(found.remaining))) if found.remaining else []
 
 
 def _errors_of(found: Diagnosis) -> list[str]:
-    """Errors in an older answer, which has no gap."""
+    """Errors in an answer of an older version, which has no error by stage."""
     lines: list[str] = []
     for label, errors in (("fitted to", found.rmse_fit), ("held out", found.rmse_holdout)):
         if errors:
@@ -142,7 +143,7 @@ def _errors_of(found: Diagnosis) -> list[str]:
 
 
 def _beside(label: str, lines: Sequence[str]) -> list[str]:
-    """Lines beside a label, as they are."""
+    """Lines beside a label, unwrapped."""
     return [f"{'' if number else label:<{INDENT}}{line}".rstrip() for number, line in enumerate(lines)]
 
 
@@ -153,10 +154,10 @@ def _error(e: SignalError) -> str:
 
 def _asked(experiment: NextExperiment) -> str:
     asked = f"{experiment.name}, {experiment.duration:.1f} s on the arm: {experiment.reason}"
-    if not experiment.separates or experiment.differs_at is not None:  # the reason gives the separation already
+    if not experiment.separates or experiment.differs_at is not None:  # the reason already contains the separation
         return asked
     apart = f"{experiment.predicted_separation:.1f} standard deviations"
-    return f"{asked} It would tell {' and '.join(experiment.separates)} apart by {apart}."
+    return f"{asked} It would separate {' and '.join(experiment.separates)} by {apart}."
 
 
 def _value(value: FoundValue) -> str:
@@ -172,7 +173,7 @@ def _beside_file(step: Step, name: str, value: FoundValue, stated: Mapping[str, 
 
 
 def _moved(numbers: Sequence[FittedNumber]) -> list[str]:
-    """Numbers of the machine file as stated, as fitted, and how far apart: a line each, or two where it is too wide."""
+    """Parameters of the machine file as stated, as fitted, and their distance: one line each, two if too wide."""
     pairs = [(with_deviation(n.stated, n.deviation, n.unit), with_deviation(n.fitted, None, n.unit)) for n in numbers]
     stated, fitted = (max(map(len, column)) for column in zip(*pairs, strict=True))
     name = max(len(n.name) for n in numbers)

@@ -1,4 +1,4 @@
-"""Effects, parameters and bounds as the command line names them."""
+"""Parses effects, parameters and bounds from the command line."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ NO_EFFECT = "none"
 def with_effects(model: Model, text: str) -> Model:
     """Adds effects written as `viscous,coulomb:2-3` to a model; `none` adds none.
 
-    A name may be abbreviated as long as it is unique. Without joints an effect acts on every joint it can act on, or on
-    the whole machine. Raises SpecError with one line.
+    Names may be abbreviated if unique. Without joints, an effect acts on every possible joint, or on the whole machine.
+    Raises a one-line SpecError.
     """
     from model.effects.library import effect
 
@@ -41,7 +41,7 @@ def with_effects(model: Model, text: str) -> Model:
 
 
 def effect_choices(text: str | None, files: Sequence[Path] | None = None) -> tuple[EffectChoice, ...]:
-    """Effects written as for `with_effects`, for traces whose models are not known yet; those of files are loaded
+    """Returns effects written as for `with_effects`, for traces whose models are not yet known; effect files are loaded
     first. Raises SpecError."""
     from daq.contracts.service.jobs import EffectChoice
 
@@ -56,13 +56,13 @@ def effect_choices(text: str | None, files: Sequence[Path] | None = None) -> tup
 
 
 def candidate_effects(text: str | None, files: Sequence[Path] | None = None) -> tuple[str, ...] | None:
-    """Candidates for a diagnosis, likewise; None for every effect."""
+    """Returns the candidates of a diagnosis in the same way; None for all effects."""
     load_effects(files or ())
     return None if text is None else effect_names(text)
 
 
 def _joints_of(name: str, model: Model) -> tuple[int, ...]:
-    """Every joint that the effect may act on."""
+    """Returns every joint on which the effect may act."""
     from model.effects.library import effect
 
     own = effect(name).joints
@@ -70,7 +70,7 @@ def _joints_of(name: str, model: Model) -> tuple[int, ...]:
 
 
 def effect_name(text: str) -> str:
-    """The one effect whose name begins with `text`. Raises SpecError, which lists the effects that it could be."""
+    """Returns the only effect whose name begins with `text`. Raises SpecError, which lists the possible effects."""
     from model.effects.library import library
 
     name = text.strip().replace("-", "_")
@@ -85,7 +85,7 @@ def effect_name(text: str) -> str:
 
 
 def effect_names(text: str) -> tuple[str, ...]:
-    """The effects of a list such as `backlash,coulomb`, for commands with an option of their own for joints. Raises
+    """Returns the effects in a list such as `backlash,coulomb`, for commands with a separate option for joints. Raises
     SpecError."""
     found = []
     for part in text.split(","):
@@ -100,7 +100,7 @@ def effect_names(text: str) -> tuple[str, ...]:
 
 
 def patterns(text: str | None) -> tuple[str, ...] | None:
-    """Names or patterns of parameters, separated by commas; None where nothing is said."""
+    """Returns names or patterns of parameters, separated by commas; None if none are given."""
     if text is None:
         return None
     found = tuple(part.strip() for part in text.split(",") if part.strip())
@@ -110,7 +110,7 @@ def patterns(text: str | None) -> tuple[str, ...] | None:
 
 
 def bounds(texts: Sequence[str]) -> dict[str, tuple[float | None, float | None]]:
-    """Bounds written `link2.mass=0.3:0.9`, either side may be left out. Raises SpecError with one line."""
+    """Parses bounds such as `link2.mass=0.3:0.9`; either side may be left out. Raises a one-line SpecError."""
     found: dict[str, tuple[float | None, float | None]] = {}
     for text in texts:
         match = re.fullmatch(r"\s*([\w.+]+)\s*=\s*([^:]*):([^:]*)", text)

@@ -1,4 +1,4 @@
-"""`daq fit --torques`: parameters from recorded torques, without simulation."""
+"""`daq fit --torques`: estimates parameters from recorded torques, without simulation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from model.machine_model.model import Model
 
 MOST_DRAWN = 6
-"""Most traces that the report shows as pictures."""
+"""Most traces plotted in the report."""
 
 
 def fit_recorded_torques(

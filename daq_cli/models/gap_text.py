@@ -1,4 +1,4 @@
-"""How the gap between simulation and measurement shrinks, as a table for a terminal."""
+"""A table of the error between simulation and measurement by stage, for a terminal."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 COLUMN = 13
 WIDTH = 71
-"""Columns of text: 80 less the label that stands before it."""
+"""Columns of text: 80 minus the label before it."""
 
 
 def gap_lines(gap: Gap) -> list[str]:
-    """A row a model, first on the traces fitted to, then on the held-out ones, and the noise; a column a joint, so many
-    side by side as fit; then what the numbers would have had to become without the effects."""
+    """One row per model, first on the fitted traces, then on the held-out ones, and the noise. One column per joint, as
+    many side by side as fit. Then the parameter values that would be needed without the effects."""
     lines = _table(gap)
     if gap.without is not None:
         lines += ["", *wrap(gap.without.text, WIDTH, break_long_words=False, break_on_hyphens=False)]
@@ -50,7 +50,7 @@ def _table(gap: Gap) -> list[str]:
 
 
 def _texts(rows: Sequence[Sequence[float | None]], factors: Sequence[float]) -> list[list[str]]:
-    """Rows of numbers as text, a joint's all with the same decimals; a dash for what is not finite."""
+    """Formats rows of numbers, all of a joint with the same decimals; a dash for values that are not finite."""
     columns = []
     for place, factor in enumerate(factors):
         values = [row[place] for row in rows]

@@ -31,7 +31,7 @@ TraceFolderOption = Annotated[Path | None, typer.Option(help="Folder of traces (
 
 
 def _page(path: Path | None) -> Path | None:
-    """Refuses a file of another kind, or one that cannot be written, before anything is computed."""
+    """Rejects an unsuitable or unwritable file before the computation."""
     if path is not None:
         if path.suffix != ".html":
             raise SpecError(f"report {path}: is written as .html")
@@ -45,7 +45,7 @@ ReportOption = Annotated[
 
 
 def _model_file(path: Path | None) -> Path | None:
-    """Refuses a file of another kind, or one that cannot be written, before anything is computed."""
+    """Rejects an unsuitable or unwritable file before the computation."""
     if path is not None:
         if path.suffix != ".json":
             raise SpecError(f"--out {path}: a model is written as .json")
@@ -123,9 +123,9 @@ MODEL_HELP = "A model (.json, as `daq fit` writes it), a machine file (.toml), o
 
 
 def read_model(name: str) -> Model:
-    """The model that a .json file holds, or that a machine describes with the friction its file states.
+    """Returns the model of a .json file, or of a machine with the friction in its file.
 
-    Raises SpecError with one line.
+    Raises a one-line SpecError.
     """
     from model.machine_model.model import base_model
     from model.machine_model.model_file import load_model
@@ -136,10 +136,10 @@ def read_model(name: str) -> Model:
 
 
 def load_effects(files: Sequence[Path] | None, robot: RobotAccess | None = None) -> None:
-    """Loads effects of the user's own, from files that the command line names. Raises SpecError with one line.
+    """Loads user-defined effects from files on the command line. Raises a one-line SpecError.
 
     Args:
-        robot: where the effects are to be used, if that may be at a service, which runs no programs that it is sent.
+        robot: where the effects are to be used, if that may be at a service, which never runs uploaded programs.
     """
     if files:
         if robot is not None:
@@ -153,18 +153,18 @@ def load_effects(files: Sequence[Path] | None, robot: RobotAccess | None = None)
 
 
 def model_label(name: str) -> str:
-    """What a model is called in tables: its file's name, or the machine's."""
+    """Returns the name of a model in tables: its file name, or the machine's name."""
     return Path(name).stem
 
 
 def model_labels(names: Sequence[str]) -> list[str]:
-    """Distinct labels of models: their whole names where the file names are equal."""
+    """Returns distinct labels of models: full names if the file names are equal."""
     labels = [model_label(name) for name in names]
     return labels if len(set(labels)) == len(labels) else list(names)
 
 
 def read_traces(robot: RobotAccess, folder: Path | None, names: Sequence[str]) -> list[Trace]:
-    """Traces by file, number, name or `last`; CSV files are read as they are, and what one lacks is told.
+    """Returns traces by file, ID, name or `last`. CSV files are read directly; missing data are reported.
 
     Raises TraceError, SpecError.
     """
@@ -186,21 +186,22 @@ def read_traces(robot: RobotAccess, folder: Path | None, names: Sequence[str]) -
 
 
 def files_of(traces: Sequence[Trace]) -> dict[str, str]:
-    """What the command line calls the files of traces, by the number of each."""
+    """Returns the file names of traces as on the command line, by trace ID."""
     return {trace.record.trace_id: trace.file for trace in traces if trace.file}
 
 
 def machine_of(traces: Sequence[Trace], robot: RobotAccess, names: Sequence[str] = ()) -> Machine:
-    """The machine that recorded the traces; where they do not say, the configured one, which is then announced.
+    """Returns the machine that recorded the traces; if they name none, the configured one, which is then announced.
 
-    Limits may differ: the last trace's are taken.
+    Limits may differ: those of the last trace are used.
 
     Args:
-        names: what the command line calls the traces, in order; without them, their own numbers.
+        names: the traces as on the command line, in order; without them, their IDs.
 
-    Raises SpecError when the machines differ otherwise, and for a trace that names none and lacks a joint of it.
+    Raises SpecError if the machines differ otherwise, and for a trace without a machine that lacks a joint.
     """
-    from daq.contracts.joint_matching import matched  # here: numpy takes a while to load, and completion needs none
+    # imported here: numpy takes long to load, and completion does not need it
+    from daq.contracts.joint_matching import matched
 
     machines = [t.record.machine for t in traces if t.record.machine is not None]
     called = list(dict.fromkeys(machine.name for machine in machines))
@@ -231,7 +232,7 @@ def machine_of(traces: Sequence[Trace], robot: RobotAccess, names: Sequence[str]
 
 
 def check_made_for(machine: Machine, traces: Sequence[Trace], names: Sequence[str]) -> None:
-    """Raises SpecError, with the file as the command line calls it, for a trace that cannot be of this machine."""
+    """Raises SpecError, which names the file as on the command line, for a trace that cannot be of this machine."""
     from daq.contracts.joint_matching import matched
 
     speeds = [j for j in machine.modelled_joints if (s := machine.joint(j).sensor) and s.measures == "velocity"]
@@ -274,8 +275,8 @@ def _described(machine: Machine) -> dict[str, Any]:
 
 
 def _difference(one: Any, other: Any, place: str = "") -> str:
-    """The place where two descriptions first differ, such as `joints.2.link.mass.value`; empty where they agree.
-    Sources of numbers are only words, and may differ."""
+    """The first place where two descriptions differ, such as `joints.2.link.mass.value`; empty if they are equal.
+    Sources of numbers may differ."""
     if isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other):
         one, other = dict(enumerate(one, start=1)), dict(enumerate(other, start=1))
     if isinstance(one, dict) and isinstance(other, dict):

@@ -1,4 +1,4 @@
-"""Tables of results on standard output, and what stands beside fitted parameters."""
+"""Prints tables of results, and remarks on fitted parameters."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ def print_rows(table: Table) -> None:
 
 
 def print_parameters(parameters: Sequence[FittedParameter]) -> None:
-    """Prints one line for each parameter; without a number where the data do not determine one."""
+    """Prints one line per parameter; without a value if the data do not determine it."""
     from model.fitting.shown import COLUMNS, parameter_table
 
     print_rows(parameter_table(parameters).only(*COLUMNS))
 
 
 def print_undetermined(report: IdentifiabilityReport) -> None:
-    """What records do not determine, a paragraph each."""
+    """Prints what the records do not determine, one paragraph each."""
     for combination in report.undetermined:
         print_prose(combination.text, "  not determined: ")
 
 
 def print_on_the_edge(links: Sequence[str]) -> None:
-    """Prints which bodies a fit with consistent inertias left on the edge of what can exist, if any."""
+    """Prints which bodies a fit with consistent inertias left at the boundary of physical consistency, if any."""
     if links:
         print_prose(
-            f"{', '.join(links)}: flat or thin after the fit; the traces ask for a body that cannot exist: something "
-            "else is missing from the model, or they do not tell these moments"
+            f"{', '.join(links)}: flat or thin after the fit; the traces fit a body that cannot exist: something "
+            "else is missing from the model, or they do not determine these moments"
         )

@@ -1,4 +1,4 @@
-"""The check of records, which every command of models makes before it computes anything."""
+"""The check of records that precedes the computation in every model command."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ DespiteDoubtsOption = Annotated[
 def stop_if_doubted(
     model: Model, traces: Sequence[Trace], *, despite_doubts: bool, as_json: bool, torques: bool = False
 ) -> None:
-    """Checks records before anything is computed from them, and ends the command where one is doubted.
+    """Checks records before the computation, and ends the command if one is doubted.
 
-    Raises TraceError where nothing can be computed at all.
+    Raises TraceError if nothing can be computed at all.
     """
     from model.record_check.check import check_records, require_computable
 
@@ -47,7 +47,7 @@ def stop_if_doubted(
 
 
 def say_what_is_lacking(model: Model, traces: Sequence[Trace]) -> None:
-    """Says which fields an answer needs that records do not have, joint by joint, on standard error."""
+    """Prints which fields an answer needs but the records lack, by joint, on standard error."""
     from model.record_check.fields import field_reports
 
     for report in field_reports(model, traces):
@@ -57,7 +57,7 @@ def say_what_is_lacking(model: Model, traces: Sequence[Trace]) -> None:
 
 
 def print_fields(reports: Sequence[FieldReport]) -> None:
-    """What each record holds, field by field, and what that means for an answer."""
+    """Prints the fields of each record, and what each one means for an answer."""
     from rich.table import Table
 
     for record in dict.fromkeys(report.record for report in reports):
@@ -71,13 +71,13 @@ def print_fields(reports: Sequence[FieldReport]) -> None:
 
 
 def end_if_doubted(findings: Sequence[RecordFinding]) -> None:
-    """Ends the command with the exit code of `daq check` where a record is doubted, behind all that it prints."""
+    """Ends the command with the exit code of `daq check` if a record is doubted, after all other output."""
     if doubts_in(findings):
         raise typer.Exit(exit_codes.WRONG_INPUT)
 
 
 def print_record(findings: Sequence[RecordFinding]) -> None:
-    """What the check of the records found, a paragraph each: doubts as CHECK, others as record."""
+    """Prints the findings of the record check, one paragraph each: doubts as CHECK, others as record."""
     for line in lines_of(doubts_in(findings)):
         print_prose(line, "CHECK  ")
     for line in lines_of([finding for finding in findings if finding.consequence == "note"]):

@@ -1,4 +1,4 @@
-"""Fits, validations, comparisons and diagnoses as jobs of a service, on its traces, kept with its results."""
+"""Runs fits, validations, comparisons and diagnoses as jobs of a service, on its stored traces."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
     from server.jobs.results import ComparisonData, FitData, JobResult, ValidationData
 
 LOOK_EVERY = 1.0
-"""s between two questions about a job's progress."""
+"""Time (s) between two polls of a job's progress."""
 MOST_STARTS = 20
-"""Most starts of a fit that a job may have."""
+"""Most starts of a fit in a job."""
 MOST_MODELS = 10
-"""Most models that a job compares."""
+"""Most models in a comparison job."""
 KINDS: dict[JobKind, str] = {
     "fit": "fit",
     "validate": "validation",
@@ -55,7 +55,7 @@ EXIT_CODES = {
 
 
 class JobEndedError(DaqError):
-    """A job that has found nothing: refused, cancelled, or lost with its process."""
+    """A job ended without a result: refused, cancelled, or lost with its process."""
 
     def __init__(self, job: Job) -> None:
         super().__init__(f"job {job.id} {job.state}: {job.reason or 'no reason is known'}")
@@ -65,14 +65,14 @@ class JobEndedError(DaqError):
 
 @dataclass(frozen=True)
 class NamedTraces:
-    """Traces as they were read, with what the command line calls them."""
+    """Traces, with their names on the command line."""
 
     names: Sequence[str]
     traces: Sequence[Trace]
 
 
 def service_jobs(robot: RobotAccess) -> ServiceJobs | None:
-    """The jobs of the service that has the robot; None where this process computes."""
+    """Returns the jobs of the service that owns the robot; None if this process computes."""
     return None if robot.call.server is None else ServiceJobs(robot)
 
 
@@ -80,7 +80,7 @@ def service_jobs(robot: RobotAccess) -> ServiceJobs | None:
 class ServiceJobs:
     """Computes at the service. Ctrl-C cancels a job.
 
-    Every method raises JobEndedError, and what the service refuses; a report is fetched into the file named.
+    Every method raises JobEndedError, and the service's refusals. A report is downloaded to the given file.
     """
 
     robot: RobotAccess
@@ -94,7 +94,7 @@ class ServiceJobs:
         out: Path,
         report: Path | None,
     ) -> FitData:
-        """The fit; its model has the name of the file `out`."""
+        """Runs a fit; its model gets the name of the file `out`."""
         from server.jobs.results import FitJobResult
 
         if options.starts > MOST_STARTS:
@@ -120,7 +120,7 @@ class ServiceJobs:
         damping_ratio: float,
         report: Path | None,
     ) -> ValidationData:
-        """The validation of the model that is called `name`."""
+        """Runs the validation of the model called `name`."""
         from server.jobs.results import ValidationJobResult
 
         request = ValidateRequest(
@@ -137,7 +137,7 @@ class ServiceJobs:
     def compare(
         self, names: Sequence[str], models: Sequence[Model], traces: NamedTraces, report: Path | None
     ) -> ComparisonData:
-        """The comparison of models that are called `names`."""
+        """Runs the comparison of the models called `names`."""
         from server.jobs.results import ComparisonJobResult
 
         sent = self._numbers(traces)
@@ -159,7 +159,7 @@ class ServiceJobs:
         *,
         design: bool = False,
     ) -> Diagnosis:
-        """The diagnosis; the model that it makes has the name of the file `out`. design: the next experiment, too."""
+        """Runs the diagnosis; its model gets the name of the file `out`. design: also design the next experiment."""
         from server.jobs.results import DiagnosisJobResult
 
         request = DiagnoseRequest(
@@ -175,7 +175,7 @@ class ServiceJobs:
         return found.data
 
     def _numbers(self, named: NamedTraces) -> tuple[str, ...]:
-        """The service's numbers of traces; files of this computer are sent unless it has them."""
+        """Returns the service's IDs of traces; local files are uploaded unless the service has them."""
         with self.robot.service("jobs") as robot:
             return tuple(
                 robot.traces.upload_unless_there(Path(name), trace.record.trace_id).id
@@ -185,7 +185,7 @@ class ServiceJobs:
             )
 
     def _number(self, model: Model, name: str) -> str:
-        """The service's number of a model, which is sent unless it is the one that its machine file describes."""
+        """Returns the service's ID of a model. The model is uploaded, unless its machine file describes it."""
         from model.machine_model.model import base_model
         from model.machine_model.model_file import save_model
 
@@ -202,7 +202,7 @@ class ServiceJobs:
             return robot.models.upload(file, model_name(name)).id
 
     def _done(self, request: JobRequest, report: Path | None) -> JobResult:
-        """What a job found, once it is done; its report is fetched."""
+        """Returns the result of a job once it is done, and downloads its report."""
         from pydantic import TypeAdapter
 
         from server.jobs.results import JobResult
@@ -219,18 +219,18 @@ class ServiceJobs:
 
 
 def _given(options: FitOptions | DiagnosisOptions) -> dict[str, Any]:
-    """The options that were given, as fields of a request: it refuses what it has no field for."""
+    """Returns the given options as fields of a request, which rejects unknown fields."""
     return {name: getattr(options, name) for name in options.model_fields_set}
 
 
 def model_name(text: str) -> str:
-    """A name in the form that the service accepts."""
+    """Converts a name to a form that the service accepts."""
     kept = re.sub(r"[^A-Za-z0-9 _.-]+", "-", Path(text).stem).lstrip(" _.-")[:64]
     return kept or "model"
 
 
 def standing_of(job: Job, now: datetime) -> str:
-    """The progress of a job, or what it waits for, in a few words."""
+    """Returns the progress of a job, or what it waits for, in a few words."""
     behind = job.waits_behind
     if job.state != "queued" or behind is None:
         return job.progress_text or job.state

@@ -1,4 +1,4 @@
-"""Whether the experiment that a diagnosis asks for is run: one rule for `daq diagnose --acquire` and for blind
+"""Decides whether to run the experiment that a diagnosis proposes: one rule for `daq diagnose --acquire` and for blind
 trials."""
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment
 
 
 def next_to_run(found: Diagnosis, runs: Sequence[Acquired], budget: float) -> NextExperiment | None:
-    """The experiment that an answer asks for, if it is to be run; None ends the diagnosis.
+    """Returns the experiment that an answer proposes, if it is to be run; None ends the diagnosis.
 
-    The diagnosis ends when no experiment is asked for, when it would take longer than the rest of the budget, and when
-    the last run was not complete.
+    The diagnosis ends if no experiment is proposed, if the experiment would exceed the remaining budget, or if the last
+    run was not complete.
 
     Args:
-        found: the latest answer. runs: what was run since the first, in order. budget: s of robot time for all of it.
+        found: the latest answer. runs: the runs since the first one, in order. budget: total robot time (s).
     """
     asked = found.next_experiment
     if asked is None or asked.duration > time_left(runs, budget) or (runs and runs[-1].outcome != "complete"):
@@ -26,12 +26,12 @@ def next_to_run(found: Diagnosis, runs: Sequence[Acquired], budget: float) -> Ne
 
 
 def time_left(runs: Sequence[Acquired], budget: float) -> float:
-    """Robot time in s that is left of a budget. Incomplete runs have used theirs, too."""
+    """Remaining robot time (s) of a budget. Incomplete runs count too."""
     return budget - sum(run.duration for run in runs)
 
 
 def as_run(asked: NextExperiment, trace: Trace, file: Path, outcome: str) -> Acquired:
-    """The record of an experiment that was asked for and run. outcome: how the run ended; only a complete trace is
+    """Returns the record of a proposed experiment that was run. outcome: how the run ended; only complete traces are
     used."""
     return Acquired(
         experiment=asked.name,

@@ -1,1 +1,1 @@
-"""The robot as every command reaches it (`RobotAccess`): at this computer's port, or through a service."""
+"""Access to the robot for every command (`RobotAccess`): at this computer's port, or through a service."""

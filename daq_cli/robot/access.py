@@ -1,4 +1,4 @@
-"""One way for every command to reach a robot, whichever process owns its port."""
+"""Selects how a command reaches its robot: at a local port, or through a service."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from daq_cli.robot.operations import RobotAccess
 
 
 def robot_access(call: Invocation) -> RobotAccess:
-    """The robot at this computer's port, or that of the service which the command line names."""
+    """Returns the robot at this computer's port, or of the service that the command line names."""
     if call.server is None:
         from daq_cli.robot.local import LocalRobot
 
@@ -20,5 +20,5 @@ def robot_access(call: Invocation) -> RobotAccess:
 
 
 def robot_of(context: typer.Context) -> RobotAccess:
-    """The robot of this invocation of `daq`."""
+    """Returns the robot of this call of `daq`."""
     return robot_access(invocation(context))

@@ -1,4 +1,4 @@
-"""The answers of a robot to commands, which are the same for a local robot and for one at a service."""
+"""Answers of a robot to commands, equal for a local robot and a service's."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RobotState:
-    """The state of the robot, in full and in one line."""
+    """State of the robot, as data and as one line."""
 
     report: StatusReport
     headline: str
     gains: Mapping[int, Gain] = field(default_factory=dict)
-    """P, I and D by joint; may be empty where no joint is limp."""
+    """P, I and D by joint; may be empty if no joint is limp."""
 
 
 @dataclass(frozen=True)
 class ImportedTrace:
-    """An imported trace: its number, its file, one line on where it is, what was noted in making it, and which columns
-    its signals are."""
+    """An imported trace: its ID, its file, a line about its place, the notes of the import, and the columns of its
+    signals."""
 
     trace: str
     file: str
@@ -34,7 +34,7 @@ class ImportedTrace:
 
 
 def headline(found: StatusReport) -> str:
-    """The state of a robot in one line."""
+    """Returns the state of a robot in one line."""
     if found.identity is None:
         problem = f": {found.connection_problem}" if found.connection_problem else ""
         return f"{found.robot}: {found.connection}{problem}"

@@ -25,18 +25,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How to carry out an experiment: the options shared by every command that runs one."""
+    """Options shared by every command that runs an experiment."""
 
     folder: Path | None
     dry_run: bool
     yes: bool
     json: bool
     cron: str | None = None
-    """When a service shall run it, again and again; None for now."""
+    """Cron schedule of repeated runs by a service; None for a run now."""
 
 
 def read_spec(path: Path) -> ExperimentSpec:
-    """The experiment that a .json or .toml file describes. Raises SpecError with one line."""
+    """Returns the experiment in a .json or .toml file. Raises a one-line SpecError."""
     from daq.contracts.documents import read_document
     from daq.contracts.experiment import parse_spec
 
@@ -45,7 +45,7 @@ def read_spec(path: Path) -> ExperimentSpec:
 
 
 def carry_out(robot: RobotAccess, spec: ExperimentSpec, options: RunOptions) -> None:
-    """Runs `spec` as the options say, prints the result, and ends with its exit code unless it is complete."""
+    """Runs `spec` with these options, prints the result and, unless it is complete, ends with its exit code."""
     if options.dry_run:
         preview(spec, robot.machine, options.json)
         return
@@ -63,7 +63,7 @@ def carry_out(robot: RobotAccess, spec: ExperimentSpec, options: RunOptions) -> 
 
 
 def cron_of(daily: str | None, cron: str | None) -> str | None:
-    """The cron expression of `--daily HH:MM` or `--cron`; None without either. Raises SpecError."""
+    """Returns the cron expression of `--daily HH:MM` or `--cron`; None without either. Raises SpecError."""
     if daily is None:
         return cron
     if cron is not None:
@@ -75,7 +75,7 @@ def cron_of(daily: str | None, cron: str | None) -> str | None:
 
 
 def _schedule(robot: RobotAccess, spec: ExperimentSpec, cron: str, *, as_json: bool) -> None:
-    """Has the service run `spec` whenever `cron` fits the clock of its computer. Moves nothing now."""
+    """Makes the service run `spec` at the times of `cron`, in the time zone of its computer. Moves nothing now."""
     with robot.service("run --daily or --cron") as service:
         made = service.schedules.create(spec, cron=cron)
     if as_json:
@@ -91,7 +91,7 @@ def _schedule(robot: RobotAccess, spec: ExperimentSpec, cron: str, *, as_json: b
 def acquire_complete(
     robot: RobotAccess, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt
 ) -> Finished:
-    """Runs `spec` for a use that needs the whole record. Raises OrderFailedError for an incomplete one, too."""
+    """Runs `spec` if the complete record is required. Raises OrderFailedError for an incomplete one, too."""
     finished = robot.acquire(spec, machine, folder, consent)
     if finished.outcome != "complete":
         why = f"{finished.outcome}: {finished.reason}" if finished.reason else finished.outcome
@@ -101,7 +101,7 @@ def acquire_complete(
 
 
 def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
-    """Prints the planned motion and the limits that it violates. Raises SafetyError when it violates any."""
+    """Prints the planned motion and the limits that it violates. Raises SafetyError if it violates any."""
     from daq.contracts.joint_text import position_text, speed_text
     from daq.safety import check_plan, unchecked
     from daq.trajectories.planner import plan, start_angles
@@ -131,12 +131,13 @@ def preview(spec: ExperimentSpec, machine: Machine, as_json: bool) -> None:
 
 
 def print_result(finished: Finished, pictures: Sequence[Path] = (), server: str | None = None) -> None:
-    """Prints the result of a run for people: how it ended, what was seen, its pictures, and what comes next.
+    """Prints the result of a run for people: how it ended, its figures, its pictures, and the next command.
 
     Args:
-        server: URL of the service that made the run; None for a robot at this computer.
+        server: URL of the service that made the run; None for a local robot.
     """
-    from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line  # loads numpy: not for the tab key
+    # imports numpy, which completion does not need
+    from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line
     from daq.traces.reader import read_trace
     from daq_cli.robot.seen import print_figures
 

@@ -1,4 +1,4 @@
-"""Traces of other rigs and tools: text with columns, and what plug-ins read."""
+"""Imports traces of other machines and tools: text tables, and files that plug-ins read."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from daq.contracts.trace_limits import TraceLimits
 
 
 def foreign_trace(file: Path, limits: TraceLimits, choice: Choice) -> Trace:
-    """The trace in a file of another program. Raises SpecError, TraceError, MissingExtraError."""
+    """Returns the trace in a file of another program. Raises SpecError, TraceError, MissingExtraError."""
     from daq.traces.files import open_trace
     from daq.traces.kinds import kind_of
 
@@ -28,14 +28,14 @@ def foreign_trace(file: Path, limits: TraceLimits, choice: Choice) -> Trace:
 def to_upload(
     file: Path, limits: TraceLimits, choice: Choice, numbering: Callable[[], tuple[str, ...]]
 ) -> Iterator[tuple[Path, Trace | None]]:
-    """Yields the file to upload to a service, and the trace that was made of anything but a trace."""
+    """Yields the file to upload to a service, and the trace made from it (None if the file is a trace already)."""
     from daq.traces.kinds import is_trace
     from daq.traces.naming import trace_path
     from daq.traces.store import write_trace
 
     if file.is_file() and is_trace(file, limits):
         if choice != Choice():
-            raise SpecError(f"{file}: is a trace already, of which nothing is chosen")
+            raise SpecError(f"{file}: is a trace of this program; options of an import do not apply")
         yield file, None
         return
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""The robot at this computer's port, which an owner of its own opens for each command."""
+"""The robot at this computer's port. Each command starts an owner of its own."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class LocalRobot(RobotAccess):
 
     @contextmanager
     def _changed(self, consent: ConsentPrompt | None) -> Iterator[OwnRobot]:
-        """Raises ReachError when no robot is configured: a new mock would have no state worth showing."""
+        """Raises ReachError if no robot is configured: a new mock would have no state worth showing."""
         from daq_cli.robot.own_robot import OwnRobot
 
         if self.call.port_option is None and self.call.settings.robot.port is None:
@@ -63,7 +63,7 @@ class LocalRobot(RobotAccess):
             pass
 
     def state(self) -> RobotState:
-        """The state that the board reports now."""
+        """Reads the board's present state."""
         from daq.contracts.limp import GAINS_UNKNOWN
         from daq.owner.messages import ReadState, StateAnswer
 
@@ -90,13 +90,13 @@ class LocalRobot(RobotAccess):
         return stop_configured(self.call, reached)
 
     def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
-        """Runs the experiment by an owner of its own."""
+        """Runs the experiment with an owner of its own."""
         from daq_cli.robot.local_run import acquire_locally
 
         return acquire_locally(self.call, spec, machine, folder, consent)
 
     def list_traces(self, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
-        """The traces of the folder; none where there is no such folder."""
+        """Lists the traces of the folder; empty if it does not exist."""
         from daq.traces.catalogue import list_traces
 
         place = folder or self.call.trace_folder
@@ -126,13 +126,13 @@ class LocalRobot(RobotAccess):
         return ImportedTrace(found.record.trace_id, str(made), str(made), found.record.notes, found.record.columns)
 
     def program(self, name: Path) -> Program:
-        """A program in a file. Raises SpecError."""
+        """Returns a program from a file. Raises SpecError."""
         from daq.teaching.program import load_program
 
         return load_program(name)
 
     def teaching(self, consent: ConsentPrompt) -> Teaching:
-        """Teaching by an owner of its own."""
+        """Returns teaching with an owner of its own."""
         from daq_cli.robot.local_teaching import LocalTeaching
 
         return LocalTeaching(self.call, self.machine, consent)
@@ -142,11 +142,11 @@ class LocalRobot(RobotAccess):
         raise SpecError(f"{what}: only a service has this: `daq --server http://host:8300 {what} …`, or set DAQ_SERVER")
 
     def require_local(self, why: str) -> None:
-        """Refuses nothing."""
+        """Does nothing: this robot is local."""
 
 
 def _report(call: Invocation, machine: Machine, identity: RobotIdentity, seen: StateAnswer) -> StatusReport:
-    """What was seen, in the form of a service's status."""
+    """Converts the state to the form of a service's status."""
     from daq.contracts.status import StatusReport
     from daq.owner.seen import link_of, sample_of
 

@@ -1,4 +1,4 @@
-"""An experiment at this computer's port, by an owner of its own."""
+"""Runs an experiment at this computer's port, with an owner of its own."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def acquire_locally(
 ) -> Finished:
     """Runs `spec` and shows its progress and events.
 
-    Raises OrderFailedError if there is no trace, SpecError for a folder or a port that is not valid.
+    Raises OrderFailedError if there is no trace, SpecError for an invalid folder or port.
     """
     if not str(folder).isprintable():
         raise SpecError(f"folder {str(folder)!r}: a trace's folder has a name of printable characters")

@@ -1,4 +1,4 @@
-"""Stops through the configured ports, for which no process needs to own a port."""
+"""Stops robots through the configured ports if no process owns them."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from daq_cli.app.context import Invocation
 
 
 def stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:
-    """Stops the robots of the command line or the configuration, all of them unless one is named, except those whose
-    processes have been asked.
+    """Stops the robots of the command line or the configuration (all of them unless one is named), except those whose
+    processes were asked already.
 
-    If the configuration cannot be read, the answer says so; other robots have been stopped by then.
+    If the configuration cannot be read, the answer states it; the early stop has reached other robots by then.
     """
     try:
         ports = _ports(call)
@@ -26,12 +26,12 @@ def stop_configured(call: Invocation, reached: set[str]) -> list[StopAnswer]:
         return []
     from daq.owner.port_stop import stop_at_port
 
-    with ThreadPoolExecutor(len(left)) as pool:  # a line that does not answer delays no other arm's stop
+    with ThreadPoolExecutor(len(left)) as pool:  # a line that does not answer must not delay the stop of other arms
         return list(pool.map(lambda one: stop_at_port(*one), left))
 
 
 def _ports(call: Invocation) -> list[tuple[str, str]]:
-    """Names and ports of the robots to stop. Raises SpecError."""
+    """Returns names and ports of the robots to stop. Raises SpecError."""
     if call.port_option:
         return [("robot", call.port_option)]
     wanted = call.robot_option
@@ -40,7 +40,7 @@ def _ports(call: Invocation) -> list[tuple[str, str]]:
 
 
 def _device(url: str) -> object:
-    """Returns the device or address in a port's URL, whatever its spelling; the text itself if it is not a URL."""
+    """Returns the device or address in a port's URL, in any spelling; the text itself if it is not a URL."""
     from daq.transport.url import SerialPort, TcpPort, TransportError, parse_port_url
 
     try:

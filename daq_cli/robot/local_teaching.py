@@ -1,4 +1,4 @@
-"""Teaching at this computer's port, by an owner of its own: jogging, programs, leading by hand."""
+"""Teaching at this computer's port, with an owner of its own: jogging, programs, hand guiding."""
 
 from __future__ import annotations
 
@@ -35,19 +35,19 @@ from daq_cli.robot.own_owner import owned
 from daq_cli.robot.pendant import Pendant, StatusLine, announce_lead, drive_with_keys
 
 LOOK_EVERY = 0.1
-"""Time (s) between two looks whether a lead is to end."""
+"""Time (s) between two checks whether hand guiding must end."""
 
 
 @dataclass
 class _Seen:
-    """The lines and samples that an owner has reported. tell: prints a line"""
+    """Lines and samples reported by an owner. tell: prints a line."""
 
     tell: Callable[[str], object]
     first: LiveSample | None = None
     newest: LiveSample | None = None
 
     def hear(self, report: Report) -> None:
-        """Takes a report."""
+        """Handles a report."""
         if isinstance(report, TeachingText):
             self.tell(report.text)
         elif isinstance(report, LiveSample):
@@ -61,7 +61,7 @@ class _Seen:
 
 @dataclass
 class _Driven:
-    """`Driven` by an owner that jogs."""
+    """`Driven` by an owner in jog mode."""
 
     owner: OwnerOnDemand
     jogging: Future[Answer]
@@ -98,7 +98,7 @@ class LocalTeaching:
     consent: ConsentPrompt
 
     def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
-        """Drives until the pendant has ended."""
+        """Drives until the pendant ends."""
         with open_keyboard() as keyboard, self._owned() as owner:
             jogging = owner.begin(JogBegin)
             drive_with_keys(_Driven(owner, jogging, line), keyboard, pendant, keep, line)
@@ -106,13 +106,13 @@ class LocalTeaching:
             done(owner.answer_to(jogging))
 
     def perform(self, program: Program) -> str:
-        """Has the program planned and checked from the arm's present posture, and carried out."""
+        """Plans and checks the program from the arm's present posture, and carries it out."""
         with self._owned() as owner:
             performing = owner.begin(RunProgram, program=program.model_dump(mode="json"))
             return str(done(owner.answer_to(performing, _Seen(console().print).hear)).data["text"])
 
     def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
-        """Records until `seconds` of the arm's time are over, or Enter is pressed."""
+        """Records for `seconds` of the arm's time, or until Enter is pressed."""
         with self._owned() as owner:
             seen, leading = _Seen(console().print), owner.begin(LeadBegin, joints=tuple(joints))
             while seen.first is None and not leading.done():

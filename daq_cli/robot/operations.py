@@ -1,4 +1,4 @@
-"""What a command asks of its robot, and what is the same at this computer's port and at a service."""
+"""Operations of a robot that commands use, the same at this computer's port and through a service."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Orders(Protocol):
-    """What a robot answers: by the owner of its port, or by the service."""
+    """Requests to a robot, answered by the owner of its port or by the service."""
 
     def gains(self) -> JointGains:
         """P, I and D of every joint."""
@@ -35,14 +35,14 @@ class Orders(Protocol):
         """Process inputs and outputs, and the gripper."""
 
     def reset(self, *, here: bool = False) -> Done:
-        """Ends the stop that is in force now."""
+        """Ends the stop that is now in force."""
 
 
 class Changes(Protocol):
-    """What needs the operator's consent on a real arm."""
+    """Changes that need the operator's consent on a real arm."""
 
     def set_gains(self, gains: Mapping[int, Gain]) -> JointGains:
-        """Writes gains, and reads all back."""
+        """Writes gains, and reads all of them back."""
 
     def set_output(self, output: int, *, on: bool, while_stopped: bool = False) -> ProcessState:
         """Switches one process output."""
@@ -55,7 +55,7 @@ class RobotAccess(ABC):
     """A robot, through the owner of its port or through a service. Both give the same answers, so `--json` has one
     schema.
 
-    Every method raises a DaqError when the robot is not reached, or refuses. Angles are in rad.
+    Every method raises a DaqError if the robot cannot be reached, or refuses. Angles are in rad.
     """
 
     call: Invocation
@@ -63,26 +63,26 @@ class RobotAccess(ABC):
     @property
     @abstractmethod
     def machine(self) -> Machine:
-        """The machine file of the robot, with the limits that hold for it now."""
+        """Returns the robot's machine file, with its present limits."""
 
     @abstractmethod
     def require_reached(self) -> None:
-        """Connects, without sending anything that could move the arm, and raises the errors of connecting."""
+        """Connects without sending anything that could move the arm. Raises the errors of connecting."""
 
     @abstractmethod
     def state(self) -> RobotState:
-        """Posture, state and link, as they are now."""
+        """Reads posture, state and link."""
 
     @abstractmethod
     def _asked(self) -> AbstractContextManager[Orders]:
-        """Whoever answers."""
+        """Yields the object that answers requests."""
 
     @abstractmethod
     def _changed(self, consent: ConsentPrompt) -> AbstractContextManager[Changes]:
-        """Whoever changes something, with the operator's consent on a real arm."""
+        """Yields the object that makes changes, after the operator's consent on a real arm."""
 
     def gains(self) -> Mapping[int, Gain]:
-        """P, I and D of every joint."""
+        """Reads P, I and D of every joint."""
         with self._asked() as robot:
             return robot.gains().gains
 
@@ -92,69 +92,71 @@ class RobotAccess(ABC):
             return control.set_gains(wanted).gains
 
     def process(self) -> ProcessState:
-        """Process inputs and outputs, and the gripper."""
+        """Reads process inputs and outputs, and the gripper."""
         with self._asked() as robot:
             return robot.process()
 
     def set_output(self, output: int, *, on: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
-        """Switches one process output, and returns what is read back."""
+        """Switches one process output, and returns the values read back."""
         with self._changed(consent) as control:
             return control.set_output(output, on=on, while_stopped=while_stopped)
 
     def set_gripper(self, *, closed: bool, while_stopped: bool, consent: ConsentPrompt) -> ProcessState:
-        """Moves the gripper, and returns what is read back."""
+        """Moves the gripper, and returns the values read back."""
         with self._changed(consent) as control:
             return control.set_gripper(closed=closed, while_stopped=while_stopped)
 
     def reset(self, *, adopt_posture: bool) -> str:
-        """Ends the freeze of a stop, and says what holds now.
+        """Ends the freeze of a stop. Returns a line about the new state.
 
         Args:
-            adopt_posture: make the measured posture the set points first.
+            adopt_posture: first set the set points to the measured posture.
         """
         with self._asked() as robot:
             return robot.reset(here=adopt_posture).text
 
     @abstractmethod
     def stop(self, reached: set[str]) -> list[StopAnswer]:
-        """Stops the robot that the command line or the configuration names. Never raises: failures are answers.
+        """Stops the robot of the command line or the configuration. Never raises: failures are answers.
 
         Args:
-            reached: ports whose processes have been asked already.
+            reached: ports whose processes were asked already.
         """
 
     @abstractmethod
     def acquire(self, spec: ExperimentSpec, machine: Machine, folder: Path, consent: ConsentPrompt) -> Finished:
-        """Runs an experiment and shows its progress; its trace is in `folder` then. Ctrl-C stops the arm.
+        """Runs an experiment and shows its progress; the trace is then in `folder`. Ctrl-C stops the arm.
 
-        Raises OrderFailedError when there is no trace.
+        Raises OrderFailedError if there is no trace.
         """
 
     @abstractmethod
     def list_traces(self, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
-        """Returns all traces, the oldest first, and the name of their place."""
+        """Returns all traces, the oldest first, and the name of their folder or service."""
 
     @abstractmethod
     def find_trace(self, folder: Path, wanted: str) -> Path:
-        """Finds a trace by path, number, name or `last` in `folder`; a service's trace is downloaded into it."""
+        """Returns the file of a trace, by path, ID, name or `last` in `folder`; a service's trace is downloaded into
+        it."""
 
     @abstractmethod
     def import_trace(self, file: Path, folder: Path | None, choice: Choice) -> ImportedTrace:
-        """Imports a trace of another rig or tool; `choice` is for a bag."""
+        """Imports a trace of another machine or tool; `choice`: what to import."""
 
     @abstractmethod
     def program(self, name: Path) -> Program:
-        """A taught program. name: the path of its file, or its name at the service."""
+        """Returns a taught program. name: path of its file, or its name at the service."""
 
     @abstractmethod
     def teaching(self, consent: ConsentPrompt) -> Teaching:
-        """Jogging, programs and leading by hand, one of them at a time."""
+        """Returns jogging, programs and hand guiding; one activity at a time."""
 
     @abstractmethod
     def service(self, what: str) -> AbstractContextManager[Robot]:
-        """The service's client, for what only a service has. Without a service raises SpecError, which begins with
-        `what`."""
+        """Returns the service's client, for operations that only a service has. Without a service, raises SpecError,
+        which begins with `what`."""
 
     @abstractmethod
     def require_local(self, why: str) -> None:
-        """Called before something that only this computer can do: raises SpecError with the line `why` at a service."""
+        """Called before an operation that only this computer can do. At a service, raises SpecError with the line
+        `why`."""

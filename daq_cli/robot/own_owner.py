@@ -1,4 +1,4 @@
-"""The owner of this computer's port, started for one command."""
+"""Starts an owner of this computer's port for one command."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ def owned(
     moves: bool = False,
     live: bool = False,
 ) -> Iterator[OwnerOnDemand]:
-    """An owner of the command's port; with `consent` only with the operator's word on a real arm. Where it `moves` the
-    arm, Ctrl-C, Ctrl-Z and SIGTERM become a stop.
+    """Yields an owner of the command's port; with `consent`, only after the operator's consent for a real arm. If
+    `moves` is set, Ctrl-C, Ctrl-Z and SIGTERM become a stop.
 
-    No process has the port while the operator is asked, so that a stop gets through. Raises OrderFailedError when the
-    robot is not reached, SpecError for a port that is not valid, SafetyError without consent.
+    No process holds the port while the operator is asked, so that `daq stop` can use it. Raises OrderFailedError if the
+    robot cannot be reached, SpecError for an invalid port, SafetyError without consent.
     """
     from daq.config.robot_files import load_memory_map
     from daq.owner.messages import Open
     from daq.transport import parse_port_url
 
-    parse_port_url(call.port)  # an invalid port is refused without starting a process
+    parse_port_url(call.port)  # reject an invalid port before starting a process
     opening = Open(
         url=call.port,
         machine=machine,

@@ -1,4 +1,4 @@
-"""Questions and orders to the owner of this computer's port."""
+"""Requests and orders to the owner of this computer's port."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from daq.owner.messages import MoveGripper, ReadGains, ReadProcess, Reset, Write
 
 @dataclass(frozen=True)
 class OwnRobot:
-    """`Orders` and `Changes` by such an owner. Raises OrderFailedError for what is refused."""
+    """`Orders` and `Changes` through such an owner. Raises OrderFailedError for refused orders."""
 
     owner: OwnerOnDemand
 
@@ -39,5 +39,5 @@ class OwnRobot:
         return ProcessState.model_validate(self.owner.ask(MoveGripper, closed=closed, while_stopped=while_stopped))
 
     def reset(self, *, here: bool = False) -> Done:
-        """Ends the stop that the board is in."""
+        """Ends the stop that is now in force on the board."""
         return Done.model_validate(self.owner.ask(Reset, stop=None, here=here))

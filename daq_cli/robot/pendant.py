@@ -1,4 +1,4 @@
-"""What teaching shares on both sides: its operations, the keys of `daq teach jog`, and what the terminal shows."""
+"""Common parts of local and remote teaching: its operations, the keys of `daq teach jog`, and the status line."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FASTER, SLOWER = 1.25, 0.8
 
 
 def require_jog_speed(speed: float) -> float:
-    """Checks the speed (rad/s) that jogging begins with. Raises SpecError, in degrees/s."""
+    """Checks the initial jog speed (rad/s). Raises SpecError, in degrees/s."""
     if not 0 < speed <= JOG_SPEED:
         raise SpecError(
             f"jog speed of {math.degrees(speed):.4g}°/s: allowed are above 0 and up to {math.degrees(JOG_SPEED):.0f}°/s"
@@ -35,8 +35,8 @@ def require_jog_speed(speed: float) -> float:
 
 
 class Pendant:
-    """The joint, direction and speed (rad/s) that the keys have chosen. No joint is driven faster than its own
-    limit. A joint that slides has the same share of its highest speed of jogging as one that turns."""
+    """The joint, direction and speed (rad/s) chosen by keys. No joint exceeds its own limit. A prismatic joint gets the
+    same share of its highest jog speed as a revolute one."""
 
     def __init__(self, machine: Machine, speed: float) -> None:
         self.joint = 1
@@ -49,18 +49,18 @@ class Pendant:
 
     @property
     def speed(self) -> float:
-        """Speed of the chosen joint in rad/s; in m/s if it slides."""
+        """Speed of the chosen joint in rad/s (m/s if prismatic)."""
         usual = SLIDE_JOG_SPEED / JOG_SPEED if slides(self._machine, self.joint) else 1.0
         return min(self.wish * usual, top_speed(self._machine, self._machine.limits, self.joint))
 
     @property
     def speed_text(self) -> str:
-        """Speed of the chosen joint as people read it."""
+        """Speed of the chosen joint, for people."""
         return speed_text(self._machine, self.joint, self.speed)
 
     def command(self, typed: str, now: float) -> JogCommand | None:
-        """Returns the newest command after the keys `typed` at `now` (s, the samples' clock), or the command before if
-        these keys drive nothing."""
+        """Returns the newest command after the keys `typed` at `now` (s, the samples' clock); the previous one if these
+        keys drive nothing."""
         direction = typed.count(RIGHT) - typed.count(LEFT)
         for key in typed.replace(RIGHT, "").replace(LEFT, ""):
             if key in "123456" and int(key) <= len(self._machine.joints):
@@ -79,7 +79,7 @@ class Pendant:
 
 
 class StatusLine:
-    """One line at the bottom of the terminal (standard error), written again only when it changes."""
+    """One line at the bottom of the terminal (standard error), rewritten only when it changes."""
 
     def __init__(self) -> None:
         self._shown = ""
@@ -93,7 +93,7 @@ class StatusLine:
             self._shown = line
 
     def tell(self, line: str) -> None:
-        """Prints a line of its own; the status follows below it."""
+        """Prints a separate line; the status follows below it."""
         self.close()
         print(line, file=sys.stderr)
 
@@ -105,35 +105,35 @@ class StatusLine:
 
 
 def announce_lead(seconds: float | None) -> None:
-    """Says that the arm may be led now, and until when."""
-    console().print("recording: lead the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
+    """Prints that the arm may be guided now, and until when."""
+    console().print("recording: guide the arm" + ("; Enter ends it" if seconds is None else f" for {seconds:g} s"))
 
 
 class Driven(Protocol):
     """An arm that keys drive."""
 
     def jog(self, velocities: Mapping[int, float]) -> None:
-        """Drives joints (rad/s, m/s) for a moment."""
+        """Drives joints (rad/s, m/s) for at most 0.3 s."""
 
     def set_gripper(self, *, closed: bool) -> None:
         """Closes or opens the gripper."""
 
     def set_points(self) -> Mapping[int, float] | None:
-        """Those of the newest sample (rad, m); None where there is none."""
+        """Set points of the newest sample (rad, m); None if there is none."""
 
     def wait(self, seconds: float) -> None:
-        """Waits. Raises a DaqError when the arm is no longer driven, such as after a stop."""
+        """Waits. Raises a DaqError if the arm is no longer driven, for example after a stop."""
 
 
 def drive_with_keys(
     arm: Driven, keyboard: Keyboard, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine
 ) -> None:
-    """Drives an arm until the pendant has ended. Each press drives for a moment, so that the arm holds after it."""
+    """Drives an arm until the pendant ends. Each key press drives for a moment; then the arm holds."""
     line.tell(HELP)
     while not pendant.ended:
         now = time.monotonic()
         command = pendant.command(keyboard.pressed(), now)
-        if command is not None and command.time == now:  # only a new command is sent, not an older one again
+        if command is not None and command.time == now:  # only a new command is sent
             arm.jog(command.velocities)
         if pendant.gripper is not None:
             arm.set_gripper(closed=pendant.gripper)
@@ -149,10 +149,10 @@ class Teaching(Protocol):
     """An arm that a person teaches. Ctrl-C stops it. Angles are in rad."""
 
     def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
-        """Drives joints with the keys; `keep` is called with the set points of a posture that the person saves."""
+        """Drives joints by keys; `keep` is called with the set points of each posture that the person saves."""
 
     def perform(self, program: Program) -> str:
-        """Carries out a taught program, and returns one line on how it ended."""
+        """Carries out a taught program, and returns a line on how it ended."""
 
     def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
-        """Records a path while the arm is led by hand; `keep` is called with the path, even after a stop."""
+        """Records a path while the arm is guided by hand; `keep` is called with the path, even after a stop."""

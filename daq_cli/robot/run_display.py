@@ -1,4 +1,4 @@
-"""Shows a run in the terminal while it goes on."""
+"""Shows a run in the terminal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class RunDisplay:
-    """A progress bar, and a line for each event above it."""
+    """A progress bar, with a line per event above it."""
 
     def __init__(self, bar: Progress, kind: str, quiet: frozenset[str]) -> None:
         self._bar = bar
@@ -24,12 +24,12 @@ class RunDisplay:
         self._task = bar.add_task(kind, total=1.0, text="connecting")
 
     def progress(self, fraction: float, text: str) -> None:
-        """Shows how far the run is."""
+        """Shows the progress of the run."""
         self._bar.update(self._task, completed=fraction, text=text)
 
     def event(self, kind: str, time: float, message: str) -> None:
-        """Shows an event of the trace; `time` is in s from the start of the record. What every run's result says at its
-        end is left to that."""
+        """Shows an event of the trace; `time` in s from the start of the record. Events that the result also states are
+        left out."""
         from rich.text import Text
 
         from daq.contracts.limp import GAINS_UNKNOWN
@@ -44,7 +44,7 @@ class RunDisplay:
 
 @contextmanager
 def run_display(spec: ExperimentSpec) -> Iterator[RunDisplay]:
-    """Shows a run within the block; the bar vanishes at its end, and is absent where no terminal shows it."""
+    """Shows a run within the block; the bar is removed at its end, and absent without a terminal."""
     kind = spec.trajectory.kind
     # A sequence has dozens of marks; they are in the trace.
     marks = {"note", "ramp_start", "ramp_end", "reversal"} if kind == "sequence" else set()

@@ -1,4 +1,4 @@
-"""What a record shows of every joint that moved, as a table on standard output."""
+"""Prints a table of the figures of every joint that moved."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ HEADS = ("joint", "from", "to", "overshoot", "rise time", "largest error", "erro
 
 
 def print_figures(trace: Trace) -> None:
-    """Prints the figures of every joint that moved; nothing where none did."""
+    """Prints the figures of every joint that moved; nothing if none did."""
     from rich.table import Table
 
     from daq.traces.summary import joint_figures

@@ -1,4 +1,4 @@
-"""Sizes of a linked image by its sources, from the linker's map, for `make size`."""
+"""Prints the sizes of a linked image by source, from the linker's map, for `make size`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ IN_RAM = ("data", "rodata", "bss", "noinit")
 
 
 def sizes(text: str) -> tuple[Counter[str], Counter[str]]:
-    """Bytes in flash and in RAM by folder."""
+    """Returns bytes in flash and in RAM by folder."""
     flash: Counter[str] = Counter()
     ram: Counter[str] = Counter()
     for kind, size, source in SECTION.findall(text):
@@ -28,7 +28,7 @@ def sizes(text: str) -> tuple[Counter[str], Counter[str]]:
 
 
 def core_files(text: str) -> Counter[str]:
-    """Bytes in flash by file of the core."""
+    """Returns bytes in flash by file of the core."""
     flash: Counter[str] = Counter()
     for kind, size, source in SECTION.findall(text):
         if "core+" in source and kind in IN_FLASH:

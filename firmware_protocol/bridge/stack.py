@@ -1,7 +1,7 @@
-"""The deepest stack of an AVR image, from its disassembly: `python3 stack.py IMAGE.elf`.
+"""Computes the deepest stack of an AVR image from its disassembly: `python3 stack.py IMAGE.elf`.
 
-Counts what each function pushes and reserves, and follows its calls. A recursion, or a call through a pointer, has no
-bound and is an error. The result is the deepest path of `main` and, on top of it, the deepest interrupt: they do not
+Counts what each function pushes and reserves, and follows its calls. Recursion, or a call through a pointer, has no
+bound and is an error. The result is the deepest path of `main` plus the deepest interrupt, since interrupts do not
 interrupt each other.
 """
 
@@ -20,17 +20,17 @@ INSTRUCTION = re.compile(r"^\s+[0-9a-f]+:\t(?:[0-9a-f]{2} )+\s*\t(\S+)\s*([^;]*)
 
 @dataclass
 class Function:
-    """What a function takes of the stack by itself, and the functions that it enters."""
+    """Stack use of a function by itself, and the functions that it enters."""
 
     own: int = 0
     frame_low: int = 0
     calls: set[str] = field(default_factory=set)
     jumps: set[str] = field(default_factory=set)
-    """Entered by a jump: the return address is the caller's."""
+    """Functions entered by a jump, without a return address of their own."""
 
 
 def functions(disassembly: str) -> dict[str, Function]:
-    """All functions of an image."""
+    """Returns all functions of an image."""
     found: dict[str, Function] = {}
     name = ""
     for line in disassembly.splitlines():
@@ -63,7 +63,7 @@ def _take(function: Function, name: str, operation: str, operands: str, target: 
 
 
 def deepest(name: str, found: dict[str, Function], above: tuple[str, ...] = ()) -> tuple[int, tuple[str, ...]]:
-    """Bytes below the entry of a function, and the path of calls that needs them."""
+    """Returns the bytes below the entry of a function, and the path of calls that needs them."""
     if name in above:
         raise ValueError(f"recursion: {' -> '.join((*above, name))}")
     function = found[name]

@@ -1,4 +1,4 @@
-"""The control table of the X series, as far as it is used here (e-manual, XM430-W350: EEPROM and RAM area)."""
+"""The part of the X series' control table that is used here (e-manual, XM430-W350: EEPROM and RAM area)."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ class Item:
     writable: bool = True
 
     def pack(self, value: int) -> bytes:
-        """The bytes of a value. Raises ProtocolError for one that does not fit."""
+        """Returns the bytes of a value. Raises ProtocolError if it does not fit."""
         try:
             return value.to_bytes(self.size, "little", signed=self.signed)
         except OverflowError:
             raise ProtocolError(f"value {value}: does not fit into the {self.size} bytes from {self.address}") from None
 
     def of(self, block: bytes, start: int = 0) -> int:
-        """The value in a block of the table that begins at address `start`."""
+        """Returns the value in a block of the table that begins at address `start`."""
         at = self.address - start
         return int.from_bytes(block[at : at + self.size], "little", signed=self.signed)
 
@@ -86,26 +86,26 @@ class Table(Item, Enum):
 
 
 FIRST_IN_RAM = 64
-"""From here on values may be written while the torque is on, and are lost with the supply."""
+"""First address whose values may be written with torque on, and are lost without supply."""
 POSITION_MODE = 3
-"""Operating Mode of position control within one turn."""
+"""Operating Mode: position control within one turn."""
 TORQUE_ON_BY_GOAL = 0x08
-"""Bit of Drive Mode: every goal that is written switches the torque on."""
+"""Bit of Drive Mode: every written goal switches the torque on."""
 COUNTS_A_TURN = 4096
-"""Counts of goal and present position in a turn (0.088° each)."""
+"""Counts of goal and present position per turn (0.088° each)."""
 FULL_PWM = 885
-"""Value of a PWM of 100 %."""
+"""PWM value for 100 %."""
 TICKS = 32768
-"""Realtime Tick (ms) begins anew after 32767."""
+"""Realtime Tick (ms) restarts after 32767."""
 WATCHDOG_UNIT_S = 0.020
-"""Unit of Bus Watchdog."""
+"""Unit (s) of Bus Watchdog."""
 WATCHDOG_ERROR = -1
-"""Value of Bus Watchdog when the bus was silent for too long: the servo has stopped, and refuses goals until 0 is
+"""Value of Bus Watchdog after the bus was silent for too long: the servo has stopped, and refuses goals until 0 is
 written."""
 
 
 class HardwareError(IntFlag):
-    """Bits of Hardware Error Status. Those in Shutdown switch the torque off, and only a reboot ends that."""
+    """Bits of Hardware Error Status. Those in Shutdown switch the torque off, and only a reboot clears them."""
 
     INPUT_VOLTAGE = 1
     OVERHEATING = 4
@@ -115,5 +115,5 @@ class HardwareError(IntFlag):
 
 
 def in_words(error: int) -> str:
-    """The hardware errors of a servo, for people."""
+    """Returns the hardware errors of a servo, for people."""
     return ", ".join(bit.name.lower().replace("_", " ") for bit in HardwareError(error) if bit.name) or f"{error:#04x}"

@@ -1,8 +1,8 @@
-"""Servos as the driver's controller: each request of the driver becomes reads and writes of control tables.
+"""Servos as a controller for the driver: each request becomes reads and writes of control tables.
 
-Protocol 2.0 numbers nothing, so a reply is recognised by its sender, its length and what it says: a command counts as
-obeyed when the servos, read back, hold what was written. What this dialect knows of time is the servos' own clock
-(Realtime Tick), which counts milliseconds: one tick is one control period.
+Protocol 2.0 has no sequence numbers, so a reply is recognised by its sender, its length and its content. A command
+counts as carried out if the servos, read back, contain what was written. The only clock is that of the servos (Realtime
+Tick), which counts milliseconds: one tick is one control period.
 """
 
 from __future__ import annotations
@@ -40,46 +40,47 @@ from firmware_protocol.scale import LineScale
 from firmware_protocol.wide import WideGains, WideStopped
 
 PERIOD_US = 1000
-"""Period of the servos' position control: an assumption, that of their clock. The manual gives none."""
+"""Period (µs) of the servos' position control (an assumption: that of their clock, since the manual gives none)."""
 EVERY = 20
-"""Periods from one sample to the next, where the line is quick enough: 50 samples a second."""
+"""Periods from one sample to the next on a fast enough line: 50 samples per second."""
 WATCHDOG = 25
-"""Bus Watchdog (20 ms each) from the first set point to the end of the connection: servos whose host has gone stop by
+"""Bus Watchdog (20 ms each) from the first set point to the end of the connection: servos whose host is gone stop by
 themselves after half a second."""
 MOST_WRITES = 8
-"""How often a step is written again because the servos, read back, do not hold it; then the link asks anew."""
+"""How often a step is written again if the servos, read back, do not contain it; then the link repeats the request."""
 MOST_LATE = 3
-"""Readings in succession that seem to be late before the servos' clocks are believed."""
+"""Successive readings that seem late after which the servos' clocks are accepted."""
 NEAR = 23
-"""Counts (2°) that a servo may be away from its goal when its torque is switched on."""
+"""Largest distance (counts; 2°) of a servo from its goal when its torque is switched on."""
 
 Servos = dict[int, Servo]
 
 
 @dataclass
 class _Job:
-    """A request under way. `heard` are the status packets of its present step, by servo."""
+    """A request in progress. `heard`: the status packets of its present step, by servo."""
 
     sequence: int
     request: Request
     length: int
     stops: int
-    """Number of the newest stop when it was asked."""
+    """Number of the newest stop at the time of the request."""
     heard: dict[int, Packet] = field(default_factory=dict)
     goals: dict[int, int] | None = None
-    """Goals by servo that the step before has written; None in the first step of several."""
+    """Goals by servo written in the previous step; None in the first of several steps."""
     writes: int = 0
     freed: bool = False
-    """Of a release: whether all servos have been read without a stop."""
+    """For a release: whether all servos have been read without a stop."""
 
 
 class DynamixelDialect:
-    """Servos of these IDs on one bus; the first is joint 1. Set points, positions and errors are counts of 1/4096 turn.
+    """Servos with these IDs on one bus; the first is joint 1. Set points, positions and errors are counts of 1/4096
+    turn.
 
-    - Stop: the bench is marked as stopped (STOP_MARK) before anything is read, and each servo's goal becomes its
-      measured position, within its limits.
-    - Release: the same goals, and the mark is taken away; when they have been read back the torque is switched on.
-      Nothing else switches it on.
+    - Stop: marks the bench as stopped (STOP_MARK) before anything is read; each servo's goal becomes its measured
+      position, within its limits.
+    - Release: writes the same goals and removes the mark; once they are read back, switches the torque on. Nothing else
+      switches it on.
     - Set points: refused beyond a servo's own position limits, or while the bench is stopped or a torque is off.
     """
 
@@ -107,14 +108,14 @@ class DynamixelDialect:
         self._settings: dict[int, ServoSettings] = {}
         self._armed = self._stopped = False
         self._stops = 0
-        """Stops since this dialect was made, its own and those that it has seen."""
+        """Number of stops since this dialect was made: its own, and others that it has seen."""
         self._faults = ""
         self._clocks: dict[int, int] = {}
         self._tick = self._late = 0
 
     @property
     def damaged(self) -> int:
-        """Pieces that were no packet."""
+        """Pieces of input that were not a packet."""
         return self._decoder.damaged
 
     @property
@@ -129,14 +130,14 @@ class DynamixelDialect:
         return f"servo {names} does not answer, the others do: has it dropped off the bus?"
 
     def reset(self) -> None:
-        """Forgets an unfinished packet and what was under way."""
+        """Discards an unfinished packet and all requests in progress."""
         self._decoder.reset()
         self._jobs.clear()
         self._next, self._armed = b"", False
 
     def encode(self, sequence: int, request: Request) -> bytes:
-        """The instructions of a request's first step. Raises ProtocolError for what servos do not have, and for a set
-        point outside a servo's limits."""
+        """Returns the instructions of a request's first step. Raises ProtocolError for requests that servos do not
+        support, and for a set point outside a servo's limits."""
         area, first = BLOCK, b""
         match request:
             case Hello():
@@ -158,7 +159,7 @@ class DynamixelDialect:
         return first + encode(sync_read(self._ids, *area))
 
     def feed(self, data: bytes) -> list[tuple[int, Reply]]:
-        """The replies that the status packets in `data` complete."""
+        """Returns the replies that the status packets in `data` complete."""
         replies: list[tuple[int, Reply]] = []
         for packet in self._decoder.feed(data):
             for job in self._jobs_of(packet):
@@ -172,9 +173,9 @@ class DynamixelDialect:
         return replies
 
     def again(self, request: Request, frame: bytes) -> bytes:
-        """Of set points from before a stop nothing but the question: until the bus has been silent for a moment, and
-        after a release, the servos would take them. A stop's servos are remembered over its repeats: where one is
-        silent the others stop."""
+        """Returns only the read request for set points from before a stop: until the bus has been silent for a moment,
+        and after a release, the servos would accept them. A stop's answers are kept over its repeats, so that if one
+        servo is silent, the others stop."""
         halted = True
         for job in self._jobs:
             if job.request is request:
@@ -185,29 +186,29 @@ class DynamixelDialect:
         return encode(sync_read(self._ids, *BLOCK)) if halted and isinstance(request, WriteSetPoints) else frame
 
     def forget(self, sequence: int) -> None:
-        """A request that has been given up takes no further step."""
+        """Takes no further step of a request that was given up."""
         self._jobs = [job for job in self._jobs if job.sequence != sequence]
 
     def answer(self) -> bytes:
-        """The instructions of the next step of what is under way."""
+        """Returns the instructions of the next step of the requests in progress."""
         written, self._next = self._next, b""
         return written
 
     def farewell(self) -> bytes:
-        """Ends the watch for a silent bus, which was begun with the first set point, unless the bench is stopped."""
+        """Ends the watchdog for a silent bus, which began with the first set point, unless the bench is stopped."""
         return (
             self._write(Table.BUS_WATCHDOG, dict.fromkeys(self._ids, 0)) if self._armed and not self._stopped else b""
         )
 
     def _jobs_of(self, packet: Packet) -> list[_Job]:
-        """The requests under way that this status packet says something about: all that ask for as many bytes. Whose
-        question it answers cannot be known, and need not be: it says when it was measured, or what was written."""
+        """Returns the requests in progress that this status packet may answer: all that ask for as many bytes. Which of
+        them caused it is unknown and does not matter: it contains what was measured, or what was written."""
         if packet.instruction != STATUS or packet.device not in self._ids:
-            return []  # our own instruction, where an adapter returns it, or somebody else's servo
+            return []  # our own instruction, echoed by an adapter, or another program's servo
         return [job for job in self._jobs if job.length == len(packet.data)]
 
     def _advance(self, job: _Job) -> Reply | None:
-        """What all servos' answers come to: the reply, or None and perhaps a next step."""
+        """Combines all servos' answers: returns the reply, or None, possibly with a next step."""
         request, blocks = job.request, {device: job.heard[device].data for device in self._ids if device in job.heard}
         if isinstance(request, Hello):
             return self._greeted(request, blocks)
@@ -217,7 +218,7 @@ class DynamixelDialect:
         return self._known(job, servos)
 
     def _known(self, job: _Job, servos: Servos) -> Reply | None:
-        """The same of the requests that need the servos' present state."""
+        """The same for requests that need the servos' present state."""
         if any(one.stopped for one in servos.values()) and (job.freed or not self._stopped):
             self._stopped, self._stops = True, self._stops + 1
         tick, flags = self._time(servos), self._flags(servos)
@@ -253,7 +254,7 @@ class DynamixelDialect:
         return HelloReply(PROTOCOL_VERSION, capabilities, PERIOD_US, 1, 0, request.nonce, 1)
 
     def _goals(self, request: WriteSetPoints) -> bytes:
-        """Goals, and with the first ones the watch for a silent bus."""
+        """Returns goals and, with the first ones, the watchdog for a silent bus."""
         goals = {self._ids[joint - 1]: posture for joint, posture in request.postures if joint <= len(self._ids)}
         if len(goals) != len(request.postures):
             raise ProtocolError(f"joint {request.postures[-1][0]}: this bench has joints 1 to {len(self._ids)}")
@@ -269,21 +270,23 @@ class DynamixelDialect:
         return watch + self._write(Table.GOAL_POSITION, goals)
 
     def _taken(self, job: _Job, request: WriteSetPoints, servos: Servos, tick: int, flags: int) -> Reply | None:
-        """The set points are taken when the goals read back are those that were sent."""
+        """The set points are confirmed if the goals read back equal those sent."""
         if flags & (StatusFlag.RESTARTED | StatusFlag.HARDWARE_ERROR):
             return SetPointsTaken(tick, flags)
         if flags & StatusFlag.FROZEN or job.stops != self._stops:
             return ExplainedRefusal(request.OPCODE, Refusal.FROZEN, _why_frozen(servos))
-        self._armed &= all(one.watchdog == WATCHDOG for one in servos.values())  # else it is begun again
+        self._armed &= all(one.watchdog == WATCHDOG for one in servos.values())  # otherwise it is set again
         if all(servos[self._ids[joint - 1]].goal == posture for joint, posture in request.postures):
             return SetPointsTaken(tick, flags)
-        job.heard.clear()  # an answer to an earlier question, or the goals were lost: the link asks again
+        job.heard.clear()  # an answer to an earlier request, or the goals were lost: the link asks again
         return None
 
     def _frozen(self, job: _Job, servos: Servos, tick: int) -> Reply | None:
-        """A stop: the bench was marked with the question; goals become the measured positions; both are read back.
+        """Carries out a stop: the bench was marked with the request; goals become the measured positions; both are read
+        back.
 
-        Where a servo is silent the others are stopped when they answer for the second time; confirmed is nothing.
+        If a servo is silent, the others are stopped when they answer for the second time; the stop is then not
+        confirmed.
         """
         if job.goals is not None and len(servos) == len(self._ids):
             held = (one.goal == job.goals.get(device) for device, one in servos.items())
@@ -296,7 +299,8 @@ class DynamixelDialect:
         return None
 
     def _released(self, job: _Job, request: Release, servos: Servos) -> Reply | None:
-        """A release: goals become the measured positions; when they have been read back the torque is switched on."""
+        """Carries out a release: goals become the measured positions; once they are read back, the torque is switched
+        on."""
         if refusal := self._not_releasable(request, servos):
             return refusal
         if job.goals is not None and _holds(job.goals, servos):
@@ -305,7 +309,7 @@ class DynamixelDialect:
             if not limp:
                 self._stopped, self._armed = False, False
                 for other in self._jobs:
-                    other.heard.clear()  # what was read before
+                    other.heard.clear()  # data read before the release
                 return Released()
             if self._may_write(job):
                 self._then(self._write(Table.TORQUE_ENABLE, dict.fromkeys(limp, 1)), {}, set())
@@ -317,12 +321,12 @@ class DynamixelDialect:
         return None
 
     def _not_releasable(self, request: Release, servos: Servos) -> ExplainedRefusal | None:
-        """Why the bench is not released; None where it may be."""
+        """Returns why the bench cannot be released; None if it can."""
         if why := faults(servos):
             why += "; when its cause is gone, switch the bench's supply off and on"
             return ExplainedRefusal(request.OPCODE, Refusal.UNFIT, why)
         if request.stop != self._stops:
-            why = f"stop {self._stops} is newer than the one that was to end ({request.stop}), and it holds"
+            why = f"stop {self._stops} is newer than the one to be ended ({request.stop}), and stays in force"
             return ExplainedRefusal(request.OPCODE, Refusal.OTHER_STOP, why)
         if len(self._settings) < len(self._ids):
             why = "the servos' settings have not been read on this connection"
@@ -331,14 +335,15 @@ class DynamixelDialect:
         return ExplainedRefusal(request.OPCODE, Refusal.UNFIT, why) if why else None
 
     def _here(self, servos: Servos) -> dict[int, int]:
-        """Goals at which the servos stay where they are: the measured positions, within the servos' own limits."""
+        """Returns goals at which the servos stay where they are: the measured positions, within the servos' own
+        limits."""
         goals = {device: one.position for device, one in servos.items()}
         own = self._settings
         return {i: max(own[i].low, min(own[i].high, goal)) if i in own else goal for i, goal in goals.items()}
 
     def _beyond(self, servos: Servos) -> str:
-        """Why no goal would hold a servo where it is; empty where one would. A servo that has its torque may sag a
-        little beyond a limit."""
+        """Returns why no goal would hold a servo where it is; empty if one would. A servo with torque may sag slightly
+        beyond a limit."""
         for device, goal in self._here(servos).items():
             one, own = servos[device], self._settings[device]
             if abs(one.position - goal) > (NEAR if one.torque else 0):
@@ -354,7 +359,7 @@ class DynamixelDialect:
         return job.writes <= MOST_WRITES
 
     def _then(self, first: bytes, everywhere: Mapping[Table, int], but: set[int]) -> None:
-        """Next step: writes `first` and then one value to all servos `but` these; reads everything back."""
+        """Sets the next step: writes `first` and then one value to all servos except `but`; reads everything back."""
         rest = [one for one in self._ids if one not in but]
         second = b"".join(self._write(item, dict.fromkeys(rest, value)) for item, value in everywhere.items() if rest)
         self._next += first + second + encode(sync_read(self._ids, *BLOCK))
@@ -366,10 +371,10 @@ class DynamixelDialect:
     # --- what servos say of time and state
 
     def _time(self, servos: Servos) -> int:
-        """Milliseconds of the first servo's clock since this connection began, without its turns.
+        """Milliseconds of the first servo's clock since this connection began, without its wrap-around.
 
-        Time passes only when every servo's clock has gone on: a late answer is of an earlier time. Several of them in
-        succession are none: a servo has restarted, or nobody has asked for half a turn of the clocks.
+        Time advances only if every servo's clock has advanced: a late answer is from an earlier time. Several such
+        answers in succession are not late: a servo has restarted, or nothing was read for half a wrap of the clocks.
         """
         clocks = {device: one.clock for device, one in servos.items()}
         if len(clocks) < len(self._ids):
@@ -394,12 +399,12 @@ class DynamixelDialect:
         if any(not one.torque for one in servos.values()):
             flags |= StatusFlag.NO_TORQUE
         if self._armed and any(one.watchdog == 0 and not one.torque for one in servos.values()):
-            flags |= StatusFlag.RESTARTED  # its supply has failed: the watch that was begun is gone
+            flags |= StatusFlag.RESTARTED  # its supply has failed, which ends its watchdog
         return int(flags)
 
 
 def _holds(goals: Mapping[int, int], servos: Servos) -> bool:
-    """Whether each servo is free, has the goal that was written, and would not turn if its torque came on now."""
+    """Whether each servo is free, has the written goal, and would not turn if its torque came on now."""
     return all(
         not one.stopped and one.goal == goals[device] and (one.torque or abs(one.goal - one.position) <= NEAR)
         for device, one in servos.items()
@@ -407,7 +412,7 @@ def _holds(goals: Mapping[int, int], servos: Servos) -> bool:
 
 
 _MOST_JOBS = 16
-"""Requests that are remembered while their replies are awaited."""
+"""Most requests remembered while their replies are awaited."""
 
 
 def _gains(block: bytes) -> tuple[int, int, int]:

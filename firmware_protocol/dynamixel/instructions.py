@@ -11,7 +11,7 @@ from firmware_protocol.errors import ProtocolError
 
 
 class Instruction(IntEnum):
-    """What a packet asks for."""
+    """Instruction of a packet."""
 
     PING = 0x01
     READ = 0x02
@@ -38,12 +38,12 @@ class StatusError(IntEnum):
 
 
 def ping(device: int) -> Packet:
-    """Asks for model number and firmware version."""
+    """Reads model number and firmware version."""
     return Packet(device, Instruction.PING)
 
 
 def read(device: int, address: int, count: int) -> Packet:
-    """Asks for `count` bytes from `address` on."""
+    """Reads `count` bytes from `address` on."""
     return Packet(device, Instruction.READ, struct.pack("<HH", address, count))
 
 
@@ -53,14 +53,14 @@ def write(device: int, address: int, data: bytes) -> Packet:
 
 
 def sync_read(devices: Iterable[int], address: int, count: int) -> Packet:
-    """Asks several devices for the same addresses; each answers with a packet of its own, in this order."""
+    """Reads the same addresses of several devices; each answers with its own packet, in this order."""
     return Packet(BROADCAST, Instruction.SYNC_READ, struct.pack("<HH", address, count) + bytes(devices))
 
 
 def sync_write(values: Mapping[int, bytes], address: int) -> Packet:
-    """Writes to the same addresses of several devices, which all obey at once and do not answer.
+    """Writes to the same addresses of several devices, which all act at once and do not answer.
 
-    Raises ProtocolError unless all values are of one length.
+    Raises ProtocolError unless all values have the same length.
     """
     lengths = {len(value) for value in values.values()}
     if len(lengths) != 1:
@@ -70,18 +70,18 @@ def sync_write(values: Mapping[int, bytes], address: int) -> Packet:
 
 
 def bulk_read(areas: Mapping[int, tuple[int, int]]) -> Packet:
-    """Asks each device for an area of its own: address and number of bytes."""
+    """Reads a separate area of each device: address and number of bytes."""
     parameters = b"".join(struct.pack("<BHH", device, *area) for device, area in areas.items())
     return Packet(BROADCAST, Instruction.BULK_READ, parameters)
 
 
 def status(device: int, data: bytes = b"", error: int = 0, *, alert: bool = False) -> Packet:
-    """A device's answer."""
+    """Returns a device's answer."""
     return Packet(device, STATUS, bytes((error | (ALERT if alert else 0),)) + data)
 
 
 def areas_read(packet: Packet) -> Sequence[tuple[int, int, int]]:
-    """(device, address, number of bytes) of a Read, Sync Read or Bulk Read, in the order of the answers.
+    """Returns (device, address, number of bytes) of a Read, Sync Read or Bulk Read, in the order of the answers.
 
     Raises ProtocolError for parameters of another length.
     """
@@ -99,7 +99,7 @@ def areas_read(packet: Packet) -> Sequence[tuple[int, int, int]]:
 
 
 def areas_written(packet: Packet) -> Sequence[tuple[int, int, bytes]]:
-    """(device, address, bytes) of a Write, Reg Write, Sync Write or Bulk Write, in order.
+    """Returns (device, address, bytes) of a Write, Reg Write, Sync Write or Bulk Write, in order.
 
     Raises ProtocolError for parameters of another length.
     """

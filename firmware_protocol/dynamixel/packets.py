@@ -1,10 +1,10 @@
-"""Packets of Protocol 2.0: bytes that are stuffed, counted and guarded by a CRC, and back.
+"""Packets of Protocol 2.0: encodes and decodes them, with stuffing, length and CRC.
 
     FF FF FD 00 | ID | length low, high | instruction | parameters … | CRC low, high
 
-`length` counts what follows it. A header cannot stand inside a packet: after each FF FF FD from the instruction on, one
-FD is put in, before length and CRC are computed. The CRC is CRC-16 with polynomial 8005 (start 0, bits not reflected)
-over everything before it. A status packet has the instruction 55, and its first parameter is the error.
+`length` counts the bytes after it. A header cannot occur inside a packet: after each FF FF FD from the instruction on,
+an FD is inserted, before length and CRC are computed. The CRC is CRC-16 with polynomial 8005 (start 0, bits not
+reflected) over everything before it. A status packet has the instruction 55, and its first parameter is the error.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ HEADER = b"\xff\xff\xfd\x00"
 _PATTERN = b"\xff\xff\xfd"
 STATUS = 0x55
 BROADCAST = 0xFE
-"""ID that every device obeys; none answers to it, except a ping, a Sync Read and a Bulk Read."""
+"""ID that every device obeys. None answers to it, except to a ping, a Sync Read and a Bulk Read."""
 LARGEST_ID = 252
 _BEFORE_LENGTH = 7
 """Bytes up to and including the length."""
 SHORTEST = 3
 """Smallest length: an instruction without parameters, and the CRC."""
 LONGEST = 2048
-"""Largest length that the decoder believes: every servo of the X series is read whole with a third of it."""
+"""Largest length that the decoder accepts: a whole servo of the X series takes a third of it."""
 OVERHEAD = 10
 """Bytes of a packet beside its parameters: header, ID, length, instruction, CRC."""
 ALERT = 0x80
@@ -48,12 +48,12 @@ class Packet:
 
     @property
     def error(self) -> int:
-        """The error of a status packet; 0 where there is none."""
+        """The error of a status packet; 0 if there is none."""
         return self.parameters[0] if self.instruction == STATUS and self.parameters else 0
 
     @property
     def data(self) -> bytes:
-        """What a status packet says beside its error."""
+        """The data of a status packet, without its error."""
         return self.parameters[1:]
 
 
@@ -77,12 +77,12 @@ def crc16(data: bytes) -> int:
 
 
 def stuff(content: bytes) -> bytes:
-    """Instruction and parameters with an FD after each FF FF FD."""
+    """Returns instruction and parameters with an FD after each FF FF FD."""
     return content.replace(_PATTERN, _PATTERN + b"\xfd")
 
 
 def unstuff(content: bytes) -> bytes:
-    """What `stuff` was given. Raises ProtocolError for an FF FF FD without its FD, which no sender may send."""
+    """Inverse of `stuff`. Raises ProtocolError for an FF FF FD without its FD, which no sender may send."""
     found = content.replace(_PATTERN + b"\xfd", _PATTERN)
     if stuff(found) != content:
         raise ProtocolError("byte stuffing broken: FF FF FD without FD inside a packet")
@@ -90,7 +90,7 @@ def unstuff(content: bytes) -> bytes:
 
 
 def encode(packet: Packet) -> bytes:
-    """The bytes of a packet. Raises ProtocolError for one that is too long."""
+    """Returns the bytes of a packet. Raises ProtocolError if it is too long."""
     content = stuff(bytes((packet.instruction,)) + packet.parameters)
     length = len(content) + 2
     if length > LONGEST:
@@ -101,31 +101,31 @@ def encode(packet: Packet) -> bytes:
 
 @dataclass
 class PacketDecoder:
-    """Finds packets in a stream, however it is cut. What is no packet is thrown away and counted."""
+    """Finds packets in a stream, however it is split. Other bytes are discarded and counted."""
 
     damaged: int = 0
     _buffer: bytearray = field(default_factory=bytearray)
 
     def feed(self, data: bytes) -> list[Packet]:
-        """The packets that `data` completes, in order."""
+        """Returns the packets that `data` completes, in order."""
         self._buffer += data
         found: list[Packet] = []
         while self._to_header() and (whole := self._whole()) is not None:
             packet = _parsed(whole)
             if packet is None:
                 self.damaged += 1
-                del self._buffer[:1]  # a true header may stand inside what only looked like a packet
+                del self._buffer[:1]  # a true header may be inside what only looked like a packet
             else:
                 found.append(packet)
                 del self._buffer[: len(whole)]
         return found
 
     def reset(self) -> None:
-        """Forgets an unfinished packet."""
+        """Discards an unfinished packet."""
         self._buffer.clear()
 
     def _to_header(self) -> bool:
-        """Drops what stands before the next header; whether there is one."""
+        """Drops the bytes before the next header. Returns whether there is one."""
         start = self._buffer.find(HEADER)
         if start < 0:  # the end may be the beginning of a header
             kept = next((n for n in range(len(HEADER) - 1, 0, -1) if self._buffer.endswith(HEADER[:n])), 0)
@@ -136,7 +136,7 @@ class PacketDecoder:
         return len(self._buffer) >= len(HEADER)
 
     def _whole(self) -> bytes | None:
-        """The bytes of the packet that the buffer begins with; None until all are there."""
+        """Returns the bytes of the packet at the start of the buffer; None until it is complete."""
         if len(self._buffer) < _BEFORE_LENGTH:
             return None
         length = int.from_bytes(self._buffer[5:7], "little")
@@ -147,7 +147,7 @@ class PacketDecoder:
 
 
 def _parsed(whole: bytes) -> Packet | None:
-    """The packet in these bytes; None when they are none."""
+    """Returns the packet in these bytes; None if they are none."""
     if len(whole) < OVERHEAD or crc16(whole[:-2]) != int.from_bytes(whole[-2:], "little"):
         return None
     try:

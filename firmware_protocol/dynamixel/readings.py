@@ -1,4 +1,4 @@
-"""What a bench of servos says: a servo's registers, its settings, and what is wrong with it."""
+"""State of a bench of servos: a servo's registers, its settings, and its errors."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from firmware_protocol.wide import WideReading
 
 FIRST, LAST = Table.TORQUE_ENABLE, Table.PRESENT_POSITION
 BLOCK = (FIRST.address, LAST.address + LAST.size - FIRST.address)
-"""Address and number of bytes of what is read of a servo at a time."""
+"""Address and number of bytes that are read from a servo at a time."""
 WHOLE = (0, LAST.address + LAST.size)
-"""The same with the settings that are kept without a supply, read once a connection."""
+"""The same including the settings that survive without supply; read once per connection."""
 GAINS = (Table.POSITION_D_GAIN.address, 6)
 """Gains D, I and P."""
 STOP_MARK = 1
-"""Bus Watchdog (20 ms) that a stop writes: the servos refuse goals as soon as the bus is silent for so long, until
-somebody writes 0. No run uses this value, so it tells every host that the bench has been stopped."""
+"""Bus Watchdog (20 ms) written by a stop: the servos refuse goals once the bus has been silent for so long, until 0 is
+written. No run uses this value, so it shows every host that the bench was stopped."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Servo:
 
     @classmethod
     def of(cls, block: bytes) -> Servo:
-        """From the bytes of BLOCK."""
+        """Decodes the bytes of BLOCK."""
         value = {item: item.of(block, BLOCK[0]) for item in _READ}
         return cls(
             torque=value[Table.TORQUE_ENABLE] == 1,
@@ -53,7 +53,8 @@ class Servo:
 
     @property
     def reading(self) -> WideReading:
-        """For the driver: goal, position and error in counts of 1/4096 turn, power in steps of the PWM."""
+        """Returns the reading for the driver: goal, position and error in counts of 1/4096 turn, power in steps of the
+        PWM."""
         return WideReading(self.goal, self.position, self.goal - self.position, self.pwm)
 
 
@@ -70,7 +71,7 @@ _READ = (
 
 @dataclass(frozen=True)
 class ServoSettings:
-    """What a servo keeps without a supply, as far as it decides whether it can be driven."""
+    """Settings of a servo that survive without supply, as far as they decide whether it can be driven."""
 
     simulated: bool
     drive: int
@@ -80,7 +81,7 @@ class ServoSettings:
 
     @classmethod
     def of(cls, whole: bytes) -> ServoSettings:
-        """From the bytes of WHOLE."""
+        """Decodes the bytes of WHOLE."""
         information = whole[Table.MODEL_INFORMATION.address :][: Table.MODEL_INFORMATION.size]
         return cls(
             simulated=information == SIMULATED,
@@ -91,7 +92,7 @@ class ServoSettings:
         )
 
     def unfit(self) -> str:
-        """Why it cannot be driven; empty where it can."""
+        """Why it cannot be driven; empty if it can."""
         if self.mode != POSITION_MODE:
             return f"is in operating mode {self.mode}, position control ({POSITION_MODE}) is needed"
         if self.drive & TORQUE_ON_BY_GOAL:
@@ -100,10 +101,10 @@ class ServoSettings:
 
 
 SIMULATED = b"MOCK"
-"""Model Information of a servo that has no motor behind it."""
+"""Model Information of a servo without a motor."""
 
 
 def faults(servos: dict[int, Servo]) -> str:
-    """The servos that report a hardware error, in words; empty where none does."""
+    """Returns the servos that report a hardware error, in words; empty if none does."""
     bad = [f"servo {device} reports {in_words(one.error)}" for device, one in servos.items() if one.error]
     return "; ".join(bad)

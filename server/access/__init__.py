@@ -1,1 +1,1 @@
-"""Access control: tokens, roles, one-time tickets, limits, and protection from requests of other pages in a browser."""
+"""Access control: tokens, roles, one-time tickets, limits, and protection from requests of other web pages."""

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Caller:
-    """A person or program that sends requests. `name` is their token's name; `local` for a user of this computer
-    without a token.
+    """A person or program that sends requests. `name`: name of its token; `local` for a user of this computer without a
+    token.
 
-    token:   hash of the token, or of the session's secret, with which they were admitted; None if none was needed
-    expires: when their session ends; None for everybody without one
+    token:   hash of the token, or of the session's secret, that was accepted; None if none was needed
+    expires: end of the session; None without a session
     """
 
     name: str
@@ -30,20 +30,21 @@ class Caller:
 
     @property
     def may_operate(self) -> bool:
-        """Whether they may change something."""
+        """Whether the caller may change anything."""
         return self.role != "viewer"
 
     def owns(self, owners: Collection[str]) -> bool:
-        """Whether they are an owner of an arm whose configuration names `owners`; without names, every owner is one."""
+        """Whether the caller is an owner of an arm whose configuration names `owners`; without names, every owner is
+        one."""
         return self.role == "admin" or (self.role == "owner" and (not owners or self.name in owners))
 
 
 LOCAL = Caller("local", "owner")
-"""A user of this computer: they reach a service on loopback without a token and without a proxy."""
+"""A user of this computer, who reaches a service on loopback without a token and without a proxy."""
 
 
 def caller_of(connection: HTTPConnection) -> Caller | None:
-    """Returns the caller that the gate has admitted; None for an anonymous request."""
+    """Returns the caller accepted by the gate; None for an anonymous request."""
     found: Caller | None = getattr(connection.state, "caller", None)
     return found
 
@@ -55,7 +56,7 @@ def token_needed() -> ProblemError:
 
 
 def require_viewer(connection: HTTPConnection) -> Caller:
-    """Returns the caller, who may see the robot. Raises a 401."""
+    """Returns the caller, who may see the robot. Raises a 401 otherwise."""
     caller = caller_of(connection)
     if caller is None:
         raise token_needed()
@@ -63,7 +64,7 @@ def require_viewer(connection: HTTPConnection) -> Caller:
 
 
 def require_operator(connection: HTTPConnection) -> Caller:
-    """Returns the caller, who may change something. Raises a 401 or a 403."""
+    """Returns the caller, who may make changes. Raises a 401 or a 403 otherwise."""
     caller = require_viewer(connection)
     if not caller.may_operate:
         line = f"{caller.name} may look, and stop the robot; this needs the role operator"

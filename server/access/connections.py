@@ -1,7 +1,8 @@
-"""Limits before a caller is known: the number of connections, and the length of a request's address and headers.
+"""Limits that apply before the caller is known: the number of connections, and the size of a request's address and
+headers.
 
-Connections use up the open files that the process also needs for stop sockets, database and traces. And uvicorn's
-parser keeps every header of a request, however many there are, before the gate sees the request.
+Connections use open files, which the process also needs for stop sockets, database and traces. uvicorn's parser would
+store any number of headers before the gate sees the request.
 """
 
 from __future__ import annotations
@@ -16,24 +17,24 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from server.problems import MEDIA_TYPE, ProblemError, details_of
 
 MOST_CONNECTIONS = 500
-"""Largest number of connections: half of the files that a process may open by default (1024); fewer where it may open
-fewer (`server.steady`)."""
+"""Most connections: half of the files that a process may open by default (1024); fewer if it may open fewer
+(`server.steady`)."""
 MOST_HEADERS = 100
-"""Largest number of headers of one request. Browsers send some twenty."""
+"""Most headers of one request. Browsers send about twenty."""
 LARGEST_HEAD = 32 << 10
-"""Largest size of a request's address and headers together, in bytes."""
+"""Largest size (bytes) of a request's address and headers together."""
 LINGER = 1.0
-"""Time (s) for which a refused connection may go on sending."""
+"""Time (s) for which a refused connection may still send."""
 LONGEST_ADDRESS = 8 << 10
-"""Largest size of a request's address (URL) in bytes: a cursor, a search and all filters need less than 1 kB."""
+"""Largest size (bytes) of a request's address (URL): a cursor, a search and all filters need less than 1 kB."""
 
 
 class Connection(HttpToolsProtocol):
-    """uvicorn's connection, within the limits above.
+    """uvicorn's connection with the limits above.
 
-    If there are too many connections, one without a request under way is closed for the new one; if all have one, the
-    new one is closed. A request whose head (address and headers) is too large is answered with a 414 or 431 as soon as
-    that is known, and its connection is closed.
+    If there are too many connections, an idle one is closed for the new one; if none is idle, the new one is closed. A
+    request with too large a head (address and headers) gets a 414 or 431 as soon as this is known, and its connection
+    is closed.
     """
 
     most = MOST_CONNECTIONS
@@ -44,9 +45,10 @@ class Connection(HttpToolsProtocol):
     _head = 0
     """Number of bytes of this request's head that the parser has reported."""
     _untold = 0
-    """Number of bytes received of the head, reported or not: the parser reports a header only when it has ended."""
+    """Number of bytes received of the head. The parser reports a header only when it is complete."""
     _silent = 0
-    """Number of bytes since the parser's last report: it keeps a trailer after the body until that has ended."""
+    """Number of bytes since the parser's last report: it stores a trailer after the body until the trailer is
+    complete."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Accepts a connection, or closes one if there are too many."""
@@ -59,11 +61,11 @@ class Connection(HttpToolsProtocol):
 
     @property
     def asks_nothing(self) -> bool:
-        """Whether no request is under way."""
+        """Whether no request is in progress."""
         return self.cycle is None or self.cycle.response_complete
 
     def data_received(self, data: bytes) -> None:
-        """Parses data, and refuses a head that is too large. Data after a refusal is ignored."""
+        """Parses data, and refuses too large a head. Data after a refusal is ignored."""
         if self._refusal is not None:
             return
         if self._reading_head:
@@ -76,15 +78,15 @@ class Connection(HttpToolsProtocol):
         super().data_received(data)
 
     def on_message_begin(self) -> None:
-        """Resets the counts at the beginning of a request, and notes when it arrived: from here on it may wait for its
-        other bytes, for the request before it on this connection, and for a thread."""
+        """Resets the counts at the start of a request, and notes its arrival time. After that, the request may wait for
+        its remaining bytes, for the previous request on this connection, and for a thread."""
         self._silent = 0
         super().on_message_begin()
         self.scope["state"]["arrived"] = time.monotonic()
         self._reading_head, self._headers, self._head, self._untold = True, 0, 0, 0
 
     def on_url(self, url: bytes) -> None:
-        """Counts a part of the address. Raises ProblemError, which the parser turns into an error of its own."""
+        """Counts a part of the address. Raises ProblemError, which the parser converts to its own error."""
         super().on_url(url)
         if len(self.url) > LONGEST_ADDRESS:
             line = f"the address has more than {LONGEST_ADDRESS >> 10} kB"
@@ -123,8 +125,8 @@ class Connection(HttpToolsProtocol):
         )
         self.transport.write(head.encode() + content)
         if self.cycle is not None:
-            self.cycle.disconnected = True  # the answer to an earlier request can no longer be sent
-        # Data still under way is read and discarded; otherwise the system would discard this answer with it.
+            self.cycle.disconnected = True  # the response to an earlier request can no longer be sent
+        # Read and discard data still under way; otherwise the system would discard this response too.
         self.loop.call_later(LINGER, self.transport.close)
 
     def _count(self, size: int) -> None:

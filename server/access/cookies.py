@@ -1,7 +1,7 @@
-"""The cookies of people who sign in. Pure, without web framework and database: the stop listener uses them, too.
+"""Cookies of signed-in people. Pure, without web framework and database, since the stop listener uses them too.
 
-Browsers do not tell the ports of a host apart in cookies. So the names have the port at which people reach the service:
-two services on one host name then keep their sessions apart.
+Browsers do not distinguish the ports of a host in cookies. The cookie names therefore contain the port at which people
+reach the service, which separates the sessions of two services on one host.
 """
 
 from __future__ import annotations
@@ -12,21 +12,21 @@ from urllib.parse import urlsplit
 from server.access.origin import DEFAULT_PORTS
 
 TLS_PREFIX = "__Host-"
-"""Beginning of a name that browsers take from its host over TLS only. On loopback, names are without it."""
+"""Prefix of a cookie name that browsers accept from its host over TLS only. On loopback, names have no prefix."""
 SESSION, SIGN_IN = "daq-session", "daq-sign-in"
 STOPS_FOR = 3600.0
-"""Time (s) for which an ended session still stops the robot, and nothing else: nobody shall find at the wrong moment
-that they must sign in again. A session that somebody has left stops nothing."""
+"""Time (s) for which an ended session may still stop the robot, and nothing else: nobody must find at the wrong moment
+that they have to sign in again. After signing out, a session stops nothing."""
 
 
 def session_cookie(address: str | None) -> str:
-    """Returns the name of the session's cookie. `address`: where people reach the service (`server.address`);
-    None where nobody signs in."""
+    """Returns the name of the session's cookie. `address`: where people reach the service (`server.address`); None if
+    nobody signs in."""
     return _name(SESSION, address)
 
 
 def sign_in_cookie(address: str | None) -> str:
-    """Returns the name of the cookie that ties an answer of the provider to the browser that asked."""
+    """Returns the name of the cookie that ties the provider's response to the browser that requested it."""
     return _name(SIGN_IN, address)
 
 
@@ -36,15 +36,15 @@ def is_over_tls(address: str | None) -> bool:
 
 
 def session_of(headers: Mapping[str, str], cookie: str) -> str:
-    """Returns the secret of the session in the cookie of this name; empty if there is none. `headers`: by name in lower
+    """Returns the session's secret in the cookie of this name; empty if there is none. `headers`: by name in lower
     case."""
     pairs = [one.strip().partition("=") for one in headers.get("cookie", "").split(";")]
     return {name: value for name, _, value in pairs}.get(cookie, "")
 
 
 def says_where_it_is_from(headers: Mapping[str, str]) -> bool:
-    """Whether a browser says which page a request is for. All do where a request changes something; a request with a
-    session that does not is none of our page's."""
+    """Whether a browser states which page a request is for. All browsers do this for requests that change something, so
+    a request with a session but without it does not come from our page."""
     return "origin" in headers or "sec-fetch-site" in headers
 
 

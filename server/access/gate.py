@@ -1,10 +1,8 @@
-"""The gate that every request passes: token, origin, rate and size limits, security headers.
+"""The gate for all requests: token, origin, rate and size limits, security headers.
 
-Turns of quick read requests, so that many at once do not delay anything else.
-
-The event loop runs every task that is ready once a round. With two hundred requests in one round, a stop, which needs
-several rounds, would wait for a thousand of them. So only a few are handled at a time and the others wait at no cost;
-all of them together take no longer.
+It also limits the number of quick read requests in progress, so that many of them delay nothing else. The event loop
+runs each ready task once per round. With two hundred requests in one round, a stop, which needs several rounds, would
+wait for a thousand of them. So only a few run at a time while the others wait at no cost; in total they take no longer.
 """
 
 from __future__ import annotations
@@ -46,31 +44,31 @@ from server.parts import Part
 from server.problems import ProblemError, of_damage, of_database, response
 
 AT_ONCE = 8
-"""Number of requests handled at the same time. They take 10 to 20 ms of one round of the event loop."""
+"""Number of requests in progress at the same time. They take 10 to 20 ms of one round of the event loop."""
 ASKS_THE_ROBOT = re.compile(r"/api/v1/robots/[^/]+/(gains|process)")
-"""Addresses whose answers wait for the robot. Their number is limited elsewhere, and they must not occupy turns."""
+"""Paths whose responses wait for the robot. Their number is limited elsewhere, and they must not occupy turns."""
 WAITS_FOR_AN_END = re.compile(r"/api/v1/robots/[^/]+/(experiments|jobs)/[^/]+")
-"""Addresses whose answer waits until something has ended, if the query has `wait`."""
+"""Paths whose response waits for an end, if the query has `wait`."""
 READY = "/readyz"
-"""The readiness check. It waits for disk and database; one check at a time answers all requests (`Readiness`)."""
+"""The readiness check, which waits for disk and database. One check at a time serves all requests (`Readiness`)."""
 
 
 class Turns:
-    """The turns of all requests. Use it on the event loop only."""
+    """The turns of all requests. For the event loop only."""
 
     def __init__(self) -> None:
         self._free = asyncio.Semaphore(AT_ONCE)
 
     async def taken(self, scope: Scope, send: Send) -> Turn:
-        """Waits for a turn, if this request needs one. The turn ends with the first byte of the answer, so that a slow
-        client does not occupy it."""
+        """Waits for a turn, if this request needs one. The turn ends with the first byte of the response, so that a
+        slow client does not occupy it."""
         turn = Turn(self._free if _is_plain_question(scope) else None, send)
         await turn.begin()
         return turn
 
 
 class Turn:
-    """The turn of one request. The answer is sent through `send`, which ends the turn."""
+    """The turn of one request. The response is sent through `send`, which ends the turn."""
 
     def __init__(self, free: asyncio.Semaphore | None, send: Send) -> None:
         self._free = free
@@ -82,19 +80,19 @@ class Turn:
             await self._free.acquire()
 
     def end(self) -> None:
-        """Ends the turn, so that the next request gets it."""
+        """Ends the turn, so that the next request gets one."""
         if self._free is not None:
             self._free.release()
             self._free = None
 
     async def send(self, message: Message) -> None:
-        """Ends the turn, and sends a message of the answer."""
+        """Ends the turn, and sends a message of the response."""
         self.end()
         await self._send(message)
 
 
 def _is_plain_question(scope: Scope) -> bool:
-    """Whether a request is quick: it changes nothing, stops nothing and waits for nothing."""
+    """Whether a request is a quick read: it changes nothing, stops nothing and does not wait."""
     path = scope["path"]
     if scope["method"] not in ("GET", "HEAD") or path == READY or ASKS_THE_ROBOT.fullmatch(path):
         return False
@@ -109,29 +107,29 @@ def _waits(query: bytes) -> bool:
 
 
 STOP = re.compile(r"/api/v1/(robots/[^/]+|fleet)/stop")
-"""Addresses of the stop, which no rate limit delays."""
+"""Paths of the stop, which no rate limit delays."""
 UPLOADS = re.compile(r"/api/v1/robots/[^/]+/(traces|models)")
-"""Addresses whose POST takes a file. Their routes limit its size themselves."""
+"""Paths whose POST contains a file. Their routes limit its size themselves."""
 PROGRAMS = re.compile(r"/api/v1/robots/[^/]+/(programs/[^/]+|teaching/program)")
 NOT_ALLOWED, TRY_LATER = 1008, 1013
 MOST_SOCKETS = 100
-"""Largest number of WebSockets of one caller, out of 500 connections."""
+"""Most WebSockets of one caller, out of 500 connections."""
 LOOK_EVERY = 1.0
 """Time (s) between two checks whether the token of an open WebSocket has been revoked."""
 STOP_WAITS = 0.2
-"""Time (s) for which a stop waits for the database to say that a token is still valid."""
+"""Longest wait (s) of a stop for the database to confirm that a token is valid."""
 log = logging.getLogger("server.access")
 
 
 @dataclass
 class Gate:
-    """Decides who a caller is and whether a request is admitted.
+    """Identifies the caller of a request, and decides whether the request is accepted.
 
-    open_on_loopback: whether users of this computer are operators without a token; the service listens on loopback only
-    stop_port:        the port of the stop listener, at which the page may request a stop, too
+    open_on_loopback: whether users of this computer are operators without a token; the service listens only on loopback
+    stop_port:        port of the stop listener, at which the page may request a stop too
     observed:         called with method, status and duration (s) of every request
-    refused:          called with the kind of problem of every request and WebSocket that is refused
-    cookie:           the name of the cookie of people who have signed in
+    refused:          called with the kind of problem of every refused request and WebSocket
+    cookie:           name of the cookie of signed-in people
     """
 
     tokens: KnownTokens
@@ -250,7 +248,7 @@ class Gate:
                     await WebSocketClose(NOT_ALLOWED, "this token was revoked")(scope, receive, send)
 
     async def _while_let_in(self, caller: Caller, serving: Awaitable[None]) -> bool:
-        """Serves until the connection ends (True), or until the caller's token is revoked (False)."""
+        """Serves until the connection ends (returns True), or until the caller's token is revoked (returns False)."""
         task = asyncio.ensure_future(serving)
         try:
             while not (await asyncio.wait({task}, timeout=self.look_every))[0]:
@@ -277,7 +275,7 @@ class Gate:
         if not _is_post(scope, STOP):
             self._count(caller, scope)
         if caller is None and changes and scope["type"] == "http":
-            raise token_needed()  # before any of the body is read, which the routes would do
+            raise token_needed()  # before the body is read, which the routes would do
         length = headers.get("content-length", "0")
         if not _is_post(scope, UPLOADS) and (not length.isdecimal() or int(length) > LARGEST_BODY):
             raise ProblemError(413, "too-large", f"a body may have {LARGEST_BODY >> 20} MB", "send less at once")
@@ -287,7 +285,7 @@ class Gate:
         kind, _, token = headers.get("authorization", "").partition(" ")
         if token and kind.lower() == "bearer":
             caller = await self._known(scope, token.strip())
-            if caller is None or caller.expires is not None:  # a session's secret is good as a cookie alone
+            if caller is None or caller.expires is not None:  # a session's secret is valid only as a cookie
                 line = "this token is not known, or was revoked"
                 raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name", (), _BEARER)
             return caller
@@ -313,19 +311,20 @@ class Gate:
         return local
 
     async def _of_session(self, scope: Scope, secret: str, *, needed: bool) -> Caller | None:
-        """Returns the person of a session. A stop that does not need the session waits for the database STOP_WAITS s at
-        most, and then counts whom it knew last: an old cookie must not delay or refuse it."""
+        """Returns the person of a session. A stop that does not need the session waits at most STOP_WAITS s for the
+        database, and then uses the last known person: an old cookie must not delay or refuse it."""
         if needed or not _is_post(scope, STOP):
             return await self._known(scope, secret)
         last = self.tokens.last_known(secret)
         reading = asyncio.ensure_future(self._known(scope, secret))
-        reading.add_done_callback(lambda done: done.cancelled() or done.exception())  # somebody has to take its error
+        # retrieve its error, so that asyncio does not report it
+        reading.add_done_callback(lambda done: done.cancelled() or done.exception())
         await asyncio.wait({reading}, timeout=STOP_WAITS)
         return reading.result() if reading.done() and reading.exception() is None else last
 
     async def _known(self, scope: Scope, token: str) -> Caller | None:
-        """Returns the caller of a token or a session's secret; None for an unknown one. A stop does not wait for the
-        database if that had the token when it was last read. Raises a 429 and a 503."""
+        """Returns the caller of a token or a session's secret; None if it is unknown. A stop does not wait for the
+        database if the token was in it at the last read. Raises a 429 and a 503."""
         known, caller = self.tokens.remembered(token)
         if known:
             return caller
@@ -337,11 +336,12 @@ class Gate:
         reading = asyncio.ensure_future(self._looked_up(token))
         if last is None or (await asyncio.wait({reading}, timeout=STOP_WAITS))[0]:
             return await reading
-        reading.add_done_callback(lambda done: done.cancelled() or done.exception())  # somebody has to take its error
+        # retrieve its error, so that asyncio does not report it
+        reading.add_done_callback(lambda done: done.cancelled() or done.exception())
         return last
 
     async def _looked_up(self, token: str) -> Caller | None:
-        """Looks a token up in the database. Raises a 503 if that has never been read."""
+        """Looks up a token in the database. Raises a 503 if the database has never been read."""
         try:
             return await asyncio.to_thread(self.tokens.look_up, token)
         except DamagedError as error:
@@ -365,7 +365,7 @@ class Gate:
 
 
 def _led(location: str, host: str, prefix: str) -> str:
-    """Returns an address of this service as a path below a proxy's prefix; any other address as it is."""
+    """Returns an address of this service as a path below a proxy's prefix; any other address unchanged."""
     for own in ("", f"http://{host}", f"https://{host}"):
         if location.startswith(f"{own}/"):
             return prefix + location.removeprefix(own)

@@ -1,4 +1,4 @@
-"""Security headers of every answer, by which browsers run and show only what this service has sent."""
+"""Security headers of every response: browsers then run and show only what this service has sent."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ API_PREFIX = "/api/"
 
 
 def secure(headers: MutableHeaders, path: str, stop_listener: str | None = None) -> None:
-    """Adds the security headers, and forbids caches to keep answers of the API. `stop_listener`: a second origin, at
+    """Adds the security headers, and forbids caches to store responses of the API. `stop_listener`: a second origin, at
     which the page may request a stop."""
     for name, value in SECURITY.items():
         headers.setdefault(name, value)

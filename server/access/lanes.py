@@ -1,7 +1,7 @@
-"""Lanes of expensive requests: reading a trace, planning a motion, searching. Use them on the event loop only.
+"""Limits expensive requests of each caller: reading a trace, planning a motion, searching. For the event loop only.
 
-Each caller may have a few requests in progress; their other requests wait without occupying a thread. So a caller with
-very many requests delays nobody else.
+Each caller may have a few such requests in progress; the caller's other ones wait without occupying a thread. So a
+caller with very many requests delays nobody else.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from server.problems import ProblemError
 
 AT_ONCE = 2
-"""Number of requests of one caller in progress, out of 40 threads. All users of this computer are one caller."""
+"""Most requests of one caller in progress, out of 40 threads. All users of this computer are one caller."""
 MOST_WAITING = 50
-"""Number of requests of one caller that may wait; a further one is a 429."""
+"""Most waiting requests of one caller; further ones get a 429."""
 WAIT_AT_MOST = 30.0
 """Longest wait (s); most programs have given up by then."""
 

@@ -8,16 +8,17 @@ from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
 REQUESTS_A_SECOND = 300.0
-"""Sustained rate of one caller at one address: three times the load with which the whole service was measured."""
+"""Sustained request rate (1/s) of one caller at one address: three times the load with which the service was
+measured."""
 AT_ONCE = 600.0
-"""Number of requests that one caller at one address may send at once."""
+"""Most requests that one caller at one address may send at once."""
 LARGEST_BODY = 16 << 20
-"""Largest body in bytes, enough for a recorded path of an hour."""
+"""Largest body (bytes), enough for a recorded path of an hour."""
 MOST_FIELDS, MOST_OF_A_PROGRAM = 20_000, 120_000
-"""Largest number of fields of a body. Each unknown one becomes an error, of 1 kB and 50 µs of the event loop. A
-sequence of 1000 moves has 12 000 fields, a program of 10 000 instructions for six joints 100 000."""
+"""Most fields of a body. Each unknown field becomes an error, of 1 kB and 50 µs of the event loop. A sequence of 1000
+moves has 12 000 fields, a program of 10 000 instructions for six joints 100 000."""
 MOST_REMEMBERED = 10_000
-"""Number of buckets beyond which full ones are forgotten."""
+"""Number of buckets above which full ones are deleted."""
 
 
 @dataclass
@@ -58,7 +59,7 @@ class Buckets:
         return bucket.take(now)
 
     def _forget_full(self, now: float) -> None:
-        """Removes buckets that are full again, since a new one is full, too."""
+        """Removes full buckets: a new one would be full too."""
         self._buckets = {k: b for k, b in self._buckets.items() if b.level + (now - b.at) * b.rate < b.size}
 
 
@@ -74,7 +75,7 @@ def counted(receive: Receive, largest: int, most: int = MOST_FIELDS) -> Receive:
             size += len(body)
             if size > largest:
                 raise HTTPException(413, f"a body may have {largest >> 20} MB")
-            fields += body.count(b":")  # each field of JSON has one; in texts they are few
+            fields += body.count(b":")  # each JSON field has one colon; in texts they are rare
             if fields > most:
                 raise HTTPException(413, f"a body may have {most} fields")
         return message

@@ -1,8 +1,8 @@
-"""Recognises requests that a browser sends on behalf of another page. Pure.
+"""Detects requests that a browser sends on behalf of another page. Pure.
 
-A page from elsewhere can make a browser send requests here. It cannot hide its origin in requests that change
-something. Nor can it hide the name by which it reached this service, if it uses a name of its own that it lets point to
-this computer (DNS rebinding).
+A foreign page can make a browser send requests here. It cannot hide its origin in requests that change something. It
+also cannot hide the name by which it reached this service, even if it makes its own name point to this computer (DNS
+rebinding).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ DEFAULT_PORTS = {"http": 80, "https": 443}
 PREFIX = re.compile(r"(/[A-Za-z0-9._~-]{1,64}){1,8}")
 LOOPBACK_NAMES = ("localhost", "localhost.localdomain")
 HANDED_ON = ("forwarded", "via", "x-real-ip")
-"""Headers that a proxy adds, besides all that begin with X-Forwarded-."""
+"""Headers that a proxy adds, besides all X-Forwarded-…."""
 
 
 def is_loopback(host: str) -> bool:
-    """Whether an address or name is this computer's own."""
+    """Whether an address or name is this computer's loopback."""
     if host in LOOPBACK_NAMES:
         return True
     try:
@@ -40,21 +40,21 @@ def name_of(host_header: str) -> str:
 
 
 def prefix_of(headers: Mapping[str, str]) -> str:
-    """Returns the path below which a proxy serves this service, without a slash at its end; mostly empty."""
+    """Returns the path below which a proxy serves this service, without a final slash; usually empty."""
     given = headers.get("x-forwarded-prefix", "").rstrip("/")
     return given if PREFIX.fullmatch(given) else ""
 
 
 def is_known_name(host_header: str, names: Collection[str], *, loopback_only: bool) -> bool:
-    """Whether a Host header names this service: by a loopback name or address, by one of `names`, or, unless the
-    service listens on loopback only, by an address, or by any name if there are no `names`."""
+    """Whether a Host header names this service. Accepted are loopback names and addresses, and `names`; unless the
+    service listens only on loopback, also any address, and any name if there are no `names`."""
     name = name_of(host_header)
     if is_loopback(name) or name in names:
         return True
     if loopback_only:
         return False
     if not names:
-        return True  # tokens keep strangers out, and no browser adds one by itself
+        return True  # tokens keep strangers out, and no browser adds a token by itself
     try:
         ipaddress.ip_address(name)
     except ValueError:
@@ -63,16 +63,16 @@ def is_known_name(host_header: str, names: Collection[str], *, loopback_only: bo
 
 
 def is_this_computers_user(headers: Mapping[str, str]) -> bool:
-    """Whether a request that came over loopback is from this computer: it names a loopback host, and has no header of
-    a proxy, nor the origin of a page that came by one. `headers`: by name in lower case."""
+    """Whether a request over loopback is from this computer: it names a loopback host, and has neither a proxy's header
+    nor the origin of a page behind a proxy. `headers`: by name in lower case."""
     proxied = any(name in HANDED_ON or name.startswith("x-forwarded-") for name in headers)
     page = place_of(headers.get("origin", "http://localhost"))
     return is_loopback(name_of(headers.get("host", ""))) and not proxied and page is not None and is_loopback(page[0])
 
 
 def beside(host_header: str, port: int) -> str | None:
-    """Returns the origin at another port of the same host, under the name in the Host header; None if that is not
-    valid."""
+    """Returns the origin at another port of the same host, under the name in the Host header; None if the header is
+    invalid."""
     name = name_of(host_header)
     if ":" in name:
         name = f"[{name}]"
@@ -80,7 +80,7 @@ def beside(host_header: str, port: int) -> str | None:
 
 
 def place_of(origin: str) -> tuple[str, int] | None:
-    """Returns name and port of an origin, which leaves out the usual port of its scheme; None if it has none."""
+    """Returns name and port of an origin, which omits the default port of its scheme; None if it has none."""
     try:
         page = urlsplit(origin)
         port = page.port or DEFAULT_PORTS.get(page.scheme)
@@ -90,10 +90,10 @@ def place_of(origin: str) -> tuple[str, int] | None:
 
 
 def is_from_elsewhere(headers: Mapping[str, str], names: Collection[str] = (), *, changes_something: bool) -> bool:
-    """Whether a browser sends this for a page of another origin. Programs other than browsers send no origin.
+    """Whether a browser sends this request for a page of another origin. Programs other than browsers send no origin.
 
-    Where a proxy has put another name into Host, the page's own must be one of the service's `names`, at the usual port
-    of http or https: other ports of a name may be other people's.
+    If a proxy has replaced the name in Host, the page's own name must be one of the service's `names`, at the default
+    port of http or https: other ports of a name may belong to other people.
     """
     if not changes_something:
         return False

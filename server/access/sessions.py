@@ -1,6 +1,6 @@
-"""Sessions of people who have signed in: in the database, so that they outlast a restart, as hashes like tokens.
+"""Sessions of signed-in people, stored in the database as hashes like tokens, so that they survive a restart.
 
-Tells plug-ins what a command on the service's own computer changes, beside the service.
+`note_command` informs plug-ins of changes by commands on the service's computer.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from server.store.tables import SessionRow
 def note_command(
     session: Session, at: datetime, by: str, action: str, command: str, subject: str, detail: str = ""
 ) -> None:
-    """Tells plug-ins, within the transaction that makes the change. `by`: who does it."""
+    """Informs plug-ins within the transaction that makes the change. `by`: name of the user who makes it."""
     said = {"actor": by, "action": action, "request": command, "subject": subject, "detail": detail}
     note = AuditNote(at=at, origin="command line", outcome="done", **said)
     for plugin in plugins():
@@ -34,7 +34,7 @@ def note_command(
 
 
 class SessionStore:
-    """Sessions of people whom a plug-in has let in."""
+    """Sessions of people accepted by a plug-in."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -42,8 +42,8 @@ class SessionStore:
     def begin(
         self, name_of: Callable[[Session], str], role: Role, now: datetime, lasts: timedelta
     ) -> tuple[str, Caller]:
-        """Begins a session, and returns its secret, which is shown to nobody else, with its caller. `name_of` returns
-        the person's name, within the same transaction."""
+        """Begins a session. Returns its secret, which nobody else sees, and its caller. `name_of` returns the person's
+        name within the same transaction."""
         secret = secrets.token_urlsafe(32)
         with self._store.writing() as session:
             session.execute(delete(SessionRow).where(SessionRow.expires < now - timedelta(seconds=STOPS_FOR)))
@@ -58,7 +58,7 @@ class SessionStore:
             session.execute(delete(SessionRow).where(SessionRow.digest == digest))
 
     def end_all(self, name: str, now: datetime, by: str = "unknown") -> int:
-        """Ends all sessions of a person, and returns how many there were. `by`: who does it."""
+        """Ends all sessions of a person, and returns their number. `by`: name of the user who ends them."""
         with self._store.writing() as session:
             rows = list(session.scalars(select(SessionRow).filter_by(name=name)))
             for row in rows:
@@ -74,7 +74,7 @@ class SessionStore:
             return [_caller(row) for row in session.scalars(query)]
 
     def callers(self, now: datetime) -> dict[str, Caller]:
-        """Returns the callers of all sessions by digest, also of those that have ended and may only stop the robot."""
+        """Returns the callers of all sessions by digest, including ended ones that may still stop the robot."""
         query = select(SessionRow).where(SessionRow.expires > now - timedelta(seconds=STOPS_FOR))
         with self._store.reading() as session:
             return {row.digest: _caller(row) for row in session.scalars(query)}

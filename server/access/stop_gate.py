@@ -1,4 +1,4 @@
-"""The gate of the stop listener. It has the rules of the service's gate, and is called on the request's thread."""
+"""The gate of the stop listener. It follows the rules of the service's gate, and is called on the request's thread."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from server.problems import ProblemError
 
 
 class TokensCannotBeReadError(Exception):
-    """The database has not been read, so it is not known who may stop the robot."""
+    """The database has not been read, so it is unknown who may stop the robot."""
 
 
 class Tokens(Protocol):
@@ -30,8 +30,8 @@ class Tokens(Protocol):
 
 @dataclass(frozen=True)
 class StopGate:
-    """Admits everybody who may see the robot. `service_port`: the port of the service's page, which may request a stop,
-    too. `cookie`: the name of the cookie of people who have signed in."""
+    """Accepts everybody who may see the robot. `service_port`: port of the service's page, which may request a stop
+    too. `cookie`: name of the cookie of signed-in people."""
 
     tokens: Tokens
     open_on_loopback: bool
@@ -56,7 +56,7 @@ class StopGate:
             except TokensCannotBeReadError:
                 if not local:
                     raise
-                caller = None  # an old cookie must not refuse a stop that needs none
+                caller = None  # an old cookie must not prevent a stop that needs no session
             if caller is not None:
                 return caller
             if local:
@@ -70,7 +70,7 @@ class StopGate:
         return caller
 
     def _of_session(self, headers: Mapping[str, str]) -> Caller | None:
-        """Returns the person who has signed in. Their request must come from the page."""
+        """Returns the signed-in person. The request must come from the page."""
         secret = session_of(headers, self.cookie)
         return self._known(secret) if secret and says_where_it_is_from(headers) else None
 

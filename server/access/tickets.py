@@ -1,4 +1,5 @@
-"""One-time tickets for WebSockets. A browser cannot add a header to one, and a token in its address would be logged."""
+"""One-time tickets for WebSockets. A browser cannot add a header to a WebSocket request, and a token in its address
+would be logged."""
 
 from __future__ import annotations
 
@@ -10,9 +11,9 @@ from server.access.caller import Caller
 from server.clock import Clock
 
 GOOD_FOR = 30.0
-"""Time (s) for which a ticket is valid; a page opens its WebSocket at once."""
+"""Time (s) for which a ticket is valid; a page uses it at once."""
 MOST = 100
-"""Largest number of tickets that are kept of a caller, who may have as many WebSockets."""
+"""Most tickets stored per caller, who may have as many WebSockets."""
 
 
 class Tickets:
@@ -24,7 +25,7 @@ class Tickets:
         self._given: dict[str, tuple[Caller, float]] = {}
 
     def give(self, caller: Caller) -> Ticket:
-        """Issues a new ticket for `caller`. Their own oldest are dropped if they have too many."""
+        """Issues a new ticket for `caller`. If the caller has too many, the oldest are dropped."""
         ticket = secrets.token_urlsafe(24)
         with self._lock:
             now = self._clock.monotonic()
@@ -36,7 +37,7 @@ class Tickets:
         return Ticket(ticket=ticket, seconds=GOOD_FOR)
 
     def take(self, ticket: str) -> Caller | None:
-        """Returns the owner of a ticket, and uses it up; None if the ticket is unknown, used or too old."""
+        """Returns the owner of a ticket, which is then invalid; None if the ticket is unknown, used or too old."""
         with self._lock:
             found = self._given.pop(ticket, None)
         if found is None or found[1] <= self._clock.monotonic():

@@ -1,4 +1,4 @@
-"""Tokens: long random words that are shown once and stored as their SHA-256.
+"""Tokens: long random texts, shown once and stored as their SHA-256.
 
 They have 256 random bits and cannot be guessed, so a plain hash is enough.
 """
@@ -27,20 +27,20 @@ from server.store.engine import Store
 from server.store.tables import TokenRow
 
 PREFIX = "daq_"
-"""Prefix of every token, by which a token published by mistake is recognised."""
+"""Prefix of every token, by which a token published by mistake can be recognised."""
 REMEMBERED_FOR = 2.0
 """Time (s) after which a token is looked up again, so that a revoked one is refused."""
 UNKNOWN_FOR = 0.2
-"""Time (s) after which an unknown token is looked up again, so that a new one can be used soon, and guessing causes at
-most five reads of the database per second."""
+"""Time (s) after which an unknown token is looked up again, so that a new token works soon. Guessing causes at most
+five reads of the database per second."""
 CANNOT_BE_READ = (SQLAlchemyError, DamagedError)
-"""Errors that mean that the tokens cannot be read from the database."""
+"""Errors of reading the tokens from the database."""
 log = logging.getLogger("server.access")
 
 
 @dataclass(frozen=True)
 class TokenInfo:
-    """What the database holds about a token."""
+    """A token's row in the database, without its hash."""
 
     name: str
     role: Role
@@ -49,14 +49,14 @@ class TokenInfo:
 
 
 class TokenStore:
-    """Tokens in the database; `callers` has the sessions of people, too."""
+    """Tokens in the database; `callers` also includes people's sessions."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
         self._sessions = SessionStore(store)
 
     def add(self, name: str, role: Role, now: datetime, by: str = "unknown") -> str:
-        """Makes a new token and returns it; it cannot be shown again. `by`: who makes it. Raises
+        """Makes a new token and returns it; it cannot be shown again. `by`: name of the user who makes it. Raises
         SpecError if the name is taken."""
         if name == LOCAL.name:
             raise SpecError(f"token {name!r}: users of this computer have this name; choose another one")
@@ -70,8 +70,8 @@ class TokenStore:
         return token
 
     def revoke(self, name: str, now: datetime, by: str = "unknown") -> None:
-        """Revokes a token; its name stays taken. `by`: who does it. Raises SpecError if there is no
-        token of this name."""
+        """Revokes a token; its name stays taken. `by`: name of the user who revokes it. Raises SpecError if there is no
+        such token."""
         with self._store.writing() as session:
             row = session.scalar(select(TokenRow).filter_by(name=name))
             if row is None:
@@ -86,14 +86,14 @@ class TokenStore:
             return [TokenInfo(row.name, role_of(row.role), row.created, row.revoked) for row in rows]
 
     def callers(self, now: datetime) -> dict[str, Caller]:
-        """Returns the caller of each token that is not revoked, by the token's digest, and of each session that may at
-        least stop the robot. Of tokens it reads no other columns, so that a damaged time keeps nobody out."""
+        """Returns the callers by digest of all valid tokens, and of all sessions that may at least stop the robot.
+        Reads no other columns of tokens, so that a damaged time locks nobody out."""
         with self._store.reading() as session:
             rows = session.execute(select(TokenRow.digest, TokenRow.name, TokenRow.role).filter_by(revoked=None))
             tokens = {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
         try:
             return tokens | self._sessions.callers(now)
-        except CANNOT_BE_READ:  # damaged sessions take nobody's token
+        except CANNOT_BE_READ:  # damaged sessions must not invalidate tokens
             log.exception("sessions cannot be read")
             return tokens
 
@@ -107,8 +107,7 @@ class _Known:
 
 
 class KnownTokens:
-    """The valid tokens, kept in memory, so that the database is read seldom however many tokens are tried. Safe to use
-    from any thread."""
+    """The valid tokens in memory, so that trying many tokens rarely reads the database. Safe to use from any thread."""
 
     def __init__(self, tokens: TokenStore, clock: Clock) -> None:
         self._tokens = tokens
@@ -117,37 +116,37 @@ class KnownTokens:
         self._known = _Known({}, -math.inf)
 
     def remembered(self, token: str) -> tuple[bool, Caller | None]:
-        """Returns whether a token's caller is known without a read, and the caller, None if nobody has this token."""
+        """Returns whether a token's caller is known without a read, and the caller (None for an unknown token)."""
         return self._remembered(digest_of(token))
 
     def last_known(self, token: str) -> Caller | None:
-        """Returns a token's caller as the database had it when it was last read, however long ago."""
+        """Returns a token's caller as of the last read of the database, however long ago."""
         return self._known.callers.get(digest_of(token))
 
     def is_over(self, caller: Caller) -> bool:
-        """Whether the caller's session has ended. It may still stop the robot for a while."""
+        """Whether the caller's session has ended. It may still stop the robot for some time."""
         return caller.expires is not None and caller.expires <= self._clock.utc()
 
     def add(self, caller: Caller) -> None:
-        """Notes a session that has just begun, and is in the database already."""
+        """Adds a session that has just begun and is already in the database."""
         if caller.token is not None:
             with self._reading:
                 self._known = _Known({**self._known.callers, caller.token: caller}, self._known.at)
 
     def forget(self, caller: Caller) -> None:
-        """Forgets a session that was left, at once."""
+        """Removes a session at once after signing out."""
         with self._reading:
             left = {digest: one for digest, one in self._known.callers.items() if digest != caller.token}
             self._known = _Known(left, self._known.at)
 
     def look_up(self, token: str) -> Caller | None:
-        """Returns a token's caller from the database. If that cannot be read, the tokens read last stay valid: nobody
-        can have revoked one meanwhile, and nobody loses the ability to stop the robot. Raises CANNOT_BE_READ if the
+        """Returns a token's caller from the database. If the database cannot be read, the last known tokens stay valid:
+        nobody can have revoked one meanwhile, and everybody can still stop the robot. Raises CANNOT_BE_READ if the
         database has never been read."""
         return self._look_up(digest_of(token))
 
     async def still_let_in(self, caller: Caller) -> bool:
-        """Whether the token with which a caller was admitted is still valid. Call this on the event loop."""
+        """Whether the token by which a caller was accepted is still valid. For the event loop."""
         if caller.token is None:
             return True
         if self.is_over(caller):
@@ -156,7 +155,7 @@ class KnownTokens:
         if not known:
             try:
                 found = await asyncio.to_thread(self._look_up, caller.token)
-            except CANNOT_BE_READ:  # it is read again soon: nobody loses sight of the arm because a disk is busy
+            except CANNOT_BE_READ:  # retried soon: a busy disk must not disconnect anybody from the arm
                 return True
         return found == caller
 
@@ -168,7 +167,7 @@ class KnownTokens:
 
     def _look_up(self, digest: str) -> Caller | None:
         with self._reading:
-            known, caller = self._remembered(digest)  # another thread may have read them meanwhile
+            known, caller = self._remembered(digest)  # another thread may have read the tokens meanwhile
             if known:
                 return caller
             try:

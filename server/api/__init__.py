@@ -1,1 +1,1 @@
-"""The routes, one file a resource. A route translates between HTTP and the services; the work is done elsewhere."""
+"""The routes, one file per resource. A route translates between HTTP and the services, which do the work."""

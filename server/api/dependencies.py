@@ -1,7 +1,7 @@
-"""Dependencies and parameters of the routes: the services, the robot in the address, the caller.
+"""Dependencies and parameters of the routes: the services, the robot in the path, the caller.
 
 The dependencies are coroutines, although they never wait: FastAPI would run each plain function on a thread, which
-under load costs more than most answers.
+under load takes longer than most responses.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from server.store.waiting_events import EventStore
 
 
 def services_of(connection: HTTPConnection) -> Services:
-    """Returns the services with which the application was made."""
+    """Returns the services of the application."""
     services: Services = connection.app.state.services
     return services
 
@@ -52,7 +52,7 @@ async def robot_services(
     robot: Annotated[str, Path(max_length=64, examples=["ma2000"], description="Name of the robot.")],
     services: ServicesDep,
 ) -> RobotServices:
-    """Returns the services of the robot in the address. Raises a 404."""
+    """Returns the services of the robot in the path. Raises a 404."""
     return services.robot(robot)
 
 
@@ -60,7 +60,7 @@ RobotDep = Annotated[RobotServices, Depends(robot_services)]
 
 
 def given(get: Callable[[Services], object]) -> Any:
-    """Returns the dependency of a route on a part of the service."""
+    """Returns a route's dependency on a part of the service."""
 
     async def found(connection: HTTPConnection) -> object:
         return get(services_of(connection))
@@ -69,7 +69,7 @@ def given(get: Callable[[Services], object]) -> Any:
 
 
 def part(kind: type[Part]) -> Any:
-    """Returns the dependency of a route on the part of a plug-in."""
+    """Returns a route's dependency on the part of a plug-in."""
     return given(lambda services: services.part(kind))
 
 
@@ -109,14 +109,14 @@ async def _turn(connection: HTTPConnection) -> AsyncIterator[None]:
 
 
 def let_others_ask(connection: HTTPConnection) -> None:
-    """Ends the request's turn among the quick requests, since it waits in its caller's own lane instead."""
+    """Ends the request's turn among the quick requests, since it waits in its caller's lane instead."""
     turn = getattr(connection.state, "turn", None)
     if turn is not None:
         turn.end()
 
 
 Turn = Annotated[None, Depends(_turn, scope="function")]
-"""A turn in the caller's lane, for routes that are expensive. It ends before the answer is sent."""
+"""A turn in the caller's lane, for expensive routes. It ends before the response is sent."""
 
 
 async def _arrived(connection: HTTPConnection) -> float:
@@ -125,14 +125,14 @@ async def _arrived(connection: HTTPConnection) -> float:
 
 
 Arrived = Annotated[float, Depends(_arrived)]
-"""When the request's first byte arrived (s, monotonic), before it waited for anything."""
+"""Arrival time of the request's first byte (s, monotonic), before any waiting."""
 Viewer = Annotated[Caller, Depends(_viewer)]
 Operator = Annotated[Caller, Depends(_operator)]
 
 
 def _require_cursor(cursor: str | None) -> str | None:
-    """Raises ValueError for a cursor that no list can have returned. Its number must be that of a row or a time, and
-    its identity text that can be encoded."""
+    """Raises ValueError for a cursor that no list returned. Its number must be that of a row or a time, and its
+    identity must be valid UTF-8."""
     if cursor is not None:
         try:
             place = Cursor.parse(cursor)

@@ -1,5 +1,4 @@
-"""Serves the OpenAPI description, and a page on all kinds of problems. What writes them is loaded when they are asked
-for."""
+"""Serves the OpenAPI description, and a page about all kinds of problems. Their modules are imported on first use."""
 
 from __future__ import annotations
 
@@ -37,8 +36,8 @@ def install(app: FastAPI) -> None:
 
 
 class Described:
-    """The description, encoded once by a thread when it is first asked for, since that takes seconds. The end of the
-    service does not wait for it."""
+    """The description, encoded once by a thread on first use, which takes seconds. The end of the service does not wait
+    for it."""
 
     def __init__(self, app: FastAPI) -> None:
         self._app = app
@@ -46,8 +45,8 @@ class Described:
         self._encoded: Future[bytes] | None = None
 
     def begin(self) -> Future[bytes]:
-        """Begins unless it has been begun, and returns a future of the encoded description. What has failed is begun
-        anew."""
+        """Starts the encoding unless it was started, and returns a future of the result. A failed encoding is started
+        again."""
         with self._beginning:
             encoded = self._encoded
             if encoded is None or (encoded.done() and encoded.exception() is not None):
@@ -56,18 +55,18 @@ class Described:
             return encoded
 
     async def get(self, _request: Request) -> Response:
-        """Answers with the description."""
+        """Responds with the description."""
         return Response(await asyncio.shield(asyncio.wrap_future(self.begin())), media_type=JSON)
 
     def _encode(self, encoded: Future[bytes]) -> None:
         try:
             encoded.set_result(json.dumps(self._app.openapi(), ensure_ascii=False, separators=(",", ":")).encode())
-        except Exception as error:  # noqa: BLE001 - whoever waits is told
+        except Exception as error:  # noqa: BLE001  # the future's users get the error
             encoded.set_exception(error)
 
 
 def serve(app: FastAPI, address: str) -> None:
-    """Serves the description at `address`, and a page on all kinds of problems at that of their types."""
+    """Serves the description at `address`, and a page about all kinds of problems at the address of their types."""
     app.add_route(address, Described(app).get, include_in_schema=False)
 
     async def problems(_request: Request) -> Response:

@@ -1,4 +1,4 @@
-"""Completes the OpenAPI description, with an example of every problem."""
+"""Completes the OpenAPI description by an example of every problem."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ MOVES = f"{CHANGES}.*/(teaching/.*|programs/.*/run|gains|process/.*|gripper)"
 
 @dataclass(frozen=True)
 class Met:
-    """A problem, and which operations (`method /path`) may answer with it; None: no operation."""
+    """A problem, and the operations (`method /path`) that may return it; None: no operation."""
 
     problem: ProblemError
     where: re.Pattern[str] | None
 
     @property
     def details(self) -> ProblemDetails:
-        """The body of the answer."""
+        """The body of the response."""
         return details_of(self.problem, request_id="0f3c9a1be4d27788")
 
 
@@ -46,7 +46,7 @@ PROBLEM_EXAMPLES = tuple(
 
 @cache
 def problems_page() -> str:
-    """Returns a page with an example of every kind of problem, and what to do, at the place that its type names."""
+    """Returns a page with an example of every kind of problem and advice, each at the anchor that its type names."""
     parts: dict[str, str] = {}
     for met in sorted(PROBLEM_EXAMPLES, key=lambda one: one.problem.kind):
         problem = met.problem
@@ -60,8 +60,8 @@ def problems_page() -> str:
 
 
 def completed(document: Document) -> Document:
-    """Adds the schema of problems and their examples to `document`, in place, and returns it. The addresses in it begin
-    two levels above its own: a proxy may serve all this below a path."""
+    """Adds the schema and examples of problems to `document`, in place, and returns it. Addresses in it are relative,
+    two levels up, since a proxy may serve it below a path."""
     document["servers"] = [{"url": "../.."}]
     document["components"]["schemas"] = dict(sorted((document["components"]["schemas"] | _problem_schemas()).items()))
     for path, operations in document["paths"].items():
@@ -78,9 +78,9 @@ def _complete_operation(operation: Document, name: str) -> None:
 
 
 def _problem_schemas() -> Document:
-    """The schema of problems, and those that it refers to, by name."""
+    """Returns the schema of problems, and the schemas that it refers to, by name."""
     schema = ProblemDetails.model_json_schema(ref_template=IN_COMPONENTS)
-    del schema["properties"]["request_id"]["default"]  # null: FastAPI tells no such default of other schemas either
+    del schema["properties"]["request_id"]["default"]  # null; FastAPI omits such defaults in other schemas too
     return {**schema.pop("$defs"), ProblemDetails.__name__: schema}
 
 

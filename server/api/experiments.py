@@ -44,9 +44,9 @@ from server.routes import Router
 from server.store.experiments import ExperimentStore
 
 MOST_SHOWN = 5000
-"""Most set points in a preview; of a longer motion every second, third, … is returned."""
+"""Most set points in a preview; of a longer motion only every second, third, … is returned."""
 SHORT, FEW_POINTS = 60.0, 5000
-"""Longest motion (s) and most given set points that are planned here, in a moment; others are planned by a process."""
+"""Longest motion (s) and most given set points that are planned here, which is quick; a process plans others."""
 router = Router(prefix="/robots/{robot}/experiments", tags=["experiments"], responses=PROBLEMS)
 StateFilter = Annotated[list[ExperimentState] | None, Query(description="Only experiments in one of these states.")]
 
@@ -68,7 +68,7 @@ def submit_experiment(
     """
     request = with_preset(request)
     experiment, new = experiments.made_before(rig.robot.name, request, idempotency_key), False
-    if experiment is None:  # one that was accepted stays accepted, even if the disk is full by now
+    if experiment is None:  # an accepted request stays accepted, even if the disk is full by now
         require_possible(motions, rig, request.spec)
         require_room(rig.catalogue.folder)
         experiment, new = rig.queue.submit(request, caller.name, idempotency_key)
@@ -125,7 +125,7 @@ def change_experiment(
     caller: Operator,
     _turn: Turn,
 ) -> Experiment:
-    """Changes an experiment that still waits: one's own, or, for owners of the robot, anybody's.
+    """Changes a waiting experiment: the caller's own or, for owners of the robot, anybody's.
 
     A new specification is checked like that of a new experiment, and ends its approval.
     """
@@ -147,7 +147,8 @@ def approve_experiment(
 ) -> Experiment:
     """Approves exactly this content of a waiting experiment, so that it may move a real arm.
 
-    Whoever submitted or changed it cannot. It begins as soon as the queue lets it; a change ends the approval.
+    Nobody can approve an experiment that they submitted or changed. It begins as soon as the queue allows; a change
+    ends the approval.
     """
     given = rig.approval(caller, request.content)
     approved = experiments.approve(rig.robot.name, experiment, rig.queue.review, given, rig.robot.clock.utc())
@@ -160,7 +161,7 @@ def approve_experiment(
 def withdraw_experiment_approval(
     experiment: Identity, rig: RobotDep, experiments: Experiments, caller: Operator
 ) -> Experiment:
-    """Ends the approval of an experiment that still waits. Every operator may."""
+    """Withdraws the approval of a waiting experiment. Every operator may do this."""
     found, ended = experiments.withdraw_approval(rig.robot.name, experiment)
     if ended is not None:
         line = f"approval of {ended} withdrawn"
@@ -170,9 +171,9 @@ def withdraw_experiment_approval(
 
 @router.post("/{experiment}/cancel")
 def cancel_experiment(experiment: Identity, rig: RobotDep, experiments: Experiments, caller: Operator) -> Experiment:
-    """Cancels an experiment: one's own, or, for owners of the robot, anybody's.
+    """Cancels an experiment: the caller's own or, for owners of the robot, anybody's.
 
-    One that runs is ended by a stop: the arm is frozen and needs a reset.
+    A running experiment is ended by a stop: the arm is frozen and needs a reset.
     """
     _require_own(experiments, rig, caller, experiment)
     return rig.queue.cancel(experiment, caller.name)
@@ -186,7 +187,7 @@ def _require_own(experiments: ExperimentStore, rig: RobotServices, caller: Calle
 
 def _preview(motions: Workers, rig: RobotServices, spec: ExperimentSpec, most_shown: int) -> MotionPreview:
     """Plans a short motion here and a long one in a worker process. Raises SpecError, and a 422 for a motion that is
-    too long to be planned."""
+    too long to plan."""
     length = least_length(spec)
     if length > LONGEST:
         line = f"spec: takes {length / 3600:.1f} h, allowed are {LONGEST / 3600:g} h"

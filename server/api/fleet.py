@@ -1,4 +1,4 @@
-"""Routes over all robots: their state at a glance, the stop of all."""
+"""Routes for all robots: overview, and the stop of all."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ router = Router(prefix="/fleet", tags=["fleet"], responses=PROBLEMS)
 
 @router.get("")
 async def get_fleet(robots: Robots, clock: ClockDep, _: Viewer) -> FleetStatus:
-    """Returns the state of every robot at a glance, with the age of its newest sample."""
+    """Returns an overview of every robot, with the age of its newest sample."""
     return FleetStatus(utc=clock.utc(), robots=tuple(map(_at_a_glance, robots)))
 
 
 @router.post("/stop", responses={200: {"description": "The outcome of the stops: read `confirmed`"}})
 async def stop_fleet(robots: Robots, caller: Viewer) -> FleetStopResult:
-    """Freezes every arm of this service at once. Anybody who may see the robots may stop them, without control.
+    """Freezes every arm of this service at once. Everybody who may see the robots may stop them, without control.
 
     Unless the answer is `confirmed`, use the emergency stops. Only a reset of each arm ends its freeze.
     """

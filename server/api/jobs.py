@@ -1,6 +1,6 @@
 """Routes of jobs (fits, validations, comparisons and diagnoses in the background) and of the models they make.
 
-The effects of the library, as clients see them.
+`known_effects` lists the effects of the library for clients.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from server.routes import Router
 
 
 def known_effects() -> tuple[KnownEffect, ...]:
-    """Returns the effects in the order of the shared list, in which those of one family are together."""
+    """Returns the effects in the order of the shared list, which groups them by family."""
     from model.effects.library import library
     from model.effects.names import effect_name
 
@@ -85,7 +85,7 @@ def submit_job(
 ) -> Job:
     """Queues a computation, which begins when a worker is free. The same Idempotency-Key returns the same job (200).
 
-    Comparisons and validations of few traces have a worker of their own, so they never wait for a fit or a diagnosis.
+    Comparisons and validations of few traces have a separate worker, so they never wait for a fit or a diagnosis.
     """
     job, new = rig.jobs.submit(request, caller.name, idempotency_key)
     response.status_code = 201 if new else 200
@@ -123,7 +123,7 @@ async def get_job(job: Identity, rig: RobotDep, jobs: JobRows, _: Viewer, wait: 
 
 @router.post("/jobs/{job}/cancel", tags=["jobs"])
 def cancel_job(job: Identity, rig: RobotDep, caller: Operator) -> Job:
-    """Cancels a job. One that runs ends within about a second."""
+    """Cancels a job. A running job ends within about a second."""
     return rig.jobs.cancel(job, caller.name)
 
 
@@ -177,10 +177,10 @@ async def upload_model(
     response: Response,
     name: Annotated[ModelName, Query()],
 ) -> ModelEntry:
-    """Imports a model file as written by `daq fit`.
+    """Imports a model file written by `daq fit`.
 
-    The same file again is the same entry (200). Refused are models with user-defined effects, and models that name
-    traces which the service does not have.
+    The same file again is the same entry (200). Refused are models with user-defined effects, and models fitted to
+    traces that the service does not have.
     """
     entry, new = await store_model(request, name, rig, uploads, models, [one.robot.name for one in robots], caller)
     response.status_code = 201 if new else 200
@@ -237,7 +237,7 @@ def change_model(model: Identity, change: ModelChange, rig: RobotDep, models: Mo
 
 @router.delete("/models/{model}", tags=["models"], status_code=204)
 def delete_model(model: Identity, rig: RobotDep, models: ModelRows, caller: Operator) -> Response:
-    """Deletes a model for good. Refused while another model was made from it."""
+    """Deletes a model permanently. Refused while another model was made from it."""
     name = models.get(rig.robot.name, model).name
     rig.models.remove(model)
     rig.record_event("model", f"model {name!r} was deleted", actor=caller.name)

@@ -12,10 +12,10 @@ from server.routes import Router
 
 
 def with_preset(request: Submission) -> Submission:
-    """Returns a request whose specification is that of the preset that it names, if it names one. Raises a 422."""
+    """Returns a request with the specification of the preset that it names, if it names one. Raises a 422."""
     if request.preset is None:
         return request
-    from daq.trajectories.presets import PRESETS  # which makes all of them
+    from daq.trajectories.presets import PRESETS  # builds all of them
 
     if request.preset not in PRESETS:
         detail = f"preset: is none of {', '.join(PRESETS)} (got {request.preset!r:.80})"
@@ -28,7 +28,7 @@ router = Router(prefix="/robots/{robot}", tags=["experiments"], responses=PROBLE
 
 @router.get("/presets")
 def list_presets(rig: RobotDep, _: Viewer) -> tuple[ExperimentPreset, ...]:
-    """Lists the named experiments for the joints of this robot: to run as they are, or to start from."""
+    """Lists the named experiments for the joints of this robot: to run unchanged, or as a start."""
     from daq.trajectories.presets import PRESETS
 
     count = len(rig.robot.machine.joints)

@@ -1,4 +1,4 @@
-"""Routes of taught programs, which the service keeps until they are deleted."""
+"""Routes of taught programs, which the service stores until they are deleted."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ Revision = Annotated[
 
 @router.get("")
 def list_programs(rig: RobotDep, programs: Programs, _: Viewer) -> tuple[ProgramEntry, ...]:
-    """Lists the stored programs, the last changed first."""
+    """Lists the stored programs, most recently changed first."""
     return programs.all(rig.robot.name)
 
 
 @router.get("/{program}")
 def get_program(program: ProgramName, rig: RobotDep, programs: Programs, _: Viewer) -> StoredProgram:
-    """Returns one program with its revision, which a change has to name."""
+    """Returns one program with its revision, which a change must state."""
     return programs.get(rig.robot.name, program)
 
 
@@ -51,15 +51,15 @@ def put_program(
 ) -> ProgramEntry:
     """Stores a program, or a change to its `revision`. Moves nothing and needs no control.
 
-    A body with another name than the address renames the program. A program that somebody else has changed meanwhile
-    is not overwritten (409).
+    A body with another name than the path renames the program. A program that another client has changed meanwhile is
+    not overwritten (409).
     """
     return programs.put(rig.robot.name, program, request, revision, rig.robot.clock.utc(), caller.name)
 
 
 @router.delete("/{program}", status_code=204)
 def delete_program(program: ProgramName, rig: RobotDep, programs: Programs, caller: Operator) -> Response:
-    """Deletes a program for good."""
+    """Deletes a program permanently."""
     programs.remove(rig.robot.name, program)
     rig.record_event("teaching", f"program {program} was deleted", actor=caller.name)
     return Response(status_code=204)
@@ -74,7 +74,7 @@ def run_stored_program(
     arrived: Arrived,
     lease: LeaseHeader = None,
 ) -> TeachingStatus:
-    """Runs a stored program, as POST …/teaching/program runs one that is sent."""
+    """Runs a stored program, like POST …/teaching/program."""
     rig.require_motion(lease)
     rig.teaching.perform(rig.word(lease, arrived), programs.get(rig.robot.name, program).program)
     return rig.teaching.status()

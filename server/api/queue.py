@@ -48,7 +48,7 @@ def list_queue(rig: RobotDep, experiments: Experiments, _: Viewer) -> tuple[Expe
 
 @router.post("/queue/pause", tags=["queue"])
 def pause_queue(rig: RobotDep, caller: Operator) -> QueueStatus:
-    """Pauses the queue: no further experiment begins, and one that runs goes on."""
+    """Pauses the queue: no further experiment begins, and a running one continues."""
     rig.queue.pause(f"by {caller.name}", caller.name)
     return rig.queue.status()
 
@@ -107,7 +107,7 @@ def get_schedule(schedule: Identity, rig: RobotDep, schedules: Schedules, _: Vie
 def change_schedule(
     schedule: Identity, change: ScheduleChange, rig: RobotDep, schedules: Schedules, caller: Operator
 ) -> Schedule:
-    """Switches a schedule on or off: one's own, or, for owners of the robot, anybody's."""
+    """Switches a schedule on or off: the caller's own or, for owners of the robot, anybody's."""
     _require_own(schedules, rig, caller, schedule)
     changed = schedules.switch(rig.robot.name, schedule, active=change.active, now=rig.robot.clock.utc())
     state = "on" if change.active else "off"
@@ -130,7 +130,7 @@ def approve_schedule(
 
 @router.delete("/schedules/{schedule}/approval", tags=["queue"])
 def withdraw_schedule_approval(schedule: Identity, rig: RobotDep, schedules: Schedules, caller: Operator) -> Schedule:
-    """Ends the approval of a schedule. Runs that wait keep theirs. Every operator may."""
+    """Withdraws the approval of a schedule. Waiting runs keep theirs. Every operator may do this."""
     found, ended = schedules.withdraw_approval(rig.robot.name, schedule)
     if ended is not None:
         line = f"schedule {schedule}: approval of {ended} withdrawn"
@@ -140,7 +140,7 @@ def withdraw_schedule_approval(schedule: Identity, rig: RobotDep, schedules: Sch
 
 @router.delete("/schedules/{schedule}", tags=["queue"], status_code=204)
 def delete_schedule(schedule: Identity, rig: RobotDep, schedules: Schedules, caller: Operator) -> Response:
-    """Deletes a schedule: one's own, or, for owners of the robot, anybody's. Its experiments are kept."""
+    """Deletes a schedule: the caller's own or, for owners of the robot, anybody's. Its experiments are kept."""
     _require_own(schedules, rig, caller, schedule)
     schedules.remove(rig.robot.name, schedule)
     rig.record_event("schedule", f"schedule {schedule} deleted", actor=caller.name)
@@ -165,7 +165,7 @@ def take_control(
     rig: RobotDep,
     caller: Operator,
 ) -> ControlLease:
-    """Gives one client control of the robot. Without heartbeats it lapses: the arm holds and the queue is paused."""
+    """Gives one client control of the robot. Without heartbeats control ends: the arm holds and the queue is paused."""
     rig.require_consent(request.moves_real_arm, "is its workspace clear? then try again with moves_real_arm")
     lease = rig.control.take(caller.name, moves_real_arm=request.moves_real_arm)
     rig.record_event("control", f"{caller.name} took control", actor=caller.name)
@@ -180,9 +180,9 @@ def renew_control(rig: RobotDep, _: Operator, lease: LeaseHeader = None) -> Cont
 
 @router.delete("/control", tags=["control"], status_code=204)
 def give_control_back(rig: RobotDep, caller: Operator, lease: LeaseHeader = None) -> Response:
-    """Gives control back. The arm holds its posture; a program that still runs is stopped.
+    """Returns control. The arm holds its posture; a running program is stopped.
 
-    If experiments are waiting, the queue is paused until somebody resumes it.
+    If experiments are waiting, the queue is paused until a person resumes it.
     """
     rig.control.give_back(lease or "")
     rig.teaching.hold()

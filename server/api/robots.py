@@ -61,7 +61,7 @@ def connect_robot(rig: RobotDep, caller: Operator) -> RobotStatus:
 
 @router.post("/{robot}/disconnect")
 def disconnect_robot(rig: RobotDep, caller: Operator, lease: LeaseHeader = None) -> Done:
-    """Disconnects, so that other programs can use the port. Refused while somebody else has control."""
+    """Disconnects, so that other programs can use the port. Refused while another client has control."""
     rig.control.require_free_of_others(lease)
     free = rig.keeper.disconnect()
     rig.record_event("connection", "disconnected", actor=caller.name)
@@ -70,7 +70,7 @@ def disconnect_robot(rig: RobotDep, caller: Operator, lease: LeaseHeader = None)
 
 @router.post("/{robot}/stop", responses={200: {"description": "The outcome of the stop: read `confirmed`"}})
 async def stop_robot(rig: RobotDep, caller: Viewer) -> StopResult:
-    """Freezes the arm at its measured posture at once. Anybody who may see the robot may stop it, without control.
+    """Freezes the arm at its measured posture at once. Everybody who may see the robot may stop it, without control.
 
     Unless the answer is `confirmed`, use the emergency stop. Only a reset ends the freeze.
     """
@@ -90,7 +90,7 @@ def reset_robot(
 ) -> Done:
     """Resets the arm after a stop or a fault. Nothing moves; the queue stays paused until it is resumed.
 
-    It ends the stop that it names, `stop` of the robot's status, and is refused if another one has come since.
+    Ends the stop that the request names (`stop` of the robot's status). Refused if there is a newer stop.
     """
     rig.control.require_free_of_others(lease)
     text = str(answer_of(rig.robot, Reset, arrived, stop=request.stop, here=request.here).data["text"])

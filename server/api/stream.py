@@ -23,18 +23,18 @@ from server.robot_services import RobotServices
 
 BASE_RATE = 50
 WAITING_MESSAGES = 64
-"""Number of a client's messages that may wait: a client that holds a key sends ten a second (an assumption)."""
+"""Most waiting messages of a client: while a key is held, a client sends ten per second (an assumption)."""
 MESSAGES_A_SECOND, MESSAGES_AT_ONCE = 100.0, 500.0
-"""Limits of a client's sustained rate of messages, and of messages at once; beyond them it is disconnected."""
+"""Limits of a client's messages: sustained rate (1/s), and messages at once. A client above them is disconnected."""
 NOT_ALLOWED = 1008
 TOO_SLOW = 1013
 """Close code: try again later."""
 LOOK_EVERY = 1.0
-"""Time (s) between two checks whether a client that reads nothing must be dropped."""
+"""Time (s) between two checks whether a client that does not read must be dropped."""
 ADVICE = "docs/service.md describes the messages of this socket"
 log = logging.getLogger("server.live")
 Heard = tuple[str | None, float]
-"""A message's text, None if it is bytes, and when it arrived (s, monotonic)."""
+"""A message's text (None if it is bytes), and its arrival time (s, monotonic)."""
 
 
 async def stream(socket: WebSocket, rig: RobotServices, caller: Caller, look_every: float = LOOK_EVERY) -> None:
@@ -66,7 +66,7 @@ async def stream(socket: WebSocket, rig: RobotServices, caller: Caller, look_eve
     if dropping in done:
         rig.hub.dropped += 1
         log.warning("live client %s took nothing for too long and was dropped", client.name)
-        # A client that reads nothing does not read the close either; the server ends the connection when this returns.
+        # A client that does not read does not read the close either; the server ends the connection when this returns.
         with suppress(TimeoutError, WebSocketDisconnect):
             async with asyncio.timeout(look_every):
                 await socket.close(TOO_SLOW, "this client read too slowly")
@@ -88,8 +88,8 @@ async def _send(socket: WebSocket, rig: RobotServices, client: Client) -> None:
 
 
 async def _receive(socket: WebSocket, rig: RobotServices, client: Client, heard: asyncio.Queue[Heard]) -> None:
-    """Receives messages, and waits for nothing else, so that each gets the time of its arrival even if the one before
-    it waits."""
+    """Receives messages and waits for nothing else, so that each gets its true arrival time even if the previous one
+    waits."""
     clock = rig.robot.clock
     room = Bucket(MESSAGES_A_SECOND, MESSAGES_AT_ONCE, MESSAGES_AT_ONCE, clock.monotonic())
     while True:
@@ -151,7 +151,7 @@ def _past(rig: RobotServices, begin: float, points: int) -> str:
 
 
 def _noted_jog(command: JogCommand, rig: RobotServices, caller: Caller, origin: str, said: float) -> None:
-    """Jogs, and tells plug-ins who did."""
+    """Jogs, and informs plug-ins who did."""
     outcome: Outcome = "done"
     detail = ""
     try:
@@ -189,6 +189,6 @@ def _refuse(rig: RobotServices, client: Client, detail: str, advice: str) -> Non
 
 
 async def _drop_if_hopeless(rig: RobotServices, client: Client, look_every: float) -> None:
-    """Returns when the client must be dropped."""
+    """Returns once the client must be dropped."""
     while not client.outbox.is_hopeless(rig.robot.clock.monotonic()):
         await asyncio.sleep(look_every)

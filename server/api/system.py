@@ -39,9 +39,9 @@ async def healthz() -> Health:
 
 @plain.get("/readyz", responses={503: {"model": Health}})
 async def readyz(request: Request, services: ServicesDep, response: Response) -> Health:
-    """Answers 200 while the database and the folder of a robot's traces can be written; none need be connected.
+    """Answers 200 while the database and the folders of traces are writable. The robots need not be connected.
 
-    Callers who may see the robot get the details. The answer is up to a second old.
+    Callers who may see the robot get the details. The answer may be up to a second old.
     """
     problems = await services.readiness.check(lambda: _checks(services))
     if caller_of(request) is None:
@@ -70,7 +70,7 @@ async def get_me(services: ServicesDep, caller: Viewer) -> Me:
 def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
     """Returns version, uptime, storage and live clients of the service."""
     file = _database_file(services)
-    # Whatever becomes of a disk, the page must learn the port of the stop listener.
+    # Even if a disk fails, the page must learn the port of the stop listener.
     room = room_of(rig.catalogue.folder for rig in services.robots())
     with services.store.reading() as session:
         count = session.scalar(select(func.count()).select_from(TraceRow)) or 0
@@ -97,7 +97,7 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
 
 
 def _size_of(file: Path) -> int | None:
-    """Returns the size (bytes) of SQLite's file and of the log beside it, which holds what was written last."""
+    """Returns the size (bytes) of SQLite's file and of the log beside it, which contains the newest changes."""
     sizes = []
     for path in (file, file.with_name(f"{file.name}-wal")):
         with suppress(FileNotFoundError):
@@ -126,7 +126,7 @@ def _checks(services: Services) -> dict[str, str]:
 
 
 def _problem_of_folder(folder: Path) -> str:
-    """Returns why no trace can be written to a folder; an empty text if it can."""
+    """Returns why no trace can be written to a folder; empty if it can."""
     try:
         _require_writable(folder)
         free = shutil.disk_usage(folder).free
@@ -136,7 +136,7 @@ def _problem_of_folder(folder: Path) -> str:
 
 
 def _require_writable(folder: Path) -> None:
-    """Raises OSError if nothing can be written. The probe is a file without a name, so nobody sees it."""
+    """Raises OSError if nothing can be written. The probe is an unnamed file, so nobody sees it."""
     with tempfile.TemporaryFile(dir=folder) as probe:
         probe.write(b"written")
 

@@ -1,4 +1,4 @@
-"""Routes for jogging, steps, programs and leading by hand, which need control of the robot; and for calibration."""
+"""Routes for jogging, steps, programs and hand guiding, which need control of the robot; and for calibration."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ router = Router(prefix="/robots/{robot}", tags=["teaching"], responses=PROBLEMS)
 
 @router.get("/teaching")
 def get_teaching(rig: RobotDep, _: Viewer) -> TeachingStatus:
-    """Returns the teaching activity under way, and how the last one ended."""
+    """Returns the current teaching activity, and how the last one ended."""
     return rig.teaching.status()
 
 
@@ -45,7 +45,7 @@ def get_teaching(rig: RobotDep, _: Viewer) -> TeachingStatus:
 def jog_robot(
     request: JogRequest, rig: RobotDep, _: Operator, arrived: Arrived, lease: LeaseHeader = None
 ) -> TeachingStatus:
-    """Drives joints for at most 0.3 s. While a key is held, the client repeats this about ten times a second."""
+    """Drives joints for at most 0.3 s. While a key is held, the client repeats this about ten times per second."""
     rig.require_motion(lease)
     rig.teaching.jog(dict(request.velocities), arrived)
     return rig.teaching.status()
@@ -87,7 +87,8 @@ def run_program(
 def lead_robot(
     request: LeadRequest, rig: RobotDep, _: Operator, arrived: Arrived, lease: LeaseHeader = None
 ) -> TeachingStatus:
-    """Starts recording a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and sink."""
+    """Starts recording a path while the arm is guided by hand. HOLD THE ARM: the guided joints have no drive and
+    sink."""
     rig.require_motion(lease)
     rig.teaching.lead(rig.word(lease, arrived), tuple(sorted(set(request.joints))))
     return rig.teaching.status()
@@ -95,7 +96,7 @@ def lead_robot(
 
 @router.post("/teaching/finish")
 def finish_teaching(rig: RobotDep, _: Operator, lease: LeaseHeader = None) -> TeachingStatus:
-    """Ends jogging or leading; the answer holds the recorded path."""
+    """Ends jogging or hand guiding; the answer contains the recorded path."""
     rig.control.require(lease)
     rig.teaching.finish()
     return rig.teaching.status()

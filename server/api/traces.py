@@ -103,13 +103,13 @@ def get_trace(trace: Identity, rig: RobotDep, traces: Traces, _: Viewer, _turn: 
 
 @router.patch("/{trace}")
 def change_trace(trace: Identity, change: TraceChange, rig: RobotDep, traces: Traces, _: Operator) -> CatalogueEntry:
-    """Changes the tags or the notes, which the catalogue keeps: the file stays as it was recorded."""
+    """Changes the tags or the notes in the catalogue: the file stays unchanged."""
     return traces.change(rig.robot.name, trace, change)
 
 
 @router.delete("/{trace}", status_code=204)
 def delete_trace(trace: Identity, rig: RobotDep, caller: Operator) -> Response:
-    """Deletes a trace for good. Refused while a model or a job uses it."""
+    """Deletes a trace permanently. Refused while a model or a job uses it."""
     path = rig.catalogue.remove(trace)
     rig.record_event("trace", f"trace {trace} ({path.name}) was deleted", actor=caller.name)
     return Response(status_code=204)

@@ -1,5 +1,4 @@
-"""Taking in traces and models from elsewhere. What is uploaded is read by a process with limits before it gets a name
-in a folder."""
+"""Imports uploaded traces and models. A process with limits reads them before they get a name in a folder."""
 
 from __future__ import annotations
 
@@ -31,7 +30,7 @@ KINDS = {"application/octet-stream": ".mcap", "text/csv": ".csv"}
 LOOK_EVERY = 4 << 20
 """Number of bytes after which the free disk space is checked again."""
 LARGEST_MODEL = 16 << 20
-"""Largest size of a model's file in bytes: a saved fit has its curves, too."""
+"""Largest size (bytes) of a model file: a saved fit contains its curves, too."""
 ADVICE = {
     "not-a-trace": "docs/traces.md tells what a trace looks like",
     "not-a-model": "send a file as `daq fit` writes it",
@@ -40,8 +39,8 @@ ADVICE = {
 
 @dataclass(frozen=True)
 class Uploads:
-    """What takes in uploads: processes with limits, the lanes of those who send, the largest upload (MB) and the limits
-    of traces."""
+    """Resources for uploads: processes with limits, the lanes of the senders, the largest upload (MB) and the limits of
+    traces."""
 
     workers: Workers
     lanes: Lanes
@@ -52,7 +51,7 @@ class Uploads:
 async def store_upload(
     request: Request, rig: RobotServices, uploads: Uploads, traces: TraceStore, caller: Caller
 ) -> CatalogueEntry:
-    """Writes the body to a temporary file, then takes it in as a trace. Raises a 413, 415, 422, 409, 507."""
+    """Writes the body to a temporary file, then imports it as a trace. Raises a 413, 415, 422, 409, 507."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind not in KINDS:
         allowed = " or ".join(KINDS)
@@ -65,7 +64,7 @@ async def store_upload(
         path = Path(folder) / f"upload{KINDS[kind]}"
         if await _write_body(request, path, uploads.most << 20, too_large) == 0:
             raise ProblemError(422, "not-a-trace", "the body is empty", "send a trace")
-        async with uploads.lanes.turn(caller.name):  # not before: a body that never ends would keep it
+        async with uploads.lanes.turn(caller.name):  # not before: a body that never ends would occupy the turn
             return await run_in_threadpool(_take_in, path, rig, uploads, traces, caller)
 
 
@@ -78,8 +77,8 @@ async def store_model(
     robots: Sequence[str],
     caller: Caller,
 ) -> tuple[ModelEntry, bool]:
-    """Does the same with a model, which may name traces of these robots. Returns its entry, and whether it is new.
-    Raises a 413, 422, 507."""
+    """Imports a model that was fitted to traces of these robots. Returns its entry, and whether it is new. Raises a
+    413, 422, 507."""
     too_large = ProblemError(413, "too-large", f"a model may have {LARGEST_MODEL >> 20} MB", "send less")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.json"
@@ -97,7 +96,7 @@ async def _write_body(request: Request, path: Path, largest: int, too_large: Pro
             if size > largest:
                 raise too_large
             await run_in_threadpool(stream.write, piece)
-            if size - looked > LOOK_EVERY:  # others may upload, too
+            if size - looked > LOOK_EVERY:  # other uploads may use the disk too
                 looked = size
                 await run_in_threadpool(require_room, path.parent)
     return size
@@ -121,10 +120,10 @@ def _take_in(path: Path, rig: RobotServices, uploads: Uploads, traces: TraceStor
 def _keep(
     data: dict[str, Any], name: str, rig: RobotServices, models: ModelStore, robots: Sequence[str], caller: Caller
 ) -> tuple[ModelEntry, bool]:
-    from model.machine_model.model_file import ModelFile  # what it needs takes long to load
+    from model.machine_model.model_file import ModelFile  # its imports take long
 
     made = ModelFile.model_validate(data)
-    # Everybody who may call the service sees the traces of all its robots, and of no other.
+    # Everybody who may call the service sees the traces of all its robots, and no others.
     new = rig.models.add(made, name, caller.name, robots=robots)
     if new:
         rig.record_event("model", f"model {name!r} was uploaded", actor=caller.name)
@@ -132,7 +131,7 @@ def _keep(
 
 
 def _read(order: Order, uploads: Uploads, kind: str) -> dict[str, Any]:
-    """Reads the upload. Raises a 413 if this takes too much time or memory, and a 422 if it is not valid."""
+    """Reads the upload. Raises a 413 if this takes too much time or memory, and a 422 if it is invalid."""
     try:
         answer = uploads.workers.ask(order)
     except ExhaustedError as error:

@@ -1,5 +1,5 @@
-"""Orders to a process with limits, and its answers: one JSON object a line in each direction, so that nothing but data
-reaches the service, whatever a file does to its reader."""
+"""Orders to a process with limits, and its answers: one JSON object per line. Only data reach the service, whatever a
+file does to its reader."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from daq.traces.catalogue import TraceSummary
 
 
 class Limits(FrozenRecord):
-    """What one order may use: `memory` in bytes, and time in s."""
+    """Limits of one order: `memory` in bytes, and time in s."""
 
     memory: int
     seconds: float
 
 
 class ReadUpload(FrozenRecord):
-    """Reads an uploaded file as a trace. `folder`: where the trace made from a CSV file is written."""
+    """Reads an uploaded file as a trace. `folder`: where a trace made from a CSV file is written."""
 
     kind: Literal["upload"] = "upload"
     path: Path
@@ -39,8 +39,7 @@ class ReadModel(FrozenRecord):
 
 
 class WorkOutMotion(FrozenRecord):
-    """Plans an experiment and checks it against the machine's limits. `most_shown`: the number of set points in the
-    answer, at most."""
+    """Plans an experiment and checks it against the machine's limits. `most_shown`: most set points in the answer."""
 
     kind: Literal["motion"] = "motion"
     spec: ExperimentSpec
@@ -53,7 +52,7 @@ ORDER: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="ki
 
 
 class UploadedTrace(FrozenRecord):
-    """An uploaded file that is a trace: its path, the name that it gets, and its summary."""
+    """An uploaded file that is a trace: its path, its final name, and its summary."""
 
     path: Path
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,120}\.mcap$")]
@@ -63,10 +62,10 @@ class UploadedTrace(FrozenRecord):
 class Answer(FrozenRecord):
     """The answer to an order.
 
-    problem:   what is wrong with the input, in one line; empty if nothing is
+    problem:   error in the input, in one line; empty if there is none
     exhausted: the input needs too much memory
-    no_room:   the disk is full; nothing else is wrong
-    fault:     the traceback of an unforeseen error, whose text is in `problem`
+    no_room:   the disk is full; there is no other error
+    fault:     traceback of an unexpected error, whose text is in `problem`
     spent:     this process has grown too large or has failed, and must not be used again
     """
 

@@ -1,4 +1,4 @@
-"""The motion of an experiment, computed and checked against the machine's limits."""
+"""Computes an experiment's motion and checks it against the machine's limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from server.bounded.messages import WorkOutMotion
 
 
 def preview_of(order: WorkOutMotion) -> MotionPreview:
-    """Plans the motion. If it has more than `most_shown` set points, the preview has every second, third, … one.
+    """Plans the motion. If it has more than `most_shown` set points, the preview contains every second, third, … one.
     Raises SpecError."""
     machine = order.machine
     motion = plan(order.spec, machine, start_angles(order.spec, machine))

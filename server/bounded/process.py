@@ -1,6 +1,6 @@
-"""The main program of a process with limited memory and time.
+"""Main program of a process with limited memory and time.
 
-Reads an uploaded file as a model.
+`read_model` reads an uploaded file as a model.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from server.problems import NO_ROOM
 from server.steady import weigh_session
 
 LARGEST_KEPT = 1 << 20
-"""Largest size of a kept model in bytes. The service reads it whenever somebody looks at it; the MA2000's has 30 kB."""
+"""Largest size (bytes) of a stored model. The service reads it whenever a client opens it; the MA2000's has 30 kB."""
 
 
 def read_model(order: ReadModel) -> ModelFile:
-    """Reads the model in a file. Raises SpecError, also for one with effects that are programs of a user."""
+    """Reads the model in a file. Raises SpecError, also for a model with user-defined effects, which are programs."""
     try:
         data = parse_json(read_text(order.path, "upload"), "upload")
         _require_no_program(data)
@@ -50,16 +50,16 @@ def _require_no_program(data: Any) -> None:
 
 
 NICENESS, SESSION_NICENESS = 10, 5
-"""Nice values of the process, and of its session: somebody waits for the answer, but the service goes first."""
+"""Nice values of the process, and of its session: a client waits for the answer, but the service has priority."""
 GROWN = 256 << 20
-"""Peak resident memory in bytes beyond which a process ends after its answer, and is not reused."""
+"""Peak resident memory (bytes) above which a process ends after its answer."""
 LONGEST_LINE = 300
 OOM_SCORE = "800"
-"""Out of 1000: when the computer runs out of memory, the kernel ends this process before the service."""
+"""Out of 1000: if the computer runs out of memory, the kernel ends this process before the service."""
 
 
 def main() -> int:
-    """Reads the limits, then reads orders and answers them until the service closes its end."""
+    """Reads the limits, then carries out orders until the service closes its end."""
     os.nice(NICENESS)
     weigh_session(SESSION_NICENESS)
     with suppress(OSError):
@@ -79,7 +79,7 @@ def main() -> int:
 
 
 def answer_order(line: str, limits: Limits) -> Answer:
-    """Carries out one order. Whatever is wrong with the input becomes one line of the answer."""
+    """Carries out one order. Any error in the input becomes one line of the answer."""
     try:
         done = _carry_out(ORDER.validate_json(line))
         return Answer(data=done.model_dump(mode="json"), spent=_has_grown())
@@ -90,7 +90,7 @@ def answer_order(line: str, limits: Limits) -> Answer:
         return Answer(problem=line, exhausted=True, spent=True)
     except RecursionError:
         return Answer(problem="is nested too deeply", spent=True)
-    except Exception as error:  # noqa: BLE001 - whatever its reader raises, the file is to blame
+    except Exception as error:  # noqa: BLE001  # whatever error the reader raises, the file is the cause
         line = f"cannot be read: {type(error).__name__}: {error}"
         return Answer(problem=_short(line), fault=traceback.format_exc()[-4000:], spent=True)
 
@@ -106,7 +106,7 @@ def _carry_out(order: Order) -> UploadedTrace | ModelFile | MotionPreview:
 
 
 def _is_of_the_disk(error: BaseException | None) -> bool:
-    """Whether an error, or one of its causes, says that nothing more can be written."""
+    """Whether an error, or one of its causes, means that the disk is full."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in NO_ROOM:
             return True
@@ -122,14 +122,14 @@ def _listen(orders: queue.SimpleQueue[str]) -> None:
 
 
 def _limit(limits: Limits) -> None:
-    """Limits the memory of this process, not counting what it used when it began, and switches off core dumps."""
+    """Limits the memory of this process, in addition to its use at the start, and disables core dumps."""
     own = _virtual_data()
     resource.setrlimit(resource.RLIMIT_DATA, (own + limits.memory, own + limits.memory))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _limit_time(seconds: float) -> None:
-    """Limits the processor time of an order, so that the system ends this process if the service no longer can."""
+    """Limits the processor time of an order, so that the system ends this process even if the service cannot."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
     resource.setrlimit(resource.RLIMIT_CPU, (int(used.ru_utime + used.ru_stime + seconds) + 2, hard))
@@ -141,12 +141,12 @@ def _virtual_data() -> int:
 
 
 def _has_grown() -> bool:
-    """Whether its peak memory exceeds GROWN. `ru_maxrss` does not tell: a process inherits it from its parent."""
+    """Whether the peak memory exceeds GROWN. `ru_maxrss` is unsuitable: a process inherits it from its parent."""
     return _memory("VmHWM") > GROWN
 
 
 def _memory(name: str) -> int:
-    """Returns the bytes of one kind of memory of this process, as the kernel counts it; 0 if it does not say."""
+    """Returns one kind of memory of this process (bytes), as counted by the kernel; 0 if unknown."""
     with suppress(OSError, ValueError, IndexError):
         for line in Path("/proc/self/status").read_text("ascii").splitlines():
             if line.startswith(f"{name}:"):

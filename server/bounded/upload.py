@@ -1,4 +1,4 @@
-"""Reads an uploaded file as a trace, completely, so that the service can rely on every part of it later."""
+"""Reads an uploaded file as a trace, completely, so that the service can rely on all of it later."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from daq.traces.summary import joint_figures
 from server.bounded.messages import ReadUpload, UploadedTrace
 
 SAFE_NUMBER = re.compile(r"[A-Za-z0-9_-]{1,64}")
-"""A trace's number becomes part of its file's name, so it must not hold parts of a path."""
+"""A trace's ID becomes part of its file name, so it must not contain parts of a path."""
 LONGEST = {"operator": 100, "robot": 100, "software": 200, "notes": 10_000}
-"""Largest number of characters of the texts of a record that lists show."""
+"""Most characters of a record's texts that lists show."""
 SIGNALS = ("time", "position", "set_point", "error", "drive", "velocity", "host_time")
 
 
 def read_upload(order: ReadUpload) -> UploadedTrace:
-    """Reads the trace in a file. Raises TraceError, and any error that a damaged file causes in its reader."""
+    """Reads the trace in a file. Raises TraceError, and any error of its reader for a damaged file."""
     path = order.path
     kind = kind_of(path, order.limits)
     if kind not in ("trace", "csv"):
@@ -50,7 +50,7 @@ def _require_sound(trace: Trace) -> None:
     """Raises TraceError for a trace that can be read but not shown."""
     record = trace.record
     if not SAFE_NUMBER.fullmatch(record.trace_id):
-        raise TraceError("trace_id: is not a valid number of a trace: letters, digits, - and _ are allowed, 64 at most")
+        raise TraceError("trace_id: is not a valid ID of a trace: letters, digits, - and _ are allowed, 64 at most")
     for name, most in LONGEST.items():
         told = getattr(record, name) or ""
         if len(told) > most:
@@ -92,7 +92,7 @@ def _not_finite(value: object, where: str) -> str | None:
 
 
 def _require_true(summary: TraceSummary, trace: Trace) -> None:
-    """Checks the summary at the end of a file, which the catalogue relies on, against the file. Raises TraceError."""
+    """Checks the summary at the end of a file, on which the catalogue relies, against the file. Raises TraceError."""
     if summary.state != "finished" or summary.trace_id != trace.record.trace_id or summary.joints != trace.joints:
         raise TraceError(summary.problem or "its index does not match its records")
     length = float(trace.time[-1] - trace.time[0]) if len(trace) else 0.0

@@ -1,4 +1,4 @@
-"""The service's side: starts processes with limits, gives them orders, and ends those that use too much."""
+"""The service's side: starts processes with limits, sends them orders, and ends those that exceed the limits."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from server.bounded.messages import Answer, Limits, Order
 from server.problems import ProblemError
 
 LARGEST_ANSWER = 64 << 20
-"""Number of bytes of one line, at most."""
+"""Largest line (bytes)."""
 START_WITHIN = 30.0
-"""Time (s) for a process to start on a busy computer. It is granted in addition to the order's own time."""
+"""Time (s) for a process to start on a busy computer, in addition to the order's own time."""
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 log = logging.getLogger("server.bounded")
 
 
 class ExhaustedError(Exception):
-    """An order used more time or memory than it may, or its process ended. The text is one line."""
+    """An order exceeded its time or memory, or its process ended. The text is one line."""
 
 
 class Workers:
-    """Up to `most` processes, started when they are needed and kept while they stay small. Safe to use from any thread.
-    `ask` blocks, so call it on a thread."""
+    """Up to `most` processes, started on demand and reused while they stay small. Safe to use from any thread. `ask`
+    blocks."""
 
     def __init__(self, limits: Limits, most: int, start_within: float = START_WITHIN) -> None:
         self._limits = limits
@@ -39,7 +39,7 @@ class Workers:
         self._closed = False
 
     def ask(self, order: Order) -> Answer:
-        """Has an order carried out, and returns the answer. Raises ExhaustedError if there is none, and a 503 once the
+        """Carries out an order and returns the answer. Raises ExhaustedError if there is none, and a 503 once the
         service ends."""
         with self._room:
             worker = self._taken()
@@ -59,23 +59,23 @@ class Workers:
         return answer
 
     def close(self) -> None:
-        """Ends all processes, whatever they are doing."""
+        """Kills all processes."""
         with self._lock:
             self._closed = True
             idle, busy = self._idle, set(self._busy)
             self._idle = []
         for worker in busy:
-            worker.end()  # the thread that waits for it tidies up
+            worker.end()  # the thread that waits for it cleans up
         for worker in idle:
             worker.kill()
 
     def idle_processes(self) -> tuple[int, ...]:
-        """Returns the process numbers of those that wait for an order."""
+        """Returns the PIDs of the processes that wait for an order."""
         with self._lock:
             return tuple(worker.number for worker in self._idle)
 
     def busy_processes(self) -> tuple[int, ...]:
-        """Returns the process numbers of those that carry out an order."""
+        """Returns the PIDs of the processes that carry out an order."""
         with self._lock:
             return tuple(worker.number for worker in self._busy)
 
@@ -110,7 +110,7 @@ class _Worker:
 
     @property
     def number(self) -> int:
-        """The process number."""
+        """The process ID."""
         return self._process.pid
 
     @property
@@ -122,7 +122,7 @@ class _Worker:
         """Sends an order and waits for the answer. Raises ExhaustedError."""
         until = time.monotonic() + self._limits.seconds + self._allowance
         self._allowance = 0.0
-        self._process.send(order)  # lost if the process has ended; reading its answer says why
+        self._process.send(order)  # lost if the process has ended; reading its answer then gives the reason
         try:
             return Answer.model_validate_json(self._process.line(until, LARGEST_ANSWER))
         except LateError:

@@ -1,4 +1,4 @@
-"""Keeps the catalogue's table in step with the folder: adds new and salvaged files, and marks those that are gone."""
+"""Keeps the catalogue's table consistent with the folder: adds new and salvaged files, and marks missing ones."""
 
 from __future__ import annotations
 
@@ -24,38 +24,37 @@ from server.store.experiments import ExperimentStore
 from server.store.traces import NewTrace, TraceStore
 
 UPLOAD = ".upload-"
-"""Beginning of the name of a folder into which an upload is written."""
+"""Prefix of the name of a folder for an upload."""
 UPLOAD_IS_OLD = 2 * 3600.0
-"""Time (s) after which such a folder is no longer in use, since its reader has an hour at most."""
+"""Time (s) after which such a folder is no longer used, since its reader has at most an hour."""
 OPENED_STAYS = 600.0
-"""Time (s) for which the file of a trace stays after somebody has opened it."""
+"""Time (s) for which the file of a trace stays after it was opened."""
 PRUNE_EVERY = 60.0
-"""Time (s) between two searches for those of them that may go."""
+"""Time (s) between two searches for opened files that may be deleted."""
 log = logging.getLogger("server.catalogue")
 SHOWN = 200
-"""Number of characters of an error that the log shows."""
+"""Most characters of an error in the log."""
 
 
 def is_text(name: str) -> bool:
-    """Whether the name of a file can be written as UTF-8, as the database needs it."""
+    """Whether a file name is valid UTF-8, as the database requires."""
     return not any("\ud800" <= sign <= "\udfff" for sign in name)
 
 
 class Fetching(Protocol):
-    """What the catalogue asks of the archive. No method waits for the store."""
+    """The catalogue's requests to the archive. No method waits for the store."""
 
     def send(self, trace: str) -> None:
-        """A trace is in the folder now."""
+        """Reports that a trace is now in the folder."""
 
     def fetch(self, trace: str) -> ProblemError:
-        """Fetches a trace that only the archive has; returns the problem that says how far this is."""
+        """Fetches a trace that only the archive has. Returns the problem that describes the progress."""
 
     def bring(self, traces: Iterable[str], since: float) -> Transfer:
-        """Fetches traces. Returns how far this is altogether, or the first that has failed since that moment (s,
-        monotonic)."""
+        """Fetches traces. Returns their total progress, or the first failure since that moment (s, monotonic)."""
 
     def deleted(self) -> None:
-        """A trace has been deleted."""
+        """Reports that a trace was deleted."""
 
 
 class Catalogue:
@@ -79,11 +78,11 @@ class Catalogue:
         self._opened: dict[str, float] = {}
         self._pruned = time.monotonic()
         self._opening = threading.Lock()
-        """Held for a moment by who opens a file, and by who drops one."""
+        """Held briefly to open a file, and to delete a local copy."""
 
     def bring_up_to_date(self) -> int:
-        """Salvages traces that a crash left unfinished, and adds every file that is not in the table. Returns how many
-        were added."""
+        """Salvages traces that a crash left unfinished, and adds every file that is not in the table. Returns the
+        number of added files."""
         self.folder.mkdir(parents=True, exist_ok=True)
         with self._lock:
             for salvaged in salvage_folder(self.folder, self.limits):
@@ -98,7 +97,8 @@ class Catalogue:
             return sum(self._take_in(self.folder / name) is not None for name in sorted(there - known))
 
     def clear_uploads(self) -> None:
-        """Deletes the folders of interrupted uploads. Recent ones may belong to another service with this folder."""
+        """Deletes the folders of interrupted uploads. Recent ones may belong to another service that uses this
+        folder."""
         old = time.time() - UPLOAD_IS_OLD
         for left in self.folder.glob(f"{UPLOAD}*"):
             with suppress(OSError):  # another service may be deleting it
@@ -107,15 +107,15 @@ class Catalogue:
                     log.info("deleted %s: its upload was interrupted", left)
 
     def add(self, path: Path) -> str | None:
-        """Adds one finished file. Returns the trace's number; None if the file is not a trace, which the log says."""
+        """Adds one finished file. Returns the trace's ID; None if the file is not a trace, which is logged."""
         with self._lock:
             summary = self._take_in(path)
         return None if summary is None else summary.trace_id
 
     def move_in(self, source: Path, target: Path, summary: TraceSummary) -> bool:
         """Moves a finished file with this summary from elsewhere on the disk to `target` in the folder, and adds it.
-        Returns False, and changes nothing, if a trace with its number exists. Raises a 409 if `target` exists."""
-        with self._lock:  # others who look into the folder find both file and row, or neither
+        Returns False, and changes nothing, if a trace with its ID exists. Raises a 409 if `target` exists."""
+        with self._lock:  # other threads see both file and row, or neither
             if target.exists():
                 advice = "it is the same trace: nothing needs to be done"
                 raise conflict("trace-exists", f"{target.name} exists already", advice)
@@ -131,8 +131,8 @@ class Catalogue:
             return taken
 
     def remove(self, identity: str) -> Path:
-        """Deletes a trace for good, also if its file is gone already, and returns the file's path. Raises a 404, a 409
-        if something uses the trace, and OSError if the file cannot be deleted; nothing has changed then."""
+        """Deletes a trace permanently, even if its file is gone, and returns the file's path. Raises a 404, a 409 if
+        the trace is used, and OSError if the file cannot be deleted; nothing has changed then."""
         path = self.folder / self._traces.file_of(self._robot, identity)
 
         def take_away() -> None:
@@ -146,8 +146,8 @@ class Catalogue:
         return path
 
     def path_of(self, identity: str) -> Path:
-        """Returns the file of a trace. Raises a 404, also if the file is gone; a 503 if only the archive has it, from
-        which it is fetched then."""
+        """Returns the file of a trace. Raises a 404, also if the file is gone; a 503 if only the archive has it, which
+        starts fetching it."""
         path = self.place_of(identity)
         if not self.is_here(identity, path):
             assert self.archive is not None
@@ -155,8 +155,8 @@ class Catalogue:
         return path
 
     def place_of(self, identity: str) -> Path:
-        """Returns where the file of a trace is, or will be once it is fetched from the archive. Raises a 404 if it is
-        in neither, a 409 if there is no archive any more."""
+        """Returns the path of a trace's file, even if it must still be fetched from the archive. Raises a 404 if
+        neither folder nor archive has it, a 409 if there is no archive any more."""
         path = self.folder / self._traces.file_of(self._robot, identity)
         if path.is_file():
             return path
@@ -169,9 +169,9 @@ class Catalogue:
         return path
 
     def bring(self, traces: Iterable[str], since: float) -> Transfer | None:
-        """Fetches from the archive what the folder does not have. Returns None if it has all of these traces; else how
-        far it is, or the first that has failed since that moment (s, monotonic). Raises a 404 for one that is in
-        neither."""
+        """Fetches missing traces from the archive. Returns None if the folder has all of these traces, otherwise the
+        progress, or the first failure since that moment (s, monotonic). Raises a 404 for a trace that neither folder
+        nor archive has."""
         if self.archive is None:
             return None
         names = self._traces.files_of(self._robot, traces)
@@ -183,7 +183,7 @@ class Catalogue:
         return self.archive.bring(absent, since)
 
     def is_here(self, identity: str, path: Path) -> bool:
-        """Whether the folder has the file of a trace, which stays there for a while then."""
+        """Whether the folder has the file of a trace, which then stays there for some time."""
         with self._opening:
             if not path.is_file():
                 return False
@@ -205,21 +205,21 @@ class Catalogue:
         return target
 
     def drop(self, identity: str, is_allowed: Callable[[], bool] = lambda: True) -> bool:
-        """Deletes the local copy of a trace that the archive has. Returns False, and changes nothing, if somebody has
-        just opened it, or it is not allowed any more. Raises a 404, and OSError."""
+        """Deletes the local copy of an archived trace. Returns False, and changes nothing, if it was opened recently,
+        or deletion is no longer allowed. Raises a 404, and OSError."""
         path = self.folder / self._traces.file_of(self._robot, identity)
         with self._lock, self._opening:
             if time.monotonic() - self._opened.get(identity, -OPENED_STAYS) < OPENED_STAYS or not is_allowed():
                 return False
-            # After a crash between the two, the next start finds the file and says so.
+            # After a crash between the two steps, the next start finds the file.
             self._traces.mark_missing(self._robot, [path.name], missing=True)
             path.unlink(missing_ok=True)
             sync_folder(self.folder)
         return True
 
     def _take_in(self, path: Path) -> TraceSummary | None:
-        """Adds one file. A file that cannot be added is logged, so that it does not keep the others out. Raises
-        OperationalError if the database fails."""
+        """Adds one file. An error is logged, so that one file does not exclude the others. Raises OperationalError if
+        the database fails."""
         try:
             if not is_text(path.name):
                 log.warning("not in the catalogue: %r: its name is not UTF-8; rename it", str(path))
@@ -229,7 +229,7 @@ class Catalogue:
                 return None
         except OperationalError:
             raise
-        except Exception as error:  # noqa: BLE001  # one file must not keep the service from starting
+        except Exception as error:  # noqa: BLE001  # one file must not prevent the service from starting
             line = " ".join(str(error).split())[:SHOWN]
             log.warning("not in the catalogue: %s: %s: %s", path, type(error).__name__, line)
             return None
@@ -237,7 +237,7 @@ class Catalogue:
         return summary
 
     def _tell(self, summary: TraceSummary) -> None:
-        """Passes the outcome on to the experiment of the trace, if there is one."""
+        """Passes the outcome to the trace's experiment, if there is one."""
         assert summary.trace_id is not None
         self._experiments.traced(summary.trace_id, summary.outcome)
         if self.archive is not None:

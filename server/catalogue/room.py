@@ -1,4 +1,4 @@
-"""The free disk space for traces, and whether it is enough for another one, checked when an experiment is submitted."""
+"""Checks the free disk space for traces when an experiment is submitted."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class _Usage(NamedTuple):
 
 
 def free_room(folder: Path) -> int:
-    """Returns the free bytes for traces. Raises a 503 if the folder does not exist."""
+    """Returns the free space for traces (bytes). Raises a 503 if the folder does not exist."""
     return _usage(folder).free
 
 
@@ -35,17 +35,17 @@ def _usage(folder: Path) -> _Usage:
 
 
 class Room(NamedTuple):
-    """The room on the disks of several folders (bytes): the least that is free on one, and the size of all."""
+    """Space on the disks of several folders (bytes): the smallest free space, and the total size."""
 
     free: int
     size: int
 
 
 def room_of(folders: Iterable[Path]) -> Room:
-    """Returns the room for traces. A folder that does not exist is left out; there is no room if none exists."""
+    """Returns the space for traces, without folders that do not exist; 0 if none exists."""
     usages = []
     for folder, *_same in by_disk(folders):
-        with suppress(ProblemError):  # `storage_warnings` tells of it
+        with suppress(ProblemError):  # `storage_warnings` reports it
             usages.append(_usage(folder))
     return Room(min((one.free for one in usages), default=0), sum(one.total for one in usages))
 
@@ -53,7 +53,7 @@ def room_of(folders: Iterable[Path]) -> Room:
 def by_disk(
     folders: Iterable[Path], disk_of: Callable[[Path], object] = lambda folder: folder.stat().st_dev
 ) -> list[list[Path]]:
-    """Groups folders by the disk on which they are. One that does not exist is alone."""
+    """Groups folders by disk. A folder that does not exist forms its own group."""
     found: dict[object, list[Path]] = {}
     for folder in folders:
         try:
@@ -65,10 +65,10 @@ def by_disk(
 
 
 def disk_warnings(folder: Path, warn_at: float) -> list[str]:
-    """Returns a line if more than this share of the disk is in use, before experiments are refused for it."""
+    """Returns a line if more than this share of the disk is used, before experiments are refused for lack of space."""
     try:
         room = shutil.disk_usage(folder)
-    except OSError:  # which others tell
+    except OSError:  # reported elsewhere
         return []
     used = 1 - room.free / max(1, room.total)
     if used < warn_at:
@@ -78,8 +78,8 @@ def disk_warnings(folder: Path, warn_at: float) -> list[str]:
 
 
 def storage_warnings(folders: Mapping[str, Path], warn_at: float) -> list[str]:
-    """Returns what will need somebody soon about the folders of traces, by robot: a line for each disk, with the names
-    of its robots where there are several, and one for each folder that does not exist."""
+    """Returns warnings about the folders of traces, by robot: a line per disk, with the names of its robots if there
+    are several, and one per missing folder."""
     found = []
     for same in by_disk(folders.values()):
         names = [name for name, folder in folders.items() if folder in same]
@@ -88,7 +88,7 @@ def storage_warnings(folders: Mapping[str, Path], warn_at: float) -> list[str]:
 
 
 def of_robots(names: Sequence[str], line: str, *, among: int) -> str:
-    """Returns a line with the names of the robots that it is about; the line alone if the service has one robot."""
+    """Returns a line with the names of the robots concerned; the line alone if the service has one robot."""
     return line if among == 1 else f"{', '.join(names)}: {line}"
 
 

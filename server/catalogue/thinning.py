@@ -14,7 +14,7 @@ SIGNALS = ("position", "set_point", "error", "drive")
 
 @dataclass(frozen=True)
 class Thinned:
-    """`time` (p,) in s; each signal (p, j), or None if the trace does not have it."""
+    """`time` (p,) in s; each signal (p, j), or None if it was not recorded."""
 
     time: Floats
     signals: dict[str, Floats | None]
@@ -23,9 +23,9 @@ class Thinned:
 def thinned(trace: Trace, points: int, start: float | None = None, end: float | None = None) -> Thinned:
     """Returns the signals between `start` and `end` (s) in about `points` points.
 
-    Each of many stretches of equal length is replaced by its smallest and its largest value, at the stretch's first and
-    last time. So no peak is lost, and none is moved by more than one stretch. The larger value comes first if the
-    signal falls from the stretch's first sample to its last.
+    Each of many intervals of equal length is replaced by its smallest and its largest value, at the interval's first
+    and last time. So no peak is lost, and none is shifted by more than one interval. The larger value comes first if
+    the signal falls over the interval.
     """
     chosen = np.ones(len(trace), bool)
     if start is not None:
@@ -41,19 +41,19 @@ def thinned(trace: Trace, points: int, start: float | None = None, end: float | 
 
 
 def stretches(samples: int, points: int) -> NDArray[np.int64] | None:
-    """Returns the first sample of each of `points // 2` stretches; None if there are no more samples than points."""
+    """Returns the first sample of each of `points // 2` intervals; None if there are no more samples than points."""
     if samples <= max(points, 2):
         return None
     return np.linspace(0, samples, max(1, points // 2) + 1).astype(np.int64)[:-1]
 
 
 def moments(time: Floats, first: NDArray[np.int64]) -> Floats:
-    """Returns (2 · stretches,): the first and the last time of every stretch."""
+    """Returns (2 · intervals,): the first and the last time of every interval."""
     return np.stack([time[first], time[_last(len(time), first)]], axis=1).ravel()
 
 
 def extremes(signal: Floats, first: NDArray[np.int64]) -> Floats:
-    """Returns (2 · stretches, j): the minimum and the maximum of every stretch; the maximum first if it falls."""
+    """Returns (2 · intervals, j): minimum and maximum of every interval; the maximum first if the signal falls."""
     low, high = np.minimum.reduceat(signal, first), np.maximum.reduceat(signal, first)
     falling = signal[first] > signal[_last(len(signal), first)]
     pairs = np.stack([np.where(falling, high, low), np.where(falling, low, high)], axis=1)

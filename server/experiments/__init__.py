@@ -1,1 +1,1 @@
-"""Pure rules of experiments: states, order in the queue, endings, least length, and when a schedule submits."""
+"""Pure rules of experiments: states, order in the queue, endings, least duration, and times of scheduled runs."""

@@ -1,7 +1,8 @@
-"""The review of an experiment before it moves a real arm: what is approved, by whom, and whether that is enough. Pure.
+"""Review of an experiment before it moves a real arm: the approved content, the reviewer, and whether the approval is
+sufficient. Pure.
 
-An approval holds for exactly one content: the specification, the start time, the robot, and its machine file with the
-limits of the configuration, by which the same specification may become another motion.
+An approval is valid for exactly one content: the specification, the start time, the robot, and its machine file with
+the configured limits, since with other limits the same specification may become another motion.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from daq.contracts.service.robot import RobotIdentity
 
 @dataclass(frozen=True)
 class Given:
-    """An approval as it was given: for which content, by whom, and whether they were an owner of the robot then."""
+    """An approval: its content, the reviewer's name, and whether the reviewer was an owner of the robot."""
 
     content: str
     by: str
@@ -29,7 +30,7 @@ class Given:
 
 @dataclass(frozen=True)
 class Review:
-    """The rule of one robot. reviewer: who must approve, None if nobody needs to; machine: digest of its machine."""
+    """The rule of one robot. reviewer: who must approve; None for nobody. machine: digest of its machine."""
 
     robot: str
     machine: str
@@ -41,11 +42,11 @@ class Review:
         return cls(robot, _digest(machine.model_dump(mode="json")), reviewer)
 
     def content(self, given: str) -> str:
-        """Returns what an approval is bound to, for a specification's digest `given` (`digest_of`)."""
+        """Returns the content to which an approval is bound, for a specification's digest `given` (`digest_of`)."""
         return _digest([self.robot, self.machine, given])
 
     def is_enough(self, given: Given | None, content: str, authors: Collection[str]) -> bool:
-        """Whether an approval permits this content (as `content` returns it). `authors`: who owns, submitted or changed
+        """Whether an approval permits this content (from `content`). `authors`: people who own, submitted or changed
         the experiment; none of them can have approved it."""
         if self.reviewer is None:
             return True
@@ -54,14 +55,14 @@ class Review:
         return given.as_owner or self.reviewer == "operator"
 
     def is_needed(self, identity: RobotIdentity | None, url: str) -> bool:
-        """Whether a review is needed for the arm that is connected, or, while none is, would be at this port."""
+        """Whether a review is needed for the connected arm or, while none is connected, for an arm at this port."""
         if self.reviewer is None:
             return False
         return not url.startswith("mock://") if identity is None else not identity.simulated
 
 
 def digest_of(spec: ExperimentSpec, at: datetime | None) -> str:
-    """Returns the digest (SHA-256) of what an experiment is: its specification, and its start time if it has one."""
+    """Returns the digest (SHA-256) of an experiment: its specification, and its start time if it has one."""
     return _digest([spec.model_dump(mode="json"), None if at is None else at.astimezone(UTC).isoformat()])
 
 

@@ -1,6 +1,6 @@
-"""Computes when a schedule submits its next run. Pure, but for the table of time zones.
+"""Computes when a schedule submits its next run. Pure, except for the table of time zones.
 
-The least duration of an experiment, so that one that is far too long is refused before it is planned. Pure.
+`least_length` bounds the duration of an experiment, so that one that is far too long is refused before planning.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from daq.contracts.experiment import (
 from server.problems import ProblemError
 
 LONGEST = 4 * 3600.0
-"""Longest duration (s) of one experiment: 720 000 control periods, a trace of some 300 MB. It was chosen freely; a
-schedule runs longer studies."""
+"""Longest duration (s) of one experiment (a choice): 720 000 control periods, a trace of some 300 MB. Use a schedule
+for longer studies."""
 
 
 def least_length(spec: ExperimentSpec) -> float:
-    """Returns the duration (s) of the record without the slow returns between repeats. The planner refuses a plan that
-    these make longer than 4 h, before it fills the memory."""
+    """Returns the duration (s) of the record without the slow returns between repeats. The planner rejects a plan
+    longer than 4 h including them, before it fills the memory."""
     return spec.repeats * (spec.settle + _of(spec.trajectory) + spec.hold)
 
 
@@ -89,13 +89,13 @@ def _of(trajectory: Trajectory) -> float:
 MOMENT = timedelta(microseconds=1)
 HOURS = 24
 FIELDS = 5
-"""Minute, hour, day, month, weekday. A sixth field, of seconds, would let runs come too fast."""
+"""Minute, hour, day, month, weekday. A sixth field, seconds, would allow runs too close together."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A schedule's rule: from `starts`, `count` times (None: without end), every `every` s; or, with a `cron`
-    expression, whenever that fits the wall clock of the time zone `zone`."""
+    """A schedule's rule: from `starts`, `count` times (None: no end), every `every` s or, with a `cron` expression, at
+    its times on the wall clock of the time zone `zone`."""
 
     starts: datetime
     every: float
@@ -105,8 +105,7 @@ class Plan:
 
 
 def first(plan: Plan) -> datetime | None:
-    """Returns the time of the first run; None if there is none. Raises a 422 for an expression or a zone that is
-    none."""
+    """Returns the time of the first run; None if there is none. Raises a 422 for an invalid expression or zone."""
     if plan.cron is None:
         return plan.starts
     if len(plan.cron.split()) != FIELDS:
@@ -124,8 +123,8 @@ def first(plan: Plan) -> datetime | None:
 
 
 def broken(plan: Plan) -> str:
-    """Returns why the times of a stored schedule cannot be computed now, such as a time zone that is no longer known;
-    empty where they can."""
+    """Returns why the times of a stored schedule cannot be computed now, such as an unknown time zone; empty if they
+    can."""
     try:
         first(plan)
     except ProblemError as error:
@@ -136,8 +135,8 @@ def broken(plan: Plan) -> str:
 def following(plan: Plan, submitted: int, last: datetime, now: datetime) -> datetime | None:
     """Returns the time of the run after the one due at `last`, after `submitted` runs; None if that was the last run.
 
-    It is the first of the plan's times that is after `last` and after `now`: runs that were due while the service was
-    not running are left out. A clock that is set back does not make the run at `last` due again.
+    It is the first of the plan's times after `last` and after `now`: runs that were due while the service was off are
+    skipped. If the clock is set back, the run at `last` is not repeated.
     """
     if plan.count is not None and submitted >= plan.count:
         return None
@@ -146,7 +145,7 @@ def following(plan: Plan, submitted: int, last: datetime, now: datetime) -> date
     passed = (max(last, now) - plan.starts).total_seconds()
     steps = max(0, math.floor(passed / plan.every) + 1)
     moment = plan.starts + timedelta(seconds=steps * plan.every)
-    while moment <= last:  # rounding of the division
+    while moment <= last:  # the division may have been rounded
         steps += 1
         moment = plan.starts + timedelta(seconds=steps * plan.every)
     return moment
@@ -163,17 +162,17 @@ def zone_here() -> str:
 
 
 def _after(cron: str, zone: str | None, moment: datetime) -> datetime | None:
-    """Returns the first time after `moment` that fits. Where clocks are put forward, a time that is left out comes when
-    they are; where they are put back, a time that comes twice counts once (unless the expression means every hour)."""
+    """Returns the first matching time after `moment`. If clocks are set forward, a skipped time is moved to the change.
+    If they are set back, a repeated time counts once (unless the expression means every hour)."""
     wall = moment.astimezone(ZoneInfo(zone or "UTC"))
     found = next(CronSim(_of_the_clock(cron, CronSim(cron, wall).hours), wall), None)
     return None if found is None else found.astimezone(UTC)
 
 
 def _of_the_clock(cron: str, hours: set[int]) -> str:
-    """The expression as CronSim takes it for the wall clock: with a star for `hours` that are all there are, however
-    they are written, else with the steps of minutes and hours as ranges. What begins with a star is taken for time that
-    passes, and would come twice, or not at all, when clocks change."""
+    """The expression in CronSim's form for the wall clock: a star for `hours` that are complete, however written;
+    otherwise steps of minutes and hours as ranges. CronSim counts fields that begin with a star in elapsed time, so
+    their times would be repeated or skipped when clocks change."""
     minute, hour, *days = cron.split()
     if len(hours) == HOURS:
         return " ".join([minute, "*", *days])

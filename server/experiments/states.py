@@ -1,11 +1,9 @@
 """The states of an experiment, and the transitions between them. Pure.
 
 queued → running → done | failed | cancelled | interrupted, and queued → cancelled. An experiment never leaves an end
-state: an interrupted one does not run again by itself, but must be submitted again.
+state: an interrupted one must be submitted again.
 
-The meaning of a run's end for its experiment and for the queue. Pure.
-
-The order of the queue. Pure.
+Also defined here: the order of the queue, and what the end of a run means for its experiment and for the queue.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ from daq.owner.messages import Answer
 
 @dataclass(frozen=True)
 class Waiting:
-    """A waiting experiment. `sequence` is the order of submission, which does not depend on a clock."""
+    """A waiting experiment. `sequence`: order of submission, independent of clocks."""
 
     id: str
     sequence: int
@@ -38,10 +36,10 @@ def next_due(waiting: Iterable[Waiting], now: datetime) -> Waiting | None:
 
 
 class Event(StrEnum):
-    """What can happen to an experiment."""
+    """Events of an experiment."""
 
     TAKEN = "taken"
-    """The worker begins it."""
+    """The queue begins it."""
     COMPLETED = "completed"
     """The plan was carried out completely."""
     REFUSED = "refused"
@@ -49,9 +47,9 @@ class Event(StrEnum):
     FAULT = "fault"
     """A safety check ended it."""
     STOPPED = "stopped"
-    """Somebody stopped the arm, or cancelled the experiment while it ran."""
+    """A person stopped the arm, or cancelled the experiment while it ran."""
     CANCELLED = "cancelled"
-    """Somebody cancelled it before it began."""
+    """A person cancelled it before it began."""
     LOST = "lost"
     """The link, a process or the power failed."""
 
@@ -84,7 +82,8 @@ def advance(state: ExperimentState, event: Event) -> ExperimentState:
 
 
 def after_restart(state: ExperimentState) -> ExperimentState:
-    """Returns the state after a restart of the service: a running experiment is interrupted; other states stay."""
+    """Returns the state after a restart of the service: a running experiment becomes interrupted; others stay
+    unchanged."""
     return advance(state, Event.LOST) if state == "running" else state
 
 
@@ -108,12 +107,12 @@ class Ending:
     @property
     def pauses_queue(self) -> bool:
         """Whether a person must look at the arm before the next experiment runs: always, except after a completed plan
-        whose trace is in the catalogue, or after a plan refused before anything moved."""
+        with its trace in the catalogue, or a plan refused before anything moved."""
         return self.left_out is not None or self.event not in (Event.COMPLETED, Event.REFUSED)
 
 
 def ending_of(answer: Answer) -> Ending:
-    """Returns the ending that the answer of the port's owner reports."""
+    """Returns the ending that the owner's answer reports."""
     if answer.finished is not None:
         return Ending(_OF_OUTCOME[answer.finished.outcome], answer.finished.reason, answer.finished.outcome)
     if answer.exit_code in (exit_codes.WRONG_INPUT, exit_codes.REFUSED):

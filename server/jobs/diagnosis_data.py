@@ -1,4 +1,4 @@
-"""The answer of a diagnosis with the data of its plots: overlays, changed parameters, significance by chance."""
+"""The answer of a diagnosis with data for plots: overlays, changed parameters, chance levels of significance."""
 
 from __future__ import annotations
 
@@ -55,9 +55,12 @@ def diagnosis_data(
     given: Where | None = None,
     efforts: Sequence[TraceSignals] = (),
 ) -> DiagnosisData:
-    """Returns the answer with the data of its plots. `comparison`: of the models before and after, if they can be
-    simulated. `given`: where the given model disagrees with the traces, likewise. `efforts`: recorded beside predicted
-    ones, of a diagnosis in torques."""
+    """Returns the answer with data for plots.
+
+    `comparison`: the models before and after, if they can be simulated. `given`: where the given model disagrees with
+    the traces, also if it can be simulated. `efforts`: recorded and predicted torques of a diagnosis by inverse
+    dynamics.
+    """
     return DiagnosisData(
         **{
             **dict(found),
@@ -74,20 +77,21 @@ def diagnosis_data(
 
 
 def _words(found: Diagnosis) -> dict[str, ParameterWords]:
-    """Words for the parameters of both models, and of the effects that were tried and not added."""
+    """Names of the parameters of both models, and of effects that were tried but not added."""
     machine = found.model_before.machine
     rejected = [
         parameter
         for step in found.steps
-        if step.effect is not None and not step.adopted and step.effect not in MACHINE_NUMBERS  # the model has those
+        # parameters of added effects are in the model
+        if step.effect is not None and not step.adopted and step.effect not in MACHINE_NUMBERS
         for parameter in effect_parameters(machine, step.effect, step.joints, shared=False)
     ]
     return words_by_name([*found.model_before.parameters, *found.model_after.parameters, *rejected])
 
 
 def where_given(model: Model, traces: Sequence[Trace]) -> Where | None:
-    """Returns where a model disagrees with traces before anything is fitted; None if its simulation does not stay
-    finite. Raises TraceError, SpecError for traces that cannot be simulated."""
+    """Returns where a model disagrees with traces before any fit; None if its simulation does not stay finite. Raises
+    TraceError, SpecError for traces that cannot be simulated."""
     records = records_of(as_used(traces, model.machine, "closed"), model.machine, "position")
     runs = [simulate(model, record.inputs, Options(quantise=False)) for record in records]
     left = [record.measured - run.at_samples(run.reading) for record, run in zip(records, runs, strict=True)]
@@ -108,5 +112,5 @@ def _tried(one: Candidate) -> TriedEffect:
 
 
 def _beside_map(found: Diagnosis, where: Where) -> dict[str, Any]:
-    """What is told beside a map of disagreement."""
+    """Additional data of a disagreement map."""
     return {"chance": chance_significance(len(where.cells)), "not_a_finding": not_a_finding(found, where)}

@@ -10,15 +10,14 @@ from daq.contracts.service.jobs import CompareRequest, Job, JobRequest, Validate
 Lane = Literal["short", "long"]
 LANES: tuple[Lane, ...] = get_args(Lane)
 SHORT_LANE_WORKERS = 1
-"""Number of worker processes of the short lane. One suffices, since a job there takes seconds; each costs about 250
+"""Number of worker processes of the short lane. One is enough, since a job there takes seconds; each uses about 250
 MB."""
 MOST_PASSES = 20
-"""Largest number of passes over a trace in a short job; one takes about 1 s. A longer comparison takes as long as a
-fit."""
+"""Most passes over a trace in a short job; one takes about 1 s. A longer comparison takes as long as a fit."""
 
 
 def lane_of(request: JobRequest) -> Lane:
-    """Returns the lane of a job, from what it has to compute. Fits and diagnoses iterate and are always long."""
+    """Returns the lane of a job from its computation. Fits and diagnoses iterate and are always long."""
     match request:
         case CompareRequest():
             passes = len(request.traces) * len(request.models)
@@ -30,11 +29,11 @@ def lane_of(request: JobRequest) -> Lane:
 
 
 def with_what_it_waits_for(job: Job, running: Iterable[Job], waiting: Sequence[Job]) -> Job:
-    """Returns a queued job with the job that it waits behind, in `waits_behind`.
+    """Returns a queued job with the job before it in `waits_behind`.
 
     Args:
-        running: jobs of any lane that are being computed
-        waiting: queued jobs of any lane, the first submitted first
+        running: running jobs of any lane
+        waiting: queued jobs of any lane, in order of submission
     """
     lane = lane_of(job.request)
     computed = sorted((one for one in running if lane_of(one.request) == lane), key=lambda one: one.submitted)

@@ -1,4 +1,4 @@
-"""The folder of a job: its request, its progress, whether it must end, its result. These are files, so that a worker on
+"""The folder of a job: its request, its progress, its cancellation, its result. These are files, so that a worker on
 another computer could share them; each is written completely or not at all."""
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from daq.contracts.service.jobs import LeadingEffect
 from daq.contracts.whole_file import replacing
 
 TELL_EVERY = 0.2
-"""Time (s) between two reports of progress, and between two checks whether the job must end."""
+"""Time (s) between two progress reports, and between two checks for cancellation."""
 REQUEST, PROGRESS, CANCEL, RESULT, REPORT, MODEL = (
     "request.json",
     "progress.json",
@@ -60,11 +60,11 @@ class Mailbox:
             return None
 
     def cancel(self) -> None:
-        """Asks the job to end."""
+        """Requests that the job ends."""
         (self.folder / CANCEL).touch()
 
     def reported(self) -> Reported | None:
-        """Returns the progress of the job; None before it has begun."""
+        """Returns the job's progress; None before it has begun."""
         data = self.read(PROGRESS)
         if data is None:
             return None
@@ -74,8 +74,8 @@ class Mailbox:
     # ---- the worker's side
 
     def tell(self, fraction: float, text: str, *, at_once: bool = False) -> None:
-        """Reports progress, as `daq.contracts.progress.Progress`. A report too soon after the one before is left out,
-        unless it is `at_once`, as for the beginning of something long."""
+        """Reports progress, as `daq.contracts.progress.Progress`. Reports that follow too soon are dropped, unless
+        `at_once` is set, for the start of a long stage."""
         now = time.monotonic()
         self._now = replace(self._now, fraction=fraction, text=text)
         if now - self._told < TELL_EVERY and not at_once:

@@ -1,4 +1,5 @@
-"""The models of one robot: files in a folder, listed in the database. What reads a file is loaded when it is needed."""
+"""The models of one robot: files in a folder, listed in the database. Modules that read model files are imported on
+first use."""
 
 from __future__ import annotations
 
@@ -29,19 +30,22 @@ class Models:
         self._clock = clock
 
     def add_from_file(self, path: Path, name: str, by: str, job: str) -> str:
-        """Adds a job's model, and returns its number. Adding it again changes nothing. Raises SpecError."""
+        """Adds a job's model, and returns its ID. Adding it again changes nothing. Raises SpecError."""
         from model.machine_model.model_file import file_of, load_model
 
-        made = file_of(load_model(path))
-        self.add(made, name, by, job)
-        return made.identity
+        new = file_of(load_model(path))
+        self.add(new, name, by, job)
+        return new.identity
 
     def add(
         self, made: ModelFile, name: str, by: str, job: str | None = None, robots: Collection[str] | None = None
     ) -> bool:
-        """Adds a model; returns False if the robot has it already. A number stands for one text, so its file is written
-        once. `robots`: those whose traces it may name; None for any. Raises a 422 for a trace that none of them has,
-        SpecError if another model has its number."""
+        """Adds a model; returns False if the robot has it already. An ID belongs to exactly one text, so its file is
+        written once.
+
+        `robots`: the model's traces must belong to these; None: to any. Raises a 422 otherwise, SpecError if another
+        model has its ID.
+        """
         new = NewModel(
             id=made.identity,
             robot=self._robot,
@@ -86,7 +90,7 @@ class Models:
         )
 
     def machine_identity(self) -> str:
-        """Returns the number of the model that the machine file describes."""
+        """Returns the ID of the model that the machine file describes."""
         return self._base().identity
 
     def machine_parameters(self) -> tuple[ModelParameter, ...]:
@@ -104,8 +108,8 @@ class Models:
 
 
 def _is_stored(path: Path, made: ModelFile) -> bool:
-    """Whether a model is in its file. A file that is not there, or was damaged or changed, is to be written anew.
-    Raises SpecError for a file of another model of the same number."""
+    """Whether the model is stored in its file. A missing, damaged or changed file must be written again. Raises
+    SpecError if the file contains another model with the same ID."""
     from model.machine_model.model_file import file_of, load_model
 
     try:
@@ -113,7 +117,7 @@ def _is_stored(path: Path, made: ModelFile) -> bool:
     except (DaqError, OSError):
         return False
     if there.identity == made.identity and there.text != made.text:
-        raise SpecError(f"model {made.identity}: another model has this number; change any value of it")
+        raise SpecError(f"model {made.identity}: another model has this ID; change any of its values")
     return there.identity == made.identity
 
 

@@ -1,5 +1,5 @@
-"""The experiments that a diagnosis may ask for: those of the library that the machine's limits allow and, where
-it is wanted, experiments that are drawn within them.
+"""Experiments that a diagnosis may propose: those of the library that the machine's limits allow and, on request,
+random ones within the limits.
 
 The service, `daq diagnose` and the diagnosing process of a blind trial use this.
 """
@@ -17,15 +17,16 @@ if TYPE_CHECKING:
 
 
 DRAWN = 40
-"""Experiments that are drawn for a question."""
+"""Number of random experiments per question."""
 
 
 def experiment_chooser(machine: Machine, budget: float | None = None, *, design: bool = False) -> ExperimentChooser:
-    """Returns the library of experiments, planned and checked for a machine. The caller runs those asked for.
+    """Returns the experiment chooser for a machine, which plans and checks experiments. The caller runs the proposed
+    ones.
 
     Args:
         budget: remaining robot time (s); None for no limit.
-        design: draw experiments for each question, too.
+        design: also draw random experiments for each question.
     """
     from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
 

@@ -1,4 +1,4 @@
-"""The options and effects of a study, as its request names them, for the functions that compute it."""
+"""Options and effects of a study, as its request gives them, for the functions that compute it."""
 
 from __future__ import annotations
 
@@ -17,14 +17,13 @@ Chosen = TypeVar("Chosen", "FitOptions", "DiagnosisOptions")
 
 
 def options_of(study: FitStudy | DiagnoseStudy, kind: type[Chosen]) -> Chosen:
-    """Returns the options of a study. What the study leaves open is left to the method, which has defaults of its
-    own."""
+    """Returns the options of a study. Options that are not given get the method's defaults."""
     given = {name: getattr(study, name, None) for name in kind.model_fields}
     return kind(**{name: value for name, value in given.items() if value is not None})
 
 
 def with_effects(model: Model, effects: Sequence[EffectChoice]) -> Model:
-    """Adds effects to a model; one without joints acts on all that it can act on. Raises SpecError."""
+    """Adds effects to a model; an effect without joints acts on all possible ones. Raises SpecError."""
     from model.effects.library import effect, library
 
     for choice in effects:

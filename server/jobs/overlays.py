@@ -1,5 +1,4 @@
-"""Thins the signals of a comparison for a plot, to a number of points that a page draws at once, without losing a
-peak."""
+"""Thins the signals of a comparison to a number of points that a page draws at once, without losing peaks."""
 
 from __future__ import annotations
 
@@ -18,23 +17,23 @@ if TYPE_CHECKING:
     from model.validation.variation import TimeDomain
 
 MOST_POINTS, LEAST_POINTS = 1600, 200
-"""Number of points of one trace, and the least number if there are many traces."""
+"""Most points of one trace, and the number per trace if there are many."""
 ALL_POINTS = 16_000
-"""Number of points of all traces of one result together."""
+"""Most points of all traces of one result together."""
 DIGITS = 7
-"""Number of decimal places of rad, m and s that are sent: a count of the sensor is a thousand times larger."""
+"""Decimal places of rad, m and s in responses: a count of the sensor is a thousand times larger."""
 VARIATION_POINTS = 800
-"""Number of points of a parameter's variation with time, which is smooth."""
+"""Most points of a parameter's variation with time, which is smooth."""
 
 
 def overlays(signals: Sequence[TraceSignals]) -> tuple[Overlay, ...]:
-    """Returns every trace beside its simulations."""
+    """Returns every trace with its simulations."""
     points = int(np.clip(ALL_POINTS // max(1, len(signals)), LEAST_POINTS, MOST_POINTS))
     return tuple(overlay(one, points) for one in signals)
 
 
 def overlay(one: TraceSignals, points: int) -> Overlay:
-    """Returns one trace beside its simulations in about `points` points."""
+    """Returns one trace with its simulations in about `points` points."""
     first = stretches(len(one.time), points)
 
     def rows(signal: Floats) -> tuple[Row, ...]:
@@ -57,8 +56,8 @@ def overlay(one: TraceSignals, points: int) -> Overlay:
 
 
 def thinned_variation(one: TimeDomain) -> TimeDomain:
-    """Returns a variation with time at VARIATION_POINTS evenly spaced times at most. Accelerations were smoothed over
-    longer times than their distance."""
+    """Returns a variation with time at up to VARIATION_POINTS evenly spaced times. Accelerations were smoothed over
+    longer times than this spacing."""
     stride = max(1, -(-len(one.time) // VARIATION_POINTS))
     joints = tuple(j.model_copy(update={"values": j.values[::stride]}) for j in one.joints)
     parameters = tuple(

@@ -1,6 +1,6 @@
-"""Results of jobs as clients get them: the data of the commands' `--json`, and signals for plots.
+"""Results of jobs for clients: the data of the commands' `--json`, and signals for plots.
 
-The result of a fit, a validation or a comparison in one line, for lists. Pure.
+The functions `of_…` return the result of a fit, a validation or a comparison in one line, for lists. Pure.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def of_fit(found: FitResult, comparison: Comparison) -> str:
-    """Says how many parameters are known, and how the fit changes the error."""
+    """Returns how many parameters are known, and how the fit changes the error."""
     known = sum(p.verdict == "known" for p in found.parameters)
     before, after = comparison.models
     held = before.held_out is not None and after.held_out is not None
@@ -38,19 +38,19 @@ def of_fit(found: FitResult, comparison: Comparison) -> str:
 
 
 def of_validation(found: Fidelity) -> str:
-    """Says whether the model explains the records."""
+    """Returns whether the model explains the records."""
     total = f"Σλ² = {found.sum_of_contributions:.3g}"
     return total if found.verdict is None else f"{found.verdict.headline}; {total}"
 
 
 def of_comparison(found: Comparison) -> str:
-    """Says the error of each model over all traces."""
+    """Returns the error of each model over all traces."""
     errors = [f"{m.label} {_error(m.held_out or m.in_sample or ())}" for m in found.models]
     return f"error {'; '.join(errors)}"
 
 
 def _error(joints: Sequence[JointAgreement]) -> str:
-    """Says the root mean square over the revolute joints in degrees, and over the prismatic joints in mm."""
+    """Returns the root mean square over the revolute joints in degrees, and over the prismatic joints in mm."""
     turning = [j.rmse for j in joints if j.unit == "rad"]
     sliding = [j.rmse for j in joints if j.unit == "m"]
     told = []
@@ -66,13 +66,13 @@ def _rms(values: Sequence[float]) -> float:
 
 
 Words = dict[str, ParameterWords]
-"""How people write the parameters that a result names, by the parameter's name."""
+"""Names for people of the parameters in a result, by the parameter's name."""
 Row = tuple[float | None, ...]
 """One signal of one joint; None for samples at which a simulation was not finite."""
 
 
 class Overlay(FrozenRecord):
-    """One trace beside its simulations, thinned to the extremes of short stretches, so that no peak is lost.
+    """One trace with its simulations, thinned to the extremes of short intervals, so that no peak is lost.
 
     `time` is in s; signals have one row per joint, in the order of `joints`, in `units`. `simulated` and `residual`
     (measured − simulated, thinned separately) have such rows for every model, in the order of the result's `models`.
@@ -92,8 +92,8 @@ class Overlay(FrozenRecord):
 
 
 class FitData(FitResult):
-    """A fit, and the traces beside simulations of the models before and after it. `undetermined`: what the traces
-    cannot determine, a sentence each, with the parameters as people write them."""
+    """A fit, and the traces with simulations of the models before and after it. `undetermined`: what the traces cannot
+    determine, one sentence each, with names of parameters for people."""
 
     models: tuple[ModelAgreement, ...]
     signals: tuple[Overlay, ...]
@@ -102,7 +102,7 @@ class FitData(FitResult):
 
 class ValidationData(FrozenRecord):
     """A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other one (with the
-    same curves), and for each trace, thinned, how parameters would have to vary with time."""
+    same curves). For each trace: how parameters would have to vary with time, thinned."""
 
     fidelity: Fidelity
     three_sigma: Fidelity
@@ -120,21 +120,21 @@ class ComparisonData(FrozenRecord):
 
 
 class TriedEffect(Candidate):
-    """An effect that the diagnosis tried. `called`: the effect and its joints as people write them."""
+    """An effect that the diagnosis tried. `called`: names of the effect and its joints for people."""
 
     called: str
 
 
 class DiagnosisStep(Step):
-    """One step of the workflow. `called`: what was added, as people write it."""
+    """One step of the workflow. `called`: name of the added effect for people."""
 
     called: str
     candidates: tuple[TriedEffect, ...]
     group: tuple[TriedEffect, ...] = ()
     chance: float
-    """Significance that noise alone exceeds in any cell of `where` in one record out of a hundred."""
+    """Significance that noise alone exceeds in some cell of `where` in one record out of a hundred."""
     not_a_finding: str
-    """Why the dependences in `where` are no finding; empty where the diagnosis names one."""
+    """Why the dependences in `where` are no finding; empty if the diagnosis reports one."""
 
 
 class GivenWhere(FrozenRecord):
@@ -146,10 +146,13 @@ class GivenWhere(FrozenRecord):
 
 
 class DiagnosisData(Diagnosis):
-    """A diagnosis (docs/diagnosis-json.md), and the traces beside simulations of the models before and after it, if
-    these can be simulated. `differences` are the parameters that changed, including those of added effects; `given` is
-    where the given model disagreed with the traces before anything was fitted. `efforts` are the traces' torques
-    (forces) beside those that both models predict from the motion, of a diagnosis in torques."""
+    """A diagnosis (docs/diagnosis-json.md), and the traces with simulations of the models before and after it, if these
+    can be simulated.
+
+    `differences`: parameters that changed, including those of added effects. `given`: where the given model disagreed
+    with the traces before any fit. `efforts`: for a diagnosis by inverse dynamics, the traces' torques (forces) and
+    those that both models predict from the motion.
+    """
 
     steps: tuple[DiagnosisStep, ...]
     candidates: tuple[TriedEffect, ...] = ()

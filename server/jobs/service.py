@@ -1,4 +1,4 @@
-"""The jobs of one robot: queues them, has worker processes of two lanes compute them, and keeps their results."""
+"""The jobs of one robot: queues them, computes them in worker processes of two lanes, and stores their results."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ from server.store.labels import job_label
 LOOK_EVERY = 0.5
 """Time (s) between two checks of the jobs' progress."""
 MOST_TOLD = 50
-"""Number of waiting jobs that are published again when a job before them has begun or ended."""
+"""Most waiting jobs that are published again when a job before them has begun or ended."""
 log = logging.getLogger("server.jobs")
 
 
 @dataclass(frozen=True)
 class JobContext:
-    """Stores, services and callbacks of the jobs of one robot. `changed` is called with every job that has changed, and
-    must not block. `at_once`: the number of workers of the long lane."""
+    """Stores, services and callbacks of the jobs of one robot. `changed` is called with every changed job, and must not
+    block. `at_once`: number of workers of the long lane."""
 
     robot: str
     machine: Machine
@@ -53,13 +53,13 @@ class JobContext:
     at_once: int
     make_executor: Callable[[int], Workers] = worker_processes
     workers: SharedWorkers | None = None
-    """The workers that the robots of a service share; None for workers of its own."""
+    """Workers shared by the robots of a service; None for separate workers."""
 
 
 @dataclass(frozen=True)
 class _Fetched:
-    """A waiting job whose traces are fetched: how far they are, and when (s, monotonic) it first asked for them, and
-    last looked."""
+    """A waiting job whose traces are being fetched: their progress, and the times (s, monotonic) of its first request
+    and its last check."""
 
     transfer: Transfer
     asked: float
@@ -67,7 +67,7 @@ class _Fetched:
 
 
 class JobService:
-    """Hands jobs to executors and follows them. Safe to use from any thread."""
+    """Passes jobs to executors and follows them. Safe to use from any thread."""
 
     def __init__(self, context: JobContext) -> None:
         self._context = context
@@ -76,21 +76,21 @@ class JobService:
         self._workers = context.workers or SharedWorkers(context.at_once, context.make_executor)
         self._running: dict[str, tuple[Job, Future[Ended]]] = {}
         self._fetched: dict[str, _Fetched] = {}
-        """Waiting jobs whose traces are fetched from the archive."""
+        """Waiting jobs whose traces are being fetched from the archive."""
         self._given_to: dict[str, Workers] = {}
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
         context.jobs.settle_after_restart(context.robot, context.clock.utc())
 
     def start(self) -> None:
-        """Starts to compute waiting jobs. Jobs never move the arm."""
+        """Starts computing waiting jobs. Jobs never move the arm."""
         self._thread.start()
 
     def submit(self, request: JobRequest, by: str, key: str | None) -> tuple[Job, bool]:
-        """Queues a job, and returns it with True; or returns the one that the key made before, with False. Raises a 404
-        for an unknown trace or model, and a 409 if the key was used for another request."""
+        """Queues a job and returns it with True; or returns the job made earlier with this key, with False. Raises a
+        404 for an unknown trace or model, and a 409 if the key was used for another request."""
         context = self._context
         before = context.jobs.made_before(context.robot, request, key)
-        if before is not None:  # even if its traces and models have been deleted since
+        if before is not None:  # even if its traces and models were deleted since
             return before, False
         task = Task(
             request=request,
@@ -106,7 +106,7 @@ class JobService:
             folder.mkdir(parents=True)
             try:
                 Mailbox(folder).write(REQUEST, task.model_dump(mode="json"))
-            except OSError:  # the disk may be full: leave nothing of the job there
+            except OSError:  # the disk may be full: leave no files of the job there
                 shutil.rmtree(folder, ignore_errors=True)
                 raise
 
@@ -117,13 +117,13 @@ class JobService:
         return job, new
 
     def cancel(self, identity: str, by: str) -> Job:
-        """Cancels a waiting job; asks a running one to end. Raises a 404, and a 409 for one that has ended."""
+        """Cancels a waiting job; requests a running one to end. Raises a 404, and a 409 for an ended job."""
         context = self._context
         try:
             job = context.jobs.change(
                 context.robot, identity, Event.CANCELLED, context.clock.utc(), f"cancelled by {by}"
             )
-        except ProblemError:  # it is not waiting, or no longer
+        except ProblemError:  # the job does not wait, or no longer
             job = context.jobs.get(context.robot, identity)
             if job.state != "running":
                 raise
@@ -133,7 +133,7 @@ class JobService:
         return job
 
     def remove(self, identity: str) -> None:
-        """Deletes an ended job and its results; a model that it made is kept. Raises a 404, 409."""
+        """Deletes an ended job and its results; a model that it made stays. Raises a 404, 409."""
         self._context.jobs.remove(self._context.robot, identity)
         shutil.rmtree(self._folder(identity), ignore_errors=True)
 
@@ -212,12 +212,12 @@ class JobService:
                 # The disk may be full, or the database locked: try again at the next check.
                 log.exception("jobs")
                 failed = True
-                for lane in LANES:  # the other robots do not wait for this one's turn meanwhile
+                for lane in LANES:  # other robots must not wait for this one's turn
                     self._workers.wait_no_more(lane, self._wake.set)
             self._wake.wait(LOOK_EVERY if self._running or self._fetched or failed else None)
 
     def _begin(self) -> bool:
-        """Hands waiting jobs to free workers of their lanes. Returns whether any has begun."""
+        """Passes waiting jobs to free workers of their lanes. Returns whether any has begun."""
         context = self._context
         has_begun = False
         waiting = {job.id: job for job in context.jobs.waiting(context.robot)}
@@ -233,11 +233,11 @@ class JobService:
             try:
                 away = self._away(job)
                 if away is None or away.state == "failed":
-                    # Its state first: a job cancelled before that is never computed.
+                    # Change the state first: a job cancelled before that is never computed.
                     begun = context.jobs.change(context.robot, job.id, Event.TAKEN, context.clock.utc())
-            except BaseException as error:  # such as a folder or a database that cannot be read
+            except BaseException as error:  # such as an unreadable folder or database
                 self._workers.give_place_back(lane)
-                if isinstance(error, ProblemError):  # it has just been cancelled
+                if isinstance(error, ProblemError):  # the job was cancelled just now
                     continue
                 raise
             if begun is None:
@@ -255,8 +255,8 @@ class JobService:
         return has_begun
 
     def _away(self, job: Job) -> Transfer | None:
-        """Returns how far the traces of a job are that only the archive has; None if all are here. It looks once every
-        LOOK_EVERY, however often it is asked: each trace that has been fetched wakes this thread."""
+        """Returns the progress of a job's traces that only the archive has; None if all are local. Checks at most once
+        per LOOK_EVERY, since each fetched trace wakes this thread."""
         now, before = self._context.clock.monotonic(), self._fetched.get(job.id)
         if before is not None and now - before.looked < LOOK_EVERY:
             return before.transfer
@@ -274,7 +274,7 @@ class JobService:
         return away
 
     def look(self) -> None:
-        """Looks whether a waiting job can begin, since traces have been fetched."""
+        """Checks whether a waiting job can begin, after traces were fetched."""
         self._wake.set()
 
     def _leave(self, lane: Lane, _future: Future[Ended]) -> None:
@@ -283,7 +283,7 @@ class JobService:
         self._wake.set()
 
     def _handed_over(self, identity: str, lane: Lane) -> Future[Ended]:
-        """Hands a job to the executor of its lane, or to a new executor if the death of a worker has broken it."""
+        """Passes a job to the executor of its lane, or to a new one if the death of a worker has broken it."""
         for _ in range(2):
             try:
                 executor = self._given_to[identity] = self._workers.executor(lane)
@@ -296,12 +296,12 @@ class JobService:
         return _failed(BrokenExecutor())
 
     def _give_up(self, identity: str, lane: Lane) -> None:
-        """Ends the executor that a job was lost with."""
+        """Closes the executor with which a job was lost."""
         self._workers.give_up(lane, self._given_to.get(identity))
 
     def _collect(self) -> bool:
-        """Records the end of finished jobs. A job whose end cannot be written delays no other. Returns whether any has
-        ended."""
+        """Records the end of finished jobs. If one cannot be written, the others are not delayed. Returns whether any
+        has ended."""
         has_ended = False
         for identity, (job, future) in list(self._running.items()):
             if not future.done():
@@ -345,7 +345,7 @@ class JobService:
                     log.exception("job %s: its model", identity)
                     event, reason = Event.FAULT, _fault(error)
         self._tell(context.jobs.change(context.robot, identity, event, context.clock.utc(), reason, model, headline))
-        (self._folder(identity) / MODEL).unlink(missing_ok=True)  # not sooner: writing the end may have to be repeated
+        (self._folder(identity) / MODEL).unlink(missing_ok=True)  # not earlier: writing the end may have to be repeated
 
     def _keep_model(self, identity: str) -> str:
         context = self._context
@@ -380,7 +380,7 @@ def _refused(problem: str) -> Future[Ended]:
 
 
 def _words_of(fetched: Transfer) -> str:
-    """What a job waits for whose traces are fetched."""
+    """Returns what a job waits for while its traces are fetched."""
     if fetched.problem:
         return f"its traces are in the archive: {fetched.problem}"
     return f"fetching its traces from the archive: {fetched.done / 1e6:.1f} of {fetched.total / 1e6:.1f} MB"

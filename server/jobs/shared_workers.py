@@ -1,13 +1,11 @@
-"""The workers of all robots' jobs: each lane has so many places, which the robots take in turn.
+"""Workers for the jobs of all robots: each lane has a number of places, which the robots take in turn.
 
-Makes a worker process of the service give way to everything else on the computer.
-
-A nice value alone is not enough. Linux compares nice values only within one session (sched_autogroup): a fit in the
-service's own session uses up that session's share of the cores, and then the service itself waits for up to 0.1 s. In a
-session of its own it uses up its own share. Where sessions do not count, as in a container or a unit of systemd, its
-nice value gives the process the same share. It must have one: in the class SCHED_IDLE, with a three-hundredth of an
-ordinary process, the imports of a job took longer on a busy computer than anybody waits. SCHED_BATCH keeps it from
-taking a core at once when it wakes.
+The worker processes yield to all other work on the computer. A nice value alone is not enough for this: Linux compares
+nice values only within one session (sched_autogroup). A fit in the service's own session would use up that session's
+share of the cores, and the service would wait for up to 0.1 s. So each worker has a session of its own. Where sessions
+do not count, as in a container or a systemd unit, its nice value has the same effect. The weight must not be too low:
+in the class SCHED_IDLE, with a three-hundredth of a normal process, the imports of a job took far too long on a busy
+computer. SCHED_BATCH prevents a worker from taking a core at once when it wakes.
 """
 
 from __future__ import annotations
@@ -25,21 +23,21 @@ from server.jobs.lanes import LANES, SHORT_LANE_WORKERS, Lane
 from server.steady import weigh_session
 
 NICENESS = 10
-"""Nice value of the session, and of the process where sessions do not count: a tenth of the ordinary weight, so that
-jobs progress even on a computer that is always busy. With a third (5) the service itself waited for a core in most of
-its slowest answers."""
+"""Nice value of the session and, where sessions do not count, of the process: a tenth of the normal weight, so that
+jobs progress even on a computer that is always busy. With a third (5), the service itself waited for a core in most of
+its slowest responses."""
 
 
 def begin_worker() -> None:
-    """Sets up a worker process, before its first job and the imports of that job."""
+    """Sets up a worker process before its first job and the job's imports."""
     logs.begin()
     give_way()
     end_with_parent()
 
 
 def give_way() -> None:
-    """Makes this process compute with a tenth of the weight that the service and its robot have."""
-    with contextlib.suppress(PermissionError):  # it leads a session already
+    """Gives this process a tenth of the scheduler weight of the service and its robot."""
+    with contextlib.suppress(PermissionError):  # it already leads a session
         os.setsid()
     os.nice(NICENESS)
     if sys.platform == "linux":
@@ -52,15 +50,15 @@ Wake = Callable[[], None]
 
 
 def worker_processes(count: int) -> LocalWorkers:
-    """Makes the executor of this computer, whose processes give way to everything else."""
+    """Makes the executor of this computer, whose processes yield to all other work."""
     return LocalWorkers(count, begin_worker)
 
 
 class SharedWorkers:
-    """Executors of the lanes, opened when they are first needed. Safe to use from any thread.
+    """Executors of the lanes, opened on first use. Safe to use from any thread.
 
-    A robot is known by the function that wakes its job service. One that found no place is the next to get one, before
-    a robot that has had one since: a thousand jobs of one robot delay another's by the length of one.
+    A robot is identified by the function that wakes its job service. A robot that found no place gets the next one
+    before a robot that has had one since. So a thousand jobs of one robot delay another's by only one job.
     """
 
     def __init__(self, at_once: int, make_executor: Callable[[int], Workers] = worker_processes) -> None:
@@ -73,13 +71,13 @@ class SharedWorkers:
         self._executors: dict[Lane, Workers] = {}
 
     def take_place(self, lane: Lane, robot: Wake) -> bool:
-        """Takes a place for a job. If it is not this robot's turn, returns False; `robot` is called when it may be."""
+        """Takes a place for a job. If it is not this robot's turn, returns False and calls `robot` when it may be."""
         with self._lock:
             waiting = self._waiting[lane]
             if self._taken[lane] < self._places[lane] and (not waiting or waiting[0] == robot):
                 self._taken[lane] += 1
                 del waiting[:1]
-                # Of two places that came free together, both told the first in line only: it tells the next.
+                # If two places become free together, both wake only the first in line, which then wakes the next.
                 following = waiting[:1] if self._taken[lane] < self._places[lane] else []
             else:
                 if robot not in waiting:
@@ -90,7 +88,7 @@ class SharedWorkers:
         return True
 
     def give_place_back(self, lane: Lane) -> None:
-        """Gives a job's place to the robot that waits for one."""
+        """Passes a job's place to the robot that waits for one."""
         with self._lock:
             self._taken[lane] -= 1
             following = self._waiting[lane][:1]
@@ -98,7 +96,7 @@ class SharedWorkers:
             wake()
 
     def wait_no_more(self, lane: Lane, robot: Wake) -> None:
-        """Gives up the robot's turn, since it has no job for it any more."""
+        """Gives up the robot's turn, since it no longer has a job for it."""
         with self._lock:
             waiting = self._waiting[lane]
             was_first = waiting[:1] == [robot]
@@ -117,7 +115,7 @@ class SharedWorkers:
             return found
 
     def give_up(self, lane: Lane, lost: Workers | None) -> None:
-        """Ends an executor that a job was lost with, unless another has taken its place already."""
+        """Closes an executor with which a job was lost, unless it has been replaced already."""
         with self._opening:
             if lost is None or self._executors.get(lane) is not lost:
                 return

@@ -33,11 +33,11 @@ CURVE_POINTS = 21
 FIT_SHARE, VALIDATION_SHARE, DIAGNOSIS_SHARE = 0.9, 0.7, 0.9
 """Share of the progress before comparison and report."""
 MAP_SHARE, REPORT_SHARE = 0.94, 0.98
-"""Share of the progress before the map of disagreement of a diagnosis, and before the report."""
+"""Share of a diagnosis' progress before the disagreement map, and before the report."""
 
 
 class Task(FrozenRecord):
-    """The input of a worker: the request, and the files of the traces and models that it names."""
+    """The input of a worker: the request, and the files of its traces and models."""
 
     request: JobRequest
     machine: Machine
@@ -46,7 +46,7 @@ class Task(FrozenRecord):
     names: dict[str, str]
     """The names of the models, for tables."""
     limits: TraceLimits = DEFAULT_TRACE_LIMITS
-    """The limits within which traces are read."""
+    """The limits for reading traces."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Ended:
 
 
 def carry_out(folder: Path) -> Ended:
-    """Carries out the job in a folder. Errors that the user should see are returned, not raised."""
+    """Carries out the job in a folder. Errors for the user are returned, not raised."""
     mailbox = Mailbox(folder)
     mailbox.tell(0.0, "reading")
     task = Task.model_validate(mailbox.read(REQUEST))
@@ -91,7 +91,7 @@ class _Worker:
                 return self.diagnose(request)
 
     def fit(self, request: FitRequest) -> Ended:
-        """Does the same as `daq fit`."""
+        """Computes the same as `daq fit`."""
         from model.base_parameters.base_parameters import base_parameters
         from model.fitting.fit import fit
         from model.fitting.identifiability import undetermined_in_words
@@ -124,7 +124,7 @@ class _Worker:
         return self._done(result, report, of_fit(found, comparison), found.model)
 
     def validate(self, request: ValidateRequest) -> Ended:
-        """Does the same as `daq validate`."""
+        """Computes the same as `daq validate`."""
         from model.machine_model.parameter_words import words_by_name
         from model.reports.validation_report import validation_report
         from model.simulation.prepared import Options
@@ -164,7 +164,7 @@ class _Worker:
         return self._done(ValidationJobResult(id=self._job, data=data), report, of_validation(fidelity))
 
     def compare(self, request: CompareRequest) -> Ended:
-        """Does the same as `daq compare`, also for a single model."""
+        """Computes the same as `daq compare`, also for a single model."""
         from model.comparison.difference import differences
         from model.machine_model.parameter_words import words_by_name
         from model.reports.comparison_report import comparison_report
@@ -188,7 +188,7 @@ class _Worker:
         return self._done(result, comparison_report(comparison, differing), of_comparison(comparison))
 
     def diagnose(self, request: DiagnoseRequest) -> Ended:
-        """Does the same as `daq diagnose`."""
+        """Computes the same as `daq diagnose`."""
         from daq.contracts.machine import NoController
         from daq.plugins import report_sections
         from model.discrepancy.explanation.answer_words import headline
@@ -261,7 +261,7 @@ class _Worker:
         return self.task.names.get(number, number)
 
     def _labels(self, numbers: Sequence[str]) -> list[str]:
-        """The names of models, with their numbers where the names alone do not tell them apart."""
+        """The names of models, with their IDs if the names alone are ambiguous."""
         names = [self._name(number) for number in numbers]
         alike = len(set(names)) < len(names)
         return [
@@ -271,7 +271,7 @@ class _Worker:
 
     def _tell(self, begin: float, end: float, fraction: float, text: str) -> None:
         """Reports a stage's progress as part of the job's. The end of a stage is left out, since the next stage reports
-        itself."""
+        its start."""
         if fraction < 1:
             self.mailbox.tell(begin + (end - begin) * fraction, text)
 

@@ -13,9 +13,9 @@ from daq.owner.messages import LiveSample
 
 SIGNALS = ("set_point", "position", "error", "drive")
 DIGITS = 5
-"""Number of decimal places of values sent: 1e-5 rad is a hundredth of the sensors' resolution."""
+"""Decimal places of values sent: 1e-5 rad is a hundredth of the sensors' resolution."""
 EVENTS = 500
-"""Number of events that are kept."""
+"""Most events stored."""
 
 
 class History:
@@ -49,7 +49,7 @@ class History:
             self._events.append(event)
 
     def since(self, begin: float, points: int) -> HistoryMessage:
-        """Returns the samples after `begin` (s, monotonic), thinned to about `points`, with all extremes kept."""
+        """Returns the samples after `begin` (s, monotonic), thinned to about `points` without losing extremes."""
         with self._lock:
             order = np.arange(max(0, self._count - self._room), self._count) % self._room
             order = order[self._time[order] >= begin]

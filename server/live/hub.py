@@ -1,4 +1,5 @@
-"""The hub of one robot: takes reports and messages from any thread and sends them to every client on the event loop."""
+"""The hub of one robot: receives reports and messages on any thread and sends them to every client on the event
+loop."""
 
 from __future__ import annotations
 
@@ -28,13 +29,12 @@ from server.live.history import DIGITS, History
 from server.live.outbox import Outbox
 
 LOOK_EVERY = 1.0
-"""Longest time (s) between two reads of the status, when nothing has announced a change."""
+"""Longest time (s) between two reads of the status without an announced change."""
 MOST_OFTEN = 0.05
 """Shortest time (s) between two reads of the status."""
 MANY, WAITS = 8, 0.02
-"""Number of watchers from which messages other than samples wait for the next sample, and the longest time (s) that
-they wait. The end of an experiment brings ten messages at once, and the event loop needs some 3 ms to send one to 50
-watchers."""
+"""Number of clients from which messages other than samples wait for the next sample, and the longest wait (s). The end
+of an experiment causes ten messages at once, and the event loop takes about 3 ms to send one to 50 clients."""
 PROGRESS_EVERY = 0.2
 """Time (s) between two messages about progress."""
 log = logging.getLogger("server.live")
@@ -42,7 +42,7 @@ log = logging.getLogger("server.live")
 
 @dataclass(eq=False)
 class Client:
-    """A WebSocket; or a long-polling request, which is not counted as a watcher (`watches` is False)."""
+    """A WebSocket; or a long-polling request, which is not counted as a client (`watches` is False)."""
 
     outbox: Outbox
     name: str
@@ -54,19 +54,18 @@ class Client:
 
 
 class Hub:
-    """Clients of one robot. `hear` and `publish` from any thread; everything else on the event loop.
+    """Clients of one robot. `hear` and `publish` may be called from any thread; all else is for the event loop.
 
-    status: the robot's status now; called on a thread, it may wait for the database
+    status: returns the robot's status now. Called on a thread; it may wait for the database.
     """
 
     def __init__(self, clock: Clock, history: History, status: Callable[[], RobotStatus]) -> None:
         self.history = history
         self.dropped = 0
         self.ending = False
-        """True once the service is ending: long-polling requests answer at once."""
+        """True once the service ends: long-polling requests are then answered at once."""
         self.looking_back = asyncio.Lock()
-        """Held while a client's history is assembled. Clients that join together get it one after the other, so that
-        this work occupies one thread only."""
+        """Held while a client's history is assembled, so that clients that join together occupy only one thread."""
         self._clock = clock
         self._status = status
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -80,13 +79,13 @@ class Hub:
         self._progressed = 0.0
 
     def open(self, experiment: Callable[[], str | None]) -> None:
-        """Starts sending. Call this on the event loop before the first client. `experiment` returns the running one."""
+        """Starts sending. Call it on the event loop before the first client. `experiment` returns the running one."""
         self._loop = asyncio.get_running_loop()
         self._experiment = experiment
         self._watching = self._loop.create_task(self._watch())
 
     def end_waiting(self) -> None:
-        """Makes all long-polling requests answer now."""
+        """Makes all long-polling requests return now."""
         self.ending = True
         for client in self._clients:
             client.something.set()
@@ -103,7 +102,7 @@ class Hub:
 
     @property
     def clients(self) -> int:
-        """The number of clients that watch."""
+        """The number of connected clients."""
         return sum(client.watches for client in self._clients)
 
     def join(self, client: Client) -> None:
@@ -116,7 +115,7 @@ class Hub:
 
     @contextmanager
     def listening(self, topics: set[Topic]) -> Iterator[asyncio.Event]:
-        """An event that is set at every message of these topics, for long polling."""
+        """Yields an event that is set at every message of these topics, for long polling."""
         client = Client(Outbox(self._clock.monotonic()), "waiting", topics, watches=False)
         self.join(client)
         try:
@@ -129,7 +128,7 @@ class Hub:
         return [message for topic, message in self._shown.items() if topic in topics]
 
     def on_report(self, report: Report) -> None:
-        """Handles a report of the process that owns the robot's port. Must not block."""
+        """Handles a report of the robot's owner process. Must not block."""
         now = self._clock.monotonic()
         match report:
             case LiveSample():
@@ -178,7 +177,7 @@ class Hub:
         if loop is not None:
             try:
                 loop.call_soon_threadsafe(call)
-            except RuntimeError:  # the loop has just been closed
+            except RuntimeError:  # the loop was closed just now
                 self._loop = None
 
     def _put(self, topic: Topic, message: str, tick: int | None) -> None:
@@ -199,7 +198,7 @@ class Hub:
                 client.something.set()
 
     async def _watch(self) -> None:
-        """Publishes what has changed of the status, and the link's counters once a second."""
+        """Publishes changes of the status and, once per second, the link's counters."""
         while True:
             try:
                 async with asyncio.timeout(LOOK_EVERY):
@@ -241,7 +240,8 @@ def _parts(status: RobotStatus, now: float) -> list[tuple[Topic, BaseModel]]:
 
 
 def _comparable(encoded: str, message: BaseModel) -> str:
-    """Returns a message without what changes all the time: a lease's remaining time, the time of a link's counters."""
+    """Returns a message without values that change continuously: a lease's remaining time, the time of the link's
+    counters."""
     if isinstance(message, RobotMessage):
         control = message.control.model_copy(update={"expires": None, "remaining": None})
         return message.model_copy(update={"control": control}).model_dump_json()
@@ -251,7 +251,7 @@ def _comparable(encoded: str, message: BaseModel) -> str:
 
 
 def encoded_sample(sample: LiveSample) -> str:
-    """Encodes a SampleMessage, by hand for speed, since this is done fifty times a second."""
+    """Encodes a SampleMessage by hand for speed, since this is done fifty times per second."""
     return json.dumps(
         {
             "topic": "sample",

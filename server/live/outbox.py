@@ -1,8 +1,8 @@
-"""The messages that wait for one client, and what happens if it reads too slowly. Pure: the caller passes the time.
+"""The messages that wait for one client, and the handling of slow clients. Pure: the caller passes the time.
 
-If a client does not keep up, every second one of its waiting samples is left out, repeatedly if need be. Many samples
-at once, after a pause of the service itself, are not enough reason. A client that has not taken anything for DROP_AFTER
-is dropped. Messages other than samples are never left out.
+If a client does not keep up, every second waiting sample is dropped, repeatedly if necessary. Many samples at once
+after a pause of the service itself do not count. A client that has not taken anything for DROP_AFTER is dropped. Other
+messages than samples are never left out.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from collections import deque
 from dataclasses import dataclass, field
 
 THIN_BEYOND = 50
-"""Number of waiting samples (those of 1 s) beyond which they are thinned, if the client has taken nothing for
+"""Number of waiting samples (1 s of them) above which they are thinned, if the client has taken nothing for
 THIN_AFTER."""
 THIN_AFTER = 1.0
 """Time (s) since the client last took messages, after which its samples may be thinned."""
 DROP_AFTER = 10.0
 """Time (s) since the client last took messages, after which it is dropped if any wait."""
 MOST_WAITING = 4096
-"""Number of waiting messages of any kind beyond which a client is dropped at once."""
+"""Number of waiting messages of any kind above which a client is dropped at once."""
 
 
 @dataclass
@@ -26,9 +26,9 @@ class Outbox:
     """Encoded messages that wait, in order."""
 
     taken_at: float
-    """When the client last took messages, or the first of those that wait was put in."""
+    """When the client last took messages, or when the first waiting message was added."""
     left_out: int = 0
-    """Number of samples left out since the client was last told."""
+    """Number of samples dropped since the client was last informed."""
     _waiting: deque[tuple[bool, str]] = field(default_factory=deque)
     _samples: int = 0
 
@@ -46,7 +46,7 @@ class Outbox:
                 self._thin()
 
     def take(self, now: float) -> list[str]:
-        """Removes and returns all messages that wait, in order; the client takes them now."""
+        """Removes and returns all waiting messages in order, as taken by the client now."""
         messages = [message for _, message in self._waiting]
         self._waiting.clear()
         self._samples = 0

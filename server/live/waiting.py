@@ -1,4 +1,4 @@
-"""Long polling: the answer waits until something has ended, for clients without a WebSocket."""
+"""Long polling, for clients without a WebSocket: the response waits until an experiment or job has ended."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ T = TypeVar("T")
 
 
 async def when_ended(hub: Hub, topics: set[Topic], look: Callable[[], T], ended: Callable[[T], bool], wait: float) -> T:
-    """Returns what `look`, called on a thread, returns once that has `ended`, or after `wait` s, or when the service
-    ends."""
+    """Calls `look` on a thread until its result has `ended`, `wait` s are over, or the service ends; returns the
+    result."""
     loop = asyncio.get_running_loop()
     until = loop.time() + wait
     with hub.listening(topics) as news:

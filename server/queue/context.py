@@ -1,6 +1,6 @@
-"""What the queue of one robot depends on.
+"""Dependencies of one robot's queue.
 
-Whether an operator has confirmed to be present: a confirmation holds for 60 s and is repeated while they are.
+Also the confirmed presence of an operator: a confirmation is valid for 60 s and must be repeated.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from server.store.queues import QueueStore
 from server.store.schedules import ScheduleStore
 
 ATTENDANCE = 60.0
-"""Time (s) for which a confirmation of presence holds: an assumption."""
+"""Time (s) for which a confirmation of presence is valid (an assumption)."""
 
 
 class Attendance:
@@ -28,8 +28,8 @@ class Attendance:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._until: float | None = None
-        """When the confirmation expires (s, on the clock that goes on during sleep); None if nobody has confirmed, or
-        the expiry has been noticed."""
+        """When the confirmation expires (s, on the clock that includes sleep mode); None without confirmation, or once
+        the expiry was noticed."""
 
     def say(self) -> None:
         """Confirms that an operator is present for the next ATTENDANCE s."""
@@ -37,7 +37,7 @@ class Attendance:
 
     @property
     def left(self) -> float:
-        """Time (s) for which the confirmation still holds; 0 if there is none."""
+        """Time (s) for which the confirmation is still valid; 0 if there is none."""
         until = self._until
         return 0.0 if until is None else max(0.0, until - self._clock.elapsed())
 
@@ -71,11 +71,11 @@ class QueueContext:
     add_trace: Callable[[Answer], None]
     """Called with the answer of every run that left a trace."""
     add_unfinished_traces: Callable[[], None]
-    """Called after a run whose trace could not be closed or added to the catalogue, to add what was written of it."""
+    """Called after a run whose trace could not be closed or added to the catalogue, to add the written part."""
     unattended: bool
     reviewer: Reviewer | None = None
     """Who must approve an experiment before it moves a real arm; None for nobody."""
     paused: Callable[[str], None] = lambda _reason: None
-    """Called with the reason when the queue pauses by itself. It must not wait."""
+    """Called with the reason when the queue pauses by itself. Must not block."""
     ended: Callable[[str, ExperimentState, str], None] = lambda _experiment, _state, _reason: None
-    """Called with the end of each experiment: its number, its state, and why. It must not wait."""
+    """Called with the end of each experiment: its ID, its state, and the reason. Must not block."""

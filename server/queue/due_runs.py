@@ -12,10 +12,10 @@ from server.problems import ProblemError
 from server.queue.context import QueueContext
 
 LEAP = 1.0
-"""Time (s) by which the wall clock runs ahead between two looks only where it was set, or the computer was asleep."""
+"""Least time (s) by which the wall clock must run ahead between two checks to count as set, or as sleep mode."""
 TRIES = 2
-"""Looks in a row, the first at its time, at which a run may fail to be submitted before it counts as missed: a database
-may be locked for a moment."""
+"""Consecutive checks, the first at its time, after which a run that cannot be submitted counts as missed. The database
+may be locked briefly."""
 log = logging.getLogger("server.queue")
 
 
@@ -24,7 +24,7 @@ class Hindered:
     """A schedule whose run is due and cannot be submitted.
 
     Args:
-        error: the last one. tries: those of the run that is due. skipped: whether it is reported that runs are skipped.
+        error: the last error. tries: attempts for the due run. skipped: whether the skipping of runs was reported.
     """
 
     error: type[Exception]
@@ -33,7 +33,7 @@ class Hindered:
 
 
 class DueRuns:
-    """Submits the runs of one robot's schedules. Used by the queue's thread alone."""
+    """Submits the runs of one robot's schedules. Used only by the queue's thread."""
 
     def __init__(self, context: QueueContext) -> None:
         self._context = context
@@ -42,37 +42,38 @@ class DueRuns:
         self._left_out: set[str] = set()
         """Schedules whose runs are skipped while the previous one waits; this is reported once."""
         self._missed_while = ""
-        """Why runs that are due by now are missed; empty where they are not."""
+        """Why runs that are due now count as missed; empty if they do not."""
         self._failed_looks = 0
         self._seen = (context.clock.monotonic(), context.clock.utc())
-        """Both clocks at the last look."""
+        """Both clocks at the last check."""
 
     def leave_out_missed(self, meanwhile: str = "the service was off") -> None:
-        """Skips the runs that were due meanwhile, while none could be submitted. Called at the start."""
+        """Skips the runs that were due while none could be submitted. Called at the start."""
         context = self._context
         for identity in context.schedules.leave_out_missed(context.robot.name, context.clock.utc()):
             line = f"runs that were due while {meanwhile} were skipped"
             context.record_event("schedule", f"schedule {identity}: {line}")
 
     def watch_clock(self) -> None:
-        """Notes whether the wall clock has leapt ahead since the last look: what became due by that is missed. Needs no
-        database, and is called during experiments too, since runs that are due meanwhile only wait."""
+        """Notes whether the wall clock has jumped ahead since the last check: runs that became due by this are missed.
+        Needs no database. Also called during experiments, when due runs only wait."""
         clock, (since, at) = self._context.clock, self._seen
         before, now = clock.monotonic(), clock.utc()
-        # read on both sides of the wall clock, so that a thread that is held up between two readings sees no leap
+        # Read the monotonic clock before and after the wall clock, so that a pause between two reads is not taken for a
+        # jump.
         if (now - at).total_seconds() - (clock.monotonic() - since) > LEAP:
             self._missed_while = "the computer's clock leapt ahead"
         self._seen = (before, now)
 
     def look_failed(self) -> None:
-        """Notes that the queue failed at this look. If it does so again before it can look, what is due is missed."""
+        """Notes that the queue failed at this check. If it fails repeatedly, due runs are missed."""
         self._failed_looks += 1
         if self._failed_looks >= TRIES:
             self._missed_while = "the queue could not look at them"
 
     def submit(self) -> None:
-        """Submits all runs that are due. A run that cannot be submitted at its time is left out as missed; it delays
-        neither other runs nor the queue."""
+        """Submits all due runs. A run that cannot be submitted at its time is skipped as missed; it delays neither
+        other runs nor the queue."""
         self.watch_clock()
         if self._missed_while:
             self.leave_out_missed(self._missed_while)
@@ -82,7 +83,7 @@ class DueRuns:
         for identity in due:
             try:
                 hindered = self._hindered.get(identity)
-                if hindered is not None and hindered.tries >= TRIES:  # it could not even be left out
+                if hindered is not None and hindered.tries >= TRIES:  # it could not even be skipped
                     self._leave_out(identity, hindered, now)
                     continue
                 self._submit_one(identity, now)
@@ -92,7 +93,7 @@ class DueRuns:
                     log.exception("schedule %s", identity)
 
     def _hinder(self, identity: str, error: Exception, now: datetime) -> bool:
-        """Leaves out a run that has been tried often enough, and tells of an error once: returns whether it is new."""
+        """Skips a run after enough attempts, and reports an error once: returns whether it is new."""
         hindered = self._hindered.setdefault(identity, Hindered(Exception))
         hindered.tries += 1
         new = hindered.error is not type(error)

@@ -1,10 +1,8 @@
-"""Decides whether the queue may move the arm now, and if not, says what is missing. Pure.
+"""Decides whether the queue may move the arm now, and if not, what is missing. Pure.
 
-Reasons to pause the queue until a person has looked, noted since a person last resumed it.
-
-An event that ends a person's part in the arm's motion must not start an experiment: a stop, control that lapses or is
-given back, a connection that ends or comes back. The threads that report these must not wait for the queue, so each is
-only noted here.
+`Notices` stores reasons to pause the queue until a person has looked. An event that ends a person's part in the arm's
+motion must not start an experiment: a stop, control that ends, a connection that ends or comes back. The threads that
+report such events must not wait for the queue, so they are only noted here.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ from daq.owner.messages import ArmReport
 
 @dataclass(frozen=True)
 class Circumstances:
-    """Everything that the decision depends on. `attended`: an operator has confirmed presence, or none is needed."""
+    """All inputs of the decision. `attended`: an operator has confirmed presence, or none is needed."""
 
     identity: RobotIdentity | None
     arm: ArmReport | None
@@ -43,7 +41,7 @@ class Missing:
 def why_paused(arm: ArmReport) -> str:
     """Returns why the queue must wait for a person after a stop or a fault of the arm; empty in every other state.
 
-    It holds after the reset as well. The arm itself says the cause, and until the reset that one is needed.
+    The reason stays valid after the reset. The cause itself is in the arm's report until then.
     """
     if arm.arm not in ("stopped", "fault"):
         return ""
@@ -51,7 +49,7 @@ def why_paused(arm: ArmReport) -> str:
 
 
 def approval_missing(experiments: int, reviewer: Reviewer | None) -> str:
-    """Returns what so many experiments without an approval wait for; empty for none."""
+    """Returns what this number of experiments without approval waits for; empty for 0."""
     if experiments == 0 or reviewer is None:
         return ""
     who = "an operator" if reviewer == "operator" else "an owner of the robot"
@@ -59,7 +57,7 @@ def approval_missing(experiments: int, reviewer: Reviewer | None) -> str:
 
 
 def what_is_missing(now: Circumstances) -> Missing | None:
-    """Returns the first thing that is missing; None if an experiment may begin."""
+    """Returns the first missing condition; None if an experiment may begin."""
     if now.identity is None or now.arm is None:
         return Missing(f"the robot is not connected. {now.connection_problem}".strip())
     state, cause = now.arm.arm, why_paused(now.arm)
@@ -83,7 +81,7 @@ LOOK_FIRST = "look at the arm, then resume the queue"
 
 
 class Notices:
-    """The reason to pause the queue. Safe to use from any thread, since its lock is held for a few assignments only.
+    """The reason to pause the queue. Safe to use from any thread, since its lock is held only for a few assignments.
     `now`: the monotonic clock (s) by which requests arrive."""
 
     def __init__(self, now: Callable[[], float]) -> None:
@@ -100,15 +98,15 @@ class Notices:
         self._link_lost = False
 
     def pop_reason(self) -> str:
-        """Returns the reason, and forgets it."""
+        """Returns the reason, and clears it."""
         with self._lock:
             reason, self.reason = self.reason, ""
             return reason
 
     def acknowledge(self, asked: float) -> int | None:
-        """Forgets the notices that a person can have seen whose request arrived at this time (s). The newest of any
-        later ones becomes the reason, even if a reason has been taken since. Returns the connection that they saw, by
-        the number of those before it; None if it has ended meanwhile."""
+        """Clears the notices that the sender of a request that arrived at this time (s) can have seen. The newest of
+        any later ones becomes the reason, even if a reason was taken since. Returns the number of the connection that
+        the sender saw; None if it has ended meanwhile."""
         with self._lock:
             self.reason = self._newest if self._noted_at >= asked else ""
             return None if self._ended_at >= asked else self.connections
@@ -120,7 +118,7 @@ class Notices:
             self._newest, self._noted_at = reason, self._now()
 
     def arm_reported(self, arm: ArmReport) -> None:
-        """Notes a stop, a fault, a lost link, or a link that comes back: somebody may be at the cable."""
+        """Notes a stop, a fault, a lost link, or a link that comes back: a person may be at the cable."""
         lost = arm.link == "lost"
         if cause := why_paused(arm):
             self.note(cause)
@@ -129,17 +127,17 @@ class Notices:
         self._link_lost = lost
 
     def control_lapsed(self, name: str) -> None:
-        """Notes that a client that had control went silent, so that nobody knows where its person is."""
+        """Notes that a client with control became silent, so that the place of its operator is unknown."""
         self.note(f"{name}'s control has lapsed: {LOOK_FIRST}")
 
     def control_given_back(self, name: str, waiting: int) -> None:
-        """Notes that a person gave control back while experiments wait: they may still be beside the arm, unaware of
-        the experiments."""
+        """Notes that a person returned control while experiments wait: the person may still be beside the arm, unaware
+        of the experiments."""
         if waiting:
             self.note(f"{name} gave control back while {_counted(waiting)}: {LOOK_FIRST}")
 
     def stop_asked(self, name: str) -> None:
-        """Notes that somebody requested a stop, even if it was not delivered, or no arm is connected."""
+        """Notes that a person requested a stop, even if it was not delivered, or no arm is connected."""
         self.note(f"{name} requested a stop: look at the arm, reset it if it is stopped, then resume the queue")
 
     def operator_left(self) -> None:
@@ -153,7 +151,7 @@ class Notices:
             self.note(f"the robot was connected while {_counted(waiting)}: {LOOK_FIRST}")
 
     def connection_ended(self, why: str) -> None:
-        """Notes the end of a connection. An attempt to connect that failed is not noted."""
+        """Notes the end of a connection. A failed attempt to connect is not noted."""
         was, self._connected = self._connected, False
         if was:
             with self._lock:

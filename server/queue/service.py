@@ -1,4 +1,4 @@
-"""The queue of one robot: it takes experiments, runs them one at a time, and pauses when a person must look first."""
+"""The queue of one robot: runs experiments one at a time, and pauses when a person must look first."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from server.store.experiments import NotApprovedError
 from server.store.queues import QueueState
 
 LOOK_EVERY = 1.0
-"""Time (s) between two checks for due experiments, since the wall clock may be set meanwhile, and for the presence of
-an operator."""
+"""Time (s) between two checks for due experiments, since the wall clock may be set, and for the presence of an
+operator."""
 log = logging.getLogger("server.queue")
 
 
@@ -62,19 +62,19 @@ class QueueService:
         self._changed = threading.Event()
         self._closing = False
         self._consented_connection: int | None = None
-        """The connection, by the number of those before it, for which a person consented to moving a real arm."""
+        """Number of the connection for which a person consented to moving a real arm."""
         self._attendance = Attendance(context.clock)
         self._running: Running | None = None
         self._waiting_for = ""
         self.notices = Notices(context.clock.monotonic)
-        """Reasons to pause the queue that no operator has acknowledged yet. Call `wake` after adding one."""
+        """Reasons to pause the queue that no operator has acknowledged. Call `wake` after adding one."""
         self._written = True
         """Whether the state is in the database."""
         self._ended: Ended | None = None
-        """The last experiment, if its end could not be written yet: no other begins until it is."""
+        """The last experiment, if its end could not be written yet: no other begins until it is written."""
         self._runs = DueRuns(context)
         self.review = Review.of(context.robot.name, context.robot.place.machine, context.reviewer)
-        """The rule by which experiments are approved before they move a real arm."""
+        """The rule for approving experiments before they move a real arm."""
         self._state = self._state_at_start()
         self._runs.leave_out_missed()
         self._worker = threading.Thread(target=self._work, name="queue", daemon=True)
@@ -89,8 +89,8 @@ class QueueService:
         return self._running
 
     def submit(self, request: ExperimentRequest, by: str, key: str | None) -> tuple[Experiment, bool]:
-        """Queues an experiment, and returns it with True; or returns the one that the key made before, with False.
-        Raises a 409 if the key was used for another request."""
+        """Queues an experiment and returns it with True; or returns the experiment made earlier with this key, with
+        False. Raises a 409 if the key was used for another request."""
         experiment, new = self._context.experiments.submit(
             self._context.robot.name, request, self._context.clock.utc(), by, key
         )
@@ -99,12 +99,12 @@ class QueueService:
         return experiment, new
 
     def submitted(self, experiment: Experiment, by: str) -> None:
-        """Tells of an experiment that is in the database by now, and looks whether it can begin."""
+        """Reports an experiment that is already in the database, and checks whether it can begin."""
         self._context.record_event("experiment", "queued", actor=by, experiment=experiment.id)
         self.wake()
 
     def cancel(self, identity: str, by: str) -> Experiment:
-        """Cancels an experiment; stops the arm if it runs. Raises a 404, and a 409 for one that has ended."""
+        """Cancels an experiment; stops the arm if it runs. Raises a 404, and a 409 for an ended experiment."""
         name = self._context.robot.name
         with self._lock:
             running = self._running
@@ -118,7 +118,7 @@ class QueueService:
         return found
 
     def pause(self, reason: str, by: str | None = None) -> None:
-        """Pauses the queue: no further experiment begins, and one that runs goes on."""
+        """Pauses the queue: no further experiment begins, and a running one continues."""
         with self._lock:
             paused = self._pause(reason, anew=by is not None)
         if paused:
@@ -127,7 +127,7 @@ class QueueService:
                 self._context.paused(reason)
 
     def resume(self, by: str, *, moves_real_arm: bool, asked: float = math.inf) -> None:
-        """Resumes the queue with the operator's consent that it may move the arm. A notice since their request arrived
+        """Resumes the queue with the operator's consent that it may move the arm. A notice since the request arrived
         (`asked`, s, monotonic) pauses it again. Raises a 409 while the arm is stopped or at fault."""
         with self._lock:
             connection = self.notices.acknowledge(asked)
@@ -137,7 +137,7 @@ class QueueService:
                 line = f"the arm {'is stopped' if arm.arm == 'stopped' else 'has a fault'}: {arm.cause}"
                 raise conflict("arm-stopped", line, "look at the arm, reset it, then resume the queue")
             state = QueueState(False, f"resumed by {by}", self._context.clock.utc())
-            self._context.queues.set(self._context.robot.name, state)  # first: what is not written stays paused
+            self._context.queues.set(self._context.robot.name, state)  # first: a state that is not written stays paused
             self._state, self._written = state, True
             self._consented_connection = connection if moves_real_arm else self._consented_connection
             self._attendance.say()
@@ -151,7 +151,7 @@ class QueueService:
         self.wake()
 
     def on_report(self, report: Report) -> None:
-        """Hears what the owner of the robot's port reports."""
+        """Handles a report of the robot's owner."""
         if isinstance(report, Progress):
             self.progressed(report.fraction, report.text)
         elif isinstance(report, ArmReport):
@@ -172,12 +172,12 @@ class QueueService:
         self.wake()
 
     def control_lapsed(self, name: str) -> None:
-        """Pauses the queue, since the client that had control went silent. Must not block."""
+        """Pauses the queue, since the client with control became silent. Must not block."""
         self.notices.control_lapsed(name)
         self.wake()
 
     def control_given_back(self, name: str) -> None:
-        """Pauses the queue if experiments wait, so that giving back control starts none of them. Must not block."""
+        """Pauses the queue if experiments wait, so that returning control starts none of them. Must not block."""
         self.notices.control_given_back(name, self._count_waiting())
         self.wake()
 
@@ -187,13 +187,13 @@ class QueueService:
         self.wake()
 
     def connection_ended(self, why: str) -> None:
-        """Ends the operator's consent, which was given for the arm that was connected. Must not block."""
+        """Ends the operator's consent, which was for the previously connected arm. Must not block."""
         self.notices.connection_ended(why)
         self.wake()
 
     def wake(self) -> None:
-        """Wakes the worker thread, since something has changed that may let the next experiment begin."""
-        self._changed.set()  # and nothing else: callers must not wait for a disk
+        """Wakes the worker thread after a change that may let the next experiment begin."""
+        self._changed.set()  # nothing else, since callers must not wait for a disk
 
     def progressed(self, fraction: float, text: str) -> None:
         """Records the progress of the running experiment."""
@@ -202,8 +202,8 @@ class QueueService:
             running.progress, running.text = fraction, text
 
     def with_progress(self, experiment: Experiment) -> Experiment:
-        """Returns `experiment` as clients see it: with its progress while it runs, and while it waits with its content
-        on this machine, and with whose approval it still needs."""
+        """Returns `experiment` for clients: while it runs, with its progress; while it waits, with its content on this
+        machine and the approval that it needs."""
         if experiment.state == "queued":
             return experiment.model_copy(update=self._reviewed(experiment, experiment.owner))
         running = self._running
@@ -212,20 +212,20 @@ class QueueService:
         return experiment.model_copy(update={"progress": running.progress, "progress_text": running.text})
 
     def with_review(self, schedule: Schedule) -> Schedule:
-        """Returns `schedule` as clients see it: with its content on this machine, and whose approval its runs need."""
+        """Returns `schedule` for clients: with its content on this machine, and the approval that its runs need."""
         return schedule.model_copy(update=self._reviewed(schedule, schedule.created_by))
 
     def _reviewed(self, one: Experiment | Schedule, owner: str) -> dict[str, object]:
         if self.review.reviewer is None:
             return {}
         content, approval = self.review.content(one.content), one.approval
-        # An approval whose content has changed is removed with the change, so whatever approval there is is for this.
+        # A change of the content removes the approval, so an existing approval is for this content.
         given = None if approval is None else Given(content, approval.by, approval.as_owner)
         lacks = self._needs_review() and not self.review.is_enough(given, content, (owner,))
         return {"content": content, "needs_approval_of": self.review.reviewer if lacks else None}
 
     def status(self) -> QueueStatus:
-        """Returns the status now. It waits neither for a disk nor for the lock, since the event loop calls this."""
+        """Returns the status now. Waits neither for a disk nor for the lock, since the event loop calls this."""
         running, waiting_for, state, left = self._running, self._waiting_for, self._state, self._attendance.left
         if not state.paused and (reason := self.notices.reason):  # the queue counts as paused from now on
             state = QueueState(True, reason, self._context.clock.utc())
@@ -241,13 +241,14 @@ class QueueService:
         )
 
     def begin_no_more(self) -> None:
-        """Lets no further experiment begin. Later notices come from the service's own end, and pause nothing."""
+        """Prevents further experiments from starting. Later notices come from the service's own end, and pause
+        nothing."""
         with self._lock:
             self._closing = True
         self._changed.set()
 
     def close(self, patience: float) -> None:
-        """Lets no further experiment begin, and waits until the end of the running one is written."""
+        """Prevents further experiments from starting, and waits until the end of the running one is written."""
         self.begin_no_more()
         if self._worker.is_alive():
             self._worker.join(patience)
@@ -273,8 +274,8 @@ class QueueService:
         return state
 
     def _pause(self, reason: str, *, anew: bool = False) -> bool:
-        """Pauses the queue, under the lock. Unless `anew`, a queue that is paused already keeps its reason, and this
-        returns False."""
+        """Pauses the queue, under the lock. If it is paused already, it keeps its reason and this returns False, unless
+        `anew` is set."""
         if self._state.paused and not anew:
             return False
         self._state, self._written = QueueState(True, reason, self._context.clock.utc()), False
@@ -318,8 +319,8 @@ class QueueService:
                     continue
                 told = ""
             except Exception as error:
-                # The disk may be full, or the database locked: the queue must neither end nor go on blindly. What lasts
-                # is told once.
+                # The disk may be full, or the database locked: the queue must neither end nor continue blindly. A
+                # lasting error is reported once.
                 if (fault := f"{type(error).__name__}: {error.args[:1]}") != told:
                     log.exception("queue")
                 told = fault
@@ -354,26 +355,27 @@ class QueueService:
             if not context.control.take_for_queue(next_experiment.id):
                 self._waiting_for = "somebody has control of the robot"
                 return None
-            if self.notices.reason:  # for example, a client's control has just ended: the queue must pause first
+            if self.notices.reason:  # for example, a client's control ended just now: the queue must pause first
                 context.control.give_back_for_queue()
                 self.wake()
                 return None
-            # Before it stops waiting, so that the queue never looks empty.
+            # Set before it stops waiting, so that the queue never looks empty.
             self._running = Running(next_experiment.id, reviewed=review is not None)
             try:
                 return context.experiments.begin(name, next_experiment.id, context.clock.utc(), review)
             except BaseException as error:
                 self._running = None
                 context.control.give_back_for_queue()
-                if isinstance(error, NotApprovedError):  # its approval was withdrawn just now, or is for something else
+                # its approval was withdrawn just now, or is for another content
+                if isinstance(error, NotApprovedError):
                     self._end_outdated_approvals()
                     self.wake()
-                elif not isinstance(error, IllegalEventError):  # which means that it has just been cancelled
+                elif not isinstance(error, IllegalEventError):  # IllegalEventError means that it was cancelled just now
                     raise
                 return None
 
     def _end_outdated_approvals(self) -> None:
-        """Ends approvals that are for another content than what now waits: of before another machine file."""
+        """Ends approvals for another content than the one that now waits, such as an earlier machine file."""
         context = self._context
         for identity, by in context.experiments.void_outdated(context.robot.name, self.review):
             line = f"approval of {by} ended: the experiment or the machine file is another one now"
@@ -385,7 +387,7 @@ class QueueService:
     def _what_is_missing(self) -> str:
         robot = self._context.robot
         if robot.arm is not None:
-            self.notices.arm_reported(robot.arm)  # so that the state behind this decision has been noted
+            self.notices.arm_reported(robot.arm)  # so that the state on which this decision is based has been noted
         attended = self._attendance.left > 0 or not self._needs_attendance()
         missing = what_is_missing(
             Circumstances(robot.identity, robot.arm, robot.problem, self._has_consent(), attended)
@@ -400,7 +402,7 @@ class QueueService:
             self.notices.operator_left()
 
     def _carry_out(self, experiment: Experiment) -> None:
-        """Runs an experiment to its end. If anything fails, the queue pauses, so that a person looks before the next
+        """Runs an experiment to its end. After any failure the queue pauses, so that a person looks before the next
         one."""
         context = self._context
         try:
@@ -421,7 +423,8 @@ class QueueService:
             state = advance("running", ending.event)
             reason = _joined(ending.reason, "its trace is not in the catalogue yet" if ending.left_out else "")
             why = f"{_ended_as(experiment, state)} ({reason}): look at the arm, then resume the queue"
-            paused = ending.pauses_queue and self._pause(why)  # first, so that clients told of the end find it paused
+            # first, so that clients that learn of the end find the queue paused
+            paused = ending.pauses_queue and self._pause(why)
             self._ended = Ended(experiment.id, ending, context.clock.utc())
             try:
                 self._write_end()
@@ -451,7 +454,7 @@ class QueueService:
         context.ended(ended.id, state, reason)
 
     def _add_left_out(self, ending: Ending) -> str:
-        """Adds the trace that could not be added at once. Returns a line if it cannot be now. Raises DatabaseError
+        """Adds the trace that could not be added at once. Returns a line if it still cannot be. Raises DatabaseError
         while the database is locked: nothing else can be written either."""
         if ending.left_out is None:
             return ""
@@ -464,7 +467,7 @@ class QueueService:
             if is_locked(error):
                 raise
             log.exception("its trace")
-            self._context.add_unfinished_traces()  # whatever else of its folder can be read
+            self._context.add_unfinished_traces()  # other readable files of its folder
             return "its trace is not in the catalogue: see the log"
         return ""
 
@@ -476,7 +479,7 @@ class QueueService:
             assert running is not None
             if running.cancelled_by is not None:
                 return Ending(Event.STOPPED, "cancelled before it moved")
-            if self._needs_review() and not running.reviewed:  # a real arm has taken the place of a simulated one
+            if self._needs_review() and not running.reviewed:  # a real arm has replaced a simulated one
                 return Ending(Event.REFUSED, "it is not approved, and a real arm was connected just before it began")
             answer = running.answer = context.robot.ask(
                 RunExperiment,
@@ -526,6 +529,6 @@ def _joined(*lines: str) -> str:
 
 
 def _ended_as(experiment: Experiment, state: ExperimentState) -> str:
-    """Returns a line such as `ramp failed`, since people know an experiment by its name, not by its number."""
+    """Returns a line such as `ramp failed`: people know an experiment by its name, not by its ID."""
     name = experiment.spec.name or experiment.spec.trajectory.kind.replace("_", " ")
     return f"{name} {state}" if state == "failed" else f"{name} was {state}"

@@ -14,9 +14,9 @@ from server.clock import Clock
 from server.problems import ProblemError, conflict
 
 LEASE_TIME = 10.0
-"""Time (s) for which a lease holds without a heartbeat: an assumption, longer than a page takes to reload."""
+"""Time (s) for which a lease is valid without a heartbeat (an assumption: longer than a page takes to reload)."""
 LOOK_EVERY = 1.0
-"""Time (s) between two checks of a lease. A longer wait would not end while the computer sleeps, but the lease does."""
+"""Time (s) between two checks of a lease. A single long wait would not count time in sleep mode, but the lease does."""
 HEARTBEAT_EVERY = 3.0
 """Time (s) between the heartbeats that clients should send: two may be lost."""
 log = logging.getLogger("server.robot")
@@ -24,8 +24,8 @@ log = logging.getLogger("server.robot")
 
 @dataclass(frozen=True)
 class Lease:
-    """A client's control. `expires` (s) is on the clock that goes on during sleep, so that neither sleep nor a wall
-    clock that is set back lengthens the lease."""
+    """A client's control. `expires` (s) is on the clock that includes sleep mode, so that neither sleep nor a changed
+    wall clock extends the lease."""
 
     secret: str
     name: str
@@ -33,15 +33,16 @@ class Lease:
     moves_real_arm: bool
 
     def holds(self, now: float) -> bool:
-        """Whether the lease has not lapsed."""
+        """Whether the lease is still valid."""
         return now < self.expires
 
 
 class ControlService:
     """Grants control of one robot.
 
-    lapsed:     called with the holder's name when a lease lapses, on a thread of its own or of the next client
-    given_back: called with the holder's name when they give control back
+    lapsed:     called with the holder's name when a lease expires, on a separate thread or that of the next client
+    given_back: called with the holder's name when control is returned
+
     The queue gets control only after these have returned.
     """
 
@@ -61,7 +62,7 @@ class ControlService:
         self._watch.start()
 
     def take(self, name: str, *, moves_real_arm: bool) -> ControlLease:
-        """Gives control to a client. Raises a 409 if somebody else has it."""
+        """Gives control to a client. Raises a 409 if another client has it."""
         with self._changed:
             now = self._clock.elapsed()
             if self._queue is not None:
@@ -77,12 +78,12 @@ class ControlService:
             self._endings += silent is not None
             self._changed.notify_all()
             told = self._told(self._lease, now)
-        if silent is not None:  # it has just lapsed, and this has not been reported yet
+        if silent is not None:  # the lease expired just now, which was not reported yet
             self._tell_end(self._lapsed, silent.name)
         return told
 
     def renew(self, secret: str) -> ControlLease:
-        """Renews the lease at a heartbeat. Raises a 409 if the lease has lapsed, or is another's."""
+        """Renews the lease at a heartbeat. Raises a 409 if the lease has expired, or is another client's."""
         with self._changed:
             now = self._clock.elapsed()
             lease = replace(self._require(secret, now), expires=now + LEASE_TIME)
@@ -100,12 +101,12 @@ class ControlService:
         self._tell_end(self._given_back, name)
 
     def require(self, secret: str | None) -> Lease:
-        """Returns the lease that allows a motion now. Raises a 409 if there is none, or it is another's."""
+        """Returns the lease that allows a motion now. Raises a 409 if there is none, or it is another client's."""
         with self._changed:
             return self._require(secret, self._clock.elapsed())
 
     def require_free_of_others(self, secret: str | None) -> None:
-        """Raises a 409 if somebody else has control. For requests that change the robot without moving it."""
+        """Raises a 409 if another client has control. For requests that change the robot without moving it."""
         with self._changed:
             now = self._clock.elapsed()
             held = self._lease is not None and self._lease.holds(now)
@@ -118,7 +119,7 @@ class ControlService:
 
     def take_for_queue(self, experiment: str) -> bool:
         """Gives control to the queue for one experiment. Returns False while a client has it, or while the end of a
-        lease is still being reported, since what that client was moving must hold first."""
+        lease is still being reported, since that client's motion must first end."""
         with self._changed:
             if self._lease is not None or self._endings:
                 self._changed.notify_all()

@@ -1,4 +1,4 @@
-"""Keeps a robot connected while somebody wants it to be; it retries with doubling delays."""
+"""Keeps a robot connected while requested; retries with doubling delays."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ log = logging.getLogger("server.robot")
 
 
 class Keeper:
-    """A thread that keeps a robot connected. Connecting moves nothing and resumes nothing that was interrupted."""
+    """A thread that keeps a robot connected. Connecting moves nothing and continues nothing that was interrupted."""
 
     def __init__(self, robot: Robot, delays: ReconnectDelay = DELAYS) -> None:
         self._robot = robot
@@ -47,7 +47,7 @@ class Keeper:
         return self._robot.disconnect(PATIENCE)
 
     def close(self, patience: float) -> None:
-        """Disconnects for good and ends the thread."""
+        """Disconnects permanently and ends the thread."""
         with self._changed:
             self._wanted, self._closing = False, True
             self._changed.notify_all()

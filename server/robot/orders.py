@@ -14,8 +14,8 @@ from server.robot.robot import ANSWER_WITHIN, Robot
 def answer_of(robot: Robot, order: Callable[..., Any], arrived: float, **fields: object) -> Answer:
     """Sends an order that arrived at this time (s, monotonic), and returns the owner's answer.
 
-    Raises a 409 at once during an experiment, a program or leading by hand, and where the order took ANSWER_WITHIN or
-    longer to come whole; a 429 if too many orders wait; the problem in the answer; ReachError if none comes within
+    Raises a 409 at once during an experiment, a program or hand guiding, or if the order itself took ANSWER_WITHIN or
+    longer to arrive; a 429 if too many orders wait; the problem in the answer; ReachError if there is no answer within
     ANSWER_WITHIN of its arrival.
     """
     activity = "experiment" if robot.experiment is not None else robot.arm.activity if robot.arm else "none"

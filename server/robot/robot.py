@@ -42,11 +42,11 @@ from server.clock import Clock
 from server.stopping.arm import Reach
 
 OPEN_WITHIN = 60.0
-"""Time (s) for a process to start, and a mock with its physics engine, on a busy computer."""
+"""Time (s) for a process, and a mock with its physics engine, to start on a busy computer."""
 ANSWER_WITHIN = 5.0
 """Time (s) to wait for the answer to an order that moves nothing."""
 ORDERS_AT_ONCE = 8
-"""Number of quick orders that may wait for answers, so that a silent robot blocks no more of the service's threads."""
+"""Most quick orders that wait for answers, so that a silent robot blocks no more of the service's threads."""
 PROGRAM = (sys.executable, "-m", "server.owner")
 log = logging.getLogger("server.robot")
 T = TypeVar("T")
@@ -78,7 +78,8 @@ class Seen:
 class Robot:
     """A robot, and the process that owns its port while it is connected.
 
-    listeners are called with every report of that process, on its thread; they must not wait. start_owner: starts it
+    Listeners are called with every report of that process, on its thread; they must not block. start_owner: starts the
+    process
     """
 
     def __init__(
@@ -90,9 +91,9 @@ class Robot:
         self.listeners: list[Callable[[Report], None]] = []
         self.disconnected: list[Callable[[str], None]] = []
         self.reached: list[Callable[[Reach], None]] = []
-        """Called whenever the way to reach the robot changes; they must not block."""
+        """Called whenever the way to reach the robot changes; must not block."""
         self.experiment: str | None = None
-        """The experiment of the queue that runs now."""
+        """The running experiment of the queue."""
         self.room_for_orders = threading.BoundedSemaphore(ORDERS_AT_ONCE)
         self._lock = threading.RLock()
         self._owner: OwnerProcess | None = None
@@ -116,7 +117,7 @@ class Robot:
 
     @property
     def identity(self) -> RobotIdentity | None:
-        """What the controller says about itself; None while it is not connected."""
+        """Properties that the controller reports; None while it is not connected."""
         return self._identity
 
     @property
@@ -149,16 +150,16 @@ class Robot:
 
     @property
     def owner_pid(self) -> int | None:
-        """The number of the process that owns the port; None if there is none."""
+        """PID of the process that owns the port; None if there is none."""
         owner = self._owner
         return None if owner is None else owner.pid
 
     def connect(self, *, anew: bool = False, wanted: Callable[[], bool] = lambda: True) -> RobotIdentity:
-        """Connects, or waits for a connection that is being made. Moves nothing. Raises ReachError, SpecError.
+        """Connects, or waits for a connection under way. Moves nothing. Raises ReachError, SpecError.
 
-        Only with `anew`, for a person who knows what is at the port, may it reach another terminal than before.
-        `wanted` is called once more under the lock: a `disconnect` either comes before, and the connection is no longer
-        wanted, or after, and ends the connection.
+        Only with `anew`, for a person who knows what is at the port, may it use another terminal than before. `wanted`
+        is called again under the lock. So a `disconnect` comes either before, and the connection is no longer wanted,
+        or after, and ends the connection.
         """
         with self._lock:
             if self._owner is None:
@@ -180,7 +181,7 @@ class Robot:
         return Reach(self.name, self.place.url, self.owner_pid, self._terminal, self._stop_by_pipe)
 
     def require_same_place(self) -> None:
-        """Raises ReachError if another program has got the port's number meanwhile: nothing may be sent there."""
+        """Raises ReachError if another program now has the port's number: nothing may be sent there."""
         port = parse_port_url(self.place.url)
         if isinstance(port, SerialPort):
             try:
@@ -191,7 +192,7 @@ class Robot:
 
     def disconnect(self, patience: float = 4.0) -> bool:
         """Frees the port, after a stop of running work. Returns whether this is done within `patience` s."""
-        with self._lock:  # an attempt may just be starting its process
+        with self._lock:  # a connection attempt may be starting its process
             owner = self._owner
         return True if owner is None else owner.close(patience)
 
@@ -237,7 +238,7 @@ class Robot:
         try:
             self._owner = self._start_owner(opening, self._on_report, self._on_end)
             _notify_each(self.reached, self.reach())
-        except OSError as error:  # no memory or no file descriptor is left for another process
+        except OSError as error:  # no memory or file descriptor is left for another process
             self._problem = f"the robot's process cannot be started: {error.strerror or error}"
             raise ReachError(self._problem) from error
 

@@ -1,4 +1,4 @@
-"""Stops the robot at once, on threads with no other task, whatever the event loop is doing."""
+"""Stops the robot at once, on separate threads, whatever the event loop is doing."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class StopService:
         self._stop = stop
         self._threads = ThreadPoolExecutor(STOPPERS, thread_name_prefix="stop")
         ready = threading.Barrier(STOPPERS)
-        # The threads are made now, so that a stop need not ask the operating system for one.
+        # Start the threads now: creating one during a stop could fail or take time.
         for _ in range(STOPPERS):
             self._threads.submit(ready.wait)
 
@@ -32,7 +32,7 @@ class StopService:
         return await asyncio.get_running_loop().run_in_executor(self._threads, self.stop_now)
 
     def stop_now(self) -> StopResult:
-        """Stops the robot. May be called from any thread. Never raises: the result says what happened."""
+        """Stops the robot. May be called from any thread. Never raises: the result contains any error."""
         result = self._stop(self._robot.reach())
         if result.confirmed:
             self._robot.note_stop()

@@ -1,4 +1,4 @@
-"""Teaching of one robot: jogging, which begins with its first command, steps, programs, leading by hand."""
+"""Teaching of one robot: jogging, which begins with its first command, steps, programs, hand guiding."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from server.problems import ProblemError, conflict
 from server.robot.robot import ANSWER_WITHIN, Robot
 
 LINES = 50
-"""Number of lines for the operator that are kept."""
+"""Number of stored lines for the operator."""
 LEAD_ENDS_WITHIN = PATIENCE + ANSWER_WITHIN
-"""Time (s) for leading to end: the arm may take PATIENCE to come to rest before its gains are restored."""
+"""Time (s) for hand guiding to end: the arm may take PATIENCE to come to rest before its gains are restored."""
 IF_A_LEAD_GOES_ON = (
     "HOLD THE ARM: led joints have no drive, and a stop does not hold them; reset it here, then set gains"
 )
@@ -45,7 +45,7 @@ _HELD = {"stopped": "stopped", "fault": "at fault"}
 
 @dataclass(frozen=True)
 class Word:
-    """A client's request to move the arm. `said`: when it arrived (s, monotonic). `require_control` is called just
+    """A client's request to move the arm. `said`: its arrival time (s, monotonic). `require_control` is called just
     before the order is sent, and raises if the client may no longer move the arm."""
 
     said: float
@@ -53,11 +53,11 @@ class Word:
 
 
 class TeachingService:
-    """Teaching by a client that has control. Safe to use from any thread.
+    """Teaching by a client with control. Safe to use from any thread.
 
-    notify:          called with one line when a teaching has ended
-    ends_within:     s that what was told to finish may take
-    lead_ends_within: s that a lead may take
+    notify:          called with one line when a teaching activity has ended
+    ends_within:     time (s) for an activity to finish on request
+    lead_ends_within: the same for hand guiding
     """
 
     def __init__(
@@ -81,9 +81,9 @@ class TeachingService:
         robot.listeners.append(self._on_report)
 
     def jog(self, velocities: dict[int, float], said: float) -> None:
-        """Drives joints for a moment, by a command that arrived at the time `said` (s, monotonic). A command delayed by
-        longer than it may drive the arm is ignored. Raises a 409 if the arm cannot move now, SpecError for a joint that
-        does not exist or is too fast."""
+        """Drives joints for at most 0.3 s, by a command that arrived at the time `said` (s, monotonic). A command
+        delayed by longer than that is ignored. Raises a 409 if the arm cannot move now, SpecError for a joint that does
+        not exist or is too fast."""
         self._require_possible(velocities)
         self._require_not_stopped()
         with self._changed:
@@ -94,18 +94,18 @@ class TeachingService:
             self._robot.tell(JogDrive(velocities=velocities, said=said))
 
     def perform(self, word: Word, program: Program, activity: Literal["program", "step"] = "program") -> None:
-        """Begins a taught program. Raises a 409 while something else is taught, or without control."""
+        """Begins a taught program. Raises a 409 during another teaching activity, or without control."""
         with self._changed:
             self._begin(word, activity, RunProgram, program=program.model_dump(mode="json"), activity=activity)
 
     def lead(self, word: Word, joints: tuple[int, ...]) -> None:
-        """Begins leading by hand. Raises a 409 while something else is taught, or without control."""
+        """Begins hand guiding. Raises a 409 during another teaching activity, or without control."""
         with self._changed:
             self._begin(word, "lead", LeadBegin, joints=joints)
 
     def finish(self) -> None:
-        """Ends jogging or leading in good order, and waits for the end. A program goes on to its own end. Raises a 503
-        if the end does not come."""
+        """Ends jogging or hand guiding in good order, and waits for the end. A program continues to its own end. Raises
+        a 503 if the end does not come."""
         with self._changed:
             under_way = self._under_way
             if under_way is None or under_way[0] not in ("jog", "lead"):
@@ -118,7 +118,7 @@ class TeachingService:
                 raise ProblemError(503, "not-reached", line, IF_A_LEAD_GOES_ON if leading else "stop the robot")
 
     def hold(self) -> None:
-        """Ends teaching after control has ended: jogging and leading in good order, a program by a stop. Never
+        """Ends teaching after control has ended: jogging and hand guiding in good order, a program by a stop. Never
         blocks."""
         with self._changed:
             under_way = self._under_way
@@ -143,7 +143,7 @@ class TeachingService:
             line = f"the arm is busy: {self._under_way[0]}"
             raise conflict("arm-busy", line, "wait for its end, or stop it")
         self._require_not_stopped()
-        word.require_control()  # control may have lapsed while a jog came to its end
+        word.require_control()  # control may have ended while jogging was being finished
         asked = self._robot.ask(order, asked=word.said, **fields)
         self._result = self._problem = ""
         self._path = None

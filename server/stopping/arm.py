@@ -16,9 +16,9 @@ SILENT = "the process that owns the port did not answer"
 
 @dataclass(frozen=True)
 class Reach:
-    """How to reach a robot. `owner`: the process that owns its port, None if there is none; `terminal`: the
-    pseudo-terminal at which it was reached, if it is a mock's; `ask`: stops through the owner's pipe, and returns None
-    without an answer; the service alone has it."""
+    """How to reach a robot. `owner`: PID of the process that owns its port, None if there is none. `terminal`: the
+    pseudo-terminal at which it was reached, if it is a mock's. `ask`: stops through the owner's pipe and returns None
+    without an answer; only the service has it."""
 
     robot: str
     url: str
@@ -28,7 +28,7 @@ class Reach:
 
 
 def stop_arm(reach: Reach) -> StopResult:
-    """Freezes the arm. Never raises: the result says what happened."""
+    """Freezes the arm. Never raises: the result contains any error."""
     begun = time.monotonic()
     answer = _ask(reach)
     if answer.confirmed:
@@ -49,7 +49,7 @@ def stop_arm(reach: Reach) -> StopResult:
 
 
 def together(results: Mapping[str, StopResult]) -> FleetStopResult:
-    """Returns the results of the stops of all robots as one, which is as good as the worst of them."""
+    """Returns the results of all robots' stops as one, which is as good as the worst of them."""
     every = list(results.values())
     texts = [f"{name}: {result.text}" for name, result in results.items()]
     return FleetStopResult(
@@ -73,11 +73,11 @@ def _in_detail(results: Mapping[str, StopResult]) -> str:
 
 
 def _ask(reach: Reach) -> StopAnswer:
-    """Asks at the stop socket; where nobody answers there, by the owner's pipe; where nobody owns it, at the port."""
+    """Asks at the stop socket; if there is no answer, by the owner's pipe; if there is no owner, at the port."""
     why = ""
     try:
         attempts = request_stop(reach.robot, reach.owner)
-    except OSError as error:  # for example, too many files are open for another socket
+    except OSError as error:  # for example, too many open files for another socket
         attempts, why = [], f"the process that owns the port cannot be asked: {error.strerror or error}"
     answers = [attempt.answer for attempt in attempts if attempt.answer is not None]
     if len(answers) < len(attempts):

@@ -1,4 +1,5 @@
-"""The service's side of the stop listener: starts its process, tells it who owns each port, and receives its stops."""
+"""The service's side of the stop listener: starts its process, tells it the owner of each port, and receives its
+stops."""
 
 from __future__ import annotations
 
@@ -19,8 +20,8 @@ from server.stopping.messages import NEWS, Begin, Joined, Known, Left, Owned, Re
 READY_WITHIN = 30.0
 """Time (s) for the process to start on a busy computer."""
 BEGIN_AGAIN_AFTER, BEGIN_AGAIN_AT_MOST = 0.5, 8.0
-"""Shortest and longest time (s) before a process that has ended by itself is started again. The time doubles whenever
-a process ends before it listens."""
+"""Shortest and longest time (s) before a process that has ended by itself is started again. The time doubles whenever a
+process ends before it listens."""
 END_WITHIN = 3.0
 """Time (s) to answer requests under way when the service ends."""
 log = logging.getLogger("server.stop")
@@ -33,10 +34,10 @@ class StopDoorError(DaqError):
 
 
 class StopDoor:
-    """The listener's process, started again when it ends.
+    """The listener's process, restarted when it ends.
 
-    listener: a bound socket, kept open here, so that clients that connect while the process is restarted wait for it
-    stopped:  called with every stop, on a thread of its own
+    listener: a bound socket, kept open here, so that clients that connect during a restart wait for the new process
+    stopped:  called with every stop, on a separate thread
     """
 
     def __init__(self, listener: socket.socket, begin: Begin, begin_again_after: float = BEGIN_AGAIN_AFTER) -> None:
@@ -47,7 +48,7 @@ class StopDoor:
         self._lock = threading.Lock()
         self._owned: dict[str, Owned] = {}
         self._joined: dict[str, Caller] = {}
-        """Sessions that have begun since the service has read the tokens, for a process that is started again."""
+        """Sessions that have begun since the service read the tokens, for a restarted process."""
         self._ready = threading.Event()
         self._closing = threading.Event()
         self._process = self._start()
@@ -56,7 +57,7 @@ class StopDoor:
 
     @property
     def pid(self) -> int:
-        """The process number."""
+        """The process ID."""
         return self._process.pid
 
     def wait_ready(self) -> None:
@@ -73,14 +74,15 @@ class StopDoor:
             self._process.send(told)
 
     def set_tokens(self, callers: Mapping[str, Caller]) -> None:
-        """Passes on the tokens that the service has read, by digest; also to a process that is started again later."""
+        """Passes on the tokens that the service has read, by digest; also to a process that is restarted later."""
         tokens = {digest: (caller.name, caller.role) for digest, caller in callers.items()}
         with self._lock:
             self._begin = self._begin.model_copy(update={"tokens": tokens})
             self._process.send(Known(tokens=tokens))
 
     def add(self, caller: Caller) -> None:
-        """Passes on a session that has just begun, so that its person can stop the robot whatever the database does."""
+        """Passes on a session that has just begun, so that its person can stop the robot whatever the state of the
+        database."""
         assert caller.token is not None
         with self._lock:
             self._joined = {digest: one for digest, one in self._joined.items() if not _stops_nothing(one)}
@@ -88,7 +90,7 @@ class StopDoor:
             self._process.send(_joined(caller))
 
     def remove(self, caller: Caller) -> None:
-        """Tells that a session was left: neither this process nor one that is started later takes its stops."""
+        """Reports a session that was ended by signing out: neither this process nor a later one accepts its stops."""
         assert caller.token is not None
         with self._lock:
             self._joined.pop(caller.token, None)
@@ -98,7 +100,7 @@ class StopDoor:
             self._process.send(Left(digest=caller.token))
 
     def close(self) -> None:
-        """Ends the process, after it has answered the requests under way."""
+        """Ends the process after it has answered the requests in progress."""
         self._closing.set()
         with self._lock:
             self._process.end_input()
@@ -135,7 +137,7 @@ class StopDoor:
                 return
 
     def _start_again(self) -> bool:
-        """Starts the process; returns False if the operating system cannot start one now. It may later."""
+        """Starts the process. Returns False if the operating system cannot start one now, which may change."""
         with self._lock:
             if self._closing.is_set():
                 return True
@@ -155,7 +157,7 @@ class StopDoor:
                         self._ready.set()
                     else:
                         self.stopped(news)
-                except Exception:  # half a line of a process that was killed, or a listener's fault
+                except Exception:  # an incomplete line of a killed process, or a listener's error
                     log.exception("stop listener: %.200r", line)
 
 
@@ -165,5 +167,5 @@ def _joined(caller: Caller) -> Joined:
 
 
 def _stops_nothing(caller: Caller) -> bool:
-    """Whether a session ended so long ago that it does not even stop the robot."""
+    """Whether a session ended so long ago that it may not even stop the robot."""
     return caller.expires is not None and caller.expires + timedelta(seconds=STOPS_FOR) < datetime.now(UTC)

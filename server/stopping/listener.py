@@ -1,6 +1,6 @@
-"""An HTTP server for the stop alone: `POST /api/v1/robots/{robot}/stop`, and `POST /api/v1/fleet/stop` for all robots.
+"""An HTTP server only for stops: `POST /api/v1/robots/{robot}/stop`, and `POST /api/v1/fleet/stop` for all robots.
 
-Every request is carried out on a thread of its own, with the same names, tokens, origins and answers as the service's.
+Every request has its own thread, and the same names, tokens, origins and answers as the service's.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ ALL = "/api/v1/fleet/stop"
 READ_WITHIN = 2.0
 """Time (s) in which a client must send its whole request, so that nobody occupies a connection by sending slowly."""
 MOST_AT_ONCE = 32
-"""Number of connections at once. A further one is closed at once; the service itself still takes stops."""
+"""Most connections at once. A further one is closed at once; the service itself still accepts stops."""
 LARGEST_REQUEST = 96 << 10
-"""Number of bytes that are read of a connection. More than 100 headers are a 431, an address of over 64 kB a 414."""
+"""Most bytes read from a connection. More than 100 headers get a 431, an address of over 64 kB a 414."""
 LONGEST_BODY = 4096
-"""Number of bytes of a body that are read and ignored. A connection closed with unread bytes would lose the answer."""
+"""Most bytes of a body that are read and ignored. Closing a connection with unread bytes would lose the answer."""
 ANSWERED_WITHIN = 2.0
-"""Time (s) to answer requests under way when the listener ends; a stop is answered within 1.1 s."""
+"""Time (s) to answer requests in progress when the listener ends; a stop is answered within 1.1 s."""
 log = logging.getLogger("server.stop")
 
 Stop = Callable[[], StopResult]
@@ -44,7 +44,7 @@ Stop = Callable[[], StopResult]
 
 @dataclass(frozen=True)
 class Asked:
-    """Who asked for a stop, from which computer, and at which address of this listener."""
+    """Sender of a stop, its computer, and the address on this listener."""
 
     caller: Caller
     origin: str
@@ -55,8 +55,8 @@ OnStop = Callable[[str, StopResult, Asked], None]
 
 
 class StopListener:
-    """Listens until closed. `stops`: by robot; `on_stop`: called with the robot, the stop's result, and who asked,
-    from any thread."""
+    """Listens until closed. `stops`: by robot. `on_stop`: called with the robot, the result of the stop and its sender,
+    on any thread."""
 
     def __init__(self, listener: socket.socket, gate: StopGate, stops: Mapping[str, Stop], on_stop: OnStop) -> None:
         self._server = _Server(listener, gate, stops, on_stop)
@@ -64,7 +64,7 @@ class StopListener:
         self._thread.start()
 
     def close(self) -> None:
-        """Takes no more requests, and waits until those under way are answered."""
+        """Accepts no more requests, and waits until those in progress are answered."""
         self._server.shutdown()
         self._thread.join()
         self._server.server_close()
@@ -82,11 +82,11 @@ class _Server(ThreadingHTTPServer):
         self._most = most_connections(MOST_AT_ONCE)
         self._room = threading.BoundedSemaphore(self._most)
         self._since: dict[socket.socket, float] = {}
-        """When each connection was made (s, monotonic). Adding and removing an entry are one atomic operation each."""
+        """When each connection was made (s, monotonic). Adding and removing an entry are atomic operations."""
         self.server_activate()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Handles a connection on a thread of its own or closes it if there are too many."""
+        """Handles a connection on a separate thread, or closes it if there are too many."""
         if self._room.acquire(blocking=False):
             self._since[request] = time.monotonic()
             try:
@@ -105,18 +105,18 @@ class _Server(ThreadingHTTPServer):
             self._room.release()
 
     def service_actions(self) -> None:
-        """Stops reading, twice a second, from clients that have not sent a request in time. Answers are still sent."""
+        """Twice per second, stops reading from clients that have not sent a request in time. Answers are still sent."""
         latest = time.monotonic() - READ_WITHIN
         for request, begun in self._since.copy().items():
             if begun < latest:
-                with suppress(OSError):  # it has been closed meanwhile
+                with suppress(OSError):  # it was closed meanwhile
                     request.shutdown(socket.SHUT_RD)
 
     def stop_all(self, robots: Sequence[str], asked: Asked) -> dict[str, StopResult]:
-        """Stops robots at the same time, so that an arm that does not answer delays no other's stop.
+        """Stops robots at the same time, so that an arm that does not answer delays no other stop.
 
-        `on_stop` is called for each as soon as its result is there, on several threads at once: before the answer,
-        since the client may be gone, and without waiting for the slowest arm.
+        `on_stop` is called with each result at once, on several threads: before the answer, since the client may be
+        gone, and without waiting for the slowest arm.
         """
         found: dict[str, StopResult] = {}
 
@@ -124,7 +124,7 @@ class _Server(ThreadingHTTPServer):
             found[name] = self.stops[name]()  # never raises
             try:
                 self.on_stop(name, found[name], asked)
-            except Exception:  # the arm has been stopped, and the other arms and the client still count on the answer
+            except Exception:  # the arm was stopped; the other arms and the client still need this thread
                 log.exception("stop listener: the stop of %s is not told", name)
 
         here = list(robots[:1])  # on this thread, so that one stop needs no further thread
@@ -181,7 +181,7 @@ class _Bounded(io.RawIOBase):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """Answers one request with what the server knows."""
+    """Handles one request."""
 
     server: _Server
     protocol_version = "HTTP/1.1"
@@ -190,7 +190,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = READ_WITHIN
 
     def setup(self) -> None:
-        """Sets up as the base class does, but limits what is read to the size of a request."""
+        """Sets up as the base class does, with a limit on the bytes read."""
         super().setup()
         self.rfile = io.BufferedReader(_Bounded(self.rfile, LARGEST_REQUEST))
 
@@ -210,12 +210,12 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer(200, together(results) if self.path == ALL else results[robots[0]], "application/json")
 
     def do_OPTIONS(self) -> None:
-        """Answers whether the service's page may ask. It is at another port, and so of another origin."""
+        """Answers whether the service's page may send stops. It has another port, and so another origin."""
         headers = {"Access-Control-Allow-Methods": "POST", "Access-Control-Allow-Headers": "authorization"}
         self._answer(204, None, "", headers if self.server.gate.is_from_here(self._headers()) else {})
 
     def do_GET(self) -> None:
-        """Refuses every other method."""
+        """Rejects every other method."""
         problem = ProblemError(405, "no-such-method", f"{self.command} {self.path[:100]}: a stop is a POST")
         self._answer(problem.status, details_of(problem), MEDIA_TYPE)
 
@@ -226,7 +226,7 @@ class _Handler(BaseHTTPRequestHandler):
         log.debug(format, *args)
 
     def _admitted(self) -> tuple[tuple[str, ...], Caller]:
-        """Returns the robots to stop, and who asks. Raises a 401, 403 and 404."""
+        """Returns the robots to stop, and the caller. Raises a 401, 403 and 404."""
         found = ADDRESS.fullmatch(self.path)
         caller = self.server.gate.admit(self._headers())
         if self.path == ALL:

@@ -1,4 +1,4 @@
-"""Messages to and from the stop listener: one JSON object a line, on its standard input and output."""
+"""Messages to and from the stop listener: one JSON object per line, on its standard input and output."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from daq.contracts.service.queue import Role
 
 
 class Begin(FrozenRecord):
-    """The first line. `descriptor`: the listening socket, which it inherits. `urls`: each robot's port."""
+    """The first line. `descriptor`: the inherited listening socket. `urls`: each robot's port."""
 
     kind: Literal["begin"] = "begin"
     descriptor: int
@@ -22,7 +22,7 @@ class Begin(FrozenRecord):
     open_on_loopback: bool
     names: tuple[str, ...]
     cookie: str
-    """Name of the cookie of people who have signed in."""
+    """Name of the cookie of signed-in people."""
     urls: dict[str, str]
     database_url: str
     sqlite: Path | None
@@ -48,15 +48,15 @@ class Joined(FrozenRecord):
 
 
 class Left(FrozenRecord):
-    """A session that its person has left, by the digest of its secret: it stops nothing any more."""
+    """A session that was ended by signing out, by the digest of its secret: it stops nothing any more."""
 
     kind: Literal["left"] = "left"
     digest: str
 
 
 class Owned(FrozenRecord):
-    """Which process owns a robot's port now; None if none does. `terminal`: the pseudo-terminal at which the robot was
-    reached, by number, time of creation and holder, as `daq.transport` knows it."""
+    """The process that owns a robot's port now; None if none does. `terminal`: the pseudo-terminal at which the robot
+    was reached, as number, time of creation and holder, as in `daq.transport`."""
 
     kind: Literal["owned"] = "owned"
     robot: str
@@ -68,13 +68,13 @@ class Owned(FrozenRecord):
 
 
 class Ready(FrozenRecord):
-    """The listener takes requests now."""
+    """The listener now accepts requests."""
 
     kind: Literal["ready"] = "ready"
 
 
 class Stopped(FrozenRecord):
-    """A stop that was requested, its result in one line, and who requested it."""
+    """A requested stop, its result in one line, and its sender."""
 
     kind: Literal["stopped"] = "stopped"
     robot: str
@@ -85,7 +85,7 @@ class Stopped(FrozenRecord):
     origin: str
     """Address of the computer that sent the request."""
     address: str
-    """Address that was requested."""
+    """Address of the request."""
     at: AwareDatetime
 
 

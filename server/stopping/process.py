@@ -1,6 +1,6 @@
-"""The main program of the stop listener's process.
+"""Main program of the stop listener's process.
 
-Tells the service what the stop listener has done, without ever delaying a stop.
+`Teller` reports stops to the service, without ever delaying a stop.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from server.stopping.messages import ORDER, Begin, Joined, Known, Left, Owned, R
 from server.stopping.tokens import Callers, StopTokens, reader_of
 
 MOST_WAITING = 10_000
-"""Number of lines that wait while the service does not read. A further one is only in the log."""
+"""Most lines that wait while the service does not read. Further ones are only in the log."""
 log = logging.getLogger("server.stop")
 
 
 class Teller:
-    """Writes lines into a pipe on a thread of its own: a suspended service, whose pipe is full, reads them later."""
+    """Writes lines to a pipe on a separate thread: a suspended service, whose pipe is full, reads them later."""
 
     def __init__(self, descriptor: int, most_waiting: int = MOST_WAITING) -> None:
         self._descriptor = descriptor
@@ -46,7 +46,7 @@ class Teller:
         self._thread.start()
 
     def tell(self, news: Ready | Stopped) -> None:
-        """Tells the service, as soon as it reads. Never blocks."""
+        """Reports to the service once it reads. Never blocks."""
         line = news.model_dump_json().encode() + b"\n"
         with self._changed:
             if len(self._lines) < self._most_waiting:
@@ -56,7 +56,7 @@ class Teller:
         log.error("stop listener: the service does not read; only here: %s", line.decode().rstrip())
 
     def close(self, within: float) -> None:
-        """Waits until all is told, for this time (s) at most; what is not is in the log."""
+        """Waits at most this time (s) until everything is reported; the rest is in the log."""
         with self._changed:
             self._closing = True
             self._changed.notify()
@@ -86,20 +86,20 @@ class Teller:
 
 
 FIRST_READ_WITHIN = 1.0
-"""Time (s) to wait for the first read of the tokens before the service is told that the listener is ready. The
-database may not exist yet."""
+"""Longest wait (s) for the first read of the tokens before the service is told that the listener is ready. The database
+may not exist yet."""
 TOLD_WITHIN = 0.5
-"""Time (s) to tell the service of the last stops when the listener ends."""
+"""Time (s) to report the last stops to the service when the listener ends."""
 
 
 class Robots:
-    """How to reach each robot, as the service has reported."""
+    """How to reach each robot, as reported by the service."""
 
     def __init__(self, urls: dict[str, str]) -> None:
         self._reach = {name: Reach(name, url) for name, url in urls.items()}
 
     def set_owner(self, told: Owned) -> None:
-        """Notes that another process owns the port now, or none."""
+        """Notes which process owns the port now; it may be none."""
         terminal = None if told.terminal is None else Terminal(*told.terminal)
         self._reach[told.robot] = replace(self._reach[told.robot], owner=told.process, terminal=terminal)
 
@@ -120,7 +120,7 @@ def main() -> int:
     lines = sys.stdin.buffer
     first = lines.readline()
     if not first:
-        return 0  # the service has ended before it began
+        return 0  # the service ended before it began
     begin = ORDER.validate_json(first)
     assert isinstance(begin, Begin)
     robots = Robots(begin.urls)

@@ -1,4 +1,4 @@
-"""The tokens that may stop the robot, read from the database without the service and without its libraries."""
+"""The tokens that may stop the robot, read from the database without the service and its libraries."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ UNKNOWN_FOR = 0.2
 """Time (s) after which the database is read again for an unknown token. It limits guessing to five reads per second,
 and lets a new token be used soon."""
 UNKNOWN_WITHIN = 0.5
-"""Time (s) for which a request with an unknown token waits for the database. One with a known token never waits."""
+"""Longest wait (s) of a request with an unknown token for the database. A request with a known token never waits."""
 BUSY_WITHIN = 0.4
-"""Time (s) for which a read may wait for a lock of SQLite's."""
+"""Longest wait (s) of a read for a lock of SQLite."""
 log = logging.getLogger("server.stop")
 
 TOKENS = "SELECT digest, name, role FROM tokens WHERE revoked IS NULL"
 SESSIONS = "SELECT digest, name, role FROM sessions WHERE expires > :ended"
-"""Sessions that may stop the robot, also those that have ended lately. They are read by themselves, so that a fault in
-their table, or a database that has none yet, takes nobody's token."""
+"""Sessions that may stop the robot, including recently ended ones. They are read separately, so that an error in their
+table, or a database without one, invalidates no token."""
 
 NO_SESSIONS = "sessions cannot be read; those read last stay valid: %s"
 
 Callers = dict[str, Caller]
-"""The caller of each token, by the token's digest, without revoked tokens."""
+"""The caller of each valid token, by the token's digest."""
 
 
 class StopTokens:
-    """The tokens as last read from the database. If it cannot be read, the tokens read before stay valid, so that
-    nobody loses the ability to stop the robot. A thread of its own reads, and no stop with a known token waits for it.
-    Safe to use from any thread.
+    """The tokens as of the last read of the database. If it cannot be read, they stay valid, so that everybody can
+    still stop the robot. A separate thread reads, and no stop with a known token waits for it. Safe to use from any
+    thread.
 
     known: the tokens that the service has read; None if it has not
     """
@@ -59,7 +59,7 @@ class StopTokens:
         self._callers = known
         self._changed = threading.Condition()
         self._wanted = 1
-        """The number of the last read that somebody waits for."""
+        """The number of the last read for which a request waits."""
         self._begun = self._ended = 0
         """The numbers of reads begun and ended; failed reads count as ended."""
         self._read_at = -math.inf
@@ -76,28 +76,29 @@ class StopTokens:
         self._thread.join(UNKNOWN_WITHIN)
 
     def wait_read(self, within: float) -> None:
-        """Waits until the first read has ended, even if it failed, for `within` s at most."""
+        """Waits at most `within` s until the first read has ended, even if it failed."""
         with self._changed:
             self._changed.wait_for(lambda: self._ended > 0, within)
 
     def update(self, callers: Callers) -> None:
-        """Takes the service's tokens if none have been read yet; tokens read from the database are as new or newer."""
+        """Uses the service's tokens if none have been read yet; tokens read from the database are at least as new."""
         with self._changed:
             self._callers = self._callers or callers
 
     def add(self, digest: str, caller: Caller) -> None:
-        """Takes a session that has just begun. It is in the database, so the next read has it, too."""
+        """Adds a session that has just begun. It is in the database, so the next read includes it."""
         with self._changed:
             self._callers = {**(self._callers or {}), digest: caller}
 
     def remove(self, digest: str) -> None:
-        """Forgets a session that was left. It is not in the database any more, so the next read has it not, either."""
+        """Removes a session after signing out. It is no longer in the database, so the next read does not include it
+        either."""
         with self._changed:
             if self._callers is not None:
                 self._callers = {one: caller for one, caller in self._callers.items() if one != digest}
 
     def remembered(self, token: str) -> tuple[bool, Caller | None]:
-        """Returns whether a token's caller is known without a read, and the caller, None if nobody has this token."""
+        """Returns whether a token's caller is known without a read, and the caller (None for an unknown token)."""
         return self._remembered(digest_of(token))
 
     def look_up(self, token: str) -> Caller | None:
@@ -144,28 +145,28 @@ class StopTokens:
 
 
 def reader_of(database_url: str, sqlite: Path | None) -> Callable[[], Callers]:
-    """Returns a function that reads all tokens: from a SQLite file with the standard library, from another database as
-    its plug-in does."""
+    """Returns a function that reads all tokens: from a SQLite file by the standard library, from other databases by
+    their plug-in."""
     read_both = partial(_of_file, sqlite) if sqlite is not None else _of_database(database_url)
     last: Callers = {}
 
     def read() -> Callers:
         nonlocal last
         tokens, sessions = read_both()
-        last = last if sessions is None else sessions  # like tokens, those read last stay valid
+        last = last if sessions is None else sessions  # like tokens, the last known sessions stay valid
         return tokens | last
 
     return read
 
 
 def ended() -> datetime:
-    """Returns the end (UTC, without zone, as the table has it) of the oldest session that still stops the robot."""
+    """Returns the end (UTC, without zone, as in the table) of the oldest session that still stops the robot."""
     return datetime.now(UTC).replace(tzinfo=None) - timedelta(seconds=STOPS_FOR)
 
 
 def _of_file(file: Path) -> tuple[Callers, Callers | None]:
-    """Reads tokens and sessions (None: these cannot be read) over a new connection. A suspended service that holds the
-    write lock does not block readers (WAL)."""
+    """Reads tokens and sessions (None if unreadable) over a new connection. A suspended service that holds the write
+    lock does not block readers (WAL)."""
     with closing(open_to_read(file, BUSY_WITHIN)) as connection:
         tokens = callers_of(connection.execute(TOKENS).fetchall())
         try:
@@ -177,7 +178,7 @@ def _of_file(file: Path) -> tuple[Callers, Callers | None]:
 
 
 def callers_of(rows: Iterable[Sequence[Any]]) -> Callers:
-    """Returns the callers of rows of digest, name and role."""
+    """Returns the callers in rows of digest, name and role."""
     return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
 
 

@@ -1,4 +1,4 @@
-"""The address of a database in the configuration, checked before anything is opened."""
+"""The database address in the configuration, checked before anything is opened."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ EXAMPLE = "sqlite:////srv/arm/service.sqlite"
 
 
 class StoreError(DaqError):
-    """The database cannot be opened or brought up to date."""
+    """The database cannot be opened or migrated."""
 
     exit_code = exit_codes.WRONG_INPUT
 
 
 def address_of(section: ServiceSettings) -> URL:
-    """Returns the address of a service's database: the configured one, or else that of a file in the service's folder.
-    Raises StoreError."""
+    """Returns the address of a service's database: the configured one, otherwise that of a file in the service's
+    folder. Raises StoreError."""
     if section.database:
         return parse_address(section.database)
     return file_address(section.folder.absolute() / "service.sqlite")
 
 
 def file_address(file: Path) -> URL:
-    """Returns the address of a SQLite file. In a pasted one, `?`, `#` and `%` of its folders' names would be syntax."""
+    """Returns the address of a SQLite file. Without quoting, `?`, `#` and `%` in folder names would be URL syntax."""
     return URL.create("sqlite", database=str(file))
 
 
 def parse_address(url: str | URL) -> URL:
-    """Parses a database's address. Raises StoreError if it is not valid, or of an unknown kind of database.
+    """Parses a database address. Raises StoreError if it is invalid, or of an unknown kind of database.
 
     No error repeats a password.
     """
@@ -59,13 +59,13 @@ def parse_address(url: str | URL) -> URL:
 
 
 def masked(url: URL) -> str:
-    """Returns an address without its password, also if that is given as a parameter, for messages."""
+    """Returns an address without its password, even if that is a parameter, for messages."""
     query = {name: "hidden" if "pass" in name.lower() else value for name, value in url.query.items()}
     return url.set(query=query).render_as_string()
 
 
 def masked_settings(settings: Settings) -> Settings:
-    """Returns settings that can be shown: without the password of the database."""
+    """Returns settings for display, without the password of the database."""
     if settings.server.database is None:
         return settings
     try:
@@ -77,11 +77,11 @@ def masked_settings(settings: Settings) -> Settings:
 
 
 def open_engine(url: str | URL) -> Engine:
-    """Makes the engine of a database, which connects when it is first used. Raises StoreError; if a driver is missing,
-    the error says which package to install."""
+    """Makes the engine of a database, which connects on first use. Raises StoreError; if a driver is missing, the error
+    names the package to install."""
     parsed = parse_address(url)
     try:
-        # A connection that its server has closed meanwhile is replaced before it is used.
+        # Replace a connection that its server has closed meanwhile.
         return create_engine(parsed, pool_pre_ping=parsed.get_backend_name() != "sqlite")
     except ModuleNotFoundError as error:
         raise _no_driver(parsed, error) from error

@@ -1,6 +1,7 @@
 """Opens the database, and migrates it to this version's tables.
 
-Checks whether the database is as this program writes it. The error is one line that names the table.
+`require_sound` checks that the database is in the form written by this program. Its error is one line that names the
+table.
 """
 
 from __future__ import annotations
@@ -28,9 +29,11 @@ from server.store.tables import ExperimentRow, JobRow
 
 
 def require_sound(engine: Engine, place: str) -> None:
-    """Raises DamagedError if the file is damaged, something that the migrations make is missing or of another form, or
-    a row has an unknown state.
-    `place`: the database's address without its password."""
+    """Raises DamagedError if the file is damaged, a table or other object differs from what the migrations make, or a
+    row has an unknown state.
+
+    `place`: the database's address without its password.
+    """
     try:
         with engine.connect() as connection:
             if engine.dialect.name == "sqlite":
@@ -57,7 +60,7 @@ def _require_schema(connection: Connection, place: str) -> None:
 
 
 def _require_known_states(connection: Connection, rows: type[ExperimentRow | JobRow], place: str) -> None:
-    known = get_args(ExperimentState)  # those of jobs are the same
+    known = get_args(ExperimentState)  # states of jobs are the same
     unknown = connection.execute(select(rows.id, rows.state).where(rows.state.not_in(known)).limit(1)).first()
     if unknown is not None:
         line = f"database {place}: table {rows.__tablename__}: {unknown[0]} has the state {unknown[1]!r:.40}"
@@ -65,13 +68,13 @@ def _require_known_states(connection: Connection, rows: type[ExperimentRow | Job
 
 
 BUSY_TIMEOUT_MS = 5000
-"""Time to wait for a lock: another process (`daq token`, a backup) may hold the write lock for a moment."""
+"""Longest wait (ms) for a lock: another process (`daq token`, a backup) may hold the write lock briefly."""
 
 
 def _require_not_emptied(file: Path) -> None:
-    """Raises DamagedError for a file without anything in it: SQLite would begin anew in it, and nobody would hear that
-    everything is gone. A file that is not there is a first start."""
-    with suppress(OSError):  # SQLite's own error, later, says more
+    """Raises DamagedError for an empty file: SQLite would silently create a new database in it, although all data are
+    lost. A missing file means a first start."""
+    with suppress(OSError):  # SQLite's own error, later, has more details
         if file.stat().st_size == 0 and not file.with_name(f"{file.name}-wal").exists():
             raise DamagedError(f"database {file}: is empty; {BRING_BACK}; without one, delete it to begin anew")
 
@@ -88,7 +91,7 @@ class Store:
             except OSError as error:
                 raise StoreError(f"database {parsed.database}: its folder cannot be made: {error.strerror}") from error
             _require_not_emptied(Path(parsed.database))
-            with suppress(OSError):  # SQLite's own error, later, says more
+            with suppress(OSError):  # SQLite's own error, later, has more details
                 # Other users must not read hashes of tokens. SQLite gives its files beside this one the same mode.
                 os.close(os.open(parsed.database, os.O_CREAT | os.O_RDWR, 0o600))
         self.url = url
@@ -122,14 +125,14 @@ class Store:
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
-        """A session that changes nothing. Raises DamagedError for rows that this program cannot have written."""
+        """A session for reading. Raises DamagedError for rows that this program cannot have written."""
         with self._told_of_damage(), self._readers() as session:
             yield session
 
     @contextmanager
     def writing(self) -> Iterator[Session]:
-        """A session whose changes are on the disk when it ends, all of them or none. Raises DamagedError for rows that
-        this program cannot have written; errors of the code within the block pass unchanged."""
+        """A session whose changes are on the disk when it ends: all of them or none. Raises DamagedError for rows that
+        this program cannot have written; other errors within the block pass unchanged."""
         with self._writing, self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
             yield session
 
@@ -154,7 +157,7 @@ class Store:
         require_sound(self.engine, self.place)
 
     def require_writable(self) -> None:
-        """Raises OperationalError if the database cannot be written to: takes the write lock, and releases it."""
+        """Raises OperationalError if the database is not writable: takes the write lock, and releases it."""
         with self._writing, self._writers() as session:
             session.execute(text("SELECT 1"))
 
@@ -173,7 +176,7 @@ def _is_of_a_row(error: Exception) -> bool:
 
 def _safe_and_shared(connection: sqlite3.Connection, _record: Any) -> None:
     """Sets up a connection so that others can read while one writes, and commits survive a power cut."""
-    connection.isolation_level = None  # SQLAlchemy begins transactions (`_begin`): the driver would do so too late
+    connection.isolation_level = None  # SQLAlchemy begins transactions (`_begin`); the driver would do so too late
     for pragma in (
         "journal_mode=WAL",
         "synchronous=FULL",
@@ -184,6 +187,7 @@ def _safe_and_shared(connection: sqlite3.Connection, _record: Any) -> None:
 
 
 def _begin(connection: Any) -> None:
-    """Begins a transaction. One that will write takes the lock at once: one begun as a reader might never get it."""
+    """Begins a transaction. One that will write takes the lock at once: if it began as a reader, it might never get the
+    lock."""
     writing = connection.get_execution_options().get("writing", False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if writing else "BEGIN")

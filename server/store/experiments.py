@@ -40,7 +40,7 @@ class ExperimentStore:
 
     @contextmanager
     def _changing(self, *robots: str) -> Iterator[Session]:
-        """A session that may change these robots' numbers of waiting experiments, which are remembered afterwards."""
+        """A session that may change these robots' numbers of waiting experiments, which are cached afterwards."""
         with self._counting:
             with self._store.writing() as session:
                 yield session
@@ -49,7 +49,7 @@ class ExperimentStore:
             self._waiting |= waiting
 
     def made_before(self, robot: str, request: ExperimentRequest, key: str | None) -> Experiment | None:
-        """Returns the experiment that this key made before. Raises a 409 if the key was used for another request."""
+        """Returns the experiment made earlier with this key. Raises a 409 if the key was used for another request."""
         with self._store.reading() as session:
             found = made_before(session, ExperimentRow, robot, key, digest_of_request(request))
             return None if found is None else as_experiment(found)
@@ -65,11 +65,12 @@ class ExperimentStore:
         owner: str | None = None,
         also: Callable[[Session, ExperimentRow], None] = lambda _session, _row: None,
     ) -> tuple[Experiment, bool]:
-        """Queues a new experiment, and returns it with True; or returns the one that the key made before, with False.
+        """Queues a new experiment and returns it with True; or returns the experiment made earlier with this key, with
+        False.
 
-        `owner` is who submits it, unless a schedule does, whose runs have its approval. `also` is called in the
-        transaction that makes the experiment, so that both are written or neither. Raises a 409 if the key was used for
-        another request.
+        `owner`: the submitter, or for a scheduled run the schedule's maker. A scheduled run has its schedule's
+        approval. `also` is called in the transaction that makes the experiment, so that both are written or neither.
+        Raises a 409 if the key was used for another request.
         """
         with self._changing(robot) as session:
             row, new = _submit(session, robot, request, now, by, key, schedule, owner)
@@ -81,7 +82,7 @@ class ExperimentStore:
     def submit_to_each(
         self, robots: Sequence[str], request: ExperimentRequest, now: datetime, by: str, key: str | None = None
     ) -> list[tuple[Experiment, bool]]:
-        """Does the same for several robots in one transaction: if one raises, no robot gets the experiment."""
+        """Queues an experiment for several robots in one transaction: if one raises, no robot gets it."""
         with self._changing(*robots) as session:
             made = [_submit(session, robot, request, now, by, key) for robot in robots]
             return [(as_experiment(row), new) for row, new in made]
@@ -100,8 +101,8 @@ class ExperimentStore:
         limit: int,
         order: ExperimentOrder = "submitted",
     ) -> Page[Experiment]:
-        """Returns a part of the list, the last submitted first; with the order `ended` only experiments that have
-        ended, the last one first."""
+        """Returns a page of the list, the last submitted first; with the order `ended` only ended experiments, the last
+        ended first."""
         query = select(ExperimentRow).where(ExperimentRow.robot == robot)
         if states:
             query = query.where(ExperimentRow.state.in_(states))
@@ -118,8 +119,8 @@ class ExperimentStore:
             return page_of(list(session.scalars(query)), limit, as_experiment, _place_by_end)
 
     def due(self, robot: str, now: datetime, *, approved: bool = False) -> list[Waiting]:
-        """Returns the first experiment that is queued and due, if any; on request the first `approved` one. It reads
-        one row, even if 100 000 wait."""
+        """Returns the first queued and due experiment, if any; with `approved`, the first approved one. Reads one row,
+        even if 100 000 wait."""
         columns = (ExperimentRow.id, ExperimentRow.sequence, ExperimentRow.priority, ExperimentRow.at)
         query = select(*columns).filter_by(robot=robot, state="queued")
         query = query.where(or_(ExperimentRow.at.is_(None), ExperimentRow.at <= now))
@@ -130,7 +131,7 @@ class ExperimentStore:
             return [Waiting(*row) for row in session.execute(query)]
 
     def count_not_approved(self, robot: str, now: datetime) -> int:
-        """Returns the number of experiments that are queued and due, and are not approved."""
+        """Returns the number of queued and due experiments without approval."""
         query = select(func.count()).select_from(ExperimentRow)
         query = query.filter_by(robot=robot, state="queued", approved_by=None)
         query = query.where(or_(ExperimentRow.at.is_(None), ExperimentRow.at <= now))
@@ -151,7 +152,7 @@ class ExperimentStore:
             return {row[0]: row[1] for row in session.execute(query)}
 
     def count_waiting(self, robot: str) -> int:
-        """Returns the number of queued experiments. It reads the database the first time only."""
+        """Returns the number of queued experiments. Reads the database only the first time."""
         if robot not in self._waiting:
             with self._changing(robot):
                 pass
@@ -159,7 +160,7 @@ class ExperimentStore:
 
     def begin(self, robot: str, identity: str, now: datetime, review: Review | None = None) -> Experiment:
         """Marks an experiment as running. Raises IllegalEventError if it was cancelled meanwhile, and NotApprovedError
-        if the review does not permit what it is now."""
+        if the review does not permit its present content."""
         with self._changing(robot) as session:
             row = _row(session, robot, identity)
             if review is not None and not _may_begin(row, review):
@@ -193,8 +194,8 @@ class ExperimentStore:
     def change(
         self, robot: str, identity: str, by: str, priority: int | None, spec: ExperimentSpec | None
     ) -> tuple[Experiment, str | None]:
-        """Changes a queued experiment, and returns it with the name of whoever had approved what it was before; None if
-        an approval stays, or there was none. Raises a 409 for an experiment that is not queued."""
+        """Changes a queued experiment. Returns it with the name of the person whose approval thereby ended; None if no
+        approval ended. Raises a 409 for an experiment that is not queued."""
         with self._store.writing() as session:
             row = _queued(session, robot, identity)
             row.priority = row.priority if priority is None else priority
@@ -205,8 +206,8 @@ class ExperimentStore:
             return as_experiment(row), ended
 
     def approve(self, robot: str, identity: str, review: Review, given: Given, now: datetime) -> Experiment:
-        """Notes an approval. Raises a 403 for one's own experiment, and a 409 if it is not queued, or not what the
-        approval is for."""
+        """Stores an approval. Raises a 403 for the caller's own experiment, and a 409 if it is not queued, or has
+        another content."""
         with self._store.writing() as session:
             row = _queued(session, robot, identity)
             require_approvable(given, _content(review, row), _authors(row), experiment_label(row))
@@ -215,7 +216,7 @@ class ExperimentStore:
             return as_experiment(row)
 
     def withdraw_approval(self, robot: str, identity: str) -> tuple[Experiment, str | None]:
-        """Ends the approval of a queued experiment, and returns who had given it. Raises a 409 for any other."""
+        """Withdraws the approval of a queued experiment, and returns who had given it. Raises a 409 for any other."""
         with self._store.writing() as session:
             row = _queued(session, robot, identity)
             ended = void(row)
@@ -223,8 +224,8 @@ class ExperimentStore:
             return as_experiment(row), ended
 
     def void_outdated(self, robot: str, review: Review) -> list[tuple[str, str]]:
-        """Ends approvals of queued experiments that are not enough any more: those of another content, such as of
-        another machine file. Returns each experiment with the name of whoever had approved it."""
+        """Ends approvals of queued experiments that are no longer sufficient: those of another content, such as another
+        machine file. Returns each experiment with the name of the person who had approved it."""
         with self._store.writing() as session:
             rows = session.scalars(
                 select(ExperimentRow)
@@ -246,17 +247,17 @@ class ExperimentStore:
             return [as_experiment(row) for row in rows]
 
     def trace_number(self, identity: str) -> str:
-        """Returns the number that the experiment's trace has, or will have."""
+        """Returns the ID that the experiment's trace has, or will have."""
         with self._store.reading() as session:
             return session.scalars(select(ExperimentRow.trace).filter_by(id=identity)).one()
 
     def of_trace(self, trace: str) -> str | None:
-        """Returns the experiment whose trace has this number; None if there is none."""
+        """Returns the experiment whose trace has this ID; None if there is none."""
         with self._store.reading() as session:
             return session.scalar(select(ExperimentRow.id).filter_by(trace=trace))
 
     def traced(self, trace: str, outcome: Outcome | None) -> None:
-        """Notes the outcome in a trace that was found for an experiment whose end was not recorded."""
+        """Stores the outcome in a trace that was found for an experiment whose end was not recorded."""
         with self._store.writing() as session:
             row = session.scalar(select(ExperimentRow).filter_by(trace=trace))
             if row is not None and row.outcome is None:
@@ -273,7 +274,7 @@ def _submit(
     schedule: str | None = None,
     owner: str | None = None,
 ) -> tuple[ExperimentRow, bool]:
-    """Adds an experiment and returns its row with True; or returns that which the key made before, with False."""
+    """Adds an experiment and returns its row with True; or returns the row made earlier with this key, with False."""
     digest = digest_of_request(request)
     if (found := made_before(session, ExperimentRow, robot, key, digest)) is not None:
         return found, False
@@ -292,8 +293,8 @@ def _submit(
 
 
 def as_experiment(row: ExperimentRow) -> Experiment:
-    """Converts a row to what clients see. The trace's number is included once there may be a trace. `content` is not
-    yet bound to the robot's machine."""
+    """Converts a row for clients. The trace's ID is included once there may be a trace. `content` is not yet bound to
+    the robot's machine."""
     has_trace = row.outcome is not None or row.state == "running"
     spec = ExperimentSpec.model_validate(row.spec)
     return Experiment(

@@ -54,7 +54,7 @@ class JobStore:
         self._store = store
 
     def made_before(self, robot: str, request: JobRequest, key: str | None) -> Job | None:
-        """Returns the job that this key made before. Raises a 409 if the key was used for another request."""
+        """Returns the job made earlier with this key. Raises a 409 if the key was used for another request."""
         with self._store.reading() as session:
             found = made_before(session, JobRow, robot, key, digest_of(request))
             return None if found is None else as_job(found)
@@ -68,10 +68,10 @@ class JobStore:
         key: str | None,
         prepare: Callable[[str], None] = lambda _identity: None,
     ) -> tuple[Job, bool]:
-        """Queues a new job, and returns it with True; or returns the one that the key made before, with False.
+        """Queues a new job and returns it with True; or returns the job made earlier with this key, with False.
 
-        `prepare` is given the number that the job will have, and writes what its worker needs; if it raises, no job is
-        made. Raises a 409 if the key was used for another request, and a 404 if a trace no longer exists.
+        `prepare` gets the job's future ID, and writes the worker's input; if it raises, no job is made. Raises a 409 if
+        the key was used for another request, and a 404 if a trace no longer exists.
         """
         digest = digest_of(request)
         with self._store.writing() as session:
@@ -106,7 +106,7 @@ class JobStore:
         limit: int,
         model: str | None = None,
     ) -> Page[Job]:
-        """Returns a part of the list, newest first. `model` keeps only jobs that used this model or made it."""
+        """Returns a page of the list, newest first. `model` selects jobs that used this model or made it."""
         query = select(JobRow).where(JobRow.robot == robot)
         if states:
             query = query.where(JobRow.state.in_(states))
@@ -117,7 +117,7 @@ class JobStore:
         return newest_first(self._store, query, JobRow.sequence, cursor, limit, as_job)
 
     def waiting(self, robot: str) -> list[Job]:
-        """Returns the queued jobs, the first submitted first."""
+        """Returns the queued jobs in order of submission."""
         query = select(JobRow).filter_by(robot=robot, state="queued").order_by(JobRow.sequence)
         with self._store.reading() as session:
             return [as_job(row) for row in session.scalars(query)]
@@ -174,7 +174,7 @@ class JobStore:
 
 
 def as_job(row: JobRow) -> Job:
-    """Converts a row to what clients see."""
+    """Converts a row for clients."""
     return Job(
         id=row.id,
         robot=row.robot,

@@ -1,4 +1,4 @@
-"""Ensures that one service at a time uses a database, by a lock that ends with its process."""
+"""Ensures that only one service uses a database, by a lock that ends with its process."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def sqlite_file(url: str | URL) -> Path | None:
 
 @contextmanager
 def sole_use(url: str | URL) -> Iterator[None]:
-    """Keeps other services and restores from using this database within the block. Raises InUseError, and StoreError
-    if a database server cannot be reached."""
+    """Keeps other services and restores from using this database within the block. Raises InUseError, and StoreError if
+    a database server cannot be reached."""
     file = sqlite_file(url)
     if file is not None:
         with _locked_file(file):

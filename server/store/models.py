@@ -1,4 +1,4 @@
-"""Models in the database, with the traces from which they were made."""
+"""Models in the database, with the traces to which they were fitted."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from server.store.tables import ModelRow, TraceRow, TraceUseRow
 
 MOST_ANCESTORS = 100
 AT_ONCE = 500
-"""Number of traces in one query; SQLite takes 32 766 values in one."""
+"""Number of traces per query; SQLite allows 32 766 values in one."""
 
 
 @dataclass(frozen=True)
 class NewModel:
-    """The columns of a new row, and the traces from which the model was made."""
+    """The columns of a new row, and the traces to which the model was fitted."""
 
     id: str
     robot: str
@@ -44,12 +44,12 @@ class ModelStore:
         self._store = store
 
     def insert(self, new: NewModel, also: Callable[[], None], robots: Collection[str] | None = None) -> bool:
-        """Adds a model; returns False if the robot has it already. Equal models have equal numbers.
+        """Adds a model; returns False if the robot has it already. Equal models have equal IDs.
 
         Args:
-            also: keeps the file. It is called last before the transaction is written: if it raises, there is no row.
-            robots: those whose traces may be named; None for a model that the service has made itself. Raises a 422 for
-                a trace that none of them has.
+            also: stores the file. Called last before the transaction is written: if it raises, there is no row.
+            robots: the model's traces must belong to these; None for a model made by the service itself. Raises a 422
+                otherwise.
         """
         with self._store.writing() as session:
             if session.get(ModelRow, (new.id, new.robot)) is not None:
@@ -76,7 +76,7 @@ class ModelStore:
             return _row(session, robot, identity).file
 
     def ancestors(self, robot: str, identity: str) -> tuple[ModelEntry, ...]:
-        """Returns the models from which it was made, the nearest first, as far as they are in the database."""
+        """Returns the ancestors of a model, the nearest first, as far as they are in the database."""
         found: list[ModelEntry] = []
         with self._store.reading() as session:
             row: ModelRow | None = _row(session, robot, identity)
@@ -93,7 +93,7 @@ class ModelStore:
             return tuple(_entry(session, row) for row in session.scalars(query.limit(most)))
 
     def page(self, robot: str, cursor: str | None, limit: int) -> Page[ModelEntry]:
-        """Returns a part of the list, newest first."""
+        """Returns a page of the list, newest first."""
         query = select(ModelRow).where(ModelRow.robot == robot)
         if cursor is not None:
             place = Cursor.parse(cursor)
@@ -118,8 +118,8 @@ class ModelStore:
     def remove(self, robot: str, identity: str, also: Callable[[str], None]) -> None:
         """Deletes a model. Raises a 404, and a 409 if another model was made from it.
 
-        `also` deletes the file of the name that it is given, last before the transaction is written. It is not called
-        if another robot has the model, too, and needs the file.
+        `also` deletes the file with the given name, last before the transaction is written. It is not called if another
+        robot has the model too, and needs the file.
         """
         with self._store.writing() as session:
             row = _row(session, robot, identity)
@@ -136,7 +136,7 @@ class ModelStore:
 
 
 def _require_traces(session: Session, traces: Sequence[str], robots: Collection[str]) -> None:
-    """Raises a 422 unless each trace is one of these robots'."""
+    """Raises a 422 unless each trace belongs to one of these robots."""
     seen: set[str] = set()
     for part in range(0, len(traces), AT_ONCE):
         asked = traces[part : part + AT_ONCE]

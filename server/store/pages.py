@@ -1,5 +1,5 @@
-"""Lists in parts. A cursor says where the next part begins in the order of the list, so no row is skipped or repeated
-when rows are added or deleted meanwhile."""
+"""Lists in pages. A cursor marks where the next page begins in the order of the list, so that no row is skipped or
+repeated if rows are added or deleted meanwhile."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class Cursor:
-    """The last row of a part: its number; or its time, with its identity, if rows have no number."""
+    """The last row of a page: its number; or, for rows without number, its time and ID."""
 
     number: float
     identity: str = ""
@@ -34,7 +34,7 @@ class Cursor:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Parses a cursor. Raises a 422 for a text that no list has returned."""
+        """Parses a cursor. Raises a 422 for a text that no list returned."""
         try:
             number, identity = json.loads(base64.urlsafe_b64decode(text.encode()))
             if isinstance(number, int | float) and isinstance(identity, str) and abs(number) < 2**62:
@@ -45,7 +45,7 @@ class Cursor:
 
     @property
     def moment(self) -> datetime:
-        """The number as a time, for a list ordered by time. Routes refuse cursors whose number is no time
+        """The number as a time, for a list ordered by time. Routes reject cursors whose number is not a time
         (`CursorOf`)."""
         return datetime.fromtimestamp(self.number, UTC)
 
@@ -53,7 +53,7 @@ class Cursor:
 def page_of(
     rows: Sequence[Row], limit: int, convert: Callable[[Row], Item], place: Callable[[Row], Cursor]
 ) -> Page[Item]:
-    """Makes a part from up to `limit` rows. One row more than `limit` means that another part follows."""
+    """Makes a page from up to `limit` rows. One row more than `limit` means that another page follows."""
     shown = rows[:limit]
     following = str(place(shown[-1])) if len(rows) > limit and shown else None
     return Page(items=tuple(convert(row) for row in shown), next=following)
@@ -67,8 +67,8 @@ def newest_first(
     limit: int,
     convert: Callable[[Row], Item],
 ) -> Page[Item]:
-    """Returns a part of the rows that `query` finds, in descending order of `number`, which grows with every row even
-    if clocks are set back."""
+    """Returns a page of a query's rows in descending order of `number`, which grows with every row even if clocks are
+    set back."""
     query = query.order_by(number.desc())
     if cursor is not None:
         query = query.where(number < Cursor.parse(cursor).number)

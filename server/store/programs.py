@@ -1,4 +1,4 @@
-"""Taught programs in the database. They are kept until somebody deletes them, and everybody sees them."""
+"""Taught programs in the database. They are kept until they are deleted, and are visible to everybody."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from server.store.engine import Store
 from server.store.tables import ProgramRow
 
 MOST_PROGRAMS = 1000
-"""Largest number of programs of one robot. They are listed in one part."""
+"""Most programs of one robot. They are listed on one page."""
 
 
 class StoredProgram(Wire):
@@ -33,7 +33,7 @@ class ProgramStore:
         self._most = most
 
     def all(self, robot: str) -> tuple[ProgramEntry, ...]:
-        """Returns the programs of a robot, the last changed first."""
+        """Returns the programs of a robot, most recently changed first."""
         query = select(ProgramRow).options(defer(ProgramRow.program)).filter_by(robot=robot)
         query = query.order_by(ProgramRow.changed.desc(), ProgramRow.name)
         with self._store.reading() as session:
@@ -50,10 +50,10 @@ class ProgramStore:
     ) -> ProgramEntry:
         """Saves a program under its own name; if that differs from `name`, the program `name` is renamed.
 
-        `revision` is the one that was edited, None for a new program. Raises a 409 if somebody else has changed the
-        program meanwhile, if its new name is taken, or if there are as many as allowed already; raises a 404 if the
-        edited program is gone. Saving an identical program again changes nothing, so a client that has lost the answer
-        may repeat its request.
+        `revision`: the revision that was edited, None for a new program. Raises a 409 if another client has changed the
+        program meanwhile, if its new name is taken, or if there are too many programs; a 404 if the edited program is
+        gone. Saving an identical program again changes nothing, so a client that lost the answer may repeat its
+        request.
         """
         content = program.model_dump(mode="json")
         with self._store.writing() as session:
@@ -82,7 +82,7 @@ class ProgramStore:
             return _entry(row)
 
     def remove(self, robot: str, name: str) -> None:
-        """Deletes a program for good. Raises a 404."""
+        """Deletes a program permanently. Raises a 404."""
         with self._store.writing() as session:
             session.delete(_row(session, robot, name))
 

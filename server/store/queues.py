@@ -25,7 +25,7 @@ class QueueStore:
         self._store = store
 
     def get(self, robot: str) -> QueueState | None:
-        """Returns the state of a robot's queue; None for a robot that is not in this database."""
+        """Returns the state of a robot's queue; None if the robot is not in this database."""
         with self._store.reading() as session:
             row = session.get(QueueRow, robot)
             return None if row is None else QueueState(row.paused, row.reason, row.since)

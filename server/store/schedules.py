@@ -31,7 +31,7 @@ class ScheduleStore:
         zone = None if request.cron is None else request.zone or zone_here()
         plan = Plan(request.starts or now, request.every or 0.0, request.count, request.cron, zone)
         begins = first(plan)
-        if begins is not None and begins < now:  # times that have passed are not caught up with
+        if begins is not None and begins < now:  # past times are skipped
             begins = following(plan, 0, begins, now)
         row = ScheduleRow(
             id=secrets.token_hex(6),
@@ -60,12 +60,12 @@ class ScheduleStore:
             return _schedule(_row(session, robot, identity))
 
     def page(self, robot: str, cursor: str | None, limit: int) -> Page[Schedule]:
-        """Returns a part of the list, newest first."""
+        """Returns a page of the list, newest first."""
         query = select(ScheduleRow).where(ScheduleRow.robot == robot)
         return newest_first(self._store, query, ScheduleRow.sequence, cursor, limit, _schedule)
 
     def switch(self, robot: str, identity: str, *, active: bool, now: datetime) -> Schedule:
-        """Switches a schedule on or off. Runs that were due while it was off are left out. Raises a 404."""
+        """Switches a schedule on or off. Runs that were due while it was off are skipped. Raises a 404."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             if active and not row.active:
@@ -75,8 +75,8 @@ class ScheduleStore:
             return _schedule(row)
 
     def approve(self, robot: str, identity: str, review: Review, given: Given, now: datetime) -> Schedule:
-        """Notes an approval, which all later runs have. Raises a 403 for one's own schedule, a 404, and a 409 if it is
-        not what the approval is for."""
+        """Stores an approval, which applies to all later runs. Raises a 403 for the caller's own schedule, a 404, and a
+        409 if it has another content."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             schedule = _schedule(row)
@@ -87,7 +87,7 @@ class ScheduleStore:
             return _schedule(row)
 
     def withdraw_approval(self, robot: str, identity: str) -> tuple[Schedule, str | None]:
-        """Ends an approval, and returns who had given it. Runs that wait keep theirs. Raises a 404."""
+        """Withdraws an approval, and returns who had given it. Waiting runs keep theirs. Raises a 404."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             ended = void(row)
@@ -95,7 +95,7 @@ class ScheduleStore:
             return _schedule(row), ended
 
     def void_outdated(self, robot: str, review: Review) -> list[tuple[str, str]]:
-        """Ends approvals that are not enough any more, and returns each schedule with whoever had approved it."""
+        """Ends approvals that are no longer sufficient. Returns each schedule with the person who had approved it."""
         with self._store.writing() as session:
             rows = session.scalars(
                 select(ScheduleRow).filter_by(robot=robot).where(ScheduleRow.approved_by.is_not(None))
@@ -110,34 +110,33 @@ class ScheduleStore:
             session.delete(_row(session, robot, identity))
 
     def due(self, robot: str, now: datetime) -> list[str]:
-        """Returns the schedules that have a run due now. One that is broken has none until it can be computed again."""
+        """Returns the schedules with a due run. A broken schedule has none until its times can be computed again."""
         with self._store.reading() as session:
             rows = session.scalars(select(ScheduleRow).filter_by(robot=robot, active=True))
             return [row.id for row in rows if is_due(row.next, now) and not broken(_plan(row))]
 
     def leave_out_missed(self, robot: str, now: datetime, identity: str | None = None) -> list[str]:
-        """Leaves out all runs that were due up to now (of one schedule, if it is named), without counting them. Returns
-        the schedules concerned."""
+        """Skips all runs that were due up to now (of one schedule, if it is given), without counting them. Returns the
+        schedules concerned."""
         which = {"robot": robot, "active": True, **({} if identity is None else {"id": identity})}
         with self._store.writing() as session:
             rows = session.scalars(select(ScheduleRow).filter_by(**which))
             return [row.id for row in rows if _leave_out_missed(row, now)]
 
     def leave_out(self, robot: str, identity: str, now: datetime) -> None:
-        """Leaves out the run that is due, and counts it as made. Raises a 404."""
+        """Skips the due run, and counts it as made. Raises a 404."""
         with self._store.writing() as session:
             self.count_run(session, robot, identity, now)
 
     def submit_run(self, session: Session, robot: str, identity: str, now: datetime, run: ExperimentRow) -> None:
-        """Counts the run that is due, and gives it the schedule's approval, in the transaction that makes it. Raises a
-        404."""
+        """Counts the due run, and gives it the schedule's approval, in the transaction that makes it. Raises a 404."""
         self.count_run(session, robot, identity, now)
         row = _row(session, robot, identity)
         if (given := given_to(row)) is not None and row.approved is not None:
             approve(run, given, row.approved)
 
     def count_run(self, session: Session, robot: str, identity: str, now: datetime) -> None:
-        """Counts the run that is due, in the transaction that makes it, and sets the next one. Raises a 404."""
+        """Counts the due run in the transaction that makes it, and sets the next one. Raises a 404."""
         row = _row(session, robot, identity)
         assert row.next is not None
         row.submitted_runs += 1
@@ -145,7 +144,7 @@ class ScheduleStore:
 
 
 def _leave_out_missed(row: ScheduleRow, now: datetime) -> bool:
-    """Moves a run that is due to the first after `now`; returns False if none is due, or the schedule is broken."""
+    """Moves a due run to the first time after `now`; returns False if none is due, or the schedule is broken."""
     if row.next is None or not is_due(row.next, now) or broken(_plan(row)):
         return False
     row.next = following(_plan(row), row.submitted_runs, row.next, now)

@@ -1,7 +1,7 @@
-"""Migrates a database's tables, and compares what a SQLite database consists of with what the migrations make.
+"""Migrates a database's tables, and compares a SQLite database with the result of the migrations.
 
-A migration is a module of a package, named by its number: `0001_tables`. Its `upgrade` takes a connection and makes of
-the tables before it its own.
+A migration is a numbered module of a package, such as `0001_tables`. Its `upgrade` gets a connection and changes the
+previous tables to its own.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from sqlalchemy import Connection, create_engine, inspect, text
 from daq.plugins import plugins
 
 Schema = Mapping[tuple[str, str], tuple[frozenset[str], str]]
-"""The columns and the form of each object, by its kind (`table`, `index`, `trigger`, `view`) and name. The form is the
-text of a trigger, the table of an index, and whether a table is virtual."""
+"""Columns and form of each object, by its kind (`table`, `index`, `trigger`, `view`) and name. The form is the text of
+a trigger, the table of an index, or whether a table is virtual."""
 Execute = Callable[[str], Iterable[Sequence[Any]]]
 VERSION = "alembic_version"
 """The table with the number of the core's last migration."""
@@ -33,9 +33,8 @@ class UnknownRevisionError(Exception):
 
 @cache
 def migrations() -> dict[str, dict[str, str]]:
-    """Returns the modules of the migrations by number, in their order, for each table that keeps the number of the last
-    one: those of this package first, then those of plug-ins. Each goes its own way, so that a plug-in can be taken
-    away."""
+    """Returns the migration modules by number, in order, for each table that stores the number of the last one: first
+    those of this package, then those of plug-ins. Each plug-in has its own sequence, so that it can be removed."""
     packages = {VERSION: "server.store.migrations"}
     for plugin in plugins():
         packages |= {f"{name}_version": package for name, package in plugin.migrations.items()}
@@ -48,7 +47,7 @@ def _numbered(package: str) -> dict[str, str]:
 
 
 def upgrade(connection: Connection, revisions: Mapping[str, str] | None = None) -> None:
-    """Migrates the tables to these revisions; without any, to the newest of all. Raises UnknownRevisionError."""
+    """Migrates the tables to these revisions; without any, to the newest. Raises UnknownRevisionError."""
     there = set(inspect(connection).get_table_names())
     for table, modules in migrations().items():
         last = next(reversed(modules)) if revisions is None else revisions.get(table, "")
@@ -68,14 +67,14 @@ def upgrade(connection: Connection, revisions: Mapping[str, str] | None = None) 
 
 
 def revisions_of(execute: Execute) -> dict[str, str]:
-    """Returns the revisions that the SQLite database has on which `execute` carries out statements, by their tables."""
+    """Returns the revisions of a SQLite database by their tables; `execute` carries out statements on it."""
     there = {row[0] for row in execute("SELECT name FROM sqlite_master")}
     kept = [table for table in migrations() if table in there]
     return {table: str(row[0]) for table in kept for row in execute(f"SELECT version_num FROM {table}")}
 
 
 def expected_schema(revisions: Mapping[str, str] | None = None) -> Schema:
-    """Returns the schema of a SQLite database with tables of these revisions; without any, of the newest of all. Raises
+    """Returns the schema of a SQLite database with tables of these revisions; without any, of the newest. Raises
     UnknownRevisionError."""
     with create_engine("sqlite://").connect() as connection:
         upgrade(connection, revisions)
@@ -83,12 +82,12 @@ def expected_schema(revisions: Mapping[str, str] | None = None) -> Schema:
 
 
 def schema_of(execute: Execute) -> Schema:
-    """Returns the schema of the SQLite database on which `execute` carries out statements."""
+    """Returns the schema of a SQLite database; `execute` carries out statements on it."""
     found: dict[tuple[str, str], tuple[frozenset[str], str]] = {}
     listed = [tuple(row) for row in execute("SELECT type, name, tbl_name, sql FROM sqlite_master")]
     for kind, name, table, sql in listed:
         words = " ".join(str(sql or "").split())
-        if name.startswith("sqlite_"):  # SQLite's own: counters, and the indexes of unique columns
+        if name.startswith("sqlite_"):  # SQLite's own objects: counters, and the indexes of unique columns
             continue
         columns = execute(f"SELECT name FROM pragma_table_xinfo({_text(name)})") if kind == "table" else ()
         form = {"trigger": words, "index": table, "table": words[7:14].upper().split(" ")[0]}.get(kind, "")
@@ -97,7 +96,7 @@ def schema_of(execute: Execute) -> Schema:
 
 
 def difference(found: Schema, expected: Schema) -> str | None:
-    """Returns in words the first object that is missing or not as expected; None where all are there as expected."""
+    """Returns in words the first object that is missing or differs; None if there is no difference."""
     for (kind, name), (columns, form) in expected.items():
         there = found.get((kind, name))
         if there is None:
@@ -110,7 +109,7 @@ def difference(found: Schema, expected: Schema) -> str | None:
 
 
 def foreign(found: Schema, expected: Schema) -> list[tuple[str, str]]:
-    """Returns kind and name of each object that is not expected, in an order in which they can be removed."""
+    """Returns kind and name of each unexpected object, in an order in which they can be removed."""
     return sorted(set(found) - set(expected), key=lambda one: (ORDER.index(one[0]), one[1]))
 
 

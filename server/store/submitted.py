@@ -1,6 +1,6 @@
-"""What experiments and jobs have in common: a request with the same key is submitted once, however often it is sent.
+"""Common part of experiments and jobs: a request with the same key is submitted only once, however often it is sent.
 
-Approvals in the rows of experiments and schedules.
+Also approvals in the rows of experiments and schedules.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from server.store.tables import Approvable, ExperimentRow, JobRow
 
 
 def approval_of(row: Approvable) -> Approval | None:
-    """Returns a row's approval as clients see it."""
+    """Returns a row's approval for clients."""
     if row.approved_by is None or row.approved is None:
         return None
     return Approval(by=row.approved_by, at=row.approved, as_owner=bool(row.approved_as_owner))
 
 
 def given_to(row: Approvable) -> Given | None:
-    """Returns a row's approval with the content that it is bound to."""
+    """Returns a row's approval with the content to which it is bound."""
     if row.approved_by is None or row.approved_content is None:
         return None
     return Given(row.approved_content, row.approved_by, bool(row.approved_as_owner))
@@ -48,7 +48,7 @@ def void(row: Approvable) -> str | None:
 
 
 def require_approvable(given: Given, content: str, authors: tuple[str, ...], what: str) -> None:
-    """Raises a 403 for somebody's own experiment, and a 409 if `content` is another than what they have seen."""
+    """Raises a 403 for the caller's own experiment, and a 409 if `content` differs from what the caller has seen."""
     if given.by in authors:
         line = f"{what} was submitted or changed by {given.by}: somebody else must approve it"
         raise ProblemError(403, "own-experiment", line, "ask another operator, or an owner of the robot")
@@ -61,12 +61,12 @@ Row = TypeVar("Row", ExperimentRow, JobRow)
 
 
 def digest_of(request: BaseModel) -> str:
-    """Returns a digest that tells whether two requests with one key are the same."""
+    """Returns a digest to compare two requests with the same key."""
     return hashlib.sha256(request.model_dump_json().encode()).hexdigest()
 
 
 def made_before(session: Session, table: type[Row], robot: str, key: str | None, digest: str) -> Row | None:
-    """Returns what this key made before, or None. Raises a 409 if the key was used for another request."""
+    """Returns the row made earlier with this key, or None. Raises a 409 if the key was used for another request."""
     if key is None:
         return None
     found = session.scalar(select(table).filter_by(robot=robot, idempotency_key=key))
@@ -77,7 +77,7 @@ def made_before(session: Session, table: type[Row], robot: str, key: str | None,
 
 
 def new_columns(robot: str, key: str | None, digest: str, now: datetime, by: str) -> dict[str, Any]:
-    """Returns the columns that a new experiment and a new job have in common."""
+    """Returns the common columns of a new experiment and a new job."""
     return {
         "id": secrets.token_hex(6),
         "robot": robot,

@@ -1,4 +1,4 @@
-"""The tables, as the first migration makes them. After a release, a change here needs a migration of its own."""
+"""The tables, as made by the first migration. After a release, a change here needs a separate migration."""
 
 from __future__ import annotations
 
@@ -47,8 +47,7 @@ class Table(DeclarativeBase):
 
 
 class Submitted:
-    """The columns that an experiment and a job have in common. `sequence` is the order of submission, since clocks may
-    be set back."""
+    """Common columns of an experiment and a job. `sequence`: order of submission, since clocks may be set back."""
 
     sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
     id: Mapped[str] = mapped_column(String(12), unique=True)
@@ -64,7 +63,7 @@ class Submitted:
 
 
 class Approvable:
-    """The columns of a review. `approved_content`: digest of what was approved; all are None without an approval."""
+    """The columns of a review. `approved_content`: digest of the approved content; all are None without an approval."""
 
     approved_content: Mapped[str | None] = mapped_column(String(64))
     approved_by: Mapped[str | None]
@@ -87,11 +86,11 @@ class ExperimentRow(Submitted, Approvable, Table):
     schedule: Mapped[str | None] = mapped_column(String(12))
     outcome: Mapped[str | None] = mapped_column(String(16))
     trace: Mapped[str] = mapped_column(String(12), unique=True)
-    """The number of its trace, chosen before it runs, so that the trace is found after a crash."""
+    """ID of its trace, chosen before it runs, so that the trace is found after a crash."""
     owner: Mapped[str] = mapped_column(default="", server_default="")
-    """Who may change and cancel it besides the robot's owners: who submitted it, or made its schedule."""
+    """Who may change and cancel it besides the robot's owners: the submitter, or the schedule's maker."""
     changed_by: Mapped[str | None]
-    """Who wrote its present specification, if it was changed after it was submitted."""
+    """Who wrote its present specification, if it was changed after submission."""
 
 
 class ScheduleRow(Approvable, Table):
@@ -104,7 +103,7 @@ class ScheduleRow(Approvable, Table):
     robot: Mapped[str] = mapped_column(String(32), index=True)
     spec: Mapped[dict[str, Any]]
     every: Mapped[float]
-    """0 where `cron` says when."""
+    """0 with `cron`."""
     cron: Mapped[str | None] = mapped_column(String(100))
     zone: Mapped[str | None] = mapped_column(String(64))
     starts: Mapped[datetime]
@@ -165,9 +164,9 @@ class TraceRow(Table):
     experiment: Mapped[str | None] = mapped_column(String(12), index=True)
     notes: Mapped[str] = mapped_column(Text, default="")
     searched: Mapped[str] = mapped_column(Text, default="")
-    """What a search looks at, in lower case."""
+    """Text that a search examines, in lower case."""
     missing: Mapped[bool] = mapped_column(default=False)
-    """Whether the folder does not have the file."""
+    """Whether the file is missing from the folder."""
 
 
 class TraceTagRow(Table):
@@ -226,7 +225,7 @@ class TraceUseRow(Table):
 
 
 class EventRow(Table):
-    """Something that happened, and who caused it."""
+    """An event, and who caused it."""
 
     __tablename__ = "events"
 
@@ -240,7 +239,7 @@ class EventRow(Table):
 
 
 class SessionRow(Table):
-    """A session of a person who has signed in: the hash of its secret, their name and role, and when it ends."""
+    """A session of a signed-in person: the hash of its secret, the person's name and role, and its end."""
 
     __tablename__ = "sessions"
 

@@ -42,14 +42,14 @@ class NewTrace:
 
     @property
     def label(self) -> str:
-        """How messages name the trace."""
+        """Name of the trace in messages."""
         return trace_label(self.name, self.kind, self.file, self.created)
 
 
 @dataclass(frozen=True)
 class TraceSearch:
-    """The filters of a list; None and empty do not filter. `text` is searched in number, file, name, kind, operator,
-    notes and tags, ignoring case."""
+    """The filters of a list; None and empty do not filter. `text` is searched in ID, file, name, kind, operator, notes
+    and tags, ignoring case."""
 
     text: str | None = None
     tag: str | None = None
@@ -61,14 +61,15 @@ class TraceSearch:
 
 
 class ArchiveIndex(Protocol):
-    """Which traces an archive has, as its plug-in tells within a transaction."""
+    """Which traces the archive has. Set by the archive plug-in, if one is installed; queried within the same
+    transaction."""
 
     def among(self, session: Session, traces: Collection[str]) -> set[str]:
         """Returns those of these traces that the archive has."""
         ...
 
     def delete_later(self, session: Session, trace: str) -> None:
-        """Notes that a trace is deleted."""
+        """Queues the archived object of a trace for deletion."""
         ...
 
 
@@ -78,11 +79,11 @@ class TraceStore:
     def __init__(self, store: Store) -> None:
         self._store = store
         self.archive_index: ArchiveIndex | None = None
-        """What an archive has, of a plug-in; None where there is none."""
+        """None if there is no archive."""
 
     def insert(self, new: NewTrace, file_exists: Callable[[str], bool] = lambda _file: True) -> None:
         """Adds a trace. If its row exists and the row's file is gone, the row gets the new file, and keeps its tags and
-        notes. Raises a 409 if the row has another file that `file_exists`."""
+        notes. Raises a 409 if the row already refers to another existing file."""
         columns = {**new.__dict__, "joints": list(new.joints), "missing": False}
         with self._store.writing() as session:
             row = session.get(TraceRow, new.id)
@@ -143,9 +144,10 @@ class TraceStore:
             return self.archive_index.among(session, list(identities))
 
     def page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
-        """Returns a part of the list, newest first."""
+        """Returns a page of the list, newest first."""
         place = None if cursor is None else Cursor.parse(cursor)
-        if any("\0" in one for one in (search.text, search.tag, search.kind) if one):  # which no database looks for
+        # PostgreSQL rejects NUL in text; nothing can match
+        if any("\0" in one for one in (search.text, search.tag, search.kind) if one):
             return Page(items=())
         with self._store.reading() as session:
             rows = list(session.scalars(_query(robot, search, place).limit(limit + 1)))
@@ -176,8 +178,8 @@ class TraceStore:
     def remove(self, robot: str, identity: str, also: Callable[[], None] = lambda: None) -> None:
         """Deletes the row. Raises a 404, and a 409 if a model or a job uses the trace.
 
-        `also`, which deletes the file, is called last before the transaction is written: if it raises, the row stays.
-        A row without a file can be deleted later; a file without a row would be added again without its tags.
+        `also` deletes the file. It is called last before the transaction is written: if it raises, the row stays. A row
+        without a file can be deleted later; a file without a row would be added again without its tags.
         """
         with self._store.writing() as session:
             row = _row(session, robot, identity)
@@ -214,9 +216,9 @@ def _tags(session: Session, identities: list[str]) -> dict[str, tuple[str, ...]]
 
 
 def _query(robot: str, search: TraceSearch, place: Cursor | None) -> Select[TraceRow]:
-    """The traces of a robot that a search finds after a place of the list, the newest first.
+    """The traces of a robot that match a search, after a place in the list, newest first.
 
-    It reads the list in its order and ends with the page. A text that no trace has is looked for in all of them.
+    The query stops once a page is full. A text that matches nothing scans all rows.
     """
     query = select(TraceRow).where(TraceRow.robot == robot)
     for column, wanted in (
@@ -236,6 +238,7 @@ def _query(robot: str, search: TraceSearch, place: Cursor | None) -> Select[Trac
     if search.until is not None:
         query = query.where(TraceRow.created < search.until)
     if place is not None:
+        # The first condition lets the database use the index; the second breaks ties of the time.
         query = query.where(TraceRow.created <= place.moment)
         query = query.where(or_(TraceRow.created < place.moment, TraceRow.id < place.identity))
     return query.order_by(TraceRow.created.desc(), TraceRow.id.desc())

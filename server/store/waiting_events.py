@@ -1,6 +1,6 @@
-"""Events on their way into the database: those that cannot be written wait, and are written later, in order.
+"""Events on their way into the database: those that cannot be written wait, and are written later in order.
 
-The record of what happened, and who caused it.
+`EventStore` stores the events and who caused them.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class EventStore:
             return _event(row)
 
     def page(self, robot: str, experiment: str | None, cursor: str | None, limit: int) -> Page[ServiceEvent]:
-        """Returns a part of the list, newest first."""
+        """Returns a page of the list, newest first."""
         query = select(EventRow).where(EventRow.robot == robot)
         if experiment is not None:
             query = query.where(EventRow.experiment == experiment)
@@ -54,7 +54,7 @@ def _event(row: EventRow) -> ServiceEvent:
 
 
 MOST_WAITING = 10_000
-"""Number of events that wait in memory; further ones are only in the log."""
+"""Most events that wait in memory; further ones are only in the log."""
 AGAIN_AFTER = 1.0
 """Time (s) after which a failed write is tried again."""
 log = logging.getLogger("server")
@@ -71,7 +71,7 @@ class _Waiting:
 
 
 class WaitingEvents:
-    """Writes events, from any thread. `written` is called with the robot's name and each event that has its row."""
+    """Writes events, from any thread. `written` is called with the robot's name and each event that has a row."""
 
     def __init__(
         self, store: EventStore, written: Callable[[str, ServiceEvent], None], again_after: float = AGAIN_AFTER
@@ -81,18 +81,18 @@ class WaitingEvents:
         self._again_after = again_after
         self._events: deque[_Waiting] = deque()
         self._changed = threading.Condition()
-        """Held for moments only."""
+        """Held only briefly."""
         self._writing = threading.Lock()
         """Held while rows are written, so that they keep their order."""
         self._thread: threading.Thread | None = None
-        """Writes what waits; nobody else tries, and waits for the database, meanwhile."""
+        """Writes the waiting events; meanwhile no other thread tries, and waits for the database."""
         self._closing = False
 
     def add(
         self, robot: str, kind: str, text: str, at: datetime, actor: str | None = None, experiment: str | None = None
     ) -> None:
-        """Writes an event, after those that wait. Never raises. Waits for the database only while it is
-        not known that others wait in vain."""
+        """Writes an event, after the waiting ones. Never raises. Waits for the database only while no other event is
+        known to wait in vain."""
         event = _Waiting(robot, kind, text, at, actor, experiment)
         with self._changed:
             if len(self._events) >= MOST_WAITING:
@@ -112,7 +112,7 @@ class WaitingEvents:
                     self._thread = None
 
     def close(self, within: float) -> None:
-        """Writes what waits, within this time (s). What does not get its row is in the log alone."""
+        """Writes the waiting events within this time (s). Events without a row are only in the log."""
         with self._changed:
             self._closing = True
             self._changed.notify_all()
@@ -134,7 +134,7 @@ class WaitingEvents:
                     return
 
     def _write_all(self) -> bool:
-        """Writes what waits, under the lock. Returns False if the database cannot be written now."""
+        """Writes the waiting events, under the lock. Returns False if the database is not writable now."""
         while self._events:
             event = self._events[0]
             try:
@@ -144,20 +144,21 @@ class WaitingEvents:
                     if self._thread is None:  # once
                         log.warning("%s: %s: not written yet: %s", event.robot, event.kind, one_line(error))
                     return False
-                # This one alone is refused. Only the log has it: without a row it has no number.
+                # Only this event is rejected. It is only in the log: without a row it has no number.
                 log.exception("%s: %s: could not be written", event.robot, event.kind)
                 made = None
             self._events.popleft()
             if made is not None:
                 try:
                     self._written(event.robot, made)
-                except Exception:  # it has its row, and the others still wait for theirs
+                except Exception:  # this event has its row, and the others still wait for theirs
                     log.exception("%s: %s: not published", event.robot, event.kind)
         return True
 
 
 def _may_pass(error: Exception) -> bool:
-    """Whether the database may take the same row later, such as after a lock or on a disk with room again."""
+    """Whether the database may accept the same row later, for example after a lock, or when the disk has space
+    again."""
     if isinstance(error, DatabaseError) and (is_value(error) or isinstance(error, IntegrityError)):
         return False
     return isinstance(error, SQLAlchemyError | OSError)

@@ -18,7 +18,7 @@ def test_a_table_is_shown_plotted_verified_and_exported_as_it_is(daq: CommandLin
     path = tmp_path / "RIG.CSV"
     path.write_text("time,position_1,drive_1\n0,0,1\n0.1,1,1\n20.1,1,1\n0.2")
     shown = daq("traces", "show", path).out
-    assert "at most 20 s (after 0.1 s); it has no ticks, so whether some are missing is not known" in shown
+    assert "at most 20 s (after 0.1 s); it has no ticks, so missing samples cannot be detected" in shown
     assert "its last row has no line end" in shown
     assert "is CSV: it has no checksums" in daq("traces", "verify", path).out
     assert daq("traces", "plot", path, "-o", tmp_path / "a.png").code == 0
@@ -111,7 +111,7 @@ def test_a_malicious_trace_is_refused_in_one_line(daq: CommandLine, tmp_path: Pa
         ("0,0", "notes = 0x" + "f" * 600, "notes: found 0xffff"),
         ("0,0", ".".join(["a"] * 5000) + " = 1", "a key has more than 64 parts"),
         ("0,0\n\n1,1\n\n1,2", "", "row 6, column 'time': 1.0 does not increase after 1.0"),
-        ("0,0", "created = 9999-12-31T23:59:59-14:00", "created: a moment of the years 1970 to 2261"),
+        ("0,0", "created = 9999-12-31T23:59:59-14:00", "created: must be a time of the years 1970 to 2261"),
         ("0,0", "created = 2020-01-01T00:00:00", "created: 2020-01-01T00:00:00 has no time zone; write Z behind it"),
         ("0,0", "period = 1e-300", "period = 1e-300 s, allowed is 1e-06 to 86400 s"),
         ("", "", "has no row below its header"),

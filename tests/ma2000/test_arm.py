@@ -43,7 +43,7 @@ def test_a_motion_outside_the_limits_is_refused_in_one_line(tmp_path: Path) -> N
 
 
 def test_an_unknown_preset_and_a_port_that_is_none_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="preset 'rampe': there is none of that name; there are ramp"):
+    with pytest.raises(SpecError, match="preset 'rampe': unknown; allowed are ramp"):
         ma2000.run("rampe", folder=tmp_path)
     with pytest.raises(ma2000.DaqError, match="must begin with serial://"):
         ma2000.run(port="/dev/ttyUSB0", folder=tmp_path)

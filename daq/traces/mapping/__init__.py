@@ -1,1 +1,1 @@
-"""Tables of other programs as traces: what their columns are called, in which unit, and which joint each is of."""
+"""Imports tables of other programs as traces: finds the name, unit and joint of each column."""

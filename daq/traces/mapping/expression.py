@@ -1,13 +1,13 @@
-"""What stands for a signal: a column, or a sum of columns times numbers, and for all joints at once a pattern with {}.
+"""Expressions for a signal: a column or a weighted sum of columns; {} is replaced by each joint.
 
-q{}                          the columns q1, q2 …, one a joint
+q{}                          the columns q1, q2 …, one per joint
 0.125*pwm_percent            a column times a number
-0.25*a - 0.5*b + 1.57        a sum; + and - stand between spaces
-pos_left, pos_right          one after the other, joint by joint
-#                            the number of the row, from 0
-int16(load)                  a count of 16 bits, read as signed
+0.25*a - 0.5*b + 1.57        a sum; + and - need spaces on both sides
+pos_left, pos_right          the first column for the first joint, the second for the second
+#                            the row number, from 0
+int16(load)                  a 16-bit count, read as signed
 positions[2::7]              every seventh value, from the third on
-currents.csv:Joint_{}        columns of another file beside it, with as many rows
+currents.csv:Joint_{}        columns of another file in the same folder, with as many rows
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace import Floats
 
 Columns = dict[str, Floats]
-"""Columns (n,) by name; a value that is no number is NaN."""
+"""Columns (n,) by name; a value that is not a number is NaN."""
 SHOWN = 20
-"""Number of columns that an error lists."""
+"""Most columns that an error lists."""
 _NUMBER = r"[0-9.]+(?:[eE][-+]?[0-9]+)?"
 _TERM = re.compile(rf"(-)?(?:({_NUMBER})\s*\*\s*)?(.+)", re.DOTALL)
 _EVERY = re.compile(r"(.+)\[(\d+|\{\})::(\d+)\]")
@@ -33,14 +33,14 @@ _EVERY = re.compile(r"(.+)\[(\d+|\{\})::(\d+)\]")
 
 @dataclass(frozen=True)
 class Table:
-    """The columns of a file, and how those of a file beside it are read."""
+    """The columns of a file, and a reader for files beside it."""
 
     origin: str
     columns: Columns
     beside: Callable[[str], Columns] | None = None
 
     def value(self, expression: str) -> Floats:
-        """The values (n,) of an expression without {}. Raises TraceError."""
+        """Returns the values (n,) of an expression without {}. Raises TraceError."""
         text = expression.strip()
         if text in self.columns:
             return self.columns[text]
@@ -49,7 +49,7 @@ class Table:
         for sign, term in zip(["+", *parts[1::2]], parts[::2], strict=True):
             total = total + (-1.0 if sign == "-" else 1.0) * self._term(term)
         if isinstance(total, float):
-            raise TraceError(f"{self.origin}: {shown(text)} names no column; it has {self.listed()}")
+            raise TraceError(f"{self.origin}: {shown(text)} is not a column; the file has {self.listed()}")
         return np.asarray(total, np.float64)
 
     def _term(self, term: str) -> Floats | float:
@@ -59,7 +59,7 @@ class Table:
             return float(term)
         match = _TERM.fullmatch(term)
         if match is None or not _is_number(match[2] or "1"):
-            raise TraceError(f"{self.origin}: {shown(term)} is no column, number, or number*column")
+            raise TraceError(f"{self.origin}: {shown(term)} is not a column, number, or number*column")
         return (-1.0 if match[1] else 1.0) * float(match[2] or 1.0) * self._column(match[3])
 
     def _column(self, name: str) -> Floats:
@@ -75,16 +75,17 @@ class Table:
         file, colon, there = name.partition(":")
         if colon and self.beside is not None:
             return Table(file, self.beside(file)).value(there)
-        raise TraceError(f"{self.origin}: column {shown(name)} is missing; it has {self.listed()}")
+        raise TraceError(f"{self.origin}: column {shown(name)} is missing; the file has {self.listed()}")
 
     def listed(self) -> str:
-        """The names of the columns, for an error."""
+        """Names of the columns, for an error."""
         return listed(tuple(self.columns))
 
     def tokens(self, pattern: str) -> tuple[str, ...]:
-        """What {} stands for in the first name of a pattern, in the order of the columns; that of numbers if they are.
+        """Returns the values of {} in the first name of a pattern, in the order of the columns (of numbers if they
+        are).
 
-        Raises TraceError where no column fits.
+        Raises TraceError if no column matches.
         """
         terms = [_TERM.fullmatch(term) for term in re.split(r"\s+[+-]\s+", pattern.strip())]
         name = next((term[3] for term in terms if term is not None and "{}" in term[3]), pattern)
@@ -96,12 +97,12 @@ class Table:
         columns = self.beside(file) if beside and self.beside is not None else self.columns
         found = tokens_in(there if beside else name, columns)
         if not found:
-            raise TraceError(f"{self.origin}: no column is called {shown(name)}; it has {listed(tuple(columns))}")
+            raise TraceError(f"{self.origin}: no column matches {shown(name)}; the file has {listed(tuple(columns))}")
         return found
 
 
 def tokens_in(name: str, columns: Sequence[str] | Columns) -> tuple[str, ...]:
-    """What {} stands for in the columns that a name with it fits."""
+    """Returns the values of {} in the columns that match a name."""
     before, _, after = name.partition("{}")
     form = re.compile(re.escape(before) + r"(.+?)" + re.escape(after).replace(re.escape("{}"), r"\1"), re.DOTALL)
     found = [match[1] for column in columns if (match := form.fullmatch(column)) is not None]
@@ -110,7 +111,7 @@ def tokens_in(name: str, columns: Sequence[str] | Columns) -> tuple[str, ...]:
 
 
 def listed(names: Sequence[str]) -> str:
-    """The first of many names, for an error."""
+    """Lists the first of many names, for an error."""
     told = ", ".join(shown(name).strip("'") for name in names[:SHOWN])
     return told + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
 

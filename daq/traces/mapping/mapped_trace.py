@@ -1,4 +1,4 @@
-"""A trace of a table whose columns have names of their own, by what the user and the file beside it say of them."""
+"""Builds a trace from a table with other column names, by the mapping of the user and of the file beside it."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from daq.traces.mapping.units import drive_of
 from daq.traces.naming import trace_id_of
 
 EPOCH = 1e8
-"""First time (s) from which times count from 1970: as a float64 they would have steps of 0.2 µs."""
+"""First time (s) that counts as time since 1970. As a float64 it would have steps of 0.2 µs."""
 Rows = NDArray[Any]
 INTEGRATED = "Positions are integrals of the measured speeds, from 0."
 """Note in a trace whose positions were integrated."""
 
 
 def mapped_trace(path: Path, table: Table, choice: Choice, description: Description, limits: TraceLimits) -> Trace:
-    """The trace in a table. Rows in which a signal is no number, or with the time of the row before, are left out and
-    counted in the notes.
+    """Returns the trace in a table. Rows in which a signal is not a number, or which repeat the previous time, are left
+    out and counted in the notes.
 
-    Raises TraceError with one line: what was found and is guessed, where that is not settled; a column or a joint that
-    is missing; a time that goes back.
+    Raises TraceError with one line: what was found and guessed, if that is not settled; a missing column or joint; a
+    time that goes back.
     """
     given = dict(choice.map)
     if choice.drive_unit is not None:
@@ -87,37 +87,37 @@ def mapped_trace(path: Path, table: Table, choice: Choice, description: Descript
 
 
 def integral(time: Floats, velocity: Floats) -> Floats:
-    """Positions (k, j) from 0 for speeds (k, j), by the trapezoidal rule."""
+    """Integrates speeds (k, j) to positions (k, j) from 0, by the trapezoidal rule."""
     steps = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time)[:, None]
     return np.concatenate([np.zeros((1, velocity.shape[1])), np.cumsum(steps, axis=0)])
 
 
 def _kept(table: Table, found: Signals, where: str | None) -> tuple[Rows, list[str]]:
-    """The rows that are taken, and what was left out. Raises TraceError where none is left, or time goes back."""
+    """Returns the rows to import, and notes about the others. Raises TraceError if none is left, or time goes back."""
     time = found.columns["time"]
     rows = np.arange(len(time)) if where is None else np.flatnonzero(_selected(table, time, where))
     notes = [] if where is None else [f"Rows where {where}."]
     if not len(rows):
         raise TraceError(f"{table.origin}: no row is left{'' if where is None else f' where {where}'}")
     finite = np.all([np.isfinite(v.reshape(len(time), -1)).all(axis=1) for v in found.columns.values()], axis=0)
-    rows = _left(table, rows, finite[rows], "Rows with a value that is no number", notes)
+    rows = _left(table, rows, finite[rows], "Rows with a value that is not a number", notes)
     steps = np.diff(time[rows], prepend=-np.inf)
     back = np.flatnonzero(steps < 0)
     if len(back):
         raise TraceError(f"{table.origin}: {_resets(table, time, rows, back)}")
-    return _left(table, rows, steps > 0, "Rows with the time of the row before", notes), notes
+    return _left(table, rows, steps > 0, "Rows that repeat the previous time", notes), notes
 
 
 def _left(table: Table, rows: Rows, good: Rows, what: str, notes: list[str]) -> Rows:
     if not good.any():
-        raise TraceError(f"{table.origin}: {what.lower()}: all of them; none is left")
+        raise TraceError(f"{table.origin}: {what.lower()}: all rows, so none is left")
     if not good.all():
         notes.append(f"{what}, left out: {int((~good).sum())}, the first is data row {int(rows[~good][0]) + 1}.")
     return rows[good]
 
 
 def _resets(table: Table, time: Floats, rows: Rows, back: Rows) -> str:
-    """A time that goes back: which column counts the records, if one does."""
+    """Describes a time that goes back. Names the column that numbers the records, if there is one."""
     first = int(back[0])
     says = f"data row {int(rows[first]) + 1}: time goes back from {time[rows[first - 1]]:g} to {time[rows[first]]:g} s"
     for name, column in table.columns.items():
@@ -125,11 +125,12 @@ def _resets(table: Table, time: Floats, rows: Rows, back: Rows) -> str:
             count = len(back) + 1
             low, high = column[rows[0]], column[rows[-1]]
             return f"{says}: it has {count} records, {name} {low:g} to {high:g}; choose one with --where {name}={low:g}"
-    return f"{says}; choose a piece with --where COLUMN=VALUE or COLUMN=LOW..HIGH"
+    return f"{says}; choose rows with --where COLUMN=VALUE or COLUMN=LOW..HIGH"
 
 
 def _selected(table: Table, time: Floats, where: str) -> Rows:
-    """Which rows a condition takes: COLUMN=VALUE, or COLUMN=LOW..HIGH without HIGH itself. Raises TraceError."""
+    """Returns which rows match a condition: COLUMN=VALUE, or COLUMN=LOW..HIGH without HIGH itself. Raises
+    TraceError."""
     name, _, said = where.partition("=")
     first, dots, last = said.partition("..")
     try:
@@ -142,7 +143,7 @@ def _selected(table: Table, time: Floats, where: str) -> Rows:
 
 
 def _chosen(table: Table, found: Signals, wanted: tuple[str, ...] | None) -> tuple[tuple[str, ...], list[int]]:
-    """Names of the joints that are taken, none where they have only numbers, and the columns of these."""
+    """Returns the names of the imported joints (empty if they have only numbers), and their columns."""
     tokens, every = found.tokens, list(range(len(found.tokens)))
     numbered = all(token.isdecimal() for token in tokens)
     if wanted is None:
@@ -157,7 +158,7 @@ def _chosen(table: Table, found: Signals, wanted: tuple[str, ...] | None) -> tup
 
 
 def _own_numbers(tokens: list[str]) -> tuple[int, ...]:
-    """Numbers from 1 for joints that are numbered from 0; else as they are."""
+    """Joint numbers from 1, also if the table counts from 0."""
     first = 1 if "0" in tokens else 0
     numbers = tuple(int(token) + first for token in tokens)
     return numbers if len(set(numbers)) == len(numbers) else tuple(range(1, len(tokens) + 1))

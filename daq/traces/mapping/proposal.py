@@ -1,4 +1,4 @@
-"""What the columns of a table may be: formats whose makers say so, and else a guess by their names, to be confirmed."""
+"""Proposes the meaning of a table's columns: by a known format, or else a guess from their names, to be confirmed."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ KNOWN: tuple[dict[str, str], ...] = (
         "drive": "Iq_measured in A",
     },
 )
-"""Formats by their columns; `?` is a unit that their files do not state."""
+"""Known formats by their columns; `?` is a unit that the files do not state."""
 
 WORDS: dict[str, tuple[str, ...]] = {
     "time": ("time", "timestamp", "t", "stamp", "seconds", "sec", "elapsed", "log_time"),
@@ -77,16 +77,17 @@ WORDS: dict[str, tuple[str, ...]] = {
     "velocity": ("velocity", "vel", "speed", "dq", "qd", "qvel", "omega", "present_velocity", "rpm", "joint_velocity"),
     "drive": ("torque", "tau", "effort", "current", "voltage", "present_current", "joint_torque", "iq", "force"),
 }
-"""Names that columns of a signal often have, alone or beside a joint's name or number."""
+"""Usual column names of a signal, alone or with a joint's name or number."""
 _FORMS = ("@[{}]", "@.{}", "@_{}", "{}.@", "{}_@", "{} @")
-"""Where a joint's name stands beside such a word, @."""
+"""Position of a joint's name relative to such a word, @."""
 _STEPS = ((1e4, "ns"), (1e2, "µs"), (0.8, "ms"), (0.0, "s"))
-"""Time from row to row from which times are probably in a unit: arms are sampled at 1 Hz to 10 kHz."""
+"""Time between rows from which a time is probably in this unit: arms are sampled at 1 Hz to 10 kHz."""
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """What a table's columns may be. sure: whether the format's makers say so; its unit of `?` is open all the same."""
+    """A proposed meaning of a table's columns. sure: whether the format is known; units given as `?` are open even
+    then."""
 
     format: str
     entries: dict[str, Said]
@@ -94,7 +95,7 @@ class Proposal:
 
 
 def proposal(table: Table) -> Proposal:
-    """The format of a table that is known, or else a guess, with as many signals as were found."""
+    """Returns the known format of a table, or else a guess, with all signals that were found."""
     for known in KNOWN:
         if all(_is_there(table, known[key].partition(" in ")[0]) for key in ("time", "position")):
             texts = {key: text for key, text in known.items() if key != "format"}
@@ -106,10 +107,10 @@ def proposal(table: Table) -> Proposal:
 
 
 def settled(table: Table, given: Mapping[str, str], *, as_guessed: bool) -> tuple[dict[str, Said], dict[str, Said]]:
-    """What is taken of a table: what is given, and of the rest what its format's makers say, or was agreed to. Beside
-    it what looks like a signal and is not taken, because columns were given for others.
+    """Returns the entries to import: the given ones and, for other signals, those of the known format or the accepted
+    guess. Also returns entries that are left out because columns were given for other signals.
 
-    Raises TraceError with everything that was found and is guessed, and the options that settle it.
+    Raises TraceError with everything found and guessed, and the options that settle it.
     """
     entries = {key: said(key, text, table.origin) for key, text in given.items()}
     guess = proposal(table)
@@ -121,7 +122,7 @@ def settled(table: Table, given: Mapping[str, str], *, as_guessed: bool) -> tupl
             entries[key] = entry
     for key, entry in entries.items():
         if not entry.expression and entry.unit != "none":
-            raise TraceError(f"{table.origin}: no column looks like {key}; it has {table.listed()}")
+            raise TraceError(f"{table.origin}: no column looks like {key}; the file has {table.listed()}")
     like = entries.get("position")
     if "set_point" in entries and entries["set_point"].unit == "?" and like is not None and like.unit != "?":
         entries["set_point"] = Said(entries["set_point"].expression, like.unit)
@@ -142,7 +143,7 @@ def _enough(entries: Mapping[str, Said]) -> bool:
 
 
 def _question(table: Table, guess: Proposal, entries: Mapping[str, Said], units: list[str], guessed: list[str]) -> str:
-    """One line: what was found, what is guessed, what is open, and the options that settle it."""
+    """Returns one line: what was found, what is guessed, what is open, and the options that settle it."""
     what = f"is {guess.format}" if guess.sure else "its columns have other names than this program's"
     lacking = [key for key in ("time", "position") if not _enough(entries) and key not in entries]
     options = [f"--map '{key}={entry}'" for key, entry in entries.items() if key in guessed or key in units]
@@ -150,7 +151,7 @@ def _question(table: Table, guess: Proposal, entries: Mapping[str, Said], units:
     asked = [f"{key} ({', '.join(known_units(key)[:6])}{_range(key, guess)})" for key in units]
     said_of = f"; not stated: the unit of {' and of '.join(asked)}" if asked else ""
     missing = f"; nothing looks like {' or '.join(lacking)}" if lacking else ""
-    rest = "" if units or lacking else "; --as-guessed takes this as it is"
+    rest = "" if units or lacking else "; --as-guessed accepts this guess"
     return (
         f"{table.origin}: {what}: {table.listed()}{missing}{said_of}. "
         f"Say {' '.join(options)}{rest}; `--map drive=none` leaves a signal out"
@@ -171,7 +172,7 @@ def _is_there(table: Table, name: str) -> bool:
 
 
 def _guess(table: Table, signal: str) -> str | None:
-    """The first column, or pattern of columns, whose name a signal often has, whatever unit follows it."""
+    """Returns the first column or pattern with a usual name of the signal, whatever unit follows it."""
     bare = {_bare(signal, name): name for name in reversed(table.columns)}
     for word in WORDS[signal]:
         for name in (word, f"{word}s"):
@@ -194,7 +195,7 @@ def _guess(table: Table, signal: str) -> str | None:
 
 
 def _bare(signal: str, name: str) -> str:
-    """A column's name in small letters, without the unit at its end and what it lies in."""
+    """Returns a column's name in lower case, without the unit at its end and without its group."""
     unit = unit_in(signal, name)
     text = name.strip().lower()
     text = text if unit is None or unit == text else text[: text.rfind(unit.lower()[:3])].rstrip(" _([")
@@ -202,7 +203,7 @@ def _bare(signal: str, name: str) -> str:
 
 
 def _guessed_unit(table: Table, signal: str, name: str) -> str:
-    """The unit that a name states; of a time, the one in which its rows are as far apart as those of an arm."""
+    """Returns the unit in a name. For a time, it is the unit that makes the time between rows that of an arm."""
     unit = unit_in(signal, name)
     if unit is not None or signal != "time":
         return unit or "?"

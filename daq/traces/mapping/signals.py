@@ -1,4 +1,4 @@
-"""A table's signals, joint by joint, in the units of a trace, by what a mapping says of each."""
+"""Converts a table's signals by a mapping to the units of a trace, joint by joint."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from daq.traces.mapping.expression import Table
 from daq.traces.mapping.units import DRIVES, NONE, factor, known_units, unit_in
 
 BY_JOINT = ("position", "set_point", "velocity", "drive")
-"""Signals that each joint may have; the position may be left out where there is a velocity."""
+"""Signals of each joint. The position may be left out if there is a velocity."""
 SIGNALS = ("time", *BY_JOINT)
 KEY = re.compile(rf"time|({'|'.join(BY_JOINT)})(?:_([1-9][0-9]?))?")
-"""What a mapping may speak of: a signal of all joints, or of the joint with a number."""
+"""Keys of a mapping: a signal of all joints, or of one joint by its number."""
 _IN = re.compile(r"(?:(.*?)\s+)?in\s+(range of .+|\S+)", re.DOTALL)
 GRIPPER = "gripper"
-"""The joint whose range a calibration counts from 0, and not from -100, to 100."""
+"""The joint whose LeRobot range is 0 to 100, not -100 to 100."""
 COUNTS = 4095
-"""Counts of a turn, in lerobot's degrees and ranges of a servo."""
+"""Counts per turn, in LeRobot's degrees and servo ranges."""
 
 
 @dataclass(frozen=True)
 class Said:
-    """One entry of a mapping: an expression, and a unit; either may be left open."""
+    """One entry of a mapping: an expression and a unit; either may be open."""
 
     expression: str
     unit: str | None
@@ -43,8 +43,8 @@ class Said:
 
 @dataclass(frozen=True)
 class Signals:
-    """Signals (n, j) by name with `time` (n,), joints by token (what {} stands for, else numbers from 1), the drive's
-    unit, and the entries that were used."""
+    """Signals (n, j) by name with `time` (n,); joints by token (the value of {}, otherwise numbers from 1); the drive's
+    unit; and the entries used."""
 
     tokens: tuple[str, ...]
     columns: dict[str, Floats]
@@ -53,11 +53,11 @@ class Signals:
 
 
 def said(key: str, text: str, origin: str) -> Said:
-    """An entry, such as `q{} in deg`. Raises TraceError for another key or unit."""
+    """Parses an entry, such as `q{} in deg`. Raises TraceError for an unknown key or unit."""
     match = KEY.fullmatch(key)
     if match is None:
         keys = ", ".join(("time", *BY_JOINT))
-        raise TraceError(f"{origin}: {shown(key)} cannot be mapped; these can: {keys}, and position_1 and so on")
+        raise TraceError(f"{origin}: {shown(key)} cannot be mapped; allowed are {keys}, position_1 and so on")
     found = _IN.fullmatch(text.strip())
     if found is None:
         return Said(text.strip(), None)
@@ -66,16 +66,16 @@ def said(key: str, text: str, origin: str) -> Said:
         return Said((found[1] or "").strip(), unit)
     if unit.startswith("range of ") and signal in ("position", "set_point"):
         return Said((found[1] or "").strip(), unit)
-    raise TraceError(f"{origin}: {key}: unit {shown(unit)} is not known; write {', '.join(known_units(signal))}")
+    raise TraceError(f"{origin}: {key}: unit {shown(unit)} is unknown; write {', '.join(known_units(signal))}")
 
 
 def signals_of(table: Table, entries: Mapping[str, Said], beside: Path) -> Signals:
-    """The signals of a table by a mapping of every one that is to be taken. beside: the table's file.
+    """Returns the signals of a table by a mapping of all signals to import. beside: the table's file.
 
-    Raises TraceError for a column, a unit or a joint that is missing.
+    Raises TraceError for a missing column, unit or joint.
     """
     if "time" not in entries:
-        raise TraceError(f"{table.origin}: nothing says which column is the time; it has {table.listed()}")
+        raise TraceError(f"{table.origin}: the column of the time is not given; the file has {table.listed()}")
     time, unit = entries["time"], _unit(table, "time", entries["time"])
     columns = {"time": table.value(time.expression) * factor("time", unit)}
     used = {"time": str(Said(time.expression, unit))}
@@ -96,20 +96,21 @@ def signals_of(table: Table, entries: Mapping[str, Said], beside: Path) -> Signa
             raise TraceError(f"{table.origin}: {signal}: has no column of joint {shown(lacking)}, which others have")
         values, unit = _of_joints(table, signal, items, beside)
         drive_unit = unit if signal == "drive" else drive_unit
-        if "#" in time.expression:  # it counts the rows of the longest column that there is
+        if "#" in time.expression:  # counts the rows of the longest column
             columns["time"] = columns["time"][: len(values[0])]
         lengths = {len(each) for each in (columns["time"], *values)}
         if len(lengths) > 1:
-            raise TraceError(f"{table.origin}: {signal}: has {max(lengths)} and {min(lengths)} values; times too count")
+            raise TraceError(f"{table.origin}: {signal}: {max(lengths)} and {min(lengths)} values or times")
         columns[signal] = np.stack(values, axis=1)
         used |= {key: str(Said(e.expression, _unit(table, signal, e))) for key, e in _of(signal, entries).items()}
     if not {"position", "velocity"} & set(columns):
-        raise TraceError(f"{table.origin}: nothing says which columns are positions; it has {table.listed()}")
+        raise TraceError(f"{table.origin}: the columns of positions are not given; the file has {table.listed()}")
     return Signals(tokens, columns, drive_unit, used)
 
 
 def _of_joints(table: Table, signal: str, items: Mapping[str, Said], beside: Path) -> tuple[list[Floats], str]:
-    """The values (n,) of each joint in the unit of a trace, and that unit. Raises TraceError where units differ."""
+    """Returns the values (n,) of each joint in the unit of a trace, and that unit. Raises TraceError if units
+    differ."""
     units = {token: _unit(table, signal, entry) for token, entry in items.items()}
     values = [
         table.value(entry.expression) * _factor(signal, units[token], token, beside) for token, entry in items.items()
@@ -121,13 +122,13 @@ def _of_joints(table: Table, signal: str, items: Mapping[str, Said], beside: Pat
 
 
 def _of(signal: str, entries: Mapping[str, Said]) -> dict[str, Said]:
-    """The entries of a signal by key, without what leaves it out."""
+    """Returns the entries of a signal by key, without an entry that leaves it out."""
     own = {key: entry for key, entry in entries.items() if (m := KEY.fullmatch(key)) and (m[1] or "time") == signal}
     return {key: entry for key, entry in own.items() if NONE not in (entry.unit, entry.expression)}
 
 
 def _items(table: Table, signal: str, entries: Mapping[str, Said]) -> dict[str, Said]:
-    """Each joint's entry, by its token."""
+    """Returns each joint's entry, by its token."""
     own = _of(signal, entries)
     items: dict[str, Said] = {}
     whole = own.pop(signal, None)
@@ -144,12 +145,12 @@ def _items(table: Table, signal: str, entries: Mapping[str, Said]) -> dict[str, 
 
 
 def _unit(table: Table, signal: str, entry: Said) -> str:
-    """The unit that is said, or that the column's name states, or that of a trace. Raises TraceError for a drive
-    without one."""
+    """Returns the given unit, else the unit in the column's name, else the unit of a trace. Raises TraceError for a
+    drive without a unit."""
     unit = entry.unit or unit_in(signal, entry.expression)
     if unit is None and signal == "drive":
         raise TraceError(
-            f"{table.origin}: drive: its unit is not stated; say --drive-unit N·m, N, A or V, or none to leave it out"
+            f"{table.origin}: drive: its unit is not stated; give --drive-unit N·m, N, A or V, or none to leave it out"
         )
     return unit or known_units(signal)[0]
 
@@ -162,7 +163,7 @@ def _factor(signal: str, unit: str, token: str, beside: Path) -> float:
         known: Any = json.loads(file.read_text("utf-8"))[token]
         span = float(known["range_max"]) - float(known["range_min"])
     except (OSError, ValueError) as error:
-        raise TraceError(f"{file}: cannot be read as a calibration of lerobot: {error}") from error
+        raise TraceError(f"{file}: cannot be read as a LeRobot calibration: {error}") from error
     except (KeyError, TypeError) as error:
         raise TraceError(f"{file}: has no range_min and range_max of joint {shown(token)}") from error
     return span / (100.0 if token == GRIPPER else 200.0) * 2 * math.pi / COUNTS

@@ -1,4 +1,4 @@
-"""Text files with columns, as any program writes them: commas, semicolons, tabs or spaces, with a header or without."""
+"""Reads text tables of any program: separated by commas, semicolons, tabs or spaces, with or without a header."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"\s*[-+]?(\d|\.\d)[\d.,]*([eE][-+]?\d+)?\s*|\s*[-+]?(nan|i
 
 
 def head_of(path: Path, data: bytes) -> tuple[str, list[str]]:
-    """What separates columns, and the names in the first line that is no comment; numbers from 0 where it holds
+    """Returns the separator, and the names in the first line that is not a comment; numbers from 0 if it contains
     numbers. Raises TraceError."""
     lines = [line for line in data[: 1 << 20].splitlines(keepends=True) if line.strip() and not line.startswith(b"#")]
     rows = _rows(path, lines[0]) if lines else []
@@ -29,13 +29,14 @@ def head_of(path: Path, data: bytes) -> tuple[str, list[str]]:
 
 
 def read_text_table(path: Path, data: bytes, limits: TraceLimits) -> Columns:
-    """The columns of a text file by name. What is no number is NaN; moments in ISO 8601 are s since 1970.
+    """Returns the columns of a text file by name. Values that are not numbers become NaN; ISO 8601 times become s since
+    1970.
 
     Raises TraceError.
     """
     rows = _rows(path, data)
     if not rows:
-        raise TraceError(f"{path}: has no row")
+        raise TraceError(f"{path}: has no rows")
     names = _names(rows[0])
     rows = rows if _is_row_of_numbers(rows[0]) else rows[1:]
     if len(rows) * len(names) > limits.records:

@@ -1,4 +1,4 @@
-"""Units in which other programs write signals, and what one of each is in the unit of a trace."""
+"""Units of signals in other programs, and their factors to the units of a trace."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ UNITS: dict[str, dict[str, float]] = {
     "velocity": {"rad/s": 1.0, "deg/s": TURN / 360, "°/s": TURN / 360, "rpm": TURN / 60, "rev/s": TURN, "turns/s": TURN}
     | {"m/s": 1.0, "cm/s": 0.01, "mm/s": 1e-3},
 }
-"""By signal. A set point has the units of a position."""
+"""Factors by signal. Set points have the units of positions."""
 UNITS["set_point"] = UNITS["position"]
 DRIVES: dict[str, tuple[str, float]] = {
     "V": ("V", 1.0),
@@ -33,14 +33,15 @@ DRIVES: dict[str, tuple[str, float]] = {
     "kN": ("N", 1e3),
     "lbf": ("N", 4.4482216152605),
 }
-"""Units of a drive: the one that a trace has in its place, and what one of it is in that."""
+"""Units of a drive: the corresponding unit of a trace, and the factor to it."""
 NONE = "none"
-"""In place of a drive's unit: the drive is left out."""
+"""Used in place of a drive's unit: the drive is left out."""
 _AT_END = re.compile(r".*[\[(_ ]([^\[\](_ )]+)[\])]?")
 
 
 def drive_of(unit: str, origin: str) -> str:
-    """What a trace calls a unit of its drive, however it is typed; `none` as it is. Raises TraceError."""
+    """Returns the name that traces use for a unit of the drive, however it is typed; `none` unchanged. Raises
+    TraceError."""
     typed = {name: base for name, (base, size) in DRIVES.items() if size == 1.0} | {NONE: NONE}
     if unit not in typed:
         raise TraceError(f"{origin}: --drive-unit {unit}: write {', '.join(dict.fromkeys(typed.values()))}")
@@ -48,17 +49,17 @@ def drive_of(unit: str, origin: str) -> str:
 
 
 def known_units(signal: str) -> tuple[str, ...]:
-    """Units that a signal may be stated in."""
+    """Returns the units in which a signal may be given."""
     return tuple(DRIVES if signal == "drive" else UNITS[signal])
 
 
 def factor(signal: str, unit: str) -> float:
-    """What one of a unit is in the unit of a trace."""
+    """Returns the factor from a unit to the unit of a trace."""
     return DRIVES[unit][1] if signal == "drive" else UNITS[signal][unit]
 
 
 def unit_in(signal: str, name: str) -> str | None:
-    """The unit that a column's name ends with, as in `time [ms]` and `q1_deg`; None where it states none."""
+    """Returns the unit at the end of a column's name, as in `time [ms]` and `q1_deg`; None if there is none."""
     text = name.replace("{}", "").strip()
     text = re.sub(r"_(rad|deg|m|mm)_s$", r" \1/s", text)
     found = _AT_END.fullmatch(f" {text}")

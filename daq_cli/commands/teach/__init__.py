@@ -1,1 +1,1 @@
-"""`daq teach`: jogging, leading by hand, steps and programs; programs edited off line, and kept by a service."""
+"""`daq teach`: jogging, hand guiding, steps and programs. Programs are edited offline and stored by a service."""

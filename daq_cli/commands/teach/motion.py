@@ -1,4 +1,4 @@
-"""`daq teach`: the four ways of teaching that the original controller had (section 6.4), without its limit of 60 s."""
+"""`daq teach`: the four ways of teaching of the original controller (section 6.4), without its limit of 60 s."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from daq.teaching.program import Instruction
 
 LONGEST_LEAD = 3600.0
-"""Longest lead in s, because somebody has to hold the arm."""
+"""Longest hand guiding (s), because a person has to hold the arm."""
 
 app = typer.Typer(
     add_completion=False,
@@ -147,7 +147,7 @@ def lead(
     ] = None,
     yes: YesOption = False,
 ) -> None:
-    """Record a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and may sink."""
+    """Record a path while the arm is guided by hand. HOLD THE ARM: the guided joints have no drive and may sink."""
     import sys
 
     from daq.contracts.experiment import parse_joints
@@ -182,7 +182,7 @@ def play(
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Play a recorded path: checked, watched and recorded like any experiment."""
+    """Play a recorded path: checked, guarded and recorded like any experiment."""
     from pydantic import ValidationError
 
     from daq.contracts.documents import read_text

@@ -1,4 +1,4 @@
-"""`daq teach programs`: lists, uploads, downloads and deletes the taught programs that a service keeps."""
+"""`daq teach programs`: lists, uploads, downloads and deletes the taught programs of a service."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 WHAT = "teach programs"
-"""The name of these commands in the error for a missing service."""
+"""The name of these commands in the error about a missing service."""
 Name = Annotated[str, typer.Argument(help="Name of a kept program.")]
 
 
 @app.command("ls")
 def list_kept(context: typer.Context, json: JsonOption = False) -> None:
-    """List the programs that the service keeps, the one changed last first."""
+    """List the programs of the service, most recently changed first."""
     from rich.table import Table
 
     with robot_of(context).service(WHAT) as robot:
@@ -43,7 +43,7 @@ def keep(
     file: Annotated[Path, typer.Argument(help="A taught program (.json or .toml).")],
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite the program of the same name.")] = False,
 ) -> None:
-    """Upload a program to the service, which keeps it until it is deleted."""
+    """Upload a program to the service, which stores it until it is deleted."""
     from daq.teaching.program import load_program
 
     access = robot_of(context)
@@ -60,7 +60,7 @@ def fetch(
     name: Name,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write (default: NAME.json).")] = None,
 ) -> None:
-    """Download a kept program into a file."""
+    """Download a stored program to a file."""
     from daq.teaching.program import require_program_file, save_program
     from daq_cli.robot.remote.robot import kept_program
 
@@ -73,7 +73,7 @@ def fetch(
 
 @app.command()
 def delete(context: typer.Context, name: Name) -> None:
-    """Delete a kept program for good."""
+    """Delete a stored program permanently."""
     access = robot_of(context)
     with access.service(WHAT) as robot:
         robot.programs.delete(name)

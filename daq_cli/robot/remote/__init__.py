@@ -1,1 +1,1 @@
-"""Subcommands with `--server`: the robot is a service's; everything else is as with a local robot."""
+"""Subcommands with `--server`: the robot belongs to a service; all else is as with a local robot."""

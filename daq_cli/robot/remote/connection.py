@@ -1,4 +1,4 @@
-"""The connection to the service that the command line names, and control of its robot."""
+"""Connects to the service named on the command line, and takes control of its robot."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ TOKEN_VARIABLE = "DAQ_TOKEN"
 
 @contextmanager
 def remote_robot(call: Invocation) -> Iterator[Robot]:
-    """The client of the named or only robot of the service. Raises SpecError, ServiceError, ServiceNotReachedError."""
+    """Yields the client of the named or only robot of the service. Raises SpecError, ServiceError,
+    ServiceNotReachedError."""
     from daq.client import Client
 
     assert call.server is not None
@@ -29,20 +30,20 @@ def remote_robot(call: Invocation) -> Iterator[Robot]:
 
 
 def connected_status(robot: Robot) -> RobotStatus:
-    """Returns the robot's status, after the service has connected to it. Raises ServiceError if it cannot."""
+    """Connects the service to the robot, and returns the robot's status. Raises ServiceError if that fails."""
     status = robot.status()
     return status if status.identity is not None else robot.connect()
 
 
 def require_consent(status: RobotStatus, consent: ConsentPrompt) -> bool:
-    """Returns whether the robot is a real arm, for which it asks the operator. Raises SafetyError without consent."""
+    """Returns whether the robot is a real arm. If it is, asks the operator, and raises SafetyError without consent."""
     consent.require(f"{status.robot} at the server ({status.port})", status.identity)
     return lacks_consent(status.identity, given=False)
 
 
 @contextmanager
 def controlled(call: Invocation, consent: ConsentPrompt) -> Iterator[tuple[Robot, HeldControl]]:
-    """The robot, with control of it, which is given back afterwards. On a real arm the operator is asked.
+    """Yields the robot, and control of it, which is returned afterwards. For a real arm the operator is asked.
 
     Raises ServiceError, SafetyError.
     """
@@ -55,7 +56,7 @@ def controlled(call: Invocation, consent: ConsentPrompt) -> Iterator[tuple[Robot
 
 
 def _say_if_paused(call: Invocation, robot: Robot, paused_before: bool) -> None:
-    """Says that the queue is paused, since waiting experiments do not begin until a person resumes it."""
+    """Prints that the queue is paused: waiting experiments do not begin until a person resumes it."""
     queue = robot.queue.status()
     if queue.paused and not paused_before:
         console().print(f"the queue is paused: {queue.reason}: `daq --server {call.server} queue resume`")

@@ -1,4 +1,4 @@
-"""The robot of the service that the command line names."""
+"""The robot of the service named on the command line."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ class RemoteRobot(RobotAccess):
             return robot.machine()
 
     def require_reached(self) -> None:
-        """Has the service connect to its robot."""
+        """Makes the service connect to its robot."""
         with remote_robot(self.call) as robot:
             connected_status(robot)
 
     def state(self) -> RobotState:
-        """Returns the state as the service knows it, with the age of the sample."""
+        """Returns the state known to the service, with the age of the sample."""
         from daq.contracts.status import report_of
 
         with remote_robot(self.call) as robot:
@@ -61,13 +61,13 @@ class RemoteRobot(RobotAccess):
 
     @contextmanager
     def _changed(self, consent: ConsentPrompt) -> Iterator[HeldControl]:
-        """Takes the control of the robot for a moment."""
+        """Takes control of the robot for a moment."""
         with controlled(self.call, consent) as (_, control):
             yield control
 
     def stop(self, reached: set[str]) -> list[StopAnswer]:
         """Stops the robots of the service."""
-        del reached  # these are processes of this computer
+        del reached  # those are processes of this computer
         from daq_cli.robot.remote.stop import stop_at_server
 
         return stop_at_server(self.call)
@@ -81,7 +81,7 @@ class RemoteRobot(RobotAccess):
             return acquire_remotely(robot, self.server, spec, folder, consent)
 
     def list_traces(self, folder: Path | None) -> tuple[Sequence[TraceSummary], str]:
-        """The traces of the service's catalogue."""
+        """Returns the traces of the service's catalogue."""
         del folder
         from daq_cli.robot.remote.traces import summary
 
@@ -89,7 +89,7 @@ class RemoteRobot(RobotAccess):
             return [summary(entry) for entry in robot.traces.list()][::-1], self.server
 
     def find_trace(self, folder: Path, wanted: str) -> Path:
-        """Returns a local file, or else a trace of the service, which is downloaded. Raises TraceError."""
+        """Returns a local file or, if there is none, downloads the service's trace. Raises TraceError."""
         if Path(wanted).exists():
             from daq.traces.catalogue import find_trace
 
@@ -99,7 +99,7 @@ class RemoteRobot(RobotAccess):
         return fetched_trace(self.call, folder, wanted)
 
     def import_trace(self, file: Path, folder: Path | None, choice: Choice) -> ImportedTrace:
-        """Uploads the file to the service, which has a folder of its own; of a bag, the trace that is made of it."""
+        """Uploads the file to the service; a bag is first converted to a trace."""
         from daq_cli.robot.imports import to_upload
 
         del folder
@@ -115,7 +115,7 @@ class RemoteRobot(RobotAccess):
         return tuple(joint.name for joint in self.machine.joints)
 
     def program(self, name: Path) -> Program:
-        """Returns a program from a local file, or else one that the service keeps. Raises SpecError."""
+        """Returns a program from a local file or, if there is none, one that the service stores. Raises SpecError."""
         from daq.teaching.program import load_program
 
         if name.exists():
@@ -130,17 +130,17 @@ class RemoteRobot(RobotAccess):
         return RemoteTeaching(controlled(self.call, consent))
 
     def service(self, what: str) -> AbstractContextManager[Robot]:
-        """The client of the service's robot."""
+        """Returns the client of the service's robot."""
         del what
         return remote_robot(self.call)
 
     def require_local(self, why: str) -> None:
-        """Raises SpecError."""
+        """Raises SpecError with `why`."""
         raise SpecError(why)
 
 
 def kept_program(robot: Robot, name: str) -> Program:
-    """Returns a program that the service keeps. Raises SpecError, and ServiceError if the service refuses."""
+    """Returns a program stored by the service. Raises SpecError, and ServiceError if the service refuses."""
     from daq.teaching.program import Program, is_program_name
 
     if not is_program_name(name):

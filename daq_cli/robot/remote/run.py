@@ -1,6 +1,6 @@
-"""An experiment through the service's queue, for a person who waits for its end.
+"""Runs an experiment through the service's queue for a person who waits for its end.
 
-Runs beside an experiment for which a person waits: reacts to stop keys, and confirms that the person is present.
+Meanwhile, a thread reacts to stop keys and confirms that the person is present.
 """
 
 from __future__ import annotations
@@ -33,17 +33,18 @@ if TYPE_CHECKING:
 ATTEND_EVERY = 20.0
 """Time (s) between two confirmations that an operator is present; the service waits a minute for one."""
 ANSWER_WITHIN = 1.0
-"""Time (s) for the service to answer a cancel or a confirmation: a late answer must not delay a stop."""
+"""Longest wait (s) for the answer to a cancel or a confirmation: a late answer must not delay a stop."""
 ENDS_WITHIN = 1.0
-"""Time (s) for an experiment to end after its cancel; then the arm is stopped, which does no harm if it has stopped."""
+"""Time (s) for an experiment to end after its cancel. Then the arm is stopped, which is harmless if it has stopped
+already."""
 LEAVES_WITHIN = 5.0
-"""Time (s) within which a cancel and a stop are answered, if at all."""
+"""Longest wait (s) for the answers to a cancel and a stop."""
 GONE = (404, 409)
-"""HTTP status of an experiment that has ended by itself at this moment."""
+"""HTTP status if the experiment has just ended by itself."""
 
 
 class Companion(StopThread):
-    """Works within the block, on a thread of its own: `press` cancels the experiment, or stops the arm. With `attends`,
+    """Works on a separate thread during the block: `press` cancels the experiment, or stops the arm. With `attends`,
     for a real arm, it regularly confirms to the service that an operator is present."""
 
     def __init__(
@@ -75,18 +76,19 @@ class Companion(StopThread):
         self._thread.join(self._leaves_within)
 
     def _wait(self) -> None:
-        while self.pressed or not self._left.is_set():  # a key that came before the end is never lost
+        while self.pressed or not self._left.is_set():  # a key pressed just before the end must not be lost
             woken = self._wake.wait(self._attend_every)
             self._wake.clear()
             if self.pressed:
                 self.pressed = False
                 self._stop()
             elif self._attends and not woken:
-                with suppress(ServiceError, ServiceNotReachedError):  # sent again in time, or the service ends the run
+                # it is sent again in time, or the service ends the run
+                with suppress(ServiceError, ServiceNotReachedError):
                     self._robot.queue.attend(within=ANSWER_WITHIN)
 
     def _stop(self) -> None:
-        """Cancels the experiment; if its end is not known soon, stops the arm in every possible way."""
+        """Cancels the experiment; if its end is not confirmed soon, stops the arm in every possible way."""
         try:
             if self._robot.experiments.cancel(self._experiment, within=ANSWER_WITHIN).state in ENDS:
                 return
@@ -111,7 +113,7 @@ EXIT_CODES = {
     "cancelled": exit_codes.STOPPED,
     "interrupted": exit_codes.NOT_REACHED,
 }
-"""Exit code by the state of an experiment that has left no trace."""
+"""Exit code by the state of an experiment without a trace."""
 POLL_EVERY = 2.0
 """Time (s) without a message after which the experiment is polled."""
 FAILED_POLLS = 5
@@ -121,14 +123,13 @@ FAILED_POLLS = 5
 def acquire_remotely(robot: Robot, server: str, spec: ExperimentSpec, folder: Path, consent: ConsentPrompt) -> Finished:
     """Queues `spec`, follows it to its end, and downloads its trace into `folder`.
 
-    Ctrl-C cancels it, or stops the arm while it runs. Raises OrderFailedError, and ServiceError if the service
-    refuses.
+    Ctrl-C cancels it, or stops the arm while it runs. Raises OrderFailedError, and ServiceError if the service refuses.
     """
     status = connected_status(robot)
     _require_open_queue(server, status)
     real = require_consent(status, consent)
     if real:
-        _require_open_queue(server, robot.status())  # again: the question may have been open for minutes
+        _require_open_queue(server, robot.status())  # checked again: the operator may have taken minutes to answer
         robot.queue.resume(moves_real_arm=True)
     with StopKeys() as keys, robot.live("events", "queue") as stream:
         experiment = robot.experiments.submit(spec)
@@ -142,7 +143,7 @@ def acquire_remotely(robot: Robot, server: str, spec: ExperimentSpec, folder: Pa
 
 
 def _require_open_queue(server: str, status: RobotStatus) -> None:
-    """Raises SafetyError: an experiment in a paused queue would begin whenever somebody else resumes it."""
+    """Raises SafetyError for a paused queue: the experiment would begin whenever another person resumes it."""
     if status.queue.paused:
         raise SafetyError(
             f"the queue of {status.robot} is paused ({status.queue.reason}): nothing was queued; when it is safe, "
@@ -160,7 +161,7 @@ class _Follower:
         self._record_ended = False
 
     def follow(self, stream: LiveStream) -> Experiment:
-        """Waits for the end of the experiment. Raises OrderFailedError when the service is lost meanwhile."""
+        """Waits for the end of the experiment. Raises OrderFailedError if the service is lost meanwhile."""
         ended: Experiment | None = None
         try:
             while ended is None:
@@ -169,7 +170,7 @@ class _Follower:
                 if any(news):
                     ended = self._look(0)
             while ended.outcome is not None and not self._record_ended:
-                # The state was polled, and the end came before messages that are still under way.
+                # The state is polled, so the end may be known before messages that are still under way.
                 if (frame := stream.next_frame(POLL_EVERY)) is None:
                     break
                 for message in frame.messages:
@@ -191,7 +192,7 @@ class _Follower:
         raise AssertionError("the last attempt returns or raises")
 
     def _look(self, wait: float) -> Experiment | None:
-        """The experiment if it has ended, else None."""
+        """Returns the experiment if it has ended, else None."""
         found = self._robot.experiments.get(self._experiment, wait)
         if found.progress is not None:
             self._display.progress(found.progress, found.progress_text)

@@ -1,4 +1,4 @@
-"""A stop of a server's robots: all of them, unless one is named. Nothing else is asked for before."""
+"""Stops a server's robots: all of them, unless one is named. No other request precedes the stop."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from daq_cli.robot.remote.connection import TOKEN_VARIABLE
 
 DEFAULT_ROBOT = "ma2000"
 NAMES_WITHIN = 1.0
-"""Time (s) for a service to name its robots: a person who stops must soon know the result."""
+"""Longest wait (s) for a service to list its robots: the person who stops needs the result soon."""
 
 
 def stop_at_server(call: Invocation) -> list[StopAnswer]:
-    """Stops the robot that is named; without a name, or if the service has none of this name, stops all its robots.
+    """Stops the named robot; without a name, or if the service has no such robot, stops all its robots.
 
-    Never raises: the answers say what is not known.
+    Never raises: failures are in the answers.
     """
     assert call.server is not None
     name = call.robot_option
@@ -43,7 +43,8 @@ def stop_at_server(call: Invocation) -> list[StopAnswer]:
 
 
 def _stop_by_name(call: Invocation, client: Client) -> list[StopAnswer]:
-    """Stops the robots of a service of version 0.1, which cannot stop all at once: first under the likely name."""
+    """Stops the robots of a service of version 0.1, which cannot stop all at once: first the one with the likely
+    name."""
     assert call.server is not None
     name = _likely_name(call)
     first = client.robot(name).stop()
@@ -55,7 +56,7 @@ def _stop_by_name(call: Invocation, client: Client) -> list[StopAnswer]:
 
 def _likely_name(call: Invocation) -> str:
     """Returns the configured name; the default name if the configuration cannot be read, so that the stop is sent
-    nevertheless."""
+    anyway."""
     try:
         return call.configuration.names[0]
     except DaqError:
@@ -63,7 +64,7 @@ def _likely_name(call: Invocation) -> str:
 
 
 def _others(client: Client, name: str, first: StopResult) -> list[str]:
-    """Says that the service has no robot of this name, and returns the names of its robots."""
+    """Prints that the service has no robot of this name, and returns the names of its robots."""
     print(f"{first.note}: {client.url} is asked to stop all of its robots", file=sys.stderr, flush=True)
     try:
         names = [one.robot for one in client.robots(within=NAMES_WITHIN)]

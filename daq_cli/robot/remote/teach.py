@@ -1,4 +1,4 @@
-"""Teaching a server's robot: steps, programs, leading by hand. Ctrl-C stops the arm."""
+"""Teaching with a server's robot: steps, programs, hand guiding. Ctrl-C stops the arm."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ if TYPE_CHECKING:
     Controlled = AbstractContextManager[tuple[Robot, HeldControl]]
 
 LOOK_EVERY = 0.1
-"""Time (s) between two checks of the state of a program or a lead."""
+"""Time (s) between two checks of the state of a program or of hand guiding."""
 
 
 class StoppedAtServerError(DaqError):
-    """A person at this terminal has stopped the arm."""
+    """A person at this terminal stopped the arm."""
 
     exit_code = exit_codes.STOPPED
 
 
 @contextmanager
 def taught(held: Controlled) -> Iterator[tuple[Robot, HeldControl, Stopped]]:
-    """The robot, control of it, and whether a key has stopped it. Within the block Ctrl-C, Ctrl-Z and SIGTERM stop it,
-    on a thread of their own."""
+    """Yields the robot, control of it, and the stop by keys: within the block Ctrl-C, Ctrl-Z and SIGTERM stop it, on a
+    separate thread."""
     with StopKeys() as keys, held as (robot, control), Stopped(robot) as stopped:
         keys.stops(stopped.press)
         try:
@@ -74,12 +74,12 @@ class Stopped(StopThread):
             self.result = self._robot.stop()
 
     def wait_for_answer(self) -> None:
-        """After a key has been pressed, waits for the result of the stop."""
+        """Waits for the result of the stop, if a key was pressed."""
         if self.pressed:
             self._thread.join()
 
     def raise_if_answered(self) -> None:
-        """Raises StoppedAtServerError once the stop has been answered."""
+        """Raises StoppedAtServerError once the stop was answered."""
         if self.result is not None:
             raise StoppedAtServerError(self.result.text)
 
@@ -114,13 +114,13 @@ class RemoteTeaching:
     held: Controlled
 
     def jog(self, pendant: Pendant, keep: Callable[[Mapping[int, float]], None], line: StatusLine) -> None:
-        """Each press drives for 0.3 s at most, so that the arm holds when the connection is lost."""
+        """Each key press drives for at most 0.3 s, so that the arm holds if the connection is lost."""
         with open_keyboard() as keyboard, taught(self.held) as (robot, control, stopped):
             drive_with_keys(_Driven(robot, control, stopped), keyboard, pendant, keep, line)
             control.finish()
 
     def perform(self, program: Program) -> str:
-        """Has the service plan, check and carry out the program."""
+        """Makes the service plan, check and carry out the program."""
         with taught(self.held) as (robot, control, stopped):
             before = _newest(robot.teaching())
             control.perform(program)
@@ -128,7 +128,7 @@ class RemoteTeaching:
         return ended.result
 
     def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
-        """Records until `seconds` are over, or Enter is pressed."""
+        """Records for `seconds`, or until Enter is pressed."""
         from daq.teaching.recording import RecordedPath
 
         with taught(self.held) as (robot, control, stopped):
@@ -150,7 +150,7 @@ class RemoteTeaching:
 
 
 def _end_of_lead(robot: Robot, control: HeldControl, stopped: Stopped) -> TeachingStatus:
-    """Ends the lead, and waits for its path: that of a stopped lead comes after the answer to the stop."""
+    """Ends hand guiding, and waits for the path; after a stop, the path comes after the answer to the stop."""
     stopped.wait_for_answer()
     try:
         return control.finish()
@@ -162,7 +162,7 @@ def _end_of_lead(robot: Robot, control: HeldControl, stopped: Stopped) -> Teachi
 
 
 def _end_of(robot: Robot, control: HeldControl, stopped: Stopped, shown: int) -> TeachingStatus:
-    """Waits for the end of a program, showing the service's lines about it from number `shown` on."""
+    """Waits for the end of a program, and prints the service's lines about it from number `shown` on."""
     while True:
         status = robot.teaching()
         for line in status.lines:
@@ -174,10 +174,10 @@ def _end_of(robot: Robot, control: HeldControl, stopped: Stopped, shown: int) ->
             if status.problem:
                 raise SafetyError(status.problem)
             return status
-        _ = control.lease  # raises if control is lost: the arm holds then, and the program does not end as planned
+        _ = control.lease  # raises if control was lost: the arm then holds, and the program does not end as planned
         time.sleep(LOOK_EVERY)
 
 
 def _newest(status: TeachingStatus) -> int:
-    """Number of the newest line that the service has shown about the teaching."""
+    """Number of the service's newest line about the teaching."""
     return max((line.number for line in status.lines), default=0)

@@ -34,7 +34,7 @@ def fetched_trace(call: Invocation, folder: Path, wanted: str) -> Path:
 
 @contextmanager
 def fetch_progress(file: str) -> Iterator[Callable[[Transfer], None]]:
-    """Shows how far the service is with fetching a trace from its archive; nothing before it begins to."""
+    """Shows the progress while the service fetches a trace from its archive; nothing before that."""
     with ExitStack() as shown:
         bars: list[Callable[[float, str], None]] = []
 
@@ -47,12 +47,12 @@ def fetch_progress(file: str) -> Iterator[Callable[[Transfer], None]]:
 
 
 def transfer_words(transfer: Transfer) -> str:
-    """How far a trace is on its way, or what it waits for."""
+    """Returns the progress of a transfer, or what it waits for."""
     return transfer.problem or f"{transfer.done / 1e6:.1f} of {transfer.total / 1e6:.1f} MB"
 
 
 def summary(entry: CatalogueEntry) -> TraceSummary:
-    """An entry of the service's catalogue as `daq traces ls` shows the traces of a folder."""
+    """Converts an entry of the service's catalogue to the form of `daq traces ls`."""
     return TraceSummary(
         path=Path(entry.file),
         state="unreadable" if entry.missing else "finished",

@@ -1,9 +1,9 @@
-"""A disc image with the bridge for a BBC Micro: FOLDER/bridge.ssd of BRIDGE and BRIDG96 in FOLDER.
+"""Makes a disc image with the bridge for a BBC Micro: FOLDER/bridge.ssd from BRIDGE and BRIDG96 in FOLDER.
 
     python disc_image.py FOLDER
 
 Acorn's DFS, 40 tracks of 10 sectors of 256 bytes. Sectors 0 and 1 are the catalogue: eight bytes of name and eight
-bytes of addresses, length and first sector for each file, the one with the highest sector first.
+bytes of addresses, length and first sector for each file, the file with the highest sector first.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ FILES = ("BRIDGE", "BRIDG96")
 TITLE = "MA2000"
 LOAD_ADDRESS = 0x1900
 IN_THE_HOST = 0x30000
-"""Added to an address: in the BBC Micro itself, also where a second processor is fitted."""
+"""Added to an address: the memory of the BBC Micro itself, even if a second processor is fitted."""
 SECTOR, SECTORS = 256, 400
 
 
 def disc_image(files: dict[str, bytes]) -> bytes:
-    """The bytes of a disc with these files in directory $, each loaded and started at LOAD_ADDRESS."""
+    """Returns the bytes of a disc with these files in directory $, each loaded and started at LOAD_ADDRESS."""
     title = TITLE.ljust(12).encode()
     names = title[:8]
     about = title[8:] + bytes((0, 8 * len(files), SECTORS >> 8, SECTORS & 0xFF))

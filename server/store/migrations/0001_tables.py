@@ -1,7 +1,7 @@
-"""Every table as `server/store/tables.py` has it.
+"""Makes every table of `server/store/tables.py`.
 
-No version has been released with it, so it follows the tables. Once one has been, it is written out, and a change of
-the tables is a migration of its own.
+No version has been released with this migration, so it follows the tables. After the first release it must be written
+out, and each change of the tables becomes a separate migration.
 """
 
 from __future__ import annotations

@@ -195,7 +195,7 @@ def test_a_trace_is_never_written_over_another(tmp_path: Path) -> None:
     traces = Traces(StandIn([httpx.Response(200, content=b"one")]).connection(), "robots/ma2000")
     assert traces.download("a", target) == target
     traces = Traces(StandIn([httpx.Response(200, content=b"another")]).connection(), "robots/ma2000")
-    with pytest.raises(TraceError, match="is there already, and is not trace a"):
+    with pytest.raises(TraceError, match="exists and is not trace a"):
         traces.download("a", target)
     assert target.read_bytes() == b"one"
     assert list(tmp_path.iterdir()) == [target]
@@ -229,7 +229,7 @@ def test_a_trace_is_found_by_the_beginning_of_its_number_or_name() -> None:
     for wanted, found in (("ab1", "ab12"), ("2026_step", "ab34"), ("last", "ab12")):
         traces = Traces(StandIn([_entries(*two)]).connection(), "robots/ma2000")
         assert traces.find(wanted).id == found
-    with pytest.raises(TraceError, match="2 traces of the service begin so"):
+    with pytest.raises(TraceError, match="2 of the service match"):
         Traces(StandIn([_entries(*two)]).connection(), "robots/ma2000").find("ab")
     with pytest.raises(TraceError, match="none of the service"):
         Traces(StandIn([_entries(*two)]).connection(), "robots/ma2000").find("ramp")

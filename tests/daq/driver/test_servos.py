@@ -175,7 +175,7 @@ def test_a_release_that_names_an_older_stop_is_refused(controller: Controller, b
     assert controller.stop().acknowledged
     first = controller.status().stop
     assert controller.stop().acknowledged
-    with pytest.raises(RequestRefusedError, match="stop 2 is newer than the one that was to end"):
+    with pytest.raises(RequestRefusedError, match="stop 2 is newer than the one to be ended"):
         controller.release(first)
     assert c.StatusFlag.FROZEN in controller.status().flags
     controller.release(first + 1)

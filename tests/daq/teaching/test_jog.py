@@ -210,7 +210,7 @@ def test_a_step_takes_no_speed_of_turning_joints_for_one_that_slides() -> None:
     machine = slide_and_turn()
     require_step_speed(machine, (2,), 0.25)
     require_step_speed(machine, (1, 2), SLIDE_JOG_SPEED)
-    with pytest.raises(SpecError, match=r"speed = 0\.25 m/s: joint 1 slides: allowed are up to 0\.07 m/s"):
+    with pytest.raises(SpecError, match=r"speed = 0\.25 m/s: joint 1 is prismatic: allowed are up to 0\.07 m/s"):
         require_step_speed(machine, (2, 1), 0.25)
 
 

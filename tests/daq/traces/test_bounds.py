@@ -44,7 +44,7 @@ def test_times_are_at_least_a_nanosecond_apart() -> None:
 def test_one_line_names_the_sample_and_the_signal() -> None:
     with pytest.raises(TraceError, match=r"^a: sample 1, column 2: drive = 2e\+09, allowed is ±1e\+09 V, N·m or N$"):
         check_signals({"drive": np.array([[0, 0, 0], [0, 0, 2e9]]), "position": None}, "a")
-    with pytest.raises(TraceError, match=r"^a: sample 2: time = 1\.0 s after 1\.0 s, it has to increase by 1e-09 s"):
+    with pytest.raises(TraceError, match=r"^a: sample 2: time = 1\.0 s after 1\.0 s, it must increase by at least"):
         check_signals({"time": np.array([0.0, 1.0, 1.0])}, "a")
 
 

@@ -97,7 +97,7 @@ def test_a_trace_is_found_by_its_path(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("wanted", "complaint"),
     [
-        ("a", "2 traces in .* begin so: .*aa1111.*ab2222.*; give more of it"),
+        ("a", "2 traces in .* match: .*aa1111.*ab2222.*; give more characters"),
         ("ff", "is not a file, and the folder .* has none"),
         ("", "is not a file, and the folder .* has none"),
     ],

@@ -136,7 +136,7 @@ def test_a_file_of_another_tool_needs_no_toml(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("", "has no row"),
+        ("", "has no rows"),
         ("speed,angle_1\n0,1\n", "its columns have other names than this program's: speed, angle_1; nothing looks"),
         ("time,position_1,position_1\n", "row 1, column 3: 'position_1' comes twice"),
         (

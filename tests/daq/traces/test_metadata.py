@@ -28,7 +28,7 @@ def test_outcome_and_counters_come_from_the_end() -> None:
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"trace_id": "../etc"}, "its number '../etc' is not letters, digits, - and _"),
+        ({"trace_id": "../etc"}, "its ID '../etc' must be letters, digits, - and _"),
         ({"trace_id": "a" * 65}, "is not letters"),
         ({"trace_id": ""}, "is not letters"),
         ({"created": "2026-01-01T00:00:00"}, "created = 2026-01-01T00:00:00 has no time zone"),

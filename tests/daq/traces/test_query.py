@@ -52,7 +52,7 @@ def test_what_is_not_known_meets_no_filter() -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("sort:ramp", "no such term; there are kind, source"),
+        ("sort:ramp", "unknown term; allowed are kind, source"),
         ("kind:ramp kind:sweep", "kind: is given twice"),
         ("source:dream", "write source: and mock or real or imported"),
         ("kind:", "write kind: and a name"),

@@ -70,7 +70,7 @@ def test_a_good_trace_has_no_findings_but_notes(tmp_path: Path) -> None:
         (
             {"ticks": [0, 2, 4], "every": 2, "taken": 5},
             ("error", "set_points"),
-            "the set points of tick 4 are said to have been taken in tick 5",
+            "the set points of tick 4 are recorded as used from tick 5",
         ),
     ],
 )
@@ -159,9 +159,7 @@ def noted(path: Path, check: str) -> list[str]:
 def test_arrival_is_told_between_percentiles_so_that_one_late_sample_does_not_count(tmp_path: Path) -> None:
     """Samples arrive 0, 0.3 or 0.6 ms after their ticks; one in 201 comes half a second late."""
     path = recorded(tmp_path / "a.mcap", list(range(201)), host_time=5000.0 + 4.0 + 0.5)
-    assert noted(path, "arrival") == [
-        "arrival against the board's clock: 0.60 ms between the 1st and the 99th percentile"
-    ]
+    assert noted(path, "arrival") == ["arrival jitter: 0.60 ms (1st to 99th percentile)"]
 
 
 @pytest.mark.parametrize(("time", "outside"), [(0.0, 0), (0.04, 0), (0.0401, 1), (-0.001, 1)])
@@ -184,6 +182,6 @@ def test_a_joint_without_a_sensor_that_is_known_is_noted(tmp_path: Path) -> None
         writer.sample(row(0, error=(9.0, 9.0, 9.0)))
         path = writer.close("complete")
     assert noted(path, "error") == [
-        f"joint {joint}: its sensor is not known, so error = set point − position was not checked" for joint in JOINTS
+        f"joint {joint}: its sensor is unknown, so error = set point − position was not checked" for joint in JOINTS
     ]
     assert verify(path).trustworthy

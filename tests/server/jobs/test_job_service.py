@@ -539,7 +539,7 @@ def test_a_model_is_not_taken_for_another_that_is_in_its_file(bench: Bench) -> N
     path = bench.models.folder / f"{made.identity}.json"
     path.parent.mkdir(exist_ok=True)
     path.write_text(made.text, "utf-8")
-    with pytest.raises(SpecError, match="another model has this number"):
+    with pytest.raises(SpecError, match="another model has this ID"):
         bench.models.add(made.model_copy(update={"text": made.text.replace("1", "2", 1)}), "forged", "bert")
     assert path.read_text("utf-8") == made.text
     path.write_text("cut off", "utf-8")

@@ -90,12 +90,12 @@ def test_expressions(tmp_path: Path, given: dict[str, str], expected: list[float
     ("given", "complaint"),
     [
         ({"angle": "q{}"}, "'angle' cannot be mapped"),
-        ({"position": "q{} in feet"}, "position: unit 'feet' is not known; write rad, deg"),
-        ({"position": "theta{}"}, "no column is called 'theta{}'; it has stamp, q0"),
-        ({"position": "theta"}, "column 'theta' is missing; it has stamp, q0"),
+        ({"position": "q{} in feet"}, "position: unit 'feet' is unknown; write rad, deg"),
+        ({"position": "theta{}"}, "no column matches 'theta{}'; the file has stamp, q0"),
+        ({"position": "theta"}, "column 'theta' is missing; the file has stamp, q0"),
         ({"position": "q{}", "drive": "tau{}"}, "drive: its unit is not stated"),
         ({"position": "q{}", "drive": "tau0 in A"}, "drive: has no column of joint '0', which others have"),
-        ({"position": "1.5 + 2"}, "'1.5 + 2' names no column"),
+        ({"position": "1.5 + 2"}, "'1.5 + 2' is not a column"),
     ],
 )
 def test_what_is_wrong_in_a_mapping_is_one_line(tmp_path: Path, given: dict[str, str], complaint: str) -> None:
@@ -143,7 +143,7 @@ def test_records_in_one_file_rows_without_a_reading_and_times_that_come_twice(tm
     first = open_trace(path, choice=Choice(map=mapping, where="episode=0"))
     np.testing.assert_array_equal(first.position[:, 0], [1, 2])
     assert "no number, left out: 1, the first is data row 2" in first.record.notes
-    assert "the time of the row before, left out: 1, the first is data row 4" in first.record.notes
+    assert "repeat the previous time, left out: 1, the first is data row 4" in first.record.notes
     with pytest.raises(TraceError, match="no row is left where time=7"):
         open_trace(path, choice=Choice(map=mapping, where="time=7..9"))
 

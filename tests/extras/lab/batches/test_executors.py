@@ -88,7 +88,7 @@ def test_a_worker_of_another_version_is_refused_by_name() -> None:
         ("simulate nowhere/traces --out o", "is no folder of traces"),
         ("simulate traces --out o", "has no trace that matches"),
         ("simulate ramp --out o", "has no trace that matches"),
-        ("simulate colour:red --out o", "no such term; there are kind"),
+        ("simulate colour:red --out o", "unknown term; allowed are kind"),
         ("simulate traces --out o --executor 4", "executor '4': is none; write local://4"),
         ("simulate traces --out o --executor local://0", "0 workers; 1 to 10000"),
         ("simulate traces --out o --model none.json", "none.json"),
