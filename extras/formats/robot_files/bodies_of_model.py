@@ -1,4 +1,4 @@
-"""A model's links as URDF and MJCF want them: each in a frame at its own joint, with its inertia about its centre."""
+"""Converts a model's links for URDF and MJCF: each in a frame at its own joint, with its inertia about its centre."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from model.machine_model.model import Model
 from model.simulation.chain_of_model import chain_of
 
 IN_BODIES = frozenset((at.MASS_ADDED, at.PAYLOAD, at.TILT_X, at.TILT_Y, at.SHIFT))
-"""Numbers of effects that are part of masses, centres and gravity."""
+"""Effect parameters that are part of masses, centres and gravity."""
 
 
 @dataclass(frozen=True, eq=False)
 class OutgoingLink:
     """One link with its joint.
 
-    name, joint: of link and joint, each of a file once
+    name, joint: names of link and joint, unique in a file
     slides:   whether the joint is prismatic
-    place:    (4, 4) frame of the link in that of the link before, with the joint at 0; the joint's axis is its z
-    angles:   roll, pitch and yaw (rad) of `place`: α and θ of the link before
-    mass, centre (3,), inertia (3, 3) about the centre, in the link's frame
-    low, high, speed: limits; None where there is none
+    place:    (4, 4) frame of the link in that of the previous link, with the joint at 0; the joint's axis is its z
+    angles:   roll, pitch and yaw (rad) of `place`: α and θ of the previous link mass, centre (3,), inertia (3, 3) about
+    the centre, in the link's frame
+    low, high, speed: limits; None for no limit
     rotor:    inertia of the drive at the joint, kg·m² or kg
-    gain, back: torque (N·m, N) at the joint for a unit of drive, and lost for a unit of speed through the drive itself
+    gain, back: torque (N·m, N) at the joint per unit of drive, and lost per unit of speed through the drive itself
     viscous, coulomb: friction at the joint
-    stiffness, slack: of a spring at the joint, and where it is slack
-    drive_limit: largest drive; None where there is none
+    stiffness, slack: of a spring at the joint, and its slack position
+    drive_limit: largest drive; None for no limit
     """
 
     name: str
@@ -76,7 +76,7 @@ class OutgoingArm:
 
 
 def outgoing_arm(model: Model) -> OutgoingArm:
-    """The arm that a model describes, with its own numbers: effects in the masses, load and payload included."""
+    """Returns the arm of a model with its own values: effects in the masses, load and payload included."""
     chain, machine = chain_of(model), model.machine
     numbers = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
     place, angles = np.eye(4), (0.0, 0.0, 0.0)
@@ -121,7 +121,9 @@ def outgoing_arm(model: Model) -> OutgoingArm:
 
 
 def left_out(model: Model, held: frozenset[int]) -> list[str]:
-    """What of a model a format cannot hold, `held` being the columns that it can: effects, sensors, the controller."""
+    """Returns the parts of a model that a format cannot hold: effects, sensors, the controller. held: columns that it
+    can.
+    """
     found = []
     for use in model.effects:
         columns = {parameter.column for parameter in effect(use.name).parameters}
@@ -137,7 +139,9 @@ def left_out(model: Model, held: frozenset[int]) -> list[str]:
 
 
 def _about_centre(inertial: Floats) -> tuple[float, Floats, Floats]:
-    """Mass, centre of mass and inertia about it, from mass, first moments and inertia about the frame's origin."""
+    """Returns mass, centre of mass and inertia about it, from mass, first moments and inertia about the frame's
+    origin.
+    """
     mass, moments = float(inertial[0]), inertial[1:4]
     xx, xy, xz, yy, yz, zz = inertial[4:]
     about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -148,7 +152,7 @@ def _about_centre(inertial: Floats) -> tuple[float, Floats, Floats]:
 
 
 def _unlike(name: str, taken: set[str]) -> str:
-    """The name, or one with a number behind it, that no joint has yet."""
+    """Returns the name, or with an appended number a name that no joint has yet."""
     plain = "_".join("".join(sign if sign.isprintable() else " " for sign in name).split()) or "joint"
     found, number = plain, 2
     while found in taken:
