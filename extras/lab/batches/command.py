@@ -189,7 +189,7 @@ def _print_end(asked: Asked, done: int, failed: int, seconds: float) -> None:
 
 app = typer.Typer(
     add_completion=False,
-    help="Study many traces, each separately, with a table as result. The same command continues after an interruption.",
+    help="Study many traces, each separately, with a table as result. The same command continues an interrupted batch.",
     no_args_is_help=True,
 )
 
