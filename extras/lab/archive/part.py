@@ -29,7 +29,7 @@ class Archives(Part, Collector):
         self._settings = services.settings.section(ArchiveSettings)
         self._bucket = open_bucket(self._settings)
         self._archived = ArchivedStore(services.store)
-        services.traces.archive_index = self._archived  # also if there is no bucket any more: its traces are still known
+        services.traces.archive_index = self._archived  # also without a bucket: traces of an earlier one are known
         self._of: dict[str, ArchiveService] = {}
         moved = "Traces sent to the archive or fetched from it, and attempts that failed."
         self._moved = Counter("daq_archive_transfers", moved, ("robot", "direction", "result"), registry=None)

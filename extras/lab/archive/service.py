@@ -356,7 +356,7 @@ class ArchiveService:
     def _require_same(self, name: str, wanted: Content) -> None:
         """Reads an object back. Raises DamagedError if it differs from the file that was sent."""
         if self._context.bucket.read(name, wanted.size, lambda _piece: None) != wanted:
-            line = f"archive {self._context.bucket.place}: {name}: the object differs from the file that was sent (SHA-256)"
+            line = f"archive {self._context.bucket.place}: {name}: differs from the file that was sent (SHA-256)"
             raise DamagedError(line)
 
     def _require_still_there(self, found: Archived, now: datetime) -> None:
