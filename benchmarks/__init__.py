@@ -1,1 +1,1 @@
-"""Measurements: figures with their targets, each by one command. Timings depend on the machine, so none is a test."""
+"""Measurements with targets, each run by one command. Timings depend on the machine, so none is a test."""

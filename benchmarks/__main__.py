@@ -24,11 +24,11 @@ MAIN_JOB = (
     "trace_open",
     "long_run",
 )
-"""What `main-job` runs, in this order."""
+"""Benchmarks of `main-job`, in this order."""
 
 
 def benchmarks() -> dict[str, str]:
-    """Every benchmark (a module or package here that can be run) and its first line."""
+    """Returns every benchmark (a module or package here that can be run) and its first line."""
     found = {}
     for path in sorted([*FOLDER.glob("*.py"), *FOLDER.glob("*/__main__.py")]):
         name = path.stem if path.parent == FOLDER else path.parent.name
@@ -39,21 +39,22 @@ def benchmarks() -> dict[str, str]:
 
 
 def run(name: str, options: list[str], run_process: Callable[..., Any] = subprocess.run) -> int:
-    """One benchmark in a process of its own, so that none inherits threads, priorities or caches; its exit code.
+    """Runs one benchmark in a separate process, so that none inherits threads, priorities or caches; returns its exit
+    code.
 
-    One that a signal ended has met no target: 1.
+    A benchmark that a signal ended has missed its target: 1.
     """
     code: int = run_process([sys.executable, "-m", f"benchmarks.{name}", *options], check=False).returncode
     return max(code, 1) if code else 0
 
 
 def _quicker(name: str) -> list[str]:
-    """The option for a shorter run, where a benchmark has one."""
+    """Returns the option for a shorter run, if a benchmark has one."""
     return ["--quick"] if '"--quick"' in (FOLDER / f"{name}.py").read_text("utf-8") else []
 
 
 def main(arguments: list[str], run_process: Callable[..., Any] = subprocess.run) -> int:
-    """The exit code: 0 when every target was met, 1 when one was missed, 2 for a name that is none."""
+    """Returns 0 if every target was met, 1 if one was missed, 2 for an unknown name."""
     known = benchmarks()
     if not arguments or arguments[0] in ("-h", "--help"):
         print((__doc__ or "").rstrip() + "\n")
@@ -66,7 +67,7 @@ def main(arguments: list[str], run_process: Callable[..., Any] = subprocess.run)
         return max(run(each, _quicker(each) if quick else [], run_process) for each in MAIN_JOB if each in known)
     name = name.replace("-", "_")
     if name not in known:
-        print(f"benchmark {name!r}: there is none; there are {', '.join(known)} and main-job", file=sys.stderr)
+        print(f"benchmark {name!r}: not known; available: {', '.join(known)} and main-job", file=sys.stderr)
         return 2
     return run(name, options, run_process)
 

@@ -1,11 +1,11 @@
-"""The bridge in C beside the mock's own: stops, accesses to the bus, size of the code and depth of the stack.
+"""Measures the bridge in C beside the mock's own: stops, accesses to the bus, size of the code and depth of the stack.
 
     python -m benchmarks bridge_in_c [--stops 200]
 
-The core runs as a library of this computer, and as the firmware image of the Mega 2560 on a simulated board; both have
-the mock's board behind them and a line of 115200 baud before them. A host samples three joints, and stops at random
-moments. All times are of the board and not of a clock: the load of this machine changes nothing. Needs gcc, gcc-avr,
-avr-libc, libsimavr-dev and libelf-dev.
+The core runs as a library on this computer, and as the firmware image of the Mega 2560 on a simulated board. Both use
+the mock's board and a line of 115200 baud. A host samples three joints, and stops at random times. All times are the
+board's, not a clock's, so the load of this machine has no influence. Needs gcc, gcc-avr, avr-libc, libsimavr-dev and
+libelf-dev.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ PERIOD_US = 20_000
 STEP_US = 200
 JOINTS = 0b000111
 FROZEN_TARGET_MS = 10.0
-"""A stop whose posture has to be read again is answered within 10 ms (PROTOCOL.md, section 3)."""
+"""A stop whose posture must be read again is answered within 10 ms (PROTOCOL.md, section 3)."""
 USED_TARGET_MS = 45.0
 
 
@@ -51,14 +51,14 @@ class Host:
         self._replies: dict[int, Any] = {}
 
     def run_until(self, time_us: int) -> None:
-        """Lets time pass, and hears what comes."""
+        """Advances time, and receives what arrives."""
         while self.link.time_us < time_us:
             self.link.run_until(min(self.link.time_us + STEP_US, time_us))
             for frame in self._decoder.feed(self.link.take_output()):
                 self._replies[frame.sequence] = c.parse_reply(frame)
 
     def send(self, request: c.Request) -> int:
-        """Puts a request on the line; its sequence number."""
+        """Sends a request; returns its sequence number."""
         self._sequence += 1
         if request.IS_COMMAND:
             self._stamp = c.Stamp(self._stamp.session, self._stamp.number + 1)
@@ -69,7 +69,7 @@ class Host:
         return self._sequence
 
     def ask(self, request: c.Request) -> Any:
-        """The reply to a request."""
+        """Returns the reply to a request."""
         sequence = self.send(request)
         give_up_us = self.link.time_us + 10 * PERIOD_US
         while sequence not in self._replies:
@@ -89,7 +89,7 @@ class Host:
 
 
 class BlindHost(Host):
-    """A host of a bridge without SAMPLE, which reads the memory instead."""
+    """A host for a bridge without SAMPLE, which reads the memory instead."""
 
     def ask(self, request: c.Request) -> Any:
         if isinstance(request, c.Sample):
@@ -110,7 +110,7 @@ class Stops:
 
 
 def measure(host: Host, frozen_us: Callable[[], int], board: Any, count: int) -> Stops:
-    """Stops at random moments, a sample being waited for."""
+    """Measures stops at random times while a sample is waited for."""
     dice, stops = Random(1991), Stops()
     host.run_until(5 * PERIOD_US)
     host.greet()
@@ -133,7 +133,7 @@ def measure(host: Host, frozen_us: Callable[[], int], board: Any, count: int) ->
 
 
 def rows(name: str, stops: Stops) -> list[Figure]:
-    """The table's rows of one bridge."""
+    """Returns the table's rows of one bridge."""
     found = []
     columns = (("frozen in memory", stops.frozen, FROZEN_TARGET_MS), ("first used", stops.used, USED_TARGET_MS))
     for what, times, target in columns:
@@ -143,7 +143,7 @@ def rows(name: str, stops: Stops) -> list[Figure]:
 
 
 def mock_rows(count: int) -> list[Figure]:
-    """The mock's own bridge."""
+    """Returns rows of the mock's own bridge."""
     device = build_device(Options(tcp="nowhere:0", baud=BAUD), lambda _: None)
     stops = device.bridge.stops
     host = Host(device.link, line_is_modelled=True)
@@ -151,7 +151,7 @@ def mock_rows(count: int) -> list[Figure]:
 
 
 def hosted_rows(name: str, count: int, *, sees_period: bool) -> list[Figure]:
-    """The core as a library of this computer."""
+    """Returns rows of the core as a library on this computer."""
     device = build_device(Options(tcp="nowhere:0"), lambda _: None)
     link = HostedLink(device, sees_period=sees_period)
     host = (Host if sees_period else BlindHost)(link, line_is_modelled=False)
@@ -159,7 +159,7 @@ def hosted_rows(name: str, count: int, *, sees_period: bool) -> list[Figure]:
 
 
 def mega_rows(count: int) -> list[Figure]:
-    """The firmware image on a simulated board."""
+    """Returns rows of the firmware image on a simulated board."""
     device = build_device(board_on_the_bus(Options(tcp="nowhere:0")), lambda _: None)
     link = MegaLink(device)
     began, host = time.perf_counter(), Host(link, line_is_modelled=True)
@@ -175,12 +175,12 @@ def mega_rows(count: int) -> list[Figure]:
         Figure("Mega 2560: address, R/W, NPGFC after 1MHzE falls, least", f"{bus.least_hold_ns} ns", "≥ 30 ns"),
         Figure("Mega 2560: data written after 1MHzE falls, least", f"{bus.least_data_hold_ns} ns", "≥ 50 ns"),
         Figure("Mega 2560: stack used, most", f"{link.simulator.stack_bytes} bytes", beside="bound: stack.py below"),
-        Figure("simulated time for a second of this machine's", f"{speed:.1f} s"),
+        Figure("simulated time per second of this machine's", f"{speed:.1f} s"),
     ]
 
 
 def main(arguments: list[str]) -> int:
-    """The exit code: 1 when a target was missed."""
+    """Returns the exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--stops", type=int, default=200, help="stops of each bridge (200)")
     count = parser.parse_args(arguments).stops

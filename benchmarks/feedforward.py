@@ -55,16 +55,17 @@ FRICTION: dict[str, tuple[tuple[float, float], ...]] = {
     "direction_dependent_friction": ((1.2, 3.0), (5.0, 12.0), (1.2, 3.0)),
     "stiction": ((5.0, 12.0), (7.0, 16.0), (2.5, 6.0)),
 }
-"""Hidden frictions, and for joints 1 to 3 the sizes between which one is drawn (N·m, or N·m·s/rad): the upper half of
-what a secret arm of the mock may have."""
+"""Hidden frictions, and for joints 1 to 3 the range from which a size is drawn (N·m, or N·m·s/rad): the upper half of
+the range for a secret arm of the mock.
+"""
 SIZES = {"viscous_friction": "coefficient", "stiction": "breakaway"}
-"""Name of the size, where it is not `torque`."""
+"""Name of the size, if it is not `torque`."""
 PAYLOAD = (0.25, 0.8)
-"""Hidden load, kg, beside the stated 1.25 kg."""
+"""Hidden load, kg, in addition to the stated 1.25 kg."""
 FLOOR = 0.1
 """Error (°), a third of a posture unit, below which attempts differ by chance."""
 LEARNED = 4
-"""Attempts that learn from the one before."""
+"""Attempts that learn from the previous one."""
 
 
 def _spec(trajectory: Mapping[str, Any], name: str, **others: Any) -> ExperimentSpec:
@@ -93,7 +94,7 @@ MOTIONS = {
 
 
 def hidden_effects(seed: int, times: float = 1.0) -> tuple[str, ...]:
-    """The mock's modifications for a seed: a friction at a joint, `times` its size, and a load."""
+    """Returns the mock's modifications for a seed: a friction at a joint, `times` its size, and a load."""
     rng = np.random.default_rng([8, seed])
     kind = str(rng.choice(list(FRICTION)))
     joint = int(rng.integers(1, 4))
@@ -107,7 +108,7 @@ def hidden_effects(seed: int, times: float = 1.0) -> tuple[str, ...]:
 
 
 def study(seed: int, times: float) -> dict[str, Any]:
-    """Errors of every method on one arm, whose hidden friction is `times` as large."""
+    """Returns errors of every method on one arm, whose hidden friction is `times` as large."""
     effects, plant = hidden_effects(seed, times), plant_text(hidden_parameters(MACHINE, seed))
     noise = iter(range(1000 * seed, 1000 * seed + 1000))
 
@@ -142,7 +143,7 @@ def _computed(model: Model, spec: ExperimentSpec) -> ExperimentSpec:
 
 
 def _learned(trace: Trace) -> ExperimentSpec:
-    """The next attempt; where learning is said to diverge, the set points of this one once more."""
+    """Returns the next attempt; if learning reports divergence, the present set points again."""
     try:
         return learn(trace, MACHINE, _plan)
     except TraceError as error:
@@ -152,7 +153,7 @@ def _learned(trace: Trace) -> ExperimentSpec:
 
 
 def _judged(trace: Trace) -> dict[str, Any]:
-    """Errors of a trace in degrees: over all joints, by joint, and what was expected."""
+    """Returns errors of a trace in degrees: over all joints, by joint, and the expected ones."""
     found = followed(trace, lambda spec: motion_of(spec, MACHINE))
     assert found is not None
     assert trace.record.spec is not None
@@ -172,7 +173,7 @@ def _together(source: Feedforward) -> float:
 
 
 def studied(seeds: Sequence[int], folder: Path, times: float) -> list[dict[str, Any]]:
-    """Every seed once; those that the folder has are not done again."""
+    """Studies every seed once; results in the folder are reused."""
     path = folder / "arms.jsonl"
     lines = path.read_text("utf-8").splitlines() if path.exists() else []
     done = {entry["seed"]: entry for entry in map(json.loads, lines)}
@@ -196,7 +197,7 @@ def _labels(entry: dict[str, Any]) -> list[str]:
 
 
 def _rms(entry: dict[str, Any], label: str) -> float:
-    """rms error (°) of a method over all motions of an arm."""
+    """Returns the rms error (°) of a method over all motions of an arm."""
     return float(np.sqrt(np.mean([run[label]["rms"] ** 2 for run in entry["runs"].values()])))
 
 
@@ -205,7 +206,7 @@ def _shares(entries: Sequence[dict[str, Any]], label: str) -> list[float]:
 
 
 def figures(entries: Sequence[dict[str, Any]]) -> list[Figure]:
-    """Medians over the arms, the worst arm beside them."""
+    """Returns medians over the arms, with the worst arm."""
     found = []
     for label in _labels(entries[0]):
         rms = [_rms(entry, label) for entry in entries]
@@ -230,19 +231,19 @@ COMPUTED = ("fitted", "diagnosed")
 
 
 def _learning(run: dict[str, Any]) -> tuple[list[float], list[float]]:
-    """Errors of the attempts, and of those after them."""
+    """Returns errors of the attempts, and of those after them."""
     errors = [run["plain"]["rms"], *(run[f"learned {k}"]["rms"] for k in range(1, LEARNED + 1))]
     return errors[:-1], errors[1:]
 
 
 def main(arguments: list[str]) -> int:
-    """The exit code: 1 when a target was missed."""
+    """Returns the exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks feedforward", description=(__doc__ or "").split("\n")[0]
     )
     parser.add_argument("--first", type=int, default=101, help="the first seed")
     parser.add_argument("--arms", type=int, default=6, help="number of arms")
-    parser.add_argument("--folder", type=Path, help="where results are kept, and found again")
+    parser.add_argument("--folder", type=Path, help="where results are kept and reused")
     parser.add_argument("--friction", type=float, default=1.0, help="factor of the hidden frictions' sizes")
     parser.add_argument("--quick", action="store_true", help="one arm")
     chosen = parser.parse_args(arguments)

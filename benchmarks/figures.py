@@ -1,4 +1,4 @@
-"""A figure with its target and what it is measured against, and the table that shows them."""
+"""A measurement with its target and comparison, and the table that shows them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Protocol, TypeVar
 
 
 class Tallied(Protocol):
-    """What a campaign has counted, with examples of its faults."""
+    """Counts of a campaign, with examples of its faults."""
 
     examples: list[str]
 
@@ -33,17 +33,17 @@ class Figure:
 
 
 def at_most(name: str, value: float, limit: float, unit: str, beside: str = "") -> Figure:
-    """A figure that must not exceed a limit."""
+    """Returns a measurement that must not exceed a limit."""
     return Figure(name, f"{value:.3g} {unit}", f"≤ {limit:g} {unit}", value <= limit, beside)
 
 
 def at_least(name: str, value: float, limit: float, unit: str, beside: str = "") -> Figure:
-    """A figure that must reach a limit."""
+    """Returns a measurement that must reach a limit."""
     return Figure(name, f"{value:.3g} {unit}", f"≥ {limit:g} {unit}", value >= limit, beside)
 
 
 def show(title: str, command: str, figures: Sequence[Figure]) -> int:
-    """Prints the figures as a table; returns the exit code: 1 when a target was missed."""
+    """Prints the measurements as a table; returns the exit code: 1 when a target was missed."""
     rows = [("figure", "measured", "target", "met", "beside")]
     rows += [(f.name, f.value, f.target, {None: "", True: "yes", False: "NO"}[f.met], f.beside) for f in figures]
     widths = [max(len(row[column]) for row in rows) for column in range(5)]
@@ -57,13 +57,13 @@ def show(title: str, command: str, figures: Sequence[Figure]) -> int:
 
 
 def machine() -> str:
-    """Description of the machine; its load shows how quiet it was."""
+    """Describes the machine; its load shows how quiet it was."""
     cores = len(os.sched_getaffinity(0))
     return f"{cores} cores, Python {platform.python_version()}, load {os.getloadavg()[0]:.1f}"
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """The smallest value that at least `share` of all values do not exceed."""
+    """Returns the smallest value that at least `share` of all values do not exceed."""
     ordered = sorted(values)
     return ordered[max(0, -(-int(share * 1e6) * len(ordered) // 1_000_000) - 1)]
 
@@ -76,8 +76,11 @@ def show_campaign(
     figures: Callable[[Tally], list[Figure]],
     description: str | None,
 ) -> int:
-    """Runs a campaign of damaged files as the command line asks, and prints its examples of faults and its figures. The
-    exit code is 1 when a target was missed. cases: the default number of files."""
+    """Runs a campaign of damaged files with the command line's options, and prints its examples of faults and its
+    measurements.
+
+    Returns the exit code, 1 when a target was missed. cases: the default number of files.
+    """
     parser = argparse.ArgumentParser(prog=f"python -m benchmarks {module}", description=description)
     parser.add_argument("--cases", type=int, default=cases, help=f"damaged files (default {cases})")
     parser.add_argument("--seed", type=int, default=1)

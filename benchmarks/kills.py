@@ -52,26 +52,26 @@ HOLDS_FOR = 100
 AT_REST = 40
 """ADC counts of error within which an arm holds."""
 RECORDING_FROM = 100
-"""The board's tick from which on there is a record: in lock-step the way to the start takes it a few."""
+"""The board's tick from which there is a record: in lock-step the move to the start takes a few ticks."""
 ACQUISITION, OWNER, WORKER = b"daq.owner", b"server.owner", b"spawn_main"
 PORT = "mock://?pty=1&lock_step=1&seed=3"
 LENGTHS_S = (1.0, 40.0)
 """Lengths of the service's experiments, in the arm's time."""
 LONGEST_MOMENT_S = 1.5
-"""Latest moment (s) of a kill after the start of an experiment or a job."""
+"""Latest time (s) of a kill after the start of an experiment or a job."""
 BACK_WITHIN_S = 120.0
 QUEUED = 3
 
 
 @dataclass
 class Findings:
-    """What was ended, and what it was doing; what was wrong, one line each."""
+    """What was ended, and during what; the faults, one line each."""
 
     met: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
     samples: int = 0
     slowest: float = 0.0
-    """Longest time (s) until everything had ended, or was back."""
+    """Longest time (s) until everything had ended, or was available again."""
 
 
 # ---- a run
@@ -79,7 +79,7 @@ class Findings:
 
 @dataclass(frozen=True)
 class Way:
-    """One way to end a run. `acquisition`: whether its acquisition process is met, or the command itself."""
+    """One way to end a run. `acquisition`: whether it ends the acquisition process or the command itself."""
 
     name: str
     number: signal.Signals
@@ -87,7 +87,7 @@ class Way:
 
     @property
     def freezes(self) -> bool:
-        """Whether a process is left that freezes the arm."""
+        """Whether a process remains that freezes the arm."""
         return not (self.acquisition and self.number is signal.SIGKILL)
 
 
@@ -101,7 +101,7 @@ WAYS = (
 
 @dataclass(frozen=True)
 class Undisturbed:
-    """A run that nobody ended: its trace, and the s that it took from the start of each process and of the record."""
+    """An undisturbed run: its trace, and the time in s from the start of each process and of the record."""
 
     trace: Trace
     command: float
@@ -111,7 +111,7 @@ class Undisturbed:
 
 @dataclass
 class Workspace:
-    """One run: a mock of its own and a folder of its own."""
+    """One run: a mock and a folder of its own."""
 
     folder: Path
     mock: RunningMock
@@ -123,7 +123,7 @@ class Workspace:
         return f"{self.mock.url}?lock_step=1"
 
     def start(self) -> subprocess.Popen[bytes]:
-        """`daq run`."""
+        """Starts `daq run`."""
         quiet = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
         command = [*COMMAND, "--port", self.url, *RUN, "--folder", str(self.folder / "traces")]
         return subprocess.Popen(
@@ -131,20 +131,20 @@ class Workspace:
         )
 
     def once_recording(self) -> None:
-        """Waits until so much of the run has gone by on the board that its record is well under way."""
+        """Waits until the run is far enough on the board that its record is well under way."""
         while self.control.ask("state")["tick"] < RECORDING_FROM:
             time.sleep(0.002)
 
 
 @contextlib.contextmanager
 def workspace() -> Iterator[Workspace]:
-    """A fresh one."""
+    """Yields a fresh workspace."""
     with tempfile.TemporaryDirectory() as name, started_mock(*MOCK) as mock, MockControl(mock.control) as control:
         yield Workspace(Path(name), mock, control)
 
 
 def undisturbed() -> Undisturbed:
-    """The run that all others are held against. Raises RuntimeError where it fails."""
+    """Returns the run with which all others are compared. Raises RuntimeError if it fails."""
     with workspace() as here:
         begun = time.monotonic()
         run = here.start()
@@ -160,7 +160,7 @@ def undisturbed() -> Undisturbed:
 
 
 def until_acquiring(run: subprocess.Popen[bytes]) -> int:
-    """The acquisition process, once it is there. Raises RuntimeError when the command ends without one."""
+    """Waits for the acquisition process. Raises RuntimeError if the command ends without one."""
     while True:
         with contextlib.suppress(RuntimeError, OSError):
             return child(run.pid, ACQUISITION)
@@ -172,7 +172,7 @@ def until_acquiring(run: subprocess.Popen[bytes]) -> int:
 def end_one(
     way: Way, share: float, whole: Undisturbed, machine: Machine, findings: Findings, *, recording: bool
 ) -> None:
-    """One run, ended after a share (0 to 1) of its time, or of its record's time."""
+    """Ends one run after a share (0 to 1) of its time, or of its record's time."""
     label = f"{way.name} at {share:.3f} of the {'record' if recording else 'run'}"
     with workspace() as here:
         run = here.start()
@@ -193,7 +193,7 @@ def end_one(
 
 
 def _left_running(run: subprocess.Popen[bytes], acquisition: int | None) -> list[str]:
-    """What of a run is left after ENDS_WITHIN s; it is ended then."""
+    """Returns the processes that remain after ENDS_WITHIN s, and ends them."""
     left, until = [], time.monotonic() + ENDS_WITHIN
     try:
         run.wait(ENDS_WITHIN)
@@ -217,7 +217,7 @@ def _runs(process: int) -> bool:
 
 
 def _left_behind(here: Workspace, way: Way, whole: Undisturbed, machine: Machine, findings: Findings) -> list[str]:
-    """What is wrong with traces, port and arm. The mock's record comes first: a look at the arm overwrites it."""
+    """Returns faults of traces, port and arm. The mock's record is read first: checking the arm overwrites it."""
     kept = {one["tick"]: one for one in here.control.ask("snapshots")["snapshots"]}
     frozen, folder = here.control.ask("state")["frozen"], here.folder / "traces"
     salvaged = salvage_folder(folder) if folder.is_dir() else ()
@@ -235,12 +235,12 @@ def _left_behind(here: Workspace, way: Way, whole: Undisturbed, machine: Machine
             wrong.append(f"{untrue} of {len(trace)} samples are wrong")
     findings.met[f"{way.name}: {outcome}"] += 1
     if way.freezes and paths and outcome != "complete" and not frozen:
-        wrong.append(f"recorded as {outcome}, and the arm is not frozen")
+        wrong.append(f"recorded as {outcome}, but the arm is not frozen")
     return [*wrong, *_port_and_arm(here.url)]
 
 
 def wrong_samples(trace: Trace, whole: Trace, kept: dict[int, dict[str, Any]], machine: Machine) -> int:
-    """Number of samples that are neither the undisturbed run's nor the mock's own record of that tick."""
+    """Returns the number of samples that are neither the undisturbed run's nor the mock's own record of that tick."""
     assert trace.tick is not None
     assert whole.tick is not None
     rows, wrong = {int(tick): row for row, tick in enumerate(whole.tick)}, 0
@@ -270,7 +270,7 @@ def _is_kept(trace: Trace, row: int, kept: dict[str, Any], machine: Machine) -> 
 def _port_and_arm(url: str) -> list[str]:
     try:
         with Controller.connect(url) as controller:
-            # The first period after a freeze uses its set points, and so it is the next one that they are seen in.
+            # The first period after a freeze uses its set points, and the next one shows them.
             first = snapshot = controller.next_snapshot(controller.next_snapshot().tick)
             for _ in range(HOLDS_FOR):
                 snapshot = controller.next_snapshot(snapshot.tick)
@@ -278,15 +278,15 @@ def _port_and_arm(url: str) -> list[str]:
         return [f"the port: {error}"]
     moved = [joint for joint, reading in snapshot.joints if reading.set_point != first[joint].set_point]
     off = [joint for joint, reading in snapshot.joints if abs(reading.error) > AT_REST]
-    return [f"set points of joints {moved} go on moving"] * bool(moved) + [f"joints {off} do not hold"] * bool(off)
+    return [f"set points of joints {moved} keep moving"] * bool(moved) + [f"joints {off} do not hold"] * bool(off)
 
 
 def end_runs(moments: int, seed: int) -> Findings:
-    """Every way at so many moments."""
+    """Ends runs in every way at this many times each."""
     machine, random, findings = load_machine("ma2000"), Random(seed), Findings()
     whole = undisturbed()
     if wrong_samples(undisturbed().trace, whole.trace, {}, machine):
-        raise RuntimeError("two undisturbed runs differ: nothing can be held against them")
+        raise RuntimeError("two undisturbed runs differ: nothing can be compared with them")
     for number in range(moments):
         for way in WAYS:
             end_one(way, random.uniform(0.0, 1.0), whole, machine, findings, recording=bool(number % 2))
@@ -297,10 +297,10 @@ def end_runs(moments: int, seed: int) -> Findings:
 
 
 class Told:
-    """The service's answers at one moment, by number."""
+    """The service's answers at one time, by ID."""
 
     def __init__(self, service: RunningService) -> None:
-        # What waits is asked for first and what has ended last: between the questions things only go on.
+        # Waiting ones are requested first and ended ones last: in between, states only advance.
         self.waiting = [one["id"] for one in service.ask("GET", "/queue/experiments")]
         self.running = service.ask("GET", "/queue")["running"]
         self.by_kind: dict[str, dict[str, dict[str, Any]]] = {}
@@ -313,7 +313,7 @@ class Told:
 
 
 def untrue(before: Told, after: Told, folder: Path) -> list[str]:
-    """What was told before a kill and is not so after it, or not so by the files."""
+    """Returns statements before a kill that are false after it, or by the files."""
     wrong = []
     for kind, was in before.by_kind.items():
         now = after.by_kind[kind]
@@ -338,7 +338,7 @@ def untrue(before: Told, after: Told, folder: Path) -> list[str]:
     wrong += [f"{path.name} is not in the catalogue" for path in files if path.name not in known]
     for number, one in after.by_kind["experiments"].items():
         outcome = traces.get(one["trace"] or "", {}).get("outcome")
-        # One that is interrupted had perhaps come to its end when its process was lost; nobody could tell.
+        # An interrupted one may have reached its end when its process was lost; nobody could know.
         allowed = {"queued": (None,), "done": ("complete",), "interrupted": (None, "interrupted", "complete")}
         if outcome not in allowed.get(one["state"], (outcome,)) or (
             one["state"] == "running" and after.running != number
@@ -353,7 +353,7 @@ def untrue(before: Told, after: Told, folder: Path) -> list[str]:
 
 
 def connect(service: RunningService) -> None:
-    """Connects; the acquisition process of a killed server has the port until it has closed its trace."""
+    """Connects; a killed server's acquisition process holds the port until it has closed its trace."""
     give_up = time.monotonic() + BACK_WITHIN_S
     while not (answer := service.robot.post("/connect")).is_success:
         if time.monotonic() > give_up:
@@ -362,7 +362,7 @@ def connect(service: RunningService) -> None:
 
 
 def kill_service(kills: int, seed: int, folder: Path) -> Findings:
-    """Server, owner of the port and worker in turn, at random moments."""
+    """Kills server, owner of the port and worker in turn, at random times."""
     random, findings = Random(seed), Findings()
     with contextlib.ExitStack() as open_:
         service = open_.enter_context(started_service(folder, PORT))
@@ -399,13 +399,13 @@ def kill_service(kills: int, seed: int, folder: Path) -> Findings:
 
 
 def main() -> int:
-    """The exit code: 1 when something was wrong."""
+    """Returns the exit code: 1 if there was a fault."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks kills", description=__doc__)
     parser.add_argument("--service", action="store_true", help="kill the service's processes in place of runs")
-    parser.add_argument("--moments", type=int, default=100, help="moments of each way to end a run")
+    parser.add_argument("--moments", type=int, default=100, help="times for each way to end a run")
     parser.add_argument("--kills", type=int, default=200, help="kills of the service's processes")
     parser.add_argument("--seed", type=int, default=1991)
-    parser.add_argument("--quick", action="store_true", help="five moments, or ten kills")
+    parser.add_argument("--quick", action="store_true", help="five times, or ten kills")
     given = parser.parse_args()
     if given.service:
         with tempfile.TemporaryDirectory() as name:
@@ -418,11 +418,11 @@ def main() -> int:
     figures = [
         Figure("ended", f"{sum(findings.met.values())}", beside=met),
         Figure("wrong", f"{len(findings.wrong)}", "0", not findings.wrong, "left running, port, arm, traces, states"),
-        Figure("traces held against what was told" if given.service else "samples compared", f"{findings.samples}"),
-        Figure("everything had ended, or was back, after at most", f"{findings.slowest:.1f} s"),
+        Figure("traces compared with the answers" if given.service else "samples compared", f"{findings.samples}"),
+        Figure("everything had ended, or was available again, after at most", f"{findings.slowest:.1f} s"),
     ]
     command = f"python -m benchmarks kills{' --service' * given.service} --seed {given.seed}"
-    return show("Ended at random moments", command, figures)
+    return show("Ended at random times", command, figures)
 
 
 if __name__ == "__main__":

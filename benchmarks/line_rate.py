@@ -47,17 +47,17 @@ class CountedChannel:
 
     @property
     def description(self) -> str:
-        """Where it leads."""
+        """Returns the channel's address."""
         return self.inner.description
 
     def read(self, timeout_s: float) -> bytes:
-        """What has arrived."""
+        """Returns the bytes that have arrived."""
         data = self.inner.read(timeout_s)
         self.passed.into += len(data)
         return data
 
     def write(self, data: bytes) -> None:
-        """All of `data`."""
+        """Writes all of `data`."""
         self.passed.out += len(data)
         self.inner.write(data)
 
@@ -68,7 +68,7 @@ class CountedChannel:
 
 @dataclass
 class CountedEndpoint:
-    """A place where a controller is reached, and what passes on the way."""
+    """An endpoint of a controller that counts the bytes."""
 
     inner: Endpoint
     passed: Passed = field(default_factory=Passed)
@@ -80,20 +80,20 @@ class CountedEndpoint:
         self.control = self.inner.control
 
     def waited(self) -> float:
-        """As the endpoint within."""
+        """Returns the wrapped endpoint's value."""
         return self.inner.waited()
 
     def connect(self) -> ByteChannel:
-        """A counted channel."""
+        """Returns a counted channel."""
         return CountedChannel(self.inner.connect(), self.passed)
 
     def close(self) -> None:
-        """Gives back what it owns."""
+        """Releases its resources."""
         self.inner.close()
 
 
 def share_of_line(controller: Controller, passed: Passed, periods: int, moving: bool) -> tuple[float, float]:
-    """Shares (%) of one direction's capacity that sampling takes: both directions added up, and the busier one."""
+    """Returns shares (%) of one direction's capacity that sampling takes: both directions added, and the busier one."""
     snapshot = controller.next_snapshot(joints=JOINTS)
     here = snapshot.set_points
     out, into = passed.out, passed.into
@@ -105,7 +105,7 @@ def share_of_line(controller: Controller, passed: Passed, periods: int, moving: 
 
 
 def trips(controller: Controller, request: Request, reply_bytes: int, repeats: int) -> tuple[float, float]:
-    """Median time (s) of round trips, one at once after the other, and the line's own time for their bytes (s)."""
+    """Returns the median time (s) of consecutive round trips, and the line's own time for their bytes (s)."""
     times = []
     for _ in range(repeats):
         begun = time.perf_counter()
@@ -116,14 +116,14 @@ def trips(controller: Controller, request: Request, reply_bytes: int, repeats: i
 
 
 def trip_figure(name: str, controller: Controller, request: Request, reply_bytes: int, repeats: int) -> Figure:
-    """Round trips of one kind, as a share of what the line allows."""
+    """Returns round trips of one kind, as a share of the line's limit."""
     took, floor = trips(controller, request, reply_bytes, repeats)
-    beside = f"{1e3 * took:.2f} ms a trip, its bytes alone {1e3 * floor:.2f} ms"
+    beside = f"{1e3 * took:.2f} ms per trip, its bytes alone {1e3 * floor:.2f} ms"
     return at_least(f"round trips: {name}", 100 * floor / took, TRIP_TARGET, "% of the line", beside)
 
 
 def main() -> int:
-    """The exit code: 1 when a target was missed."""
+    """Returns the exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks line_rate", description=__doc__)
     parser.add_argument("--periods", type=int, default=250, help="control periods sampled")
     parser.add_argument("--trips", type=int, default=1000, help="round trips of each kind")
@@ -143,7 +143,7 @@ def main() -> int:
                 beside=f"both directions added; the busier one {busier:.3g} %",
             ),
             trip_figure("status", controller, ReadStatus(), 15, repeats),
-            trip_figure("sample of 3 joints that is there", controller, kept, 27, min(repeats, 200)),
+            trip_figure("available sample of 3 joints", controller, kept, 27, min(repeats, 200)),
             trip_figure("48 bytes of memory", controller, ReadBlock(controller.memory_map.base, 48), 48, repeats),
         ]
     with Controller.connect("mock://?pty=1") as controller:

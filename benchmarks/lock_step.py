@@ -39,7 +39,7 @@ PERIOD_S = 0.02
 
 @dataclass(frozen=True)
 class Cost:
-    """What some control periods took: wall time and processor time (s) of both processes."""
+    """Cost of some control periods: wall time and processor time (s) of both processes."""
 
     periods: int
     wall_s: float
@@ -53,7 +53,7 @@ class Cost:
 
     @property
     def cpu_times_real_time(self) -> float:
-        """Controller's time over both processes' processor time: what a core without other work gives."""
+        """Controller's time over both processes' processor time: the speed of a core without other work."""
         return self.periods * PERIOD_S / (self.host_s + self.mock_s)
 
 
@@ -61,22 +61,22 @@ class Silent:
     """A run listener that ignores everything."""
 
     def progress(self, fraction: float, text: str) -> None:
-        """How far the run is."""
+        """Ignores the progress."""
 
     def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
-        """A recorded control period."""
+        """Ignores a recorded control period."""
 
     def happened(self, event: TraceEvent) -> None:
-        """An event."""
+        """Ignores an event."""
 
 
 def processor_time(process: int) -> float:
-    """CPU time (s) that a process has used so far."""
+    """Returns the CPU time (s) that a process has used so far."""
     return time.clock_gettime((~process << 3) | 2)  # Linux: the scheduler's clock of another process
 
 
 def ramps(controller: Controller, repeats: int, folder: Path) -> None:
-    """Complete default ramps, one after the other, each with a trace of its own."""
+    """Runs complete default ramps, one after the other, each with its own trace."""
     machine = load_machine("ma2000")
     for _ in range(repeats):
         control, spec = ArmControl(controller), ExperimentSpec()
@@ -87,7 +87,7 @@ def ramps(controller: Controller, repeats: int, folder: Path) -> None:
 
 
 def measure(repeats: int, profiles: tuple[Path, Path] | None = None) -> Cost:
-    """Runs ramps against a mock of its own. `profiles`: where host and mock leave what cProfile saw."""
+    """Runs ramps against a mock of its own. `profiles`: files for the results of cProfile, of host and mock."""
     host_profile, mock_profile = profiles or (None, None)
     with (
         started_mock("--tcp", "127.0.0.1:0", "--lock-step", profile=mock_profile) as mock,
@@ -111,7 +111,7 @@ def measure(repeats: int, profiles: tuple[Path, Path] | None = None) -> Cost:
 
 
 def board_alone(periods: int) -> float:
-    """Processor time (s) of so many periods of the mock's board and plant, with nobody asking."""
+    """Returns the processor time (s) of so many periods of the mock's board and plant, without a host."""
     board = build_device(Options(tcp="127.0.0.1:0", lock_step=True), lambda _: None).board
     board.run_until(1_000_000)
     begun = time.process_time()
@@ -120,7 +120,7 @@ def board_alone(periods: int) -> float:
 
 
 def print_profiles(repeats: int, lines: int) -> None:
-    """Where the time goes, by function's own time."""
+    """Prints the time by function, without the functions that it calls."""
     with tempfile.TemporaryDirectory() as folder:
         paths = (Path(folder) / "host", Path(folder) / "mock")
         cost = measure(repeats, paths)
@@ -130,7 +130,7 @@ def print_profiles(repeats: int, lines: int) -> None:
 
 
 def main() -> int:
-    """The exit code: 1 when the target was missed."""
+    """Returns the exit code: 1 when the target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks lock_step", description=__doc__)
     parser.add_argument("--ramps", type=int, default=20, help="experiments in one run")
     parser.add_argument("--runs", type=int, default=3, help="runs, of which the quickest counts")

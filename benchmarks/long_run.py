@@ -35,7 +35,7 @@ from daq.traces.reader import read_trace
 
 BAUD = 115200
 RATE = 0.005
-# A frame that is lost is not flipped too: every frame is struck once at most, and strikes can be counted one by one.
+# A lost frame is not flipped too: every frame is affected at most once, so the faults can be counted one by one.
 FAULTS = ("--fault", f"drop:rate={RATE}", "--fault", f"flip:rate={RATE}")
 JOINTS = (1, 2, 3)
 SINE_S = 4.0
@@ -52,7 +52,7 @@ class BoardRecord:
     _over: threading.Event = field(default_factory=threading.Event)
 
     def fetch_until_over(self) -> None:
-        """Fetches until the run is over; runs in a thread of its own."""
+        """Fetches until the run is over; runs in a separate thread."""
         last = 0
         while True:
             over = self._over.wait(FETCH_EVERY_S)
@@ -69,7 +69,7 @@ class BoardRecord:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a run left on disk, and what the mock knows of it."""
+    """Files of a run, and the mock's knowledge of it."""
 
     trace: Trace
     report: Finished
@@ -79,7 +79,7 @@ class Recorded:
 
 
 def record(minutes: float, folder: Path) -> Recorded:
-    """Makes the run. Raises RuntimeError when it did not complete."""
+    """Makes the run. Raises RuntimeError if it did not complete."""
     machine = load_machine("ma2000")
     sine = Sine(amplitude=math.radians(6.0), period=SINE_S, cycles=60 * minutes / SINE_S)
     spec = ExperimentSpec(trajectory=sine, joints=JOINTS, record=JOINTS, hold=0.5)
@@ -97,7 +97,9 @@ def record(minutes: float, folder: Path) -> Recorded:
 
 
 def wrong_samples(trace: Trace, board: dict[int, dict[str, Any]], machine: Machine) -> tuple[int, int]:
-    """Samples that differ from the board's record in any count of any joint; samples that it has no record of."""
+    """Returns the number of samples that differ from the board's record in any count of any joint, and of those without
+    a record.
+    """
     assert trace.tick is not None
     assert trace.set_point is not None
     assert trace.error is not None
@@ -124,7 +126,7 @@ def wrong_samples(trace: Trace, board: dict[int, dict[str, Any]], machine: Machi
 
 
 def accuracy_figures(done: Recorded, machine: Machine) -> list[Figure]:
-    """Nothing lost, nothing wrong, all damage noticed."""
+    """Returns measurements: nothing lost, nothing wrong, all damage noticed."""
     trace, counters = done.trace, done.report.counters
     wrong, unknown = wrong_samples(trace, done.board, machine)
     faults = done.counts["faults"]
@@ -140,9 +142,9 @@ def accuracy_figures(done: Recorded, machine: Machine) -> list[Figure]:
         Figure("ticks lost", f"{trace.missing}", "0", trace.missing == 0, f"of {len(trace)}"),
         Figure("wrong samples", f"{wrong}", "0", wrong == 0, "against the board's own record"),
         Figure("samples the record lacks", f"{unknown}", "0", unknown == 0, "not compared"),
-        Figure("frames struck", f"{struck}", beside=f"{100 * struck / (frames or 1):.2f} % of {frames} frames"),
+        Figure("frames affected", f"{struck}", beside=f"{100 * struck / (frames or 1):.2f} % of {frames} frames"),
         Figure(
-            "struck and not noticed",
+            "affected and not noticed",
             f"{max(0, struck - timeouts)}",
             "0",
             timeouts >= struck,
@@ -166,7 +168,7 @@ def accuracy_figures(done: Recorded, machine: Machine) -> list[Figure]:
 
 
 def timing_figures(done: Recorded) -> list[Figure]:
-    """From a tick, by the mock's own clock, to the sample's arrival and to the time stamp estimated for the tick."""
+    """Returns times from a tick, by the mock's own clock, to the sample's arrival and to the estimated time stamp."""
     trace = done.trace
     assert trace.tick is not None
     assert trace.host_time is not None
@@ -202,7 +204,7 @@ def timing_figures(done: Recorded) -> list[Figure]:
 
 
 def main() -> int:
-    """The exit code: 1 when a target was missed."""
+    """Returns the exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks long_run", description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--quick", action="store_true", help="half a minute")

@@ -1,6 +1,6 @@
-"""An arm of the mock with hidden parameters, and its traces: what the benchmarks of the model are made on.
+"""A mock arm with hidden parameters, and its traces, for the benchmarks of the model.
 
-Everything goes the way of a real arm: a mock process behind a port, experiments run by `daq`, trace files read back.
+Everything is done as with a real arm: a mock process behind a port, experiments run by `daq`, trace files read back.
 """
 
 from __future__ import annotations
@@ -39,7 +39,9 @@ PLANT_NAMES: dict[str, tuple[str, ...]] = {
     **{f"joint{j}.motor.rotor_inertia": (f"joint_{j}.rotor_inertia",) for j in (1, 2, 3)},
     **{f"joint{j}.viscous_friction.coefficient": (f"joint_{j}.viscous_friction",) for j in (1, 2, 3)},
 }
-"""Names of the model's parameters and where the mock's plant file has them; it has one arm of friction for all."""
+"""Names of the model's parameters and their place in the mock's plant file, which has one arm of friction for all
+joints.
+"""
 
 FRICTION_ARMS = tuple(f"joint{j}.load_dependent_friction.arm" for j in (1, 2, 3))
 
@@ -48,17 +50,17 @@ class Unheard:
     """A run listener that ignores everything."""
 
     def progress(self, fraction: float, text: str) -> None:
-        """How far the run is."""
+        """Ignores the progress."""
 
     def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
-        """A recorded control period."""
+        """Ignores a recorded control period."""
 
     def happened(self, event: TraceEvent) -> None:
-        """An event."""
+        """Ignores an event."""
 
 
 def hidden_parameters(machine: Machine, seed: int) -> dict[str, float]:
-    """True values of an arm, drawn from what the machine file expects: value ± deviation, Gaussian, kept positive."""
+    """Returns true values of an arm, drawn from the machine file: value ± deviation, Gaussian, kept positive."""
     rng = np.random.default_rng([1991, seed])
     model = base_model(machine)
     found = {}
@@ -70,7 +72,7 @@ def hidden_parameters(machine: Machine, seed: int) -> dict[str, float]:
 
 
 def plant_text(hidden: Mapping[str, float]) -> str:
-    """The mock's own plant file with these values in it."""
+    """Returns the mock's own plant file with these values."""
     text = _shipped("mock_controller.plant", "ma2000_plant.toml")
     for name, value in hidden.items():
         for place in PLANT_NAMES[name]:
@@ -79,7 +81,7 @@ def plant_text(hidden: Mapping[str, float]) -> str:
 
 
 def board_text(linearity: float) -> str:
-    """The mock's own board file with potentiometers of this linearity."""
+    """Returns the mock's own board file with potentiometers of this linearity."""
     return _replaced(_shipped("mock_controller.board", "ma2000_board.toml"), "converter.linearity", linearity)
 
 
@@ -93,7 +95,7 @@ def recorded(
     *,
     baud: int = 115_200,
 ) -> list[Trace]:
-    """Traces of experiments, one after the other on one mock in lock-step, with these hidden effects."""
+    """Returns traces of experiments, one after the other on one mock in lock-step, with these hidden effects."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with connected(folder, seed, plant, board, modify, baud=baud) as controller:
@@ -110,7 +112,7 @@ def connected(
     *,
     baud: int = 115_200,
 ) -> Iterator[Controller]:
-    """A new mock in lock-step with these hidden effects, whose files lie in a folder."""
+    """Yields a new mock in lock-step with these hidden effects, with its files in a folder."""
     options: dict[str, str | list[str]] = {
         "lock_step": "1",
         "seed": str(seed),

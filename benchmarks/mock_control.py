@@ -1,4 +1,4 @@
-"""A client of the mock's control port: what the mock itself knows, asked behind the host's back."""
+"""A client of the mock's control port: asks the mock for data unseen by the host."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class MockControl:
         self._lines = self._socket.makefile("rb")
 
     def ask(self, command: str, **values: Any) -> dict[str, Any]:
-        """The answer to one command. Raises RuntimeError when the mock refuses it."""
+        """Returns the answer to one command. Raises RuntimeError if the mock refuses it."""
         self._socket.sendall(json.dumps({"do": command, **values}).encode() + b"\n")
         answer: dict[str, Any] = json.loads(self._lines.readline())
         if not answer["ok"]:

@@ -1,4 +1,4 @@
-"""A mock controller as a process of its own, outside the host that is measured."""
+"""Runs a mock controller as a separate process, outside the measured host."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class RunningMock:
-    """Where a mock is reached: its port URL, its control port's URL, and its process number."""
+    """A running mock: its port URL, its control port's URL, and its PID."""
 
     url: str
     control: str
@@ -22,9 +22,9 @@ class RunningMock:
 
 @contextlib.contextmanager
 def started_mock(*options: str, profile: Path | None = None) -> Iterator[RunningMock]:
-    """A mock with these options of its command line; it ends with the block. Inherits this process's cores.
+    """Yields a mock with these options of its command line; it ends with the block. Inherits this process's cores.
 
-    profile: where cProfile leaves what it saw of the whole process
+    profile: file for the result of cProfile
     """
     profiler = [] if profile is None else ["-m", "cProfile", "-o", str(profile)]
     command = [sys.executable, *profiler, "-m", "mock_controller", *options, "--owned"]

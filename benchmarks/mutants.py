@@ -63,7 +63,7 @@ class Mutant:
         return self.file, self.function, self.was, self.now
 
     def applied(self, source: bytes) -> bytes:
-        """The file with the fault."""
+        """Returns the file with the fault."""
         return source[: self.start] + self.text.encode() + source[self.end :]
 
     def __str__(self) -> str:
@@ -72,7 +72,7 @@ class Mutant:
 
 
 def mutants_of(source: bytes, file: str) -> list[Mutant]:
-    """Every mutant of a file, in the order of its lines; those that would be the same text twice come once."""
+    """Returns every mutant of a file, in the order of its lines; equal texts come once."""
     maker = _Maker(source, file)
     maker.visit(ast.parse(source))
     unique = {(mutant.start, mutant.end, mutant.text): mutant for mutant in maker.found}
@@ -203,7 +203,7 @@ class _Maker(ast.NodeVisitor):
         elif isinstance(value, float):
             self._replaced(node, repr(2.0 * value if value else 1.0))
 
-    # ---- how a mutant is written down
+    # ---- how a mutant is recorded
 
     def _visit_all(self, nodes: Sequence[ast.AST]) -> None:
         for node in nodes:

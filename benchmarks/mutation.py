@@ -62,20 +62,20 @@ LEFT_OUT = "not slow and not browser and not hardware and not lab_data"
 TARGET = 0.9
 """Least share of mutants that the tests of a folder should kill."""
 GRACE_S = 20.0
-"""Time that a mutant has beyond three times what the unchanged tests take; the start of pytest varies by seconds."""
+"""Time limit of a mutant beyond three times that of the unchanged tests; the start of pytest varies by seconds."""
 COMPILING_S = 240.0
-"""The same for a mutant of the model, whose compiled functions have to be compiled anew."""
+"""The same for a mutant of the model, whose compiled functions must be compiled again."""
 BASELINE_LIMIT_S = 7200.0
 """Time limit of the unchanged tests of a folder."""
 _DURATION = re.compile(r"(\d+\.\d+)s (?:call|setup|teardown) +(\S.*)")
 """A line of `pytest --durations`."""
 _TIMES = count(1_000_000_000, 10)
-"""Modification times, all different, since Python recognises current bytecode by its source's time and size."""
+"""Modification times, all different, since Python recognises valid bytecode by its source's time and size."""
 
 
 @dataclass(frozen=True)
 class Tests:
-    """What is run against the mutants of a module, and how long that takes when nothing is wrong."""
+    """The tests for the mutants of a module, and their time without a fault."""
 
     files: tuple[str, ...]
     deselected: tuple[str, ...]
@@ -83,7 +83,7 @@ class Tests:
 
 
 def chosen_tests(files: Iterable[str], seconds: Mapping[str, float], longest_s: float) -> Tests:
-    """The tests of some files, the quickest file first, without the tests that take too long.
+    """Returns the tests of some files, the quickest file first, without the tests that take too long.
 
     seconds: time of each unchanged test, by the name that selects it.
     """
@@ -99,7 +99,7 @@ def chosen_tests(files: Iterable[str], seconds: Mapping[str, float], longest_s: 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one mutant ended: `killed`, `timed out` (killed as well), `survived` or `no tests`; and which test failed."""
+    """Result of one mutant: `killed`, `timed out` (killed as well), `survived` or `no tests`; and the failed test."""
 
     mutant: Mutant
     ending: str
@@ -112,20 +112,20 @@ class Outcome:
 
 
 class MutationError(Exception):
-    """The tests cannot be held against mutants; the message says why."""
+    """The tests cannot be used for mutants; the message says why."""
 
 
 # ---- which mutants
 
 
 def equivalents(file: Path = EQUIVALENT) -> dict[tuple[str, str, str, str], str]:
-    """The reason for each mutant that no test could notice, by its identity."""
+    """Returns the reason for each mutant that no test could notice, by its identity."""
     entries = tomllib.loads(file.read_text("utf-8")).get("mutant", [])
     return {(each["file"], each["function"], each["was"], each["now"]): each["reason"] for each in entries}
 
 
 def mutants_below(path: str, root: Path = ROOT) -> list[Mutant]:
-    """All mutants of a file or a folder (relative to the root)."""
+    """Returns all mutants of a file or a folder (relative to the root)."""
     place = root / path
     files = [place] if place.is_file() else sorted(place.rglob("*.py"))
     if not files:
@@ -142,7 +142,9 @@ def _import_graph() -> grimp.ImportGraph:
 
 
 def mirrored_folder(file: str, root: Path = ROOT) -> Path:
-    """The folder of tests for a module: the same path below `tests`, or the nearest folder above that exists."""
+    """Returns the folder of tests for a module: the same path below `tests`, or the nearest folder above that
+    exists.
+    """
     parent = Path(file).parent
     renamed = next((outer for outer in TEST_FOLDERS if parent.is_relative_to(outer)), None)
     inner = parent if renamed is None else TEST_FOLDERS[renamed] / parent.relative_to(renamed)
@@ -153,7 +155,7 @@ def mirrored_folder(file: str, root: Path = ROOT) -> Path:
 
 
 def _imported(file: Path, root: Path) -> set[str]:
-    """Modules that a file of tests imports, itself or through helpers below `tests`."""
+    """Returns modules that a file of tests imports, itself or through helpers below `tests`."""
     seen: set[Path] = set()
     modules: set[str] = set()
     waiting = [file]
@@ -182,7 +184,7 @@ def _import_names(file: Path) -> Iterator[str]:
 
 @cache
 def reaching(file: str, root: Path = ROOT) -> tuple[str, ...]:
-    """Test files of the mirrored folder that reach the module.
+    """Returns test files of the mirrored folder that reach the module.
 
     Preferred are those that do so within the module's own package; then any; then the whole folder, whose tests may
     reach it through a process.
@@ -205,7 +207,7 @@ def reaching(file: str, root: Path = ROOT) -> tuple[str, ...]:
 
 
 def copy_of_tree(target: Path) -> None:
-    """The files that git tracks or would track, and the built page where there is one."""
+    """Copies the files that git tracks or would track, and the built page if there is one."""
     listed = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
         cwd=ROOT,
@@ -222,9 +224,9 @@ def copy_of_tree(target: Path) -> None:
 
 
 def run_tests(tree: Path, arguments: Iterable[str], limit_s: float) -> tuple[int | None, list[str]]:
-    """pytest's exit code for the tests of a copy, and the lines that it printed.
+    """Returns pytest's exit code for the tests of a copy, and the printed lines.
 
-    The code is None when they took too long; everything they began was then ended.
+    The code is None if they took too long; everything they began was then ended.
     """
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", LEFT_OUT, *arguments]
     environment = os.environ | {"PYTHONPATH": str(tree), "CI": "", "NUMBA_CACHE_DIR": str(tree / ".compiled")}
@@ -247,14 +249,14 @@ def run_tests(tree: Path, arguments: Iterable[str], limit_s: float) -> tuple[int
 
 
 def first_failure(lines: Iterable[str]) -> str:
-    """The first test that failed; "" where none did."""
+    """Returns the first failed test; "" if none failed."""
     return next((line.split(" - ")[0] for line in lines if line.startswith(("FAILED ", "ERROR "))), "")
 
 
 def measured(tree: Path, files: Iterable[str]) -> dict[str, float]:
-    """Time (s) of each unchanged test, by the name that selects it; tests of a few ms are left out.
+    """Returns the time (s) of each unchanged test, by the name that selects it; tests of a few ms are left out.
 
-    Raises MutationError when a test fails.
+    Raises MutationError if a test fails.
     """
     code, lines = run_tests(tree, ["--durations=0", *files], BASELINE_LIMIT_S)
     if code not in (0, 5):  # pytest's 5: there was no test
@@ -266,7 +268,7 @@ def measured(tree: Path, files: Iterable[str]) -> dict[str, float]:
 
 
 def outcome(tree: Path, mutant: Mutant, tests: Tests) -> Outcome:
-    """Runs the tests of a copy against one mutant, and puts the file back."""
+    """Runs the tests of a copy against one mutant, and restores the file."""
     if not tests.files:
         return Outcome(mutant, "no tests")
     file = tree / mutant.file
@@ -290,7 +292,7 @@ def _write(file: Path, content: bytes, changed_at_ns: int) -> None:
 def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool) -> list[Outcome]:
     """Tries mutants in as many copies of the tree as there may be processes, and prints each survivor at once.
 
-    With `kills` it prints each killed one as well, with the test that failed.
+    With `kills` it prints each killed one as well, with the failed test.
     """
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         trees: SimpleQueue[Path] = SimpleQueue()
@@ -332,7 +334,7 @@ def _arguments() -> argparse.Namespace:
 
 
 def main() -> int:
-    """The exit code: 0 when enough mutants of every path were killed."""
+    """Returns the exit code: 0 if enough mutants of every path were killed."""
     options = _arguments()
     known = equivalents()
     chosen: dict[str, list[Mutant]] = {}

@@ -1,5 +1,7 @@
-"""Clients of a service: WebSockets that watch, and plain GETs at a steady rate, in two processes, so that what the
-watchers do with their samples is not counted as the service's time to answer."""
+"""Clients of a service: WebSockets that watch, and plain GETs at a steady rate.
+
+They run in two processes, so that the watchers' processing of samples does not count as the service's time to answer.
+"""
 
 from __future__ import annotations
 
@@ -26,9 +28,9 @@ class Seen:
     """Observations of the clients. Times in s."""
 
     latencies: list[float] = field(default_factory=list)
-    """Latency of every GET from the moment when it was due, so that waiting for a free connection counts."""
+    """Latency of every GET from the time when it was due, so that waiting for a free connection counts."""
     own_lateness: list[float] = field(default_factory=list)
-    """Lateness of the clients' own timer, which shares the cores with all that is measured."""
+    """Lateness of the clients' own timer, which shares the cores with the measured programs."""
     refused: int = 0
     watchers: int = 0
     """Number of watchers that have received their history."""
@@ -41,13 +43,13 @@ class Seen:
 
 @dataclass
 class _HttpLine:
-    """One connection that stays open: as little client as possible, since it shares the cores with the service."""
+    """One connection that stays open: a minimal client, since it shares the cores with the service."""
 
     reader: asyncio.StreamReader
     writer: asyncio.StreamWriter
 
     async def get(self, host: str, path: str) -> int:
-        """The status of the answer, when all of it has come."""
+        """Returns the status of the answer, when all of it has come."""
         self.writer.write(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
         head = (await self.reader.readuntil(b"\r\n\r\n")).decode("latin-1").lower()
         length = head.partition("content-length:")[2].partition("\r\n")[0]
@@ -107,7 +109,7 @@ async def _all(url: str, live: str, watchers: int, paths: Sequence[str], rate: f
     def told() -> None:
         try:
             word = parent.recv()
-        except EOFError:  # whoever measures was killed
+        except EOFError:  # the measuring process was killed
             word = "end"
         if word == "end":
             loop.remove_reader(parent.fileno())
@@ -133,7 +135,7 @@ async def _all(url: str, live: str, watchers: int, paths: Sequence[str], rate: f
 
 
 def _run(url: str, live: str, watchers: int, paths: Sequence[str], rate: float, parent: Connection) -> None:
-    os.setsid()  # the kernel shares the cores among sessions: clients are other people's programs, not the service's
+    os.setsid()  # the kernel shares the cores among sessions: clients are other users' programs, not the service's
     parent.send(asyncio.run(_all(url, live, watchers, paths, rate, parent)))
 
 
@@ -171,7 +173,7 @@ def _part(url: str, live: str, watchers: int, paths: Sequence[str], rate: float)
 
 @dataclass
 class Clients:
-    """Clients under way."""
+    """Running clients."""
 
     _watching: _Part | None
     _asking: _Part
@@ -180,18 +182,20 @@ class Clients:
 
     @property
     def processes(self) -> dict[str, int]:
-        """Processes by their task."""
+        """Returns processes by their task."""
         watching = {} if self._watching is None else {"watchers": self._watching.process}
         return watching | {"GETs": self._asking.process}
 
     def begin_anew(self) -> None:
-        """Forgets the GETs so far: those while everything started."""
+        """Discards the GETs so far, which were made during the start."""
         self._asking.pipe.send("anew")
 
 
 @contextlib.contextmanager
 def clients(url: str, watchers: int, paths: Sequence[str], rate: float, live: str = "") -> Iterator[Clients]:
-    """`watchers` WebSockets at `live` (a path), and `rate` GETs a second of `paths` in turn, as long as the block."""
+    """Runs `watchers` WebSockets at `live` (a path), and `rate` GETs per second of `paths` in turn, during the
+    block.
+    """
     with contextlib.ExitStack() as parts:
         watching = parts.enter_context(_part(url, live, watchers, (), 0.0)) if watchers else None
         asking = parts.enter_context(_part(url, live, 0, paths, rate))

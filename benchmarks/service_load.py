@@ -60,10 +60,10 @@ FITS = 20
 
 @dataclass
 class Measured:
-    """What one run of everything gave. Times in s."""
+    """Results of one run. Times in s."""
 
     endings: list[str] = field(default_factory=list)
-    """Endings of experiments that were not completed."""
+    """Ends of experiments that were not completed."""
     idle: list[float] = field(default_factory=list)
     """Jitter of the samples that nobody watched."""
     loaded: list[float] = field(default_factory=list)
@@ -73,14 +73,16 @@ class Measured:
     used: dict[str, list[float]] = field(default_factory=lambda: {OWN_DOOR: [], STOP_DOOR: []})
     unconfirmed: int = 0
     fitting: int = 0
-    """How many of the stops found the fit still running."""
+    """Number of stops during which the fit was still running."""
     busy: dict[str, float] = field(default_factory=dict)
     """Share of one core that each process took while the second experiment was recorded."""
     seen: Seen = field(default_factory=Seen)
 
 
 def jitter(path: Path) -> tuple[list[float], int]:
-    """By how much each sample came later after its tick than the quickest one (s), and how many ticks were lost."""
+    """Returns the delay (s) of each sample after its tick beyond that of the quickest one, and the number of lost
+    ticks.
+    """
     trace = read_trace(path)
     assert trace.tick is not None
     assert trace.host_time is not None
@@ -89,13 +91,13 @@ def jitter(path: Path) -> tuple[list[float], int]:
 
 
 def ready_again(service: RunningService) -> None:
-    """Makes the robot ready after a run that was not completed."""
+    """Makes the robot ready after an incomplete run."""
     service.reset()
     service.ask("POST", "/queue/resume", json={})
 
 
 def record(service: RunningService, seconds: float, found: Measured) -> tuple[list[float], int]:
-    """Records an experiment of some length; one that ends before its end is noted, and measured as far as it came."""
+    """Records an experiment of some length; one that ends early is noted, and measured as far as it came."""
     ended = service.ended("experiments", service.submit(sway(seconds)))
     if ended["state"] != "done":
         found.endings.append(f"{ended['state']}: {ended['reason']}")
@@ -105,7 +107,7 @@ def record(service: RunningService, seconds: float, found: Measured) -> tuple[li
 
 
 class ProcessorTime:
-    """Processor time of processes by name, and of everything else on this machine, from now on."""
+    """Processor time of processes by name, and of everything else on this machine, since its creation."""
 
     def __init__(self, processes: dict[str, Sequence[int]]) -> None:
         self._processes = processes
@@ -113,7 +115,7 @@ class ProcessorTime:
         self._before = self._now()
 
     def shares(self) -> dict[str, float]:
-        """Shares of one core since the beginning."""
+        """Returns shares of one core since the beginning."""
         seconds = time.monotonic() - self._begun
         shares = {name: (now - self._before[name]) / seconds for name, now in self._now().items()}
         return shares | {OTHERS: max(0.0, shares[OTHERS] - sum(shares.values()) + shares[OTHERS])}
@@ -124,29 +126,29 @@ class ProcessorTime:
 
 
 def _machine_time() -> float:
-    """Time (s) that all cores of this machine were busy."""
+    """Returns the time (s) that all cores of this machine were busy."""
     user, nice, system, _idle, _waiting, *interrupts = map(int, Path("/proc/stat").read_text("utf-8").split()[1:9])
     return (user + nice + system + sum(interrupts)) / os.sysconf("SC_CLK_TCK")
 
 
 def _processor_time(process: int) -> float:
-    """Processor time (s) of all threads of a process."""
+    """Returns the processor time (s) of all threads of a process."""
     fields = Path(f"/proc/{process}/stat").read_text("utf-8").rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def stop(line: http.client.HTTPConnection) -> tuple[float, bool]:
-    """When the stop was asked for, and whether the board confirmed it."""
+    """Returns the time of the stop request, and whether the board confirmed it."""
     at = time.monotonic()
     line.request("POST", f"{API}/stop")
     return at, bool(json.loads(line.getresponse().read())["confirmed"])
 
 
 def stop_again_and_again(service: RunningService, control: MockControl, times: int, found: Measured) -> None:
-    """Stops experiments while they are recorded, at moments that have nothing to do with the control period.
+    """Stops experiments while they are recorded, at times that are unrelated to the control period.
 
-    Through the service's own door, on a connection that is open already, and through the stop listener's beside it,
-    which hangs up after every stop.
+    Requests go through the service's own door, on an open connection, and through the stop listener's, which hangs up
+    after every stop.
     """
     random, where = dice(1991), urlsplit(service.url)
     assert where.port is not None
@@ -185,8 +187,8 @@ def fits(service: RunningService, trace: str) -> Iterator[None]:
     while not fitting(service):
         time.sleep(0.1)
     yield
-    for number in reversed(queued):  # one that waits first, or it would begin
-        service.robot.post(f"/jobs/{number}/cancel")  # a 409 says that it has ended
+    for number in reversed(queued):  # a waiting one first, or it would begin
+        service.robot.post(f"/jobs/{number}/cancel")  # a 409 means that it has ended
 
 
 def fitting(service: RunningService) -> bool:
@@ -195,7 +197,7 @@ def fitting(service: RunningService) -> bool:
 
 
 def measure(seconds: float, stops: int) -> Measured:
-    """Everything, in one go."""
+    """Measures everything in one run."""
     found = Measured()
     with (
         tempfile.TemporaryDirectory() as name,
@@ -229,7 +231,7 @@ def measure(seconds: float, stops: int) -> Measured:
 
 
 def figures_of(found: Measured) -> list[Figure]:
-    """The table."""
+    """Returns the table."""
     idle, loaded = (1e3 * quantile(times, 0.99) for times in (found.idle, found.loaded))
     lost, count = found.lost
     seen = found.seen
@@ -278,7 +280,7 @@ def figures_of(found: Measured) -> list[Figure]:
 
 
 def main() -> int:
-    """The exit code: 1 when a target was missed."""
+    """Returns the exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks service_load", description=__doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help="length of each of the two recordings")
     parser.add_argument("--stops", type=int, default=60)

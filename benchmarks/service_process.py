@@ -1,4 +1,4 @@
-"""A service as a process of its own on a mock outside it: what the measurements of the service share."""
+"""Runs a service as a separate process on a separate mock, for the measurements of the service."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ ROBOT = "ma2000"
 ANSWER_WITHIN = 100.0
 END_WITHIN = 15.0
 LONGEST_START = 90.0
-"""Time (s) within which a queued experiment is being recorded, with its move to the start."""
+"""Time (s) within which a queued experiment is being recorded, including its move to the start."""
 ENDS = ("done", "failed", "cancelled", "interrupted")
 COMMAND = (sys.executable, "-c", "from daq_cli import main; main()")
 
 
 @dataclass
 class RunningService:
-    """A service that answers at `url`; `robot` speaks to its robot's part of the API."""
+    """A service that answers at `url`; `robot` accesses its robot's part of the API."""
 
     process: subprocess.Popen[bytes]
     url: str
@@ -36,21 +36,21 @@ class RunningService:
     robot: httpx.Client
 
     def ask(self, method: str, path: str, **request: Any) -> Any:
-        """The answer's JSON. Raises RuntimeError for anything but a 2xx."""
+        """Returns the answer's JSON. Raises RuntimeError for anything but a 2xx."""
         answer = self.robot.request(method, path, **request)
         if not answer.is_success:
             raise RuntimeError(f"{method} {path}: {answer.status_code} {answer.text}")
         return answer.json() if answer.content else None
 
     def reset(self) -> None:
-        """Ends the stop that is in force. Raises RuntimeError as `ask` does."""
+        """Ends the active stop. Raises RuntimeError as `ask` does."""
         address = str(self.robot.base_url).rstrip("/")
         while (found := self.ask("GET", address))["stop"] is None and found["arm"] != "disconnected":
-            time.sleep(0.02)  # the owner of the port has yet to read its number
+            time.sleep(0.02)  # the owner of the port has yet to read its ID
         self.ask("POST", "/reset", json={"stop": found["stop"] or 0})
 
     def submit(self, spec: dict[str, Any]) -> str:
-        """Queues an experiment; its number."""
+        """Queues an experiment; returns its ID."""
         return str(self.ask("POST", "/experiments", json={"spec": spec})["id"])
 
     def ended(self, kind: str, number: str) -> dict[str, Any]:
@@ -61,7 +61,7 @@ class RunningService:
                 return found
 
     def until_recording(self, number: str) -> None:
-        """Waits until the record of an experiment has begun. Raises RuntimeError when it ends before, or never does."""
+        """Waits until the record of an experiment has begun. Raises RuntimeError if it ends before, or never begins."""
         give_up = time.monotonic() + LONGEST_START
         while True:
             found = self.ask("GET", f"/experiments/{number}", params={"wait": 0.1})
@@ -80,7 +80,9 @@ class RunningService:
 
 @contextlib.contextmanager
 def started_service(folder: Path, port: str) -> Iterator[RunningService]:
-    """`daq serve`, once it answers, ended with the block; it keeps everything in `folder`, its log too."""
+    """Yields `daq serve`, once it answers, and ends it with the block; all its files, including its log, are in
+    `folder`.
+    """
     command = [*COMMAND, "--port", port, "serve", "--port", "0"]
     with (
         (folder / "service.log").open("ab") as log,
@@ -104,24 +106,24 @@ def started_service(folder: Path, port: str) -> Iterator[RunningService]:
 
 
 def ramp(amplitude: float = 0.1, duration: float = 0.5) -> dict[str, Any]:
-    """A short experiment on joints 1 to 3."""
+    """Returns a short experiment on joints 1 to 3."""
     trajectory = {"kind": "ramp", "amplitude": amplitude, "duration": duration}
     return {"trajectory": trajectory, "joints": [1, 2, 3], "settle": 0.1, "hold": 0.1}
 
 
 def sway(seconds: float) -> dict[str, Any]:
-    """An experiment that keeps three joints moving."""
+    """Returns an experiment that keeps three joints moving."""
     trajectory = {"kind": "sine", "amplitude": 0.1, "period": 4.0, "cycles": seconds / 4.0}
     return {"trajectory": trajectory, "joints": [1, 2, 3], "settle": 0.2, "hold": 0.2}
 
 
 def dice(seed: int) -> random.Random:
-    """Random moments that are the same in every run."""
+    """Returns random times that are the same in every run."""
     return random.Random(seed)
 
 
 def child(process: int, mark: bytes) -> int:
-    """The child of a process whose command line has this in it. Raises RuntimeError when there is none."""
+    """Returns the child of a process with this in its command line. Raises RuntimeError without one."""
     found = next(children(process, mark), None)
     if found is None:
         raise RuntimeError(f"process {process} has no child with {mark!r} in its command line")
@@ -129,7 +131,7 @@ def child(process: int, mark: bytes) -> int:
 
 
 def children(process: int, mark: bytes) -> Iterator[int]:
-    """The children of a process whose command lines have this in them, in the order in which they began."""
+    """Yields the children of a process with this in their command lines, in the order of their start."""
     for thread in Path(f"/proc/{process}/task").iterdir():
         for number in (thread / "children").read_text("utf-8").split():
             if mark in Path(f"/proc/{number}/cmdline").read_bytes():

@@ -1,11 +1,11 @@
-"""Samples a second on slow lines: what the host asks for, and what comes, on a line that takes its time.
+"""Measures samples per second on slow lines: requested and received, on a line with real transmission times.
 
     python -m benchmarks slow_lines
 
-The mock emulates the line behind a real pseudo-terminal, in real time: ten bits a byte, bytes of one direction one
-after the other. Every sample comes with a set point for each of its joints. A figure is met when every n-th period was
-delivered, evenly. Samples that came late, after the time to the next one, are told: a busy machine makes some. (In
-lock-step the host's requests to let time pass would take their time on the line as well.)
+The mock emulates the line behind a real pseudo-terminal, in real time: ten bits per byte, bytes of one direction one
+after the other. Every sample comes with a set point for each of its joints. A target is met if every n-th period was
+delivered, evenly. Late samples, after the time of the next one, are reported: a busy machine causes some. (In lock-step
+the host's requests to advance time would also take time on the line.)
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ JOINTS = ((1,), (1, 2, 3), (1, 2, 3, 4, 5, 6))
 
 
 def measured(controller: Controller, joints: tuple[int, ...], samples: int) -> tuple[LineRate, list[int], int]:
-    """The rate that was promised, the ticks that came, and how many of their samples were late."""
+    """Returns the promised rate, the received ticks, and the number of late samples."""
     rate = controller.line_rate(joints, joints)
     snapshot = controller.next_snapshot(joints=joints)
     here = snapshot.set_points
@@ -36,7 +36,7 @@ def measured(controller: Controller, joints: tuple[int, ...], samples: int) -> t
 
 
 def figure(baud: int, url: str, joints: tuple[int, ...], samples: int) -> Figure:
-    """One line of the table."""
+    """Returns one line of the table."""
     with Controller.connect(f"{url}&baud={baud}") as controller:
         rate, ticks, late = measured(controller, joints, samples)
         per_second = (len(ticks) - 1) / ((ticks[-1] - ticks[0]) * controller.period_s)
@@ -52,7 +52,7 @@ def figure(baud: int, url: str, joints: tuple[int, ...], samples: int) -> Figure
 
 
 def main() -> int:
-    """The exit code: 1 when a promised rate was not kept."""
+    """Returns the exit code: 1 when a promised rate was not kept."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks slow_lines", description=__doc__)
     parser.add_argument("--samples", type=int, default=100, help="samples at each rate")
     parser.add_argument("--quick", action="store_true", help="20 samples")

@@ -1,4 +1,4 @@
-"""Start-up of the command line, `daq --help`, beside a Python that does nothing; and of the service.
+"""Measures the start-up of the command line, `daq --help`, beside a Python that does nothing; and of the service.
 
 python -m benchmarks startup
 """
@@ -23,7 +23,7 @@ SERVICE_TARGET_S = 1.0
 
 
 def fastest(command: list[str], repeats: int) -> float:
-    """Shortest wall time (s) of a command: what it takes when nothing else is in the way."""
+    """Returns the shortest wall time (s) of a command: that without disturbance by other programs."""
     times = []
     for _ in range(repeats):
         begun = time.perf_counter()
@@ -33,7 +33,9 @@ def fastest(command: list[str], repeats: int) -> float:
 
 
 def of_service(folder: Path) -> float:
-    """Processor time (s) of `daq serve` and its stop listener until its first answer. No robot is connected."""
+    """Returns the processor time (s) of `daq serve` and its stop listener until its first answer. No robot is
+    connected.
+    """
     (folder / "daq.toml").write_text("[server]\nconnect_at_start = false\n", "utf-8")
     with started_service(folder, "mock://") as service:
         httpx.get(f"{service.url}/healthz").raise_for_status()
@@ -44,13 +46,13 @@ def of_service(folder: Path) -> float:
 
 
 def least_of_service(repeats: int) -> float:
-    """The least of several starts; the first one makes the database."""
+    """Returns the least of several starts; the first one creates the database."""
     with tempfile.TemporaryDirectory() as folder:
         return min(of_service(Path(folder)) for _ in range(1 + repeats))
 
 
 def main() -> int:
-    """The exit code: 1 when a target was missed."""
+    """Returns the exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks startup", description=__doc__)
     parser.add_argument("--repeats", type=int, default=10)
     parser.add_argument("--quick", action="store_true", help="three repeats")

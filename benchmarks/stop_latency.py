@@ -50,7 +50,7 @@ WITH_START = "by `daq stop`, the start of Python included"
 
 @dataclass
 class Stops:
-    """Latencies (ms) of repeated stops from one place."""
+    """Latencies (ms) of repeated stops of one kind."""
 
     frozen: list[float] = field(default_factory=list)
     used: list[float] = field(default_factory=list)
@@ -70,7 +70,7 @@ def _sample_until_stopped(controller: Controller) -> None:
 
 
 def _host(url: str, parent: Connection) -> None:
-    """The host process. Told "run", it runs until it is stopped; told a number, it stops itself after so many s."""
+    """Runs the host process. On "run", it runs until it is stopped; on a number, it stops itself after so many s."""
     with Controller.connect(url) as controller, stop_listener(ROBOT) as listener:
 
         def freeze(_cause: str) -> StopAnswer:
@@ -127,7 +127,9 @@ def _by_command(host: Connection, after_s: float, folder: Path) -> tuple[float, 
 
 
 def stop_command(folder: Path, run_process: Callable[..., Any] = subprocess.run) -> int:
-    """The exit code of `daq stop` in a folder of its own, where it finds the robots of this benchmark and no other."""
+    """Runs `daq stop` in a folder of its own, where it finds only the robots of this benchmark; returns its exit
+    code.
+    """
     command = [str(Path(sys.executable).with_name("daq")), "stop"]
     environment = environment_of(folder)
     ended = run_process(command, stdout=subprocess.DEVNULL, check=False, cwd=folder, env=environment)
@@ -136,7 +138,9 @@ def stop_command(folder: Path, run_process: Callable[..., Any] = subprocess.run)
 
 
 def record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
-    """When stop `number` was in the memory and when it was first used (s, monotonic clock). Raises RuntimeError."""
+    """Returns when stop `number` was in the memory and when it was first used (s, monotonic clock). Raises
+    RuntimeError.
+    """
     give_up = time.monotonic() + LONGEST_WAIT_S
     while time.monotonic() < give_up:
         state = control.ask("state")
@@ -148,7 +152,9 @@ def record_of_stop(control: MockControl, number: int) -> tuple[float, float]:
 
 
 def measure(url: str, repeats: int, folder: Path) -> tuple[dict[str, Stops], int, dict[str, int]]:
-    """Stops by thread, socket and command, in `folder`; repetitions the host needed; lateness of the mock."""
+    """Measures stops by thread, socket and command, in `folder`; returns also the host's retries and the mock's
+    lateness.
+    """
     dice = random.Random(1991)
     ways: list[tuple[str, Callable[[Connection, float, Path], tuple[float, bool]], int]] = [
         ("by a thread", _by_thread, repeats),
@@ -179,7 +185,7 @@ def measure(url: str, repeats: int, folder: Path) -> tuple[dict[str, Stops], int
 
 
 def figures_of(line: str, results: dict[str, Stops], retries: int, clock: dict[str, int]) -> list[Figure]:
-    """The table's rows of one line."""
+    """Returns the table's rows of one line."""
     rows = []
     for where, stops in results.items():
         for what, times, target in (
@@ -207,7 +213,7 @@ def figures_of(line: str, results: dict[str, Stops], retries: int, clock: dict[s
 
 
 def main() -> int:
-    """The exit code: 1 when a target was missed."""
+    """Returns the exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks stop_latency", description=__doc__)
     parser.add_argument("--repeats", type=int, default=300, help="stops of each kind")
     parser.add_argument("--quick", action="store_true", help="30 stops of each kind")

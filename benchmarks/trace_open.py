@@ -1,4 +1,4 @@
-"""Traces: how large an hour is, what recording costs, and how long opening into numpy takes, the first time and again.
+"""Measures traces: the size of an hour, the cost of recording, and the time of opening into numpy, first and again.
 
 python -m benchmarks trace_open
 """
@@ -34,7 +34,7 @@ ROWS_A_SYNC = round(RATE * SYNC_INTERVAL)
 
 
 def rows(minutes: float, joints: int) -> list[SampleRow]:
-    """Sines with the noise and the rounding of a 12-bit sensor, a few degrees behind their set points."""
+    """Returns sines with the noise and the rounding of a 12-bit sensor, a few degrees behind their set points."""
     rng = np.random.default_rng(1)
     count = round(minutes * 60 * RATE)
     time_s = np.arange(count)[:, None] / RATE
@@ -91,14 +91,14 @@ def measure(folder: Path, minutes: float, joints: int) -> list[Figure]:
 
 
 def timed(path: Path) -> float:
-    """Time (s) of one opening; the page cache is warm, as after the recording."""
+    """Returns the time (s) of one opening; the page cache is warm, as after the recording."""
     begun = time.perf_counter()
     read_trace(path)
     return time.perf_counter() - begun
 
 
 def main() -> int:
-    """The exit code: 1 when a target was missed."""
+    """Returns the exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks trace_open", description=__doc__)
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--quick", action="store_true", help="six minutes")

@@ -29,14 +29,14 @@ from firmware_protocol.wide import WideGains, WideReading, WideStopped
 
 AXES, COUNTS, PERIOD_US, P_GAIN = 2, 4096, 1000, 2
 LONGEST = 200
-"""Bytes of a line; more without an end are thrown away."""
+"""Bytes of a line; longer lines without an end are discarded."""
 STATE = re.compile(rb"P (\d{1,9}) ([RHO])((?: -?\d{1,6}){6})")
 ABOUT = re.compile(rb"V STAGE 2 (SIM|HW)")
 
 
 @dataclass
 class _Job:
-    """A request under way, and whether the second step of a release has been written."""
+    """A request in progress, and whether the second step of a release has been written."""
 
     sequence: int
     request: Request
@@ -56,7 +56,7 @@ class _Axis:
 
 
 class LineStageDialect:
-    """The methods of `LinkDialect`. `numbers` are those that the port's URL has in `ids`: 1,2."""
+    """The methods of `LinkDialect`. `numbers` are those of `ids` in the port's URL: 1,2."""
 
     def __init__(self, numbers: Sequence[int]) -> None:
         if tuple(numbers) != (1, 2):
@@ -71,7 +71,7 @@ class LineStageDialect:
         self._stopped, self._stops, self._tick = False, 0, 0
 
     def encode(self, sequence: int, request: Request) -> bytes:
-        """The lines of a request's first step; each ends by asking for the state."""
+        """Returns the lines of a request's first step; each ends with a request for the state."""
         match request:
             case Hello():
                 self._tick, self._simulated, before = 0, None, b"V?\r"
@@ -82,13 +82,17 @@ class LineStageDialect:
             case Sample() | ReadStatus() | Release() | ReportGains():
                 before = b""
             case _:
-                raise ProtocolError(f"{type(request).__name__}: the stage is only read, moved, stopped and released")
+                raise ProtocolError(
+                    f"{type(request).__name__}: the stage can only be read, moved, stopped and released"
+                )
         self.forget(sequence)
         self._jobs = [*self._jobs[-15:], _Job(sequence, request, self._stops)]
         return before + b"P?\r"
 
     def again(self, request: Request, frame: bytes) -> bytes:
-        """Of set points from before a stop nothing but the question: after its release the stage would take them."""
+        """Returns only the state request for set points from before a stop: after its release the stage would use
+        them.
+        """
         for job in self._jobs:
             if job.request is request:
                 job.freed = False
@@ -97,27 +101,27 @@ class LineStageDialect:
         return frame
 
     def feed(self, data: bytes) -> list[tuple[int, Reply]]:
-        """The replies that whole lines complete."""
+        """Returns the replies that whole lines complete."""
         *lines, self._rest = (self._rest + data).split(b"\r")
         if len(self._rest) > LONGEST:
             self._rest, self.damaged = b"", self.damaged + 1
         return [reply for line in lines for reply in self._heard(line)]
 
     def forget(self, sequence: int) -> None:
-        """A request that has been given up takes no further step."""
+        """Drops a request that has been given up; it takes no further step."""
         self._jobs = [job for job in self._jobs if job.sequence != sequence]
 
     def answer(self) -> bytes:
-        """The second step of a release, when the first has been answered."""
+        """Returns the second step of a release, when the first has been answered."""
         written, self._next = self._next, b""
         return written
 
     def farewell(self) -> bytes:
-        """Nothing: the stage has no watch for a silent line, and holds its last goals."""
+        """Returns nothing: the stage does not react to a silent line, and holds its last goals."""
         return b""
 
     def reset(self) -> None:
-        """Forgets what was under way."""
+        """Drops requests in progress."""
         self._jobs.clear()
         self._rest = self._next = b""
 
@@ -134,7 +138,7 @@ class LineStageDialect:
             self._simulated = about[1] == b"SIM"
             return []
         if line == b"OK" or re.fullmatch(rb"E \d", line):
-            return []  # what P? shows says whether a command was obeyed
+            return []  # the answer to P? shows whether a command was obeyed
         found = STATE.fullmatch(line)
         if found is None:
             self.damaged += 1
@@ -183,11 +187,11 @@ class LineStageDialect:
             why = "its drives are off" if state == b"O" else "the stage is halted until it is released"
             return ExplainedRefusal(request.OPCODE, Refusal.FROZEN, why)
         held = all(axes[axis - 1].goal == goal for axis, goal in request.postures)
-        return SetPointsTaken(tick, flags) if held else None  # an answer to an earlier question: the link asks again
+        return SetPointsTaken(tick, flags) if held else None  # an answer to an earlier request: the link asks again
 
     def _released(self, job: _Job, request: Release, state: bytes) -> Reply | None:
         if request.stop != self._stops:
-            why = f"stop {self._stops} is newer than the one that was to end ({request.stop}), and it holds"
+            why = f"stop {self._stops} is newer than the one to be ended ({request.stop}), and stays active"
             return ExplainedRefusal(request.OPCODE, Refusal.OTHER_STOP, why)
         if not job.freed:
             job.freed, self._next = True, b"G\rP?\r"

@@ -20,21 +20,21 @@ COUNT, STEP, GAIN, FULL = 50e-6, 1e-4, 2, 255
 
 
 class Axis:
-    """A motor with a spindle, and a controller that is proportional alone."""
+    """A motor with a spindle, and a proportional controller."""
 
     def __init__(self, mass: float, friction: float) -> None:
         self.place, self.speed = 0.1, 0.0
         self.mass, self.coulomb = mass + ROTOR * SPINDLE**2, COULOMB * friction
         self.counts = self.encoder()
-        """What the controller has measured in its latest period."""
+        """Measurement of the controller in its latest period."""
         self.goal, self.pwm = self.counts, 0
 
     def encoder(self) -> int:
-        """Counts at this moment."""
+        """Returns counts at present."""
         return math.floor(self.place / COUNT + 0.5)
 
     def period(self, driven: bool) -> None:
-        """A millisecond: the controller measures and acts, then the axis moves."""
+        """Simulates a millisecond: the controller measures and acts, then the axis moves."""
         self.counts = self.encoder()
         self.pwm = max(-FULL, min(FULL, GAIN * (self.goal - self.counts))) if driven else 0
         for _ in range(round(1e-3 / STEP)):
@@ -53,14 +53,14 @@ class Stage:
         self.state, self.ms = "O", 0
 
     def advance_to(self, ms: int) -> None:
-        """Lets its time pass."""
+        """Advances its time."""
         while self.ms < ms:
             self.ms += 1
             for axis in self.axes:
                 axis.period(self.state != "O")
 
     def obey(self, line: bytes) -> bytes:
-        """The answer to a line, without its end."""
+        """Returns the answer to a line, without its end."""
         match line.split():
             case [b"V?"]:
                 return b"V STAGE 2 SIM"

@@ -1,10 +1,10 @@
-"""A pretended linear servo axis that hides two effects: writes CSV records, for the example in docs/one-joint-rig.md.
+"""Simulates a linear servo axis with two hidden effects: writes CSV records, for the example in docs/one-joint-rig.md.
 
     python examples/linear_axis_rig.py FOLDER
 
-A carriage is driven along a sum of sines; the motor's force and the scale's reading are recorded, 250 times a second.
-Its guides rub, and the motor's magnets pull it towards every pole, which the machine file says nothing of. Nothing here
-is shared with the project's models.
+A carriage is driven along a sum of sines; the motor's force and the scale's reading are recorded, 250 times per second.
+Its guides have friction, and the motor's magnets pull it towards every pole; the machine file states neither. It shares
+no code with the project's models.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ STIFFNESS, DAMPING = 3000.0, 250.0
 
 
 def wanted(time: float, seed: int) -> tuple[float, float]:
-    """Desired position (m) and velocity (m/s) of the carriage."""
+    """Returns desired position (m) and velocity (m/s) of the carriage."""
     turns = [(2 * math.pi * rate, size, seed * (k + 1)) for k, (rate, size) in enumerate(WAVES)]
     return (
         sum(size * math.sin(turn * time + phase) for turn, size, phase in turns),
@@ -35,7 +35,7 @@ def wanted(time: float, seed: int) -> tuple[float, float]:
 
 
 def record(seed: int, duration: float = 12.0) -> Iterator[tuple[float, float, float]]:
-    """Rows of time (s), force (N) and measured position (m)."""
+    """Yields rows of time (s), force (N) and measured position (m)."""
     noise = random.Random(seed)
     position, speed = wanted(0.0, seed)[0], 0.0
     for k in range(round(duration / PERIOD)):
@@ -55,7 +55,7 @@ def record(seed: int, duration: float = 12.0) -> Iterator[tuple[float, float, fl
 
 
 def write(folder: Path, seeds: tuple[int, ...] = (1, 2)) -> list[Path]:
-    """One CSV file a seed, each with the TOML that says what its columns cannot."""
+    """Writes one CSV file per seed, each with a TOML file for data that its columns cannot hold."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for seed in seeds:

@@ -1,9 +1,9 @@
-"""A pretended motor bench that hides an effect: writes CSV records, for the example in docs/one-joint-rig.md.
+"""Simulates a motor bench with a hidden effect: writes CSV records, for the example in docs/one-joint-rig.md.
 
     python examples/motor_bench_rig.py FOLDER
 
-A DC motor turns a disc; its volts are a sum of sines, its speed is recorded with noise, its angle is not. Bearings
-rub with a constant torque that the machine file says nothing of. Nothing here is shared with the project's models.
+A DC motor turns a disc; its volts are a sum of sines, its speed is recorded with noise, its angle is not. Bearings have
+a constant friction torque that the machine file does not state. It shares no code with the project's models.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ WAVES = ((0.15, 5.0), (0.4, 2.5), (0.9, 1.7), (2.1, 1.3))
 
 
 def volts(time: float, seed: int) -> float:
-    """Output of the amplifier."""
+    """Returns the output of the amplifier."""
     return sum(size * math.sin(2 * math.pi * rate * time + seed * (k + 1)) for k, (rate, size) in enumerate(WAVES))
 
 
 def record(seed: int, duration: float = 20.0) -> Iterator[tuple[float, float, float]]:
-    """Rows of time (s), drive (V) and measured speed (rad/s)."""
+    """Yields rows of time (s), drive (V) and measured speed (rad/s)."""
     noise = random.Random(seed)
     speed = 0.0
     for k in range(round(duration / PERIOD)):
@@ -44,7 +44,7 @@ def record(seed: int, duration: float = 20.0) -> Iterator[tuple[float, float, fl
 
 
 def write(folder: Path, seeds: tuple[int, ...] = (1, 2)) -> list[Path]:
-    """One CSV file a seed, each with the TOML that says what its columns cannot."""
+    """Writes one CSV file per seed, each with a TOML file for data that its columns cannot hold."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for seed in seeds:

@@ -1,4 +1,4 @@
-"""How alike are runs? The same ramp again and again through the service, and what differs from run to run.
+"""Measures repeatability: runs the same ramp repeatedly through the service, and reports the spread between runs.
 
     python examples/repeatability.py http://127.0.0.1:8300 --runs 5 --folder traces
 
@@ -16,7 +16,7 @@ from daq.contracts.experiment import ExperimentSpec, Ramp
 
 
 def run_once(robot: Robot, spec: ExperimentSpec, folder: Path) -> dict[int, float]:
-    """One run; overshoot in degrees by joint. Raises SystemExit when it was not completed."""
+    """Does one run; returns the overshoot in degrees by joint. Raises SystemExit if it was not completed."""
     ended = robot.experiments.wait(robot.experiments.submit(spec).id)
     if ended.state != "done" or ended.trace is None:
         raise SystemExit(f"experiment {ended.id} {ended.state}: {ended.reason}")

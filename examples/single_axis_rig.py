@@ -1,10 +1,10 @@
-"""A pretended single-axis rig: writes CSV traces as a test bench would, for the example in docs/own-machine.md.
+"""Simulates a single-axis rig: writes CSV traces as a test bench would, for the example in docs/own-machine.md.
 
     python examples/single_axis_rig.py FOLDER [paddle]
 
-With a paddle at its end the arm is dragged by the air (docs/own-effect.md).
-The arm hangs in the plane of gravity (0 straight down) and is moved by a PID at 200 Hz. Nothing here is shared with the
-project's models: the equation of motion is written out and integrated on its own.
+With a paddle at its end the air drags the arm (docs/own-effect.md). The arm hangs in the plane of gravity (0 straight
+down) and is moved by a PID at 200 Hz. It shares no code with the project's models: the equation of motion is written
+out and integrated here.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ PADDLE = 0.015
 
 
 def wanted(time: float, seed: int) -> float:
-    """Set point (rad): from rest, a sum of three sines that starts and ends gently."""
+    """Returns the set point (rad): from rest, a sum of three sines that starts and ends gently."""
     if time < 0.5:
         return 0.0
     t = time - 0.5
@@ -35,7 +35,7 @@ def wanted(time: float, seed: int) -> float:
 
 
 def record(seed: int, drag: float = 0.0, duration: float = 9.0) -> Iterator[tuple[float, float, float, float]]:
-    """Rows of time, set point, position, drive (V), one a control period."""
+    """Yields rows of time, set point, position, drive (V), one per control period."""
     noise = random.Random(seed)
     angle = speed = volts = last = 0.0
     inertia = TRUE["mass"] * TRUE["length"] ** 2 / 3 + TRUE["inertia"]
@@ -61,7 +61,7 @@ def record(seed: int, drag: float = 0.0, duration: float = 9.0) -> Iterator[tupl
 
 
 def write(folder: Path, drag: float = 0.0, seeds: tuple[int, ...] = (1, 2)) -> list[Path]:
-    """One CSV file a seed, each with the TOML that says what its columns cannot."""
+    """Writes one CSV file per seed, each with a TOML file for data that its columns cannot hold."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for seed in seeds:

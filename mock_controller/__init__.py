@@ -1,4 +1,6 @@
 import os
 
 os.environ.setdefault("MUJOCO_GL", "disable")
-"""Nothing is drawn here. Else MuJoCo loads a library for windows when it is imported, a sixth of the mock's start."""
+"""Turns off MuJoCo's graphics: the mock draws nothing, and loading the library for windows takes a sixth of its
+start.
+"""

@@ -1,7 +1,7 @@
-"""The commands of the control port, by which a test, a benchmark or a person controls the mock unseen by the host.
+"""Commands of the control port, by which a test, a benchmark or a person controls the mock unseen by the host.
 
-One JSON object per line in, one per line out: `{"do": "counts"}` → `{"ok": true, …}`; a failure is answered by
-`{"ok": false, "error": "…"}` and changes nothing.
+One JSON object per line in, one per line out: `{"do": "counts"}` → `{"ok": true, …}`. An error is answered by `{"ok":
+false, "error": "…"}` and changes nothing.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ _ENDS = ("low", "high")
 
 
 class ControlError(ValueError):
-    """A command that cannot be understood."""
+    """An invalid command."""
 
 
 class Process(Protocol):
-    """What the control port can do to the process and its line."""
+    """Methods of the process and its line for the control port."""
 
     def disconnect(self, seconds: float | None) -> None:
-        """Cuts the line; it comes back after `seconds` of the host's clock, or only by `reconnect`."""
+        """Cuts the line; restores it after `seconds` of the host's clock, or only by `reconnect`."""
         ...
 
     def reconnect(self) -> None:
@@ -43,7 +43,7 @@ class Process(Protocol):
         ...
 
     def clock(self) -> Answer:
-        """The relation of board time and the host's clock."""
+        """Returns the relation of board time and the host's clock."""
         ...
 
     def lost_bytes(self) -> int:
@@ -77,7 +77,7 @@ class Control:
         }
 
     def execute(self, line: bytes) -> bytes:
-        """The answer to one line, newline included."""
+        """Returns the answer to one line, newline included."""
         try:
             request = json.loads(line)
             answer = {"ok": True, **self._command(request)(request)}
@@ -100,7 +100,7 @@ class Control:
         return {"commands": {name: (command.__doc__ or "").strip() for name, command in self._commands.items()}}
 
     def _state(self, _: Answer) -> Answer:
-        """Board, set points, gains, the latest stop, the arm, the clock."""
+        """Returns board, set points, gains, the latest stop, the arm, the clock."""
         board = self._device.board
         memory = board.memory
         columns = [memory.values(name) for name in ("gain_p", "gain_i", "gain_d")]
@@ -123,7 +123,7 @@ class Control:
         }
 
     def _counts(self, _: Answer) -> Answer:
-        """Injected faults by name and direction, and what bridge and board have counted."""
+        """Returns injected faults by name and direction, and the counts of bridge and board."""
         bridge, link = self._device.bridge, self._device.link
         return {
             "faults": self._device.faults.counts(),
@@ -137,7 +137,7 @@ class Control:
         }
 
     def _snapshots(self, request: Answer) -> Answer:
-        """Periods after tick "after" (0) that the ring still keeps, as the board recorded them."""
+        """Returns periods after tick "after" (0) that the ring still keeps, as the board recorded them."""
         after = request.get("after", 0)
         if isinstance(after, bool) or not isinstance(after, int):
             raise ControlError('"after": the number of a tick is needed')
@@ -153,11 +153,11 @@ class Control:
         return {"ended": self._device.faults.switch_off(_word(request, "fault"))}
 
     def _fault_list(self, _: Answer) -> Answer:
-        """Faults that are switched on."""
+        """Returns the active faults."""
         return {"faults": self._device.faults.listing()}
 
     def _modifications(self, _: Answer) -> Answer:
-        """Hidden physical effects that this mock was started with; those of a secret arm are not listed."""
+        """Returns hidden physical effects with which this mock was started; those of a secret arm are not listed."""
         return {"modifications": list(self._device.modifications)}
 
     def _brown_out(self, _: Answer) -> Answer:
@@ -165,7 +165,7 @@ class Control:
         return self._fault_on({"fault": "brown_out"})
 
     def _inputs(self, request: Answer) -> Answer:
-        """Puts bits on the process inputs: "bits": 0 to 255."""
+        """Sets the process inputs: "bits": 0 to 255."""
         bits = request.get("bits")
         if isinstance(bits, bool) or not isinstance(bits, int):
             raise ControlError('"bits": a whole number from 0 to 255 is needed')
@@ -173,8 +173,9 @@ class Control:
         return {"bits": bits}
 
     def _emergency_stop(self, request: Answer) -> Answer:
-        """Presses the emergency stop ("pressed": true) or releases it: the drives lose their power, and a hand holds
-        the arm where the answer's "degrees" have it."""
+        """Presses the emergency stop ("pressed": true) or releases it. The drives lose their power, and a hand holds
+        the arm at the answer's "degrees".
+        """
         pressed = request.get("pressed")
         if not isinstance(pressed, bool):
             raise ControlError('"pressed": true or false is needed')
@@ -184,8 +185,9 @@ class Control:
         return {"pressed": pressed, "degrees": {joint: math.degrees(angle) for joint, angle in held}}
 
     def _hand(self, request: Answer) -> Answer:
-        """Leads joints by hand while the emergency stop is pressed: "to": {joint: angle in degrees, or "low" or "high"
-        for an end stop}, "seconds"."""
+        """Moves joints by hand while the emergency stop is pressed: "to": {joint: angle in degrees, or "low" or "high"
+        for an end stop}, "seconds".
+        """
         to, seconds = request.get("to"), request.get("seconds", 0.0)
         if not isinstance(to, dict) or not all(key in _JOINTS and _is_place(value) for key, value in to.items()):
             raise ControlError('"to": degrees by joint are needed, as in {"1": 90}, or "low" or "high" for an end stop')
@@ -200,11 +202,11 @@ class Control:
         return {"to": {str(joint): math.degrees(angle) for joint, angle in angles.items()}, "seconds": seconds}
 
     def _written(self, _: Answer) -> Answer:
-        """How often the host has written to each address."""
+        """Returns how often the host has written to each address."""
         return {"written": {f"{address:04X}": count for address, count in sorted(self._device.board.written.items())}}
 
     def _disconnect(self, request: Answer) -> Answer:
-        """Cuts the line: "seconds" of the clock until it is back (without: until reconnect)."""
+        """Cuts the line: "seconds" of the clock until it is restored (without: until reconnect)."""
         seconds = request.get("seconds")
         if seconds is not None and not (_is_number(seconds) and seconds >= 0):
             raise ControlError('"seconds": a number from 0 on, or nothing, is needed')

@@ -20,7 +20,7 @@ from mock_controller.plant import default_plant
 
 
 def main(arguments: list[str]) -> int:
-    """Prints d′ of every seed; the exit code."""
+    """Prints d′ of every seed; returns the exit code."""
     given = _parser().parse_args(arguments)
     try:
         arms = [draw_arm(seed) for seed in given.seeds]
@@ -41,14 +41,14 @@ def main(arguments: list[str]) -> int:
 def load_tangents(
     load: Load, experiment: Experiment, priors: Priors = "stated", processes: int = 1, cache: Path | None = None
 ) -> Tangents:
-    """Tangents of the tolerance parameters for the arm of the data files with one of its loads."""
+    """Returns tangents of the tolerance parameters for the arm of the data files with one of its loads."""
     return tangents(loaded(default_plant(), load), default_board(), experiment, priors, processes, cache)
 
 
 def detectability(arm: HiddenArm, experiment: Experiment, known: Tangents, refits: int = MOST_REFITS) -> dict[str, Any]:
-    """d′ of all effects of an arm together (0 for a clean one), and of each while the others act.
+    """Returns d′ of all effects of an arm together (0 for a clean one), and of each while the others act.
 
-    With several effects, d′ of all together is the tangents' estimate alone, because no decision depends on it.
+    With several effects, d′ of all together is only the tangents' estimate, because no decision depends on it.
     """
     plant, board = default_plant(), default_board()
     if not arm.effects:
@@ -102,7 +102,7 @@ def _parser() -> argparse.ArgumentParser:
         "--priors",
         choices=("stated", "drawn"),
         default="stated",
-        help="deviations that the refit expects: those stated to others, or those that arms are drawn with",
+        help="deviations that the refit expects: those stated to others, or those from which arms are drawn",
     )
     parser.add_argument("--refits", type=int, default=MOST_REFITS, help=f"({MOST_REFITS})")
     parser.add_argument("--processes", type=int, default=1, help="for the tangents (1)")

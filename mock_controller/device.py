@@ -37,10 +37,9 @@ class Device:
 
 
 def build_device(options: Options, disconnect: Callable[[float], None]) -> Device:
-    """Arm, board and bridge as the options say, at board time 0, with the faults switched on.
+    """Builds arm, board and bridge from the options, at board time 0, with the faults switched on.
 
-    `disconnect` cuts the line for a number of seconds. Raises ValueError with one clear line for options that cannot
-    be met.
+    `disconnect` cuts the line for a number of seconds. Raises ValueError with one clear line for invalid options.
     """
     parameters = _board_parameters(options)
     plant_parameters = _plant_parameters(options)
@@ -85,7 +84,7 @@ def _board(
     modifications: tuple[Modification, ...],
     arm_seed: int | None,
 ) -> Board:
-    """The board; with a secret memory, `memory_map` is only what the bridge has been told."""
+    """Returns the board; with a secret memory, `memory_map` is only the bridge's."""
     told = _memory_map(options)
     if options.secret_map is None:
         if told.absent:
@@ -104,7 +103,7 @@ def _board(
 
 
 def _first_number(options: Options) -> int:
-    """Where the numbers of sessions and stops begin: in lock-step by the seed, so that a run repeats to the bit."""
+    """Returns the first ID of sessions and stops: in lock-step from the seed, so that a run repeats exactly."""
     return (Random(f"bridge {options.seed}") if options.lock_step else SystemRandom()).getrandbits(32)
 
 

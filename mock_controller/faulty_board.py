@@ -1,4 +1,4 @@
-"""What faults may do to the board, the arm on it and the line to it."""
+"""Actions of faults on the board, its arm and its line."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Callable
 from mock_controller.board.board import Board
 
 _HELD_US = 10
-"""Time (µs) for which the memory is held around the moment of a fetch."""
+"""Time (µs) for which the memory is held around a fetch."""
 
 
 class FaultyBoard:
-    """A board as the faults see it. `disconnect` cuts the line for a number of seconds of the host's clock."""
+    """A board for the faults. `disconnect` cuts the line for a number of seconds of the host's clock."""
 
     def __init__(self, board: Board, disconnect: Callable[[float], None]) -> None:
         self._board = board
@@ -31,7 +31,7 @@ class FaultyBoard:
         self._board.brown_out()
 
     def stall_joint(self, joint: int) -> None:
-        """Jams a joint where it is."""
+        """Jams a joint at its present angle."""
         self._board.plant.stall(joint)
 
     def free_joint(self, joint: int) -> None:

@@ -47,11 +47,11 @@ class LockStepPace:
         self._link.hang_up()
 
     def receive(self, data: bytes) -> None:
-        """Takes what the host has sent."""
+        """Accepts bytes from the host."""
         self._pieces.extend(self._splitter.feed(data))
 
     def timeout_s(self) -> float | None:
-        """Time (s) until there is work: none, or until the host sends something."""
+        """Returns the time (s) until there is work: none, or until the host sends something."""
         return 0.0 if self._in_turn or self._pieces else None
 
     def work(self) -> bytes:

@@ -1,4 +1,4 @@
-"""Options of the mock: from the command line, or under the same names from a TOML file."""
+"""Options of the mock, from the command line, or under the same names from a TOML file."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Gain = Annotated[int, Field(ge=0, le=GAIN_MAX)]
 
 
 class OptionsError(ValueError):
-    """An invalid option; the message is one line that says which and what is allowed."""
+    """An invalid option; the message is one line that names it and the allowed values."""
 
 
 class Options(BaseModel):
-    """Everything about one mock that can be chosen."""
+    """All options of one mock."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -51,10 +51,11 @@ class Options(BaseModel):
 
 
 def read_options(arguments: list[str], *, listens: bool = True) -> Options:
-    """Options from command-line arguments and the file that `--config` names; arguments win, lists are joined. One that
-    `listens` needs an address.
+    """Returns options from command-line arguments and the file of `--config`; arguments win, lists are joined.
 
-    Raises OptionsError; `--help` prints and leaves (SystemExit).
+    Options for a mock that `listens` need an address.
+
+    Raises OptionsError; `--help` prints and exits (SystemExit).
     """
     given = vars(_parser().parse_args(arguments))
     if given.pop("help_faults"):
@@ -82,11 +83,11 @@ def read_options(arguments: list[str], *, listens: bool = True) -> Options:
         where = " ".join(map(str, first.place)).replace("_", "-")
         raise OptionsError(f"{where}: {first.message.lower()}, is {_shown(first.value)}") from None
     if options.pty and options.tcp:
-        raise OptionsError("pty and tcp: give one of them")
+        raise OptionsError("pty and tcp: give only one of them")
     if listens and not (options.pty or options.tcp):
-        raise OptionsError("nowhere to be reached: give --pty or --tcp HOST:PORT")
+        raise OptionsError("no address: give --pty or --tcp HOST:PORT")
     if options.secret is not None and options.modify:
-        raise OptionsError("secret and modify: give one of them")
+        raise OptionsError("secret and modify: give only one of them")
     if options.link is not None and not options.pty:
         raise OptionsError("link: a name for the pseudo-terminal needs --pty")
     return options
@@ -102,7 +103,7 @@ def _read_file(path: Path) -> dict[str, Any]:
         return {key.replace("-", "_"): value for key, value in tomllib.loads(path.read_text("utf-8-sig")).items()}
     except OSError as error:
         raise OptionsError(f"config: {path}: {error.strerror}") from None
-    except ValueError as error:  # also what is not UTF-8
+    except ValueError as error:  # also for text that is not UTF-8
         raise OptionsError(f"config: {path}: not TOML: {error}") from None
     except RecursionError:
         raise OptionsError(f"config: {path}: is nested too deeply") from None
@@ -127,7 +128,7 @@ def _parser() -> argparse.ArgumentParser:
         argument_default=None,
         allow_abbrev=False,
     )
-    where = parser.add_argument_group("where it is reached (one connection at a time)")
+    where = parser.add_argument_group("address (one connection at a time)")
     where.add_argument("--pty", action="store_true", default=None, help="a pseudo-terminal in raw mode")
     where.add_argument("--link", type=Path, metavar="PATH", help="symbolic link to the pseudo-terminal")
     where.add_argument("--tcp", metavar="HOST:PORT", help="a TCP port; 127.0.0.1:0 takes any free one")
@@ -141,7 +142,7 @@ def _parser() -> argparse.ArgumentParser:
         "--waits",
         action="store_true",
         default=None,
-        help="the board's clock stands still while this process gets no processor; standard output tells how long",
+        help="stop the board's clock while this process gets no processor; standard output reports how long",
     )
 
     time = parser.add_argument_group("time and line")
@@ -149,7 +150,7 @@ def _parser() -> argparse.ArgumentParser:
         "--lock-step",
         action="store_true",
         default=None,
-        help="board time moves only when the host asks; runs repeat to the bit",
+        help="board time moves only when the host asks; runs repeat exactly",
     )
     time.add_argument("--baud", type=int, metavar="N", help="bytes take as long as on a line of N baud (off)")
     time.add_argument(
@@ -164,7 +165,7 @@ def _parser() -> argparse.ArgumentParser:
         dest="compact",
         action="store_false",
         default=None,
-        help="a bridge that does not understand the compact turn for slow lines",
+        help="a bridge that does not support the compact request for slow lines",
     )
 
     machine = parser.add_argument_group("the machine")
@@ -188,7 +189,7 @@ def _parser() -> argparse.ArgumentParser:
         "--secret-map",
         type=int,
         metavar="SEED",
-        help="registers at secret addresses, others between them; --memory-map is then what the bridge believes. "
+        help="registers at secret addresses, others between them; --memory-map is then the bridge's. "
         "python -m mock_controller.reveal --memory-map SEED shows the truth",
     )
     machine.add_argument(
@@ -205,7 +206,7 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     parser.add_argument("--fault", action="append", metavar="NAME:KEY=VALUE,…", help="a fault; may be repeated")
-    parser.add_argument("--help-faults", action="store_true", help="list faults and their parameters, and leave")
-    parser.add_argument("--help-modifications", action="store_true", help="list hidden effects likewise, and leave")
+    parser.add_argument("--help-faults", action="store_true", help="list faults and their parameters, and exit")
+    parser.add_argument("--help-modifications", action="store_true", help="list hidden effects likewise, and exit")
     parser.add_argument("--config", type=Path, metavar="FILE", help="the same options in a TOML file")
     return parser

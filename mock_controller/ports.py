@@ -1,4 +1,4 @@
-"""Where the host finds the mock: a pseudo-terminal or a TCP port, for one connection at a time."""
+"""Addresses of the mock for the host: a pseudo-terminal or a TCP port, for one connection at a time."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ class PortError(ValueError):
 
 
 class Port(ABC):
-    """One way to the mock. Nothing here waits: bytes that the host does not take yet are kept."""
+    """One way to reach the mock. Nothing here waits: bytes that the host does not accept yet are kept."""
 
     def __init__(self) -> None:
         self._unsent = bytearray()
         self.lost = 0
-        """Bytes thrown away because the host did not read."""
+        """Bytes lost because the host did not read."""
 
     @property
     @abstractmethod
     def url(self) -> str:
-        """Address by which the host opens it."""
+        """URL by which the host opens it."""
 
     @property
     @abstractmethod
@@ -42,11 +42,11 @@ class Port(ABC):
     @property
     @abstractmethod
     def _line(self) -> int | None:
-        """File descriptor of the connection, None when there is none."""
+        """File descriptor of the connection, None without one."""
 
     @abstractmethod
     def read(self, readable: int) -> bytes | None:
-        """What has come in on a descriptor that is readable; None when the host has gone."""
+        """Returns the bytes from a readable descriptor; None when the host has gone."""
 
     @abstractmethod
     def cut(self) -> None:
@@ -54,7 +54,7 @@ class Port(ABC):
 
     @abstractmethod
     def restore(self) -> None:
-        """Restores the line. Raises PortError when the address is taken."""
+        """Restores the line. Raises PortError if the address is taken."""
 
     @property
     def waiting_to_write(self) -> list[int]:
@@ -84,7 +84,7 @@ class PtyPort(Port):
     """A pseudo-terminal in raw mode, and perhaps a symbolic link to it.
 
     Its far end is kept open here too, so that it stays raw while hosts come and go. As on a real serial line, nothing
-    tells that a host has gone.
+    shows that a host has gone.
     """
 
     def __init__(self, link: Path | None = None) -> None:
@@ -144,7 +144,7 @@ class PtyPort(Port):
 
 
 class TcpPort(Port):
-    """A listening TCP port; a second host is turned away while one is connected."""
+    """A listening TCP port; a second host is rejected while one is connected."""
 
     def __init__(self, host: str, port: int) -> None:
         super().__init__()
@@ -185,7 +185,7 @@ class TcpPort(Port):
 
     def _accept(self, listener: socket.socket) -> None:
         if self._connection is not None and select.select([self._connection], [], [], 0)[0]:
-            return  # unread input may be the end of the present connection: the next one waits until it is read
+            return  # unread input may include the end of the present connection: the next one waits until it is read
         with contextlib.suppress(BlockingIOError, ConnectionError):
             connection, _ = listener.accept()
             if self._connection is not None:
@@ -214,7 +214,7 @@ class TcpPort(Port):
 
 
 def listen_on(host: str, port: int) -> socket.socket:
-    """A listening socket that does not block. Raises PortError."""
+    """Returns a listening non-blocking socket. Raises PortError."""
     try:
         listener = socket.create_server((host, port))
     except OSError as error:
@@ -224,7 +224,7 @@ def listen_on(host: str, port: int) -> socket.socket:
 
 
 def host_and_port(text: str, option: str) -> tuple[str, int]:
-    """Host and port of `HOST:PORT`. Raises PortError."""
+    """Returns host and port of `HOST:PORT`. Raises PortError."""
     host, colon, port = text.rpartition(":")
     if not colon or not host or not port.isdecimal() or int(port) > 65535:
         raise PortError(f"{option}: {text!r}: write HOST:PORT with a port from 0 to 65535")

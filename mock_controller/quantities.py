@@ -1,7 +1,7 @@
-"""Numbers with a unit and a source, read from the mock's TOML data files.
+"""Reads quantities with unit and source from the mock's TOML data files.
 
-A data file's leaf is `{ value = 0.5, unit = "kg", source = "documented: table 7.9" }`. The reader knows which unit
-it needs, so a file in millimetres or degrees is refused and never silently misread.
+A data file's leaf is `{ value = 0.5, unit = "kg", source = "documented: table 7.9" }`. The reader knows the required
+unit, so a file in millimetres or degrees is rejected and never silently misread.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class DataFileError(ValueError):
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where one number comes from."""
+    """Source of one value."""
 
     name: str
     value: float
@@ -28,7 +28,7 @@ class Provenance:
 
 
 class QuantityReader:
-    """Takes quantities out of one parsed data file; `finish` refuses entries that were not taken."""
+    """Takes quantities from one parsed data file; `finish` rejects entries that were not taken."""
 
     def __init__(self, text: str, origin: str) -> None:
         self._origin = origin
@@ -42,7 +42,7 @@ class QuantityReader:
             raise DataFileError(f"{origin}: is nested too deeply") from None
 
     def take(self, table: str, key: str, unit: str, low: float = -math.inf, high: float = math.inf) -> float:
-        """Value of `[table] key` in `unit`, between `low` and `high`. Raises DataFileError."""
+        """Returns the value of `[table] key` in `unit`, between `low` and `high`. Raises DataFileError."""
         name = f"{table}.{key}"
         section = self._tables.get(table)
         leaf = section.get(key) if isinstance(section, dict) else None
@@ -64,14 +64,14 @@ class QuantityReader:
         return float(value)
 
     def take_int(self, table: str, key: str, unit: str, low: int, high: int) -> int:
-        """As `take`, for a number that must be whole."""
+        """Returns a whole number, as `take` does."""
         value = self.take(table, key, unit, low, high)
         if value != int(value):
             raise DataFileError(f"{self._origin}: {table}.{key}: value is {value}, must be a whole number")
         return int(value)
 
     def finish(self) -> None:
-        """Raises DataFileError for the first table or key that was never taken: a misspelling, most likely."""
+        """Raises DataFileError for the first table or key that was never taken: probably a misspelling."""
         for table, section in self._tables.items():
             if not isinstance(section, dict):
                 raise DataFileError(f"{self._origin}: {table}: is not a table")

@@ -16,20 +16,20 @@ from mock_controller.board.board import Board
 from mock_controller.bridge.link import Link
 
 EVENTS_AT_ONCE = 6
-"""Most controller events (three a period) that are simulated before the host's input is read again."""
+"""Most controller events (three per period) that are simulated before the host's input is read again."""
 LATE_US = 2_000
 """Delay (µs) beyond which a simulated controller event counts as late."""
 
 
 @dataclass
 class Lateness:
-    """How far the simulation fell behind the clock."""
+    """Delay of the simulation behind the clock."""
 
     late_ticks: int = 0
-    """Periods that began in the board more than LATE_US after their moment."""
+    """Periods that began in the board more than LATE_US late."""
     worst_us: int = 0
     waited_us: int = 0
-    """Time for which the board's clock has stood still, since the process was late."""
+    """Time for which the board's clock was stopped because the process was late."""
 
 
 class RealTimePace:
@@ -49,17 +49,17 @@ class RealTimePace:
         self._link.hang_up()
 
     def receive(self, data: bytes) -> None:
-        """Takes what the host has sent: it has arrived now, or, if the board is behind, as early as possible."""
+        """Accepts bytes from the host: they have arrived now, or, if the board is behind, as early as possible."""
         self._move_on()
         self._link.receive(data)
 
     def work(self) -> bytes:
-        """Does what is due; returns the bytes for the host."""
+        """Does all due work; returns the bytes for the host."""
         self._move_on()
         return self._link.take_output()
 
     def timeout_s(self) -> float:
-        """Time (s) until something is due."""
+        """Returns the time (s) until the next event."""
         due = self._board.next_event_us
         event = self._link.next_event_us()
         if event is not None:

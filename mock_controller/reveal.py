@@ -1,8 +1,8 @@
-"""`python -m mock_controller.reveal SEED…`: what the arms of `--secret SEED` hide, one line of JSON each; with
-`--memory-map`, what the memories of `--secret-map SEED` hide, with `--sensors`, the potentiometers of
-`--secret-sensors SEED`, and with `--servos`, what the bench of `daq mock dynamixel --secret SEED` hides.
+"""`python -m mock_controller.reveal SEED…`: prints the secrets of `--secret SEED` arms, one line of JSON each.
 
-For scoring answers after they have been given. Exit code 2 for seeds without a meaning.
+With `--memory-map` it prints those of `--secret-map SEED`, with `--sensors` those of `--secret-sensors SEED`, and with
+`--servos` those of `daq mock dynamixel --secret SEED`. For scoring answers after they have been given. Exit code 2 for
+invalid seeds.
 """
 
 from __future__ import annotations

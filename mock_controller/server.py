@@ -30,9 +30,9 @@ def _clock_us() -> int:
 
 
 class Server:
-    """One mock with its port and control port. `build` makes its parts; tests put another bridge before its board.
+    """One mock with its port and control port. `build` makes its parts; tests replace the bridge.
 
-    Raises ValueError with one clear line for options that cannot be met.
+    Raises ValueError with one clear line for invalid options.
     """
 
     def __init__(
@@ -71,10 +71,10 @@ class Server:
             if self._control is not None:
                 self._control.close()
 
-    # --- what the control port can do
+    # --- actions for the control port
 
     def disconnect(self, seconds: float | None) -> None:
-        """Cuts the line; it comes back after `seconds`, or only by `reconnect`."""
+        """Cuts the line; restores it after `seconds`, or only by `reconnect`."""
         self._port.cut()
         self._pace.hang_up()
         self._back_at = None if seconds is None else time.monotonic() + seconds
@@ -93,7 +93,7 @@ class Server:
         os.kill(os.getpid(), signal.SIGKILL)
 
     def clock(self) -> dict[str, Any]:
-        """The relation of board time and the clock."""
+        """Returns the relation of board time and the clock."""
         if isinstance(self._pace, LockStepPace):
             return {"mode": "lock_step"}
         late = self._pace.lateness
@@ -125,13 +125,13 @@ class Server:
             elif not os.read(_STDIN, 4096):
                 return False
         output = self._pace.work()
-        self._tell_waited()  # before what comes after it
+        self._tell_waited()  # before the work that follows it
         self._port.send(output)
         self._cut_and_restore()
         return True
 
     def _read(self, descriptor: int) -> None:
-        if descriptor not in self._port.watched:  # cut by the control port in this turn
+        if descriptor not in self._port.watched:  # the control port has cut it in this turn
             return
         data = self._port.read(descriptor)
         if data is None:
@@ -158,10 +158,12 @@ class Server:
             self.reconnect()
 
     def _tell_waited(self) -> None:
-        """Tells for how long the board's clock has stood still in all. What the owner has no room for comes later."""
+        """Reports for how long the board's clock was stopped in all. If the owner's pipe is full, it reports later."""
         if isinstance(self._pace, LockStepPace) or self._pace.lateness.waited_us == self._told_us:
             return
-        if not select.select([], [_STDOUT], [], 0)[1]:  # a pipe with room takes a whole line; others share its modes
+        if not select.select([], [_STDOUT], [], 0)[
+            1
+        ]:  # a pipe with room takes a whole line; other kinds share their modes with other programs
             return
         line = json.dumps({"waited_us": self._pace.lateness.waited_us}) + "\n"
         with contextlib.suppress(BrokenPipeError):

@@ -12,6 +12,6 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 """An array of whole numbers."""
 Mask = NDArray[np.bool_]
-"""An array of truth values, such as which samples count."""
+"""An array of truth values, such as a selection of samples."""
 Array = NDArray[Any]
 """An array in compiled code: real numbers, or dual numbers (complex128)."""

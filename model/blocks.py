@@ -1,4 +1,4 @@
-"""A result as data: text, lists, tables and pictures in sections. A terminal, a page and a notebook show the same."""
+"""A result as data: text, lists, tables and pictures in sections. Terminal, page and notebook show the same."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of cells under headings; the first cell of a row names it. `caption` says what the numbers are."""
+    """Rows of cells under headings; the first cell of a row names it. `caption` explains the numbers."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
@@ -47,17 +47,17 @@ class Table:
 
     @property
     def numeric(self) -> tuple[bool, ...]:
-        """Whether each column holds numbers."""
+        """Whether each column contains numbers."""
         return tuple(cell.number for cell in self.rows[0]) if self.rows else (False,) * len(self.head)
 
     def only(self, *heads: str) -> Table:
-        """The columns with these headings, in this order, without the caption: what a terminal has room for."""
+        """Returns the columns with these headings, in this order, without the caption, to fit a terminal."""
         places = [self.head.index(name) for name in heads]
         rows = tuple(tuple(row[place] for place in places) for row in self.rows)
         return replace(self, head=heads, rows=rows, caption="")
 
     def __str__(self) -> str:
-        """The table in columns of spaces."""
+        """Returns the table in columns of spaces."""
         rows = [self.head, *(tuple(cell.text for cell in row) for row in self.rows)]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = []
@@ -67,7 +67,7 @@ class Table:
         return "\n".join(line.rstrip() for line in lines)
 
     def html(self) -> str:
-        """The table for a notebook. Every text is escaped."""
+        """Returns the table as HTML for a notebook. Every text is escaped."""
         rows = ((cell.text for cell in row) for row in self.rows)
         head, body = self._html_row(self.head, "th"), "".join(self._html_row(row, "td") for row in rows)
         return f"<table><thead>{head}</thead><tbody>{body}</tbody></table>"
@@ -81,7 +81,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure as SVG text, and what it shows."""
+    """A figure as SVG text, and its caption."""
 
     svg: str
     caption: str
@@ -100,7 +100,7 @@ class Section:
 
     @property
     def anchor(self) -> str:
-        """Its name in links within the page."""
+        """Its anchor for links within the page."""
         return "".join(c if c.isalnum() else "-" for c in self.title.lower())
 
 
@@ -119,10 +119,10 @@ class Report:
 
 
 def cells(*texts: str, tone: Tone = "plain") -> tuple[Cell, ...]:
-    """A row: its name, then numbers."""
+    """Returns a row: its name, then numbers."""
     return (Cell(texts[0], tone), *numbers(*texts[1:], tone=tone))
 
 
 def numbers(*texts: str, tone: Tone = "plain") -> tuple[Cell, ...]:
-    """Cells that hold numbers."""
+    """Returns cells that contain numbers."""
     return tuple(Cell(t, tone, number=True) for t in texts)

@@ -1,14 +1,14 @@
-"""The place of every number of a model in the flat vector that compiled code reads.
+"""Index of every parameter of a model in the flat vector that compiled code reads.
 
-The vector is `SHARED` numbers of the whole machine, then `PER_JOINT` numbers per joint. Every effect of the library has
-its place; an effect that is not in a model lies at its null value there, where it does nothing.
+The vector is `SHARED` values of the whole machine, then `PER_JOINT` values per joint. Every effect of the library has
+its place; an effect that a model lacks is at its null value there, where it does nothing.
 """
 
 from __future__ import annotations
 
 (
     LOAD,  # kg, a point at the end of the last modelled link
-    PAYLOAD,  # kg beside the load that the machine file knows
+    PAYLOAD,  # kg in addition to the load in the machine file
     GRAVITY_X,  # m/s², base frame
     GRAVITY_Y,
     GRAVITY_Z,
@@ -48,10 +48,10 @@ SHARED = 10
     VOLTS_PER_COUNT,  # V at the motor for a DAC count
     SUPPLY,  # V
     DEAD_ZONE,  # V at the motor
-    THRESHOLD,  # V commanded, from which on the amplifier passes all
+    THRESHOLD,  # V commanded, above which the amplifier passes all
     HEATING,  # relative rise of resistance per A²·s
     COOLING_TIME,  # s
-    TIMED_RISE,  # relative rise of resistance that time alone ends at
+    TIMED_RISE,  # relative rise of resistance over time, its final value
     RISING_TIME,  # s
     VISCOUS,  # N·m·s/rad, motor side
     COULOMB,  # N·m at the joint
@@ -62,14 +62,14 @@ SHARED = 10
     STRIBECK,  # N·m
     STRIBECK_SPEED,  # rad/s
     BREAKAWAY,  # N·m above Coulomb friction
-    DIRECTION,  # N·m, forward less backward
-    VISCOUS_DIRECTION,  # N·m·s/rad, motor side, forward less backward
+    DIRECTION,  # N·m, forward − backward
+    VISCOUS_DIRECTION,  # N·m·s/rad, motor side, forward − backward
     GEAR_LOSS,  # share of the motor's torque
-    GEAR_LOSS_DIRECTION,  # share of the motor's torque, driving less driven
+    GEAR_LOSS_DIRECTION,  # share of the motor's torque, driving − driven
     COMPLIANCE,  # rad/(N·m)
     TRANSMISSION_DAMPING,  # N·m·s/rad
-    GAP,  # rad, the whole free play
-    CONTACT_COMPLIANCE,  # rad/(N·m), always in series in a transmission that has play or gives
+    GAP,  # rad, full backlash
+    CONTACT_COMPLIANCE,  # rad/(N·m), always in series in a transmission with backlash or compliance
     RIPPLE_SINE,  # N·m
     RIPPLE_COSINE,
     RIPPLE_CYCLES,  # per joint turn
@@ -82,7 +82,7 @@ SHARED = 10
     DISTURBANCE_COSINE,
     DISTURBANCE_FREQUENCY,  # Hz
     AT_ZERO,  # rad at count 0
-    RAD_PER_COUNT,  # signed; 0 where there is no sensor
+    RAD_PER_COUNT,  # signed; 0 without a sensor
     RANGE,  # rad from count 0 to the last one, signed as counting
     POTENTIOMETER_GAIN,  # relative, about the middle of the range
     POTENTIOMETER_OFFSET,  # rad
@@ -100,7 +100,7 @@ SHARED = 10
     OUTPUT_LIMIT,  # largest output of a sampled controller, unit of the drive
     SHAPE,  # of the link: CYLINDER, ROD or BODY
     PRISMATIC,  # 1, or 0 for a revolute joint
-    USER,  # the first of USER_COLUMNS for effects from files of the user's own
+    USER,  # the first of USER_COLUMNS for effects from users' files
 ) = range(80)
 BENDS = range(BEND_1, BEND_8 + 1)
 USER_COLUMNS = 8
@@ -108,28 +108,28 @@ PER_JOINT = USER + USER_COLUMNS
 
 CYLINDER, ROD, BODY = 0, 1, 2
 
-# Bits of the whole number that says which state-changing effects a joint has.
+# Bits of the integer that states which state-changing effects a joint has.
 HAS_INDUCTANCE, HAS_FLEXIBILITY, HAS_STICTION, HAS_EXTRA_TORQUE, HAS_USER_EFFECT = 1, 2, 4, 8, 16
-"""HAS_USER_EFFECT: at least one effect of the user's own."""
+"""HAS_USER_EFFECT: at least one user effect."""
 
 # Settings of a run, in this order.
 (CONTROLLER, QUANTISE, PUBLISHED_LOADS, DRIVE_RECORDED) = range(4)
 SETTINGS = 4
-# Values of the setting QUANTISE. DRIVE_ROUNDED: what a sampled controller gives out, and no reading.
+# Values of the setting QUANTISE. DRIVE_ROUNDED: only the output of a sampled controller, not the reading.
 NOTHING_ROUNDED, ALL_ROUNDED, DRIVE_ROUNDED = 0, 1, 2
 NO_CONTROLLER, BOARD_PID, SAMPLED_PID, CASCADE = 0, 1, 2, 3
 
 
 def size(joints: int) -> int:
-    """Length of the vector of a machine with `joints` modelled joints."""
+    """Returns the length of the vector of a machine with `joints` modelled joints."""
     return SHARED + joints * PER_JOINT
 
 
 def slot(joint: int, column: int) -> int:
-    """Index of a joint's (from 1) column in the vector."""
+    """Returns the index of a joint's (from 1) column in the vector."""
     return SHARED + (joint - 1) * PER_JOINT + column
 
 
 def column(slot: int) -> int:
-    """The column of a joint at an index of the vector beyond `SHARED`."""
+    """Returns the column of a joint at an index of the vector beyond `SHARED`."""
     return (slot - SHARED) % PER_JOINT

@@ -1,4 +1,4 @@
-"""Units as texts: the units that readers see, and what a unit is of. A user's own effect may state any unit."""
+"""Converts units as texts: units for readers, and dimensions. A user's own effect may have any unit."""
 
 from __future__ import annotations
 
@@ -14,31 +14,33 @@ _SHOWN = {"rad": (_DEGREES, "°"), "m": (1e3, "mm"), "rad/s": (_DEGREES, "°/s")
 
 
 def shown_unit(unit: str) -> tuple[float, str]:
-    """Factor and name of the unit to show: degrees for radians, millimetres for metres."""
+    """Returns factor and name of the unit to show: degrees for radians, millimetres for metres."""
     return _SHOWN.get(unit, (1.0, unit))
 
 
 def with_unit(number: str, unit: str) -> str:
-    """A number and its unit as they are written: 3.2°, 3.2 mm."""
+    """Returns a number with its unit as people write them: 3.2°, 3.2 mm."""
     return f"{number}{'' if unit.startswith('°') else ' '}{unit}"
 
 
 def torque_power(unit: str) -> int:
-    """Power with which a unit contains torque (or mass): what scales when all torques are scaled together."""
+    """Returns the power of torque (or mass) in a unit: the scaling when all torques are scaled together."""
     above, _, below = unit.replace("(", "").replace(")", "").partition("/")
     return int("kg" in above or "N" in above) - int("kg" in below or "N" in below)
 
 
 def sliding(unit: str) -> str:
-    """The unit on a joint that slides: forces in place of torques, lengths in place of angles."""
+    """Returns the unit on a prismatic joint: forces in place of torques, lengths in place of angles."""
     return unit.replace("N·m", "N").replace("rad", "m")
 
 
 def joint_unit(machine: Machine, joint: int) -> str:
-    """Unit of a joint's position: rad, or m where it slides. Raises SpecError when there is no such joint."""
+    """Returns the unit of a joint's position: rad, or m for a prismatic one. Raises SpecError for an unknown joint."""
     return "rad" if machine.joint(joint).kind == "revolute" else "m"
 
 
 def squared(units: Iterable[str]) -> str:
-    """Unit of a sum of squares over joints of these units; rad² + m² shows that unlike quantities are summed."""
+    """Returns the unit of a sum of squares over joints of these units; rad² + m² shows that different quantities are
+    summed.
+    """
     return " + ".join(f"({unit})²" if "/" in unit else f"{unit}²" for unit in dict.fromkeys(units))

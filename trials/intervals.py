@@ -1,6 +1,6 @@
-"""Whether the intervals of an answer cover the truth of a world, for sizes that both sides measure alike.
+"""Checks whether the intervals of an answer cover the truth of a rig, for sizes that both sides define alike.
 
-A size counts where the world's law is the library's own: a spring that gets stiffer has no stiffness.
+A size counts if the rig's law is the library's own: a hardening spring, for example, has no single stiffness.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class _Size:
-    """A parameter of the library, and what it is on the world's side: from the joint's numbers and the sizes drawn.
+    """A parameter of the library, and its value on the rig's side: from the joint's parameters and the drawn sizes.
 
-    laws: those in which the world has the library's law; None for all.
+    laws: those in which the rig has the library's law; None for all.
     """
 
     part: str
@@ -59,12 +59,13 @@ SIZES: dict[str, tuple[_Size, ...]] = {
     "wrong_gain": (_Size("relative", _drawn("gain_error")),),
     "lost_set_points": (_Size("share", _drawn("lost")),),
 }
-"""By the library's name of an effect, its sizes that can be compared."""
+"""Sizes of each effect that can be compared, by the library's name."""
 
 
 def covered(truth: Json, answer: Json | None) -> list[bool]:
-    """Of a single effect that was named at its joint, alone or in a group: whether each of its intervals covers the
-    true size."""
+    """Returns whether each interval of a single effect covers the true size, if it was named at its joint, alone or in
+    a group.
+    """
     if truth["case"] != "single" or answer is None:
         return []
     hidden = truth["hidden"][0]

@@ -1,10 +1,11 @@
-"""What `daq diagnose` answers on test rigs that share no code with it: names, joints and false alarms by kind of rig.
+"""Judges answers of `daq diagnose` on test rigs that share no code with it: names, joints and false alarms by kind of
+rig.
 
     python -m trials.judge --kinds tuning --seeds 0-4 [--case single] [--sharpness] [--folder FOLDER]
 
-Rigs are written by `python -m trials.rigs`; the diagnosis is the command, and sees their `lab` folders only. Answers
-stay in the folder, and a call that was interrupted goes on where it stopped. Kinds of REPORTING are for registered
-trials: they are refused without `--reporting`, since a kind that was looked at can no longer be used to report.
+`python -m trials.rigs` writes the rigs; the diagnosis is the command, and sees only their `lab` folders. Answers stay
+in the folder, and an interrupted call continues where it stopped. Kinds of REPORTING are for registered trials. They
+need `--reporting`, since a kind that was looked at can no longer be used to report.
 """
 
 from __future__ import annotations
@@ -29,16 +30,16 @@ from trials.rigs.world import CASES, case_of
 Json = dict[str, Any]
 
 LONGEST = 900.0
-"""s that a diagnosis may take; one that takes longer gives no answer."""
+"""Most time of a diagnosis, s; a longer one gives no answer."""
 HONEST = ("unknown-effect", "suspected", "ambiguous")
-"""Verdicts that are right of an effect outside the library, if no step gives it one name."""
+"""Verdicts that are right for an effect outside the library, if no step gives it a single name."""
 TOLD_APART = 5.0
-"""Least d′ at which a rival, or the sound arm, is told apart."""
+"""Least d′ at which a rival, or the healthy arm, counts as distinguishable."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """What an answer is worth; None where the question is not asked."""
+    """Score of an answer; None for questions that do not apply."""
 
     strict: bool | None = None
     answered: bool | None = None
@@ -62,13 +63,13 @@ QUESTIONS = {
 
 
 def names_of(answer: Json) -> list[set[str]]:
-    """By adopted step, the names that it gives: one, or those of its group."""
+    """Returns by adopted step the names that it gives: one, or those of its group."""
     adopted = [step for step in answer["steps"] if step["adopted"]]
     return [{step["effect"], *(member["effect"] for member in step["group"])} for step in adopted]
 
 
 def score(truth: Json, answer: Json | None) -> Score:
-    """An answer (None: there is none) held against the truth."""
+    """Compares an answer (None: there is none) with the truth."""
     case = truth["case"]
     steps = names_of(answer) if answer else []
     verdict = answer["verdict"] if answer else "failed"
@@ -94,7 +95,7 @@ def score(truth: Json, answer: Json | None) -> Score:
 
 
 def _known_as(hidden: Json) -> str:
-    """What the library calls a hidden effect; folders of earlier versions have the name by which it was drawn alone."""
+    """Returns the library's name of a hidden effect; folders of earlier versions have only the drawn name."""
     return str(hidden.get("known_as") or hidden["name"])
 
 
@@ -103,8 +104,11 @@ def _same(places: Sequence[list[int]], wanted: list[int]) -> bool | None:
 
 
 def _as_sharp(truth: Json, steps: list[set[str]], strict: bool, answered: bool) -> bool | None:
-    """The name where it can be told from every other, a group of what it cannot be told from else; None where the names
-    that were given were not compared, or the effect itself cannot be told from a sound arm."""
+    """Whether the answer is as sharp as the record allows.
+
+    That is the name alone if it can be distinguished from every other, or a group of those that cannot. None if named
+    rivals were not compared, or if the effect cannot be distinguished from a healthy arm.
+    """
     rivals = truth.get("sharpness")
     if not rivals or any(rival["name"] == "none" and rival["d_prime"] < TOLD_APART for rival in rivals):
         return None
@@ -119,7 +123,7 @@ def _as_sharp(truth: Json, steps: list[set[str]], strict: bool, answered: bool) 
 
 
 def diagnose(lab: Path, longest: float = LONGEST) -> Json | None:
-    """The answer of the command in a rig's folder, from its own records alone; None when it fails or is too late."""
+    """Returns the command's answer in a rig's folder, from its own records alone; None if it fails or is too late."""
     command = [str(Path(sys.executable).parent / "daq"), "diagnose", "training.csv", "--holdout", "held_out.csv"]
     environment = {name: value for name, value in os.environ.items() if not name.upper().startswith("DAQ_")}
     try:
@@ -143,7 +147,7 @@ def diagnose(lab: Path, longest: float = LONGEST) -> Json | None:
 
 
 def judged(folder: Path, kind: str, seed: int, case: str | None, *, sharp: bool) -> tuple[Json, Json | None, float]:
-    """Truth, answer and seconds of one rig; made where they are not there yet."""
+    """Returns truth, answer and seconds of one rig; computes missing ones."""
     place = folder / f"{kind}-{seed}-{case or case_of(seed)}"
     kept = place / "answer.json"
     if not kept.exists():
@@ -156,7 +160,7 @@ def judged(folder: Path, kind: str, seed: int, case: str | None, *, sharp: bool)
 
 
 def table(scores: dict[str, list[Score]]) -> list[str]:
-    """Rates by kind, right ones of those that were asked."""
+    """Returns rates by kind: right answers of those that apply."""
     lines = [f"{'kind':<18}" + "".join(f"{words:>28}" for words in QUESTIONS.values())]
     everything = [one for some in scores.values() for one in some]
     for kind, some in [*scores.items(), ("all", everything)]:
@@ -169,7 +173,7 @@ def table(scores: dict[str, list[Score]]) -> list[str]:
 
 
 def seeds_of(text: str) -> Iterable[int]:
-    """0-4, or 3,7."""
+    """Parses 0-4, or 3,7."""
     if "-" in text:
         first, last = text.split("-")
         return range(int(first), int(last) + 1)
@@ -177,14 +181,14 @@ def seeds_of(text: str) -> Iterable[int]:
 
 
 def main() -> int:
-    """The exit code."""
+    """Returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m trials.judge", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--kinds", default="tuning", help="tuning, reporting, or names: axis-pid,planar-pid")
     parser.add_argument("--seeds", type=seeds_of, default=range(5))
     parser.add_argument("--case", choices=CASES, help="instead of each seed's own")
     parser.add_argument("--folder", type=Path, help="keep rigs and answers here")
-    parser.add_argument("--sharpness", action="store_true", help="also which laws the records can tell apart")
-    parser.add_argument("--reporting", action="store_true", help="kinds for reports may be looked at")
+    parser.add_argument("--sharpness", action="store_true", help="also which laws the records can distinguish")
+    parser.add_argument("--reporting", action="store_true", help="allow kinds for reports to be looked at")
     asked = parser.parse_args()
     groups = {"tuning": list(TUNING), "reporting": list(REPORTING)}
     named = [*groups, *KINDS]
@@ -194,7 +198,7 @@ def main() -> int:
         near = get_close_matches(unknown[0], named, n=5, cutoff=0.0)
         parser.error(f"--kinds {unknown[0]}: there is none of that name; the nearest are {', '.join(near)}")
     if not asked.reporting and any(kind in REPORTING for kind in chosen):
-        parser.error("a kind for reports is not looked at while anything is tuned; say --reporting if this is a report")
+        parser.error("a kind for reports must not be looked at during tuning; give --reporting if this is a report")
     folder = asked.folder or Path(tempfile.mkdtemp(prefix="rigs-"))
     scores: dict[str, list[Score]] = {kind: [] for kind in chosen}
     for seed in asked.seeds:

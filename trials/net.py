@@ -1,11 +1,11 @@
-"""Test rigs of used-up kinds, held against the verdicts recorded for them: a part of `make net`.
+"""Compares test rigs of used-up kinds with their recorded verdicts: a part of `make net`.
 
-    python -m trials.net                compare; exit code 1 where a verdict, a name or a joint differs
-    python -m trials.net --record all   record the answers of the sources as they are (missing: only what is not there)
+    python -m trials.net                compare; exit code 1 if a verdict, a name or a joint differs
+    python -m trials.net --record all   record the answers of the present sources (missing: only missing ones)
 
-The table `expected.csv` lists the rigs: up to five of each combination of joints, drive and controller with up to
-three joints. Among them are single effects, pairs, healthy arms, and effects that are in no library. Five of each of
-the seventy kinds would take an hour. The rigs stay in `.golden/rigs` between runs.
+The table `expected.csv` lists the rigs: up to five of each combination of joints, drive and controller with up to three
+joints. Among them are single effects, pairs, healthy arms, and effects that are in no library. Five of each of the
+seventy kinds would take an hour. The rigs stay in `.golden/rigs` between runs.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Row = dict[str, str]
 
 
 def main() -> int:
-    """The exit code."""
+    """Returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m trials.net", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--record", choices=("all", "missing"))
     parser.add_argument("--processes", type=int, default=2)
@@ -40,7 +40,7 @@ def main() -> int:
     found, different = list(expected), 0
     with ThreadPoolExecutor(asked.processes) as pool:
         for n, row in zip(chosen, pool.map(_answered, [expected[n] for n in chosen]), strict=True):
-            if asked.record and row["verdict"] == "failed":  # too late on a busy computer, perhaps: no answer to keep
+            if asked.record and row["verdict"] == "failed":  # perhaps too late on a busy computer: no answer to keep
                 print(f"{_told(row)}: not recorded", flush=True)
                 continue
             found[n] = row
@@ -64,7 +64,7 @@ def _write(rows: list[Row]) -> None:
 
 
 def _answered(row: Row) -> Row:
-    """The row of a rig with the answer that the diagnosis gives now."""
+    """Returns the row of a rig with the present answer of the diagnosis."""
     place = RIGS / f"{row['kind']}-{row['seed']}-{row['case']}"
     if not (place / "truth.json").exists():
         write_world(place, row["kind"], int(row["seed"]), row["case"])
@@ -73,7 +73,7 @@ def _answered(row: Row) -> Row:
 
 
 def _effects(answer: Json | None) -> str:
-    """Each adopted step: the effect or the group of effects that it names, and its joints."""
+    """Returns each adopted step: the effect or group of effects that it names, and its joints."""
     adopted = [step for step in (answer or {}).get("steps", []) if step["adopted"]]
     return "; ".join(
         f"{' | '.join(sorted({step['effect'], *(each['effect'] for each in step['group'])}))} {step['joints']}"

@@ -1,15 +1,16 @@
-"""A registered trial on test rigs that tuning never saw: the rates of `daq diagnose`, beside those to be reached.
+"""Runs a registered trial on test rigs that tuning never saw, and prints the rates of `daq diagnose` beside their
+targets.
 
     python -m trials.registered --hashes                                                      # for a registration
     python -m trials.registered --registration docs/trial/worlds-16.toml --folder FOLDER --seconds 500
     python -m trials.registered --folder FOLDER --sharpness --seconds 500
     python -m trials.registered --table FILE.csv
 
-The second is given again until there are enough arms: each goes on where the last one stopped. Two of them run side by
-side where `--only` gives each its kinds. Seeds are drawn from the
-commit that registered the file, cases take turns, and the kind on which the least time was spent comes next. The third
-works out from the truth which effects a sound arm can imitate, and which those can that were named in their place.
-Every arm is a line of FOLDER/cases.csv; the last prints the table of such lines. docs/trial.md has the rules.
+Repeat the second until there are enough arms: each call continues where the last one stopped. Two of them run at the
+same time if `--only` gives each its kinds. Seeds are drawn from the commit that registered the file. Cases take turns,
+and the kind on which the least time was spent comes next. The third computes from the truth which effects a healthy arm
+can imitate, and which can imitate the effects that were named in their place. Every arm is a line of FOLDER/cases.csv;
+the last prints the table of such lines. docs/trial.md has the rules.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ from trials.rigs.kinds import KINDS
 from trials.rigs.world import hidden_rig
 
 DECIDES = (*REGISTERED, "daq_cli", "trials/rigs", "trials/judge.py", "trials/registered.py")
-"""Parts of the source tree that decide the outcome."""
+"""Parts of the source tree that determine the outcome."""
 FIRST_DRAWN = 10**6
 """Smallest seed that a commit draws; smaller ones are for tuning and tests."""
 TO_REACH = {
@@ -56,28 +57,30 @@ TO_REACH = {
     "alarm": "≤ 1 %",
 }
 LEAST_CASES = {"strict": 200, "sharp": 200, "alarm": 200, "both": 60}
-"""Arms with fewer of which a rate is said to have too few."""
+"""Number of arms below which a rate counts as having too few."""
 
 
 DETECTABLE = "the same without those of which d′ is known to be below 5"
-"""Second line of a question, of effects that a record shows."""
+"""Second line of a question, for effects that a record shows."""
 
 
 class WorldsRegistration(RegisteredCode):
-    """Arms of kinds of world. `cases` take turns; an answer that takes more than `longest` s is none."""
+    """Arms of several kinds of test rig. `cases` take turns; an answer that takes more than `longest` s counts as
+    none.
+    """
 
     kinds: tuple[str, ...]
     cases: tuple[str, ...]
     longest: float
 
     def seed(self, commit: str, kind: str, number: int) -> int:
-        """The seed of an arm, drawn from the commit that registered it."""
+        """Returns the seed of an arm, drawn from the commit that registered it."""
         return FIRST_DRAWN + int(sha256(f"{commit} {kind} {number}".encode()).hexdigest()[:12], 16)
 
 
 @dataclass(frozen=True)
 class Row:
-    """An arm, what was answered, and what that is worth; None where a question is not asked."""
+    """An arm, its answer, and the score; None for questions that do not apply."""
 
     kind: str
     number: int
@@ -93,15 +96,15 @@ class Row:
     honest: bool | None
     alarm: bool | None
     d_prime: float | None
-    """Between the arm with and without its effect, the least of several; None where it was not computed."""
+    """Between the arm with and without its effect, the least of several; None if not computed."""
     sharp: bool | None
-    """None where a name that was given was not compared with the effect, and where the sound arm can imitate it."""
+    """None if a given name was not compared with the effect, or if the healthy arm can imitate it."""
     excess_removed: float | None
     seconds: float
     intervals: int = 0
-    """Intervals of the effect's sizes that can be compared (`intervals`), of a single effect that was named."""
+    """Intervals of the effect's sizes that can be compared (`intervals`), for a single effect that was named."""
     covering: int = 0
-    """Those of them that cover the truth."""
+    """Number of them that cover the truth."""
 
     @property
     def resolved(self) -> bool:
@@ -114,7 +117,7 @@ def place_of(folder: Path, kind: str, number: int) -> Path:
 
 
 def make_arm(place: Path, kind: str, seed: int, case: str, longest: float) -> None:
-    """Writes a rig's folder and asks for the answer. A rig whose loop does not bear its effect has neither."""
+    """Writes a rig's folder and runs the diagnosis. A rig whose loop is unstable with its effect gets neither."""
     begun = monotonic()
     kept: dict[str, Any] = {"kind": kind, "seed": seed, "case": case, "late": False, "answer": None, "seconds": 0.0}
     try:
@@ -132,7 +135,7 @@ def make_arm(place: Path, kind: str, seed: int, case: str, longest: float) -> No
 
 
 def kept_in(folder: Path, kind: str, number: int) -> dict[str, Any] | None:
-    """What an arm's folder keeps; None where the arm has not been run to its end."""
+    """Returns the data in an arm's folder; None if the arm has not been completed."""
     file = place_of(folder, kind, number) / "answer.json"
     if not file.exists():
         return None
@@ -141,7 +144,7 @@ def kept_in(folder: Path, kind: str, number: int) -> dict[str, Any] | None:
 
 
 def numbers(folder: Path, kind: str) -> list[int]:
-    """Numbers of a kind's arms that have been run, from 0 on without a gap."""
+    """Returns numbers of a kind's completed arms, from 0 on without a gap."""
     found = 0
     while kept_in(folder, kind, found) is not None:
         found += 1
@@ -151,9 +154,9 @@ def numbers(folder: Path, kind: str) -> list[int]:
 def run(
     registration: WorldsRegistration, commit: str, folder: Path, seconds: float, only: Collection[str] = ()
 ) -> None:
-    """Runs arm after arm, the kind on which the least time was spent first, and begins none after `seconds`.
+    """Runs arm after arm, first the kind on which the least time was spent, and begins none after `seconds`.
 
-    `only` are the kinds of this process, where another one runs the rest beside it.
+    `only` are the kinds of this process, if another one runs the rest at the same time.
     """
     end = monotonic() + seconds
     kinds = [kind for kind in registration.kinds if not only or kind in only]
@@ -174,7 +177,7 @@ def run(
 
 
 def row_of(folder: Path, kind: str, number: int) -> Row | None:
-    """An arm's row; None where its loop does not bear its effect."""
+    """Returns an arm's row; None if its loop is unstable with its effect."""
     kept = kept_in(folder, kind, number)
     if kept is None or "void" in kept:
         return None
@@ -204,9 +207,9 @@ def row_of(folder: Path, kind: str, number: int) -> Row | None:
 
 
 def add_sharpness(folder: Path, seconds: float, only: Collection[str] = ()) -> None:
-    """Adds d′ to hidden effects: against the arm without them, and of single ones against whatever else was named.
+    """Adds d′ to hidden effects: against the arm without them, and for single ones against the named rivals.
 
-    `only` are the kinds of this process, where another one works out the rest beside it.
+    `only` are the kinds of this process, if another one computes the rest at the same time.
     """
     from trials.rigs.sharpness import detectability, sharpness
 
@@ -232,14 +235,14 @@ def add_sharpness(folder: Path, seconds: float, only: Collection[str] = ()) -> N
 
 
 def _add(place: Path, found: dict[str, Any]) -> None:
-    """Adds to what an arm's folder keeps of the truth."""
+    """Adds to the truth in an arm's folder."""
     file = place / "truth.json"
     truth = json.loads(file.read_text("utf-8")) | found
     file.write_text(json.dumps(truth, indent=1, ensure_ascii=False) + "\n", "utf-8")
 
 
 def rows_of(folder: Path) -> list[Row]:
-    """The rows of all arms that were run; they are written to cases.csv."""
+    """Returns the rows of all completed arms, and writes them to cases.csv."""
     found = [row for kind in KINDS for n in numbers(folder, kind) if (row := row_of(folder, kind, n)) is not None]
     with (folder / "cases.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, [field.name for field in fields(Row)])
@@ -255,7 +258,7 @@ def _text(value: Any) -> str:
 
 
 def read_rows(file: Path) -> list[Row]:
-    """Rows as they were written."""
+    """Reads rows that were written."""
     with file.open(newline="", encoding="utf-8") as lines:
         return [Row(**{name: _value(name, text) for name, text in line.items()}) for line in csv.DictReader(lines)]
 
@@ -269,7 +272,7 @@ def _value(name: str, text: str) -> Any:
 
 
 def table(rows: Sequence[Row]) -> list[str]:
-    """The table as Markdown: each rate with its exact 95 % interval, in all and by kind of world."""
+    """Returns the table as Markdown: each rate with its exact 95 % interval, in total and by kind of rig."""
     kinds = list(dict.fromkeys(row.kind for row in rows))
     seen = [row for row in rows if row.d_prime is None or row.d_prime >= TOLD_APART]
     lines = [f"| what | to reach | all | {' | '.join(kinds)} |", "|" + "---|" * (len(kinds) + 3)]
@@ -318,15 +321,17 @@ def table(rows: Sequence[Row]) -> list[str]:
 
 
 def main() -> int:
-    """The exit code."""
+    """Returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m trials.registered", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--registration", type=Path)
     parser.add_argument("--folder", type=Path, help="keeps the rigs and answers")
     parser.add_argument("--seconds", type=float, default=500.0, help="no arm is begun after this time")
     parser.add_argument("--only", nargs="+", default=(), metavar="KIND", help="the kinds of this process, of several")
-    parser.add_argument("--sharpness", action="store_true", help="add d′ against the sound arm and against wrong names")
+    parser.add_argument(
+        "--sharpness", action="store_true", help="add d′ against the healthy arm and against wrong names"
+    )
     parser.add_argument("--table", type=Path, help="print the table of these lines, and run nothing")
-    parser.add_argument("--hashes", action="store_true", help="print what a registration has to hold of the code")
+    parser.add_argument("--hashes", action="store_true", help="print the code's hashes for a registration")
     asked = parser.parse_args()
     if asked.hashes:
         hashed = [f'"{path}" = "{digest}"' for path, digest in tree_hashes(DECIDES).items()]

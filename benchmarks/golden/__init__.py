@@ -1,1 +1,1 @@
-"""Answers recorded before a change that is to leave them as they are, and the comparison with them."""
+"""Answers recorded before a change that must not alter them, and the comparison with them."""

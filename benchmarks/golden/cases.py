@@ -1,4 +1,4 @@
-"""What is asked: arms, rigs and the commands whose answers are held against the recorded ones."""
+"""Questions: arms, rigs and the commands whose answers are compared with the recorded ones."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SINGLES = (
     "wrong_gain:joint=1,factor=1.5",
     "lost_set_points:joint=3,share=0.05",
 )
-"""One hidden effect of every kind that the diagnosis knows, as the mock's `--modify` has it."""
+"""One hidden effect of every kind that the diagnosis knows, in the form of the mock's `--modify`."""
 SECOND_SINGLES = (
     "coulomb_friction:joint=3,torque=1.5",
     "stiction:joint=1,breakaway=4",
@@ -67,7 +67,7 @@ OPEN_SET = (
 )
 """Hidden effects that the diagnosis does not know."""
 SECRET_ARMS = (110, 210, 310, 410, 510, 610, 150, 250, 160, 260, 311, 412)
-"""Arms with drawn tolerances: sound ones, effects shared by joints, priors that are wrong, announced loads."""
+"""Arms with drawn tolerances: healthy ones, effects shared by joints, wrong priors, announced loads."""
 
 FITS = (
     ("secret-110", ()),
@@ -103,12 +103,12 @@ COMPARISONS = (
     ("ma2000", "models/2.json", "models/3.json", "traces/single-coulomb_friction-1/held-out.mcap"),
     ("models/4.json", "models/5.json", "traces/secret-410/fitted.mcap"),
 )
-"""Models and traces; a word with a slash is a file among what was recorded or fitted."""
+"""Models and traces; a word with a slash is one of the recorded or fitted files."""
 
 
 @dataclass(frozen=True)
 class Arm:
-    """A mock arm. query: what its port's address adds. experiment: what is recorded on it and fitted to."""
+    """A mock arm. query: part of its port's URL. experiment: recorded on it and fitted to."""
 
     name: str
     query: str
@@ -136,7 +136,7 @@ RIGS = (
 
 
 def arms() -> tuple[Arm, ...]:
-    """All arms that are diagnosed: singles, pairs, open set, secret ones; a few on the long experiment."""
+    """Returns all arms that are diagnosed: singles, pairs, open set, secret ones; a few on the long experiment."""
     found = [
         Arm(f"single-{_effect(text)}-{number}", _modify(text))
         for number, text in enumerate((*SINGLES, *SECOND_SINGLES))
@@ -161,19 +161,19 @@ def _modify(*texts: str) -> str:
 
 @dataclass(frozen=True)
 class Question:
-    """A command whose answer is recorded. words: its arguments, beginning after `daq`."""
+    """A command whose answer is recorded. words: its arguments, after `daq`."""
 
     name: str
     words: tuple[str, ...]
 
 
 def questions(place: Path) -> list[Question]:
-    """Every command, on the records in `place`, which `records.make` has written."""
+    """Returns every command, on the records in `place`, which `records.make` has written."""
     return [*_diagnoses(place), *_models(place), *_small(place)]
 
 
 def _traces(place: Path, arm: Arm) -> tuple[str, str]:
-    """The trace that an arm is fitted to and the one that is held out."""
+    """Returns the trace that an arm is fitted to and the held-out one."""
     folder = place / "traces" / arm.name
     return str(folder / "fitted.mcap"), str(folder / "held-out.mcap")
 
@@ -194,7 +194,7 @@ def _diagnoses(place: Path) -> list[Question]:
 
 
 def _models(place: Path) -> list[Question]:
-    """`fit`, `validate`, `compare`, `design`, `simulate` and `sensitivity`, several of each."""
+    """Returns several each of `fit`, `validate`, `compare`, `design`, `simulate` and `sensitivity`."""
     found, by_name = [], {arm.name: arm for arm in arms()}
     made = place / "models"
     for number, (name, options) in enumerate(FITS):
@@ -228,7 +228,7 @@ def _models(place: Path) -> list[Question]:
 
 
 def _small(place: Path) -> list[Question]:
-    """What is answered in a moment, most of it read from a mock in lock-step."""
+    """Returns quick commands, most of which read from a mock in lock-step."""
     fitted, _ = _traces(place, arms()[0])
     mock = ("--port", "mock://?lock_step=1")
     return [

@@ -1,4 +1,4 @@
-"""The records that the questions are asked about: written once by the mock in lock-step and by the rigs' scripts."""
+"""Makes the records for the questions: written once by the mock in lock-step and by the rigs' scripts."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ DAQ = (
         "sys.argv[0] = 'daq'; getattr(importlib.import_module(module), name)()"
     ),
 )
-"""The command `daq` of this folder's sources, wherever they keep it."""
+"""The command `daq` of the sources in this folder."""
 
 
 def ask(words: Sequence[str]) -> str:
-    """What `daq words…` prints. Raises RuntimeError where it ends otherwise than with 0, 3 or 5."""
+    """Returns the output of `daq words…`. Raises RuntimeError for exit codes other than 0, 3 or 5."""
     done = subprocess.run([*DAQ, *words], capture_output=True, text=True, check=False, cwd=EXAMPLES.parent)
     if done.returncode not in (0, 3, 5):
         raise RuntimeError(f"daq {' '.join(words)}: ended with {done.returncode}: {done.stderr.strip()[-400:]}")
@@ -48,7 +48,7 @@ def ask(words: Sequence[str]) -> str:
 
 
 def record_arm(place: Path, arm: Arm) -> None:
-    """The trace that is fitted to and, of the short experiment, one that is held out."""
+    """Records the trace that is fitted to and, for the short experiment, a held-out one."""
     folder = place / "traces" / arm.name
     if (folder / "done").exists():
         return
@@ -66,7 +66,7 @@ def record_arm(place: Path, arm: Arm) -> None:
 
 
 def record_rig(place: Path, rig: Rig) -> None:
-    """The CSV files that the rig's script writes."""
+    """Writes the CSV files of the rig's script."""
     folder = place / "rigs" / rig.name
     if not (folder / rig.records[-1]).exists():
         command = [sys.executable, str(EXAMPLES / rig.script), str(folder), *rig.arguments]
@@ -74,6 +74,6 @@ def record_rig(place: Path, rig: Rig) -> None:
 
 
 def record_all_rigs(place: Path) -> None:
-    """All rigs' records."""
+    """Writes all rigs' records."""
     for rig in RIGS:
         record_rig(place, rig)

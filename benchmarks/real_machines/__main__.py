@@ -39,14 +39,14 @@ from benchmarks.real_machines.reference import gain_of, reference
 from benchmarks.real_machines.rigs import HERE, Alteration, Question, Rig, load_rigs
 
 LONGEST = 400.0
-"""CPU seconds that a diagnosis may take; after them it has no answer."""
+"""Most CPU seconds of a diagnosis; after them it has no answer."""
 CUTOFF = 12.0
-"""Cutoff of the reference in Hz where no answer states one: the largest that the product takes."""
+"""Cutoff of the reference in Hz if no answer states one: the largest of the product."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table. left, reference: shares of the held-out torque, None where no torque was recorded."""
+    """One line of the table. left, reference: shares of the held-out torque, None if no torque was recorded."""
 
     rig: str
     question: str
@@ -61,7 +61,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Run:
-    """What a diagnosis printed, or why it did not; CPU seconds of the whole command."""
+    """Output of a diagnosis, or why there is none; CPU seconds of the whole command."""
 
     answer: dict[str, Any] | None
     reason: str
@@ -69,7 +69,7 @@ class Run:
 
 
 def diagnose(fitted: Sequence[Path], held_out: Sequence[Path], model: Path, place: Path, longest: float) -> Run:
-    """`daq diagnose --json` with default options, in a process of its own that ends after `longest` CPU seconds."""
+    """Runs `daq diagnose --json` with default options, in a separate process that ends after `longest` CPU seconds."""
     words = [*map(str, fitted), *(w for path in held_out for w in ("--holdout", str(path))), "--model", str(model)]
     limited = ["sh", "-c", f'ulimit -t {longest:.0f}; exec "$@"', "sh"]
     command = [*limited, sys.executable, "-c", "from daq_cli import main; main()", "diagnose", *words, "--json"]
@@ -86,7 +86,7 @@ def diagnose(fitted: Sequence[Path], held_out: Sequence[Path], model: Path, plac
 
 
 def rows(rig: Rig, alteration: Alteration | None, data: Path, longest: float, keep: Path | None) -> list[Row]:
-    """The lines of one rig, as it is or altered. keep: a folder for the JSON of the answer."""
+    """Returns the lines of one rig, unchanged or altered. keep: a folder for the JSON of the answer."""
     questions = (alteration.question,) if alteration else rig.questions
     right = {*rig.plausible, *(name for each in (*rig.questions, *questions) for name in each.names)}
     title = f"{rig.name}: {alteration.what}" if alteration else rig.name
@@ -112,7 +112,7 @@ def rows(rig: Rig, alteration: Alteration | None, data: Path, longest: float, ke
 
 
 def least_squares(rig: Rig, data: Path) -> str:
-    """One line: what a linear fit leaves of the torque on fitted and on held-out records."""
+    """Returns one line: the torque that a linear fit leaves on fitted and on held-out records."""
     records = [read_columns(rig, record, data) for record in (*rig.fitted, *rig.held_out)]
     seconds = sum(float(columns["time"][-1] - columns["time"][0]) for columns in records)
     said = f"{rig.name:<16} {rig.joints} joints, {len(records)} records, {seconds:.0f} s"
@@ -120,7 +120,7 @@ def least_squares(rig: Rig, data: Path) -> str:
         return f"{said}: no torque is recorded"
     first = len(rig.fitted)
     found = reference(rig.machine, records[:first], records[first:], CUTOFF, offset=rig.offset)
-    return f"{said}: {found.fitted:.1%} of the fitted, {found.held_out:.1%} of the held-out torque left"
+    return f"{said}: {found.fitted:.1%} of the fitted, {found.held_out:.1%} of the held-out torque remains"
 
 
 def _row(title: str, question: Question, run: Run, right: set[str], linear: float | None) -> Row:
@@ -135,13 +135,13 @@ def _row(title: str, question: Question, run: Run, right: set[str], linear: floa
 
 
 def _note(answer: dict[str, Any] | None, kind: str) -> dict[str, Any]:
-    """The values of the first note of a kind; none where there is none."""
+    """Returns the values of the first note of a kind; empty without one."""
     notes = answer["notes_data"] if answer else []
     return next((note["values"] for note in notes if note["kind"] == kind), {})
 
 
 def table(found: Sequence[Row]) -> str:
-    """The lines as a table in Markdown."""
+    """Returns the lines as a table in Markdown."""
 
     def share(value: float | None) -> str:
         return "–" if value is None else f"{value:.1%}"
@@ -155,7 +155,7 @@ def table(found: Sequence[Row]) -> str:
 
 
 def summary(found: Sequence[Row]) -> str:
-    """Marks of rigs as they are and of altered ones, runs with wrong names, and who leaves less torque."""
+    """Returns marks of unchanged and of altered rigs, runs with wrong names, and comparisons of remaining torque."""
     said = []
     for what, some in (
         ("as they are", [r for r in found if ":" not in r.rig]),
@@ -175,20 +175,22 @@ def summary(found: Sequence[Row]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Prints the table; 1 where a question is not answered rightly or least squares leaves less, 2 without data."""
+    """Prints the table; returns 1 if a question is not answered correctly or least squares leaves less, 2 without
+    data.
+    """
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path)
     parser.add_argument("--rigs", type=Path, default=HERE / "rigs.toml", help="another list of rigs")
     parser.add_argument("--only", action="append", metavar="NAME")
-    parser.add_argument("--least-squares", action="store_true", help="print what least squares leaves, alone")
+    parser.add_argument("--least-squares", action="store_true", help="only print the least-squares results")
     parser.add_argument("--as-they-are", action="store_true", help="without the alterations")
-    parser.add_argument("--longest", type=float, default=LONGEST, help="CPU seconds a diagnosis may take")
+    parser.add_argument("--longest", type=float, default=LONGEST, help="most CPU seconds of a diagnosis")
     parser.add_argument("--keep", type=Path, help="folder for the answers' JSON and the rows")
     parser.add_argument("--list", action="store_true", help="list the repositories")
     options = parser.parse_args(arguments)
     rigs = {rig.name: rig for rig in load_rigs(options.rigs)}
     if unknown := set(options.only or ()) - set(rigs):
-        parser.error(f"--only {unknown.pop()}: there is {', '.join(rigs)}")
+        parser.error(f"--only {unknown.pop()}: not known; available: {', '.join(rigs)}")
     chosen = [rigs[name] for name in options.only or rigs]
     if options.list or options.data is None:
         for rig in chosen:

@@ -1,4 +1,4 @@
-"""What `daq diagnose --json` answered, beside what is known: its name for a question, and a mark."""
+"""Compares the answer of `daq diagnose --json` with the known truth: its name for a question, and a mark."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from benchmarks.real_machines.rigs import Number, Question
 Answer = Mapping[str, Any]
 
 SAID = {"nothing-significant": "nothing", "unknown-effect": "unknown", "suspected": "suspected"}
-"""What the answer says where it names nothing. Any other verdict without a name is shown as it is."""
+"""Words for answers that name nothing. Any other verdict without a name is shown unchanged."""
 HONEST = ("unknown", "suspected", "partly", "check the record")
-"""Answers that name nothing and say that something is missing, or wrong with the record."""
+"""Answers that name nothing and state that something is missing, or wrong with the record."""
 WITHDRAWN = ("found-one-way", "leaves-more-than-noise", "contradicts-file", "worse-than-given")
-"""Refusals that take back what the search had found."""
+"""Verdicts that withdraw the result of the search."""
 
 
 def adopted(answer: Answer) -> list[Mapping[str, Any]]:
-    """The steps that are part of the answer."""
+    """Returns the steps that are part of the answer."""
     return [step for step in answer["steps"] if step["adopted"]]
 
 
 def told(step: Mapping[str, Any]) -> set[str]:
-    """Every effect that a step names, those of its group included."""
+    """Returns every effect that a step names, including those of its group."""
     return {step["effect"], *(member["effect"] for member in step["group"])}
 
 
 def wrong_names(answer: Answer, right: Iterable[str]) -> list[str]:
-    """Steps of which no name is right or plausible."""
+    """Returns steps without a right or plausible name."""
     allowed = set(right)
     return [_text(step) for step in adopted(answer) if not told(step) & allowed]
 
 
 def judge(question: Question, answer: Answer, right: Iterable[str]) -> tuple[str, str]:
-    """What was answered to a question, and a mark: right, half, honest or wrong.
+    """Returns the answer to a question, and a mark: right, half, honest or wrong.
 
-    Half: the right name within a group of others, not on every joint or on a further one, or with another size; a
-    warning that a number of the file is far off, in place of an effect, counts as half, too (`moved`).
-    Honest: nothing wrong is named, and the answer says that something is missing. right: names that are not wrong.
+    Half: the right name within a group of others, not on every joint or on a further one, or with another size. A
+    warning that a parameter of the file is far off, in place of an effect, also counts as half (`moved`).
+    Honest: nothing wrong is named, and the answer states that something is missing. right: names that are not wrong.
     """
     names, joints = set(question.names), set(question.joints)
     hits = [step for step in adopted(answer) if told(step) & names and (not joints or joints & set(step["joints"]))]
@@ -61,7 +61,7 @@ def judge(question: Question, answer: Answer, right: Iterable[str]) -> tuple[str
 
 
 def moved(question: Question, note: Mapping[str, Any]) -> str:
-    """The number of the file that a warning says is far off, where it is the one and comes out as it is known to be."""
+    """Returns the parameter of the file that a warning calls far off, if it is the right one with the known value."""
     number = question.moved
     for each in note.get("numbers", ()):
         if number is not None and each["name"] in number.of and number.low <= each["value"] <= number.high:
@@ -70,7 +70,7 @@ def moved(question: Question, note: Mapping[str, Any]) -> str:
 
 
 def _within(number: Number, joints: set[int], answer: Answer) -> bool:
-    """Whether every joint has a number in the interval; it may have others, as a second ripple is."""
+    """Whether every joint has a value in the interval; it may have others, such as a second ripple."""
     found = _found(number, answer)
     return all(
         any(number.low <= value <= number.high and (joint in of or not joints) for of, value in found)
@@ -79,7 +79,7 @@ def _within(number: Number, joints: set[int], answer: Answer) -> bool:
 
 
 def _found(number: Number, answer: Answer) -> list[tuple[tuple[int, ...], float]]:
-    """Joints and value of every such number of the answer."""
+    """Returns joints and value of every such parameter of the answer."""
     return [
         (tuple(parameter["joints"]), float(parameter["value"]))
         for step in adopted(answer)

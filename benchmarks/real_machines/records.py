@@ -1,4 +1,4 @@
-"""Records of public repositories, read by the product's own import."""
+"""Reads records of public repositories by the product's own import."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ Columns = dict[str, Floats]
 
 
 class MissingDataError(Exception):
-    """A repository or a file of it is not where it was looked for; the message says where."""
+    """A repository or a file of it is missing; the message says where."""
 
 
 def find_repository(folder: Path, name: str) -> Path:
-    """The folder of a repository `owner/name` below the one that holds them: a checkout, a bare one, or plain files.
+    """Returns the folder of a repository `owner/name` below the folder of all: a checkout, a bare one, or plain files.
 
     Raises MissingDataError.
     """
@@ -38,7 +38,7 @@ def find_repository(folder: Path, name: str) -> Path:
 
 
 def content(repository: Path, commit: str, path: str) -> bytes:
-    """A file at a commit; of a folder without git, the file as it is. Raises MissingDataError."""
+    """Returns a file at a commit; in a folder without git, the present file. Raises MissingDataError."""
     if not ((repository / ".git").exists() or (repository / "HEAD").is_file()):
         if not (repository / path).is_file():
             raise MissingDataError(f"{repository}: has no file {path}")
@@ -50,7 +50,9 @@ def content(repository: Path, commit: str, path: str) -> bytes:
 
 
 def read_columns(rig: Rig, record: Record, folder: Path) -> Columns:
-    """`time` and each joint's signals as the product imports them, by the names of its CSV files, in SI units."""
+    """Returns `time` and each joint's signals as the product imports them, by the names of its CSV files, in SI
+    units.
+    """
     repository = find_repository(folder, rig.repository)
     mapping = {signal: text.replace("{part}", record.part) for signal, text in rig.map.items()}
     where = "..".join("" if isinf(edge) else repr(edge) for edge in (record.start, record.end))
@@ -62,14 +64,14 @@ def read_columns(rig: Rig, record: Record, folder: Path) -> Columns:
         trace = read_trace(files[0], map=mapping, where=None if where == ".." else f"time={where}", drive_unit=unit)
     columns = {"time": trace.time}
     for signal in ("set_point", "position", "drive", "velocity"):
-        if any(key.rstrip("_0123456789") == signal for key in mapping):  # no position that was integrated
+        if any(key.rstrip("_0123456789") == signal for key in mapping):  # not an integrated position
             values = getattr(trace, signal)
             columns |= {f"{signal}_{joint}": values[:, trace.column(joint)] for joint in trace.joints}
     return columns
 
 
 def write_record(columns: Columns, path: Path, drive_unit: str) -> Path:
-    """A CSV file, every number exact, and the TOML beside it that says what columns cannot."""
+    """Writes a CSV file, every value exact, and the TOML beside it with data that columns cannot hold."""
     table = np.stack(list(columns.values()), axis=1)
     np.savetxt(path, table, delimiter=",", comments="", fmt="%.17g", header=",".join(columns))
     path.with_suffix(".toml").write_text(f'drive_unit = "{drive_unit}"\n', encoding="utf-8")
@@ -77,7 +79,9 @@ def write_record(columns: Columns, path: Path, drive_unit: str) -> Path:
 
 
 def add_torque(columns: Columns, torque: Torque, gain: float) -> Columns:
-    """The record of a joint with one torque more against its motion: the drive gives it, too. gain: N·m a unit."""
+    """Returns the record of a joint with an additional torque against its motion, which the drive supplies, too. gain:
+    N·m per unit.
+    """
     key = f"position_{torque.joint}"
     time = columns["time"]
     position = columns.get(key)
@@ -94,7 +98,9 @@ def add_torque(columns: Columns, torque: Torque, gain: float) -> Columns:
 
 
 def write_machine(source: Path, numbers: Mapping[str, float], removed: Sequence[str], path: Path) -> Path:
-    """A machine file with some numbers of it changed, by path such as `joints.0.link.mass.value`, or whole keys out."""
+    """Writes a machine file with some values changed, by path such as `joints.0.link.mass.value`, or whole keys
+    removed.
+    """
     document = machine_data(source)
     for name in removed:
         del document[name]
@@ -109,5 +115,5 @@ def write_machine(source: Path, numbers: Mapping[str, float], removed: Sequence[
 
 
 def machine_data(source: Path) -> dict[str, Any]:
-    """A machine file in full, as plain data."""
+    """Returns a machine file in full, as plain data."""
     return load_machine(str(source)).model_dump(mode="json", exclude_none=True)

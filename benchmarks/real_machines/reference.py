@@ -1,8 +1,8 @@
-"""The reference: linear least squares on the inverse dynamics, of the usual regressors, with numpy alone.
+"""The reference: linear least squares on the inverse dynamics, with the usual regressors, by numpy alone.
 
 Torques are linear in every link's mass, first moments and inertia about its frame, in the rotor's inertia, in the
 coefficients of viscous and Coulomb friction, and in an offset. Signals are low-passed by the gain of a Butterworth
-filter that runs forwards and backwards, applied to the spectrum. Samples at which a joint rests tell nothing of it.
+filter that runs forwards and backwards, applied to the spectrum. Samples at which a joint rests are left out.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ from benchmarks.real_machines.records import machine_data
 Floats = NDArray[np.float64]
 
 WIDER = 3.0
-"""Cutoff of the motion's low-pass, in cutoffs of the torques."""
+"""Cutoff of the motion's low-pass, as a multiple of that of the torques."""
 GRID = 3.0
-"""Samples that are compared a period of the cutoff, as the product compares them: closer ones are not independent."""
+"""Compared samples per period of the cutoff, as in the product: closer ones are not independent."""
 PADDED = 1.0
 """Seconds by which signals are mirrored at their ends."""
 LEAST = 0.01
-"""Singular values that are used, as a share of the largest: base parameters that a motion hardly excites are left out
-(Gautier asks for a condition number below 100). On six joints, a fit of all of them is twice as far off elsewhere."""
+"""Least singular value, as a share of the largest: base parameters that a motion hardly excites are left out (Gautier
+requires a condition number below 100). On six joints, a fit of all of them has twice the error elsewhere.
+"""
 EDGE = 1.0
 """Periods of the cutoff that are left out at both ends."""
 RESTS = 0.01
@@ -36,8 +37,9 @@ RESTS = 0.01
 
 @dataclass(frozen=True)
 class Reference:
-    """What a linear fit leaves: √(Σ residual² / Σ torque²) on fitted and on held-out records, and its number of
-    columns."""
+    """Result of a linear fit: √(Σ residual² / Σ torque²) on fitted and on held-out records, and its number of
+    columns.
+    """
 
     fitted: float
     held_out: float
@@ -52,7 +54,7 @@ def reference(
     *,
     offset: bool,
 ) -> Reference:
-    """The linear fit. cutoff in Hz, of torques. offset: whether every joint has a constant torque, too."""
+    """Fits the linear model. cutoff in Hz, of torques. offset: whether every joint has a constant torque, too."""
     document = machine_data(machine)
     first, second = (
         [_system(document, columns, cutoff, offset=offset) for columns in records] for records in (fitted, held_out)
@@ -62,7 +64,7 @@ def reference(
     used = size > 1e-12 * size.max()
     weight = moves / np.sqrt(
         (b**2 * moves).sum(axis=0) / moves.sum(axis=0)
-    )  # joints count alike, whatever their torques
+    )  # joints have equal weight, whatever their torques
     rows = (A[:, :, used] / size[used]) * weight[:, :, None]
     found = np.linalg.lstsq(rows.reshape(-1, int(used.sum())), (b * weight).ravel(), rcond=LEAST)[0] / size[used]
 
@@ -78,7 +80,7 @@ def reference(
 def _system(
     document: Mapping[str, Any], columns: Mapping[str, Floats], cutoff: float, *, offset: bool
 ) -> tuple[Floats, Floats, Floats]:
-    """Regressors (m, n, p), torques (m, n) and where a joint moves, 0 or 1 (m, n), of one record."""
+    """Returns regressors (m, n, p), torques (m, n) and where a joint moves, 0 or 1 (m, n), of one record."""
     joints = document["joints"]
     names = range(1, len(joints) + 1)
     time = columns["time"]
@@ -106,7 +108,7 @@ def _system(
 
 
 def gain_of(drive: Mapping[str, Any]) -> float:
-    """Torque at the joint for a unit of drive, of a motor at rest."""
+    """Returns torque at the joint per unit of drive, of a motor at rest."""
     if drive["kind"] == "gain":
         return float(drive["gain"]["value"])
     number = {key: drive[key]["value"] for key in ("gear_ratio", "torque_constant", "resistance")}
@@ -114,7 +116,7 @@ def gain_of(drive: Mapping[str, Any]) -> float:
 
 
 def _low_pass(signal: Floats, cutoff: float, period: float) -> Floats:
-    """Columns (k, …) without their fast parts and without delay."""
+    """Low-passes columns (k, …) without delay."""
     pad = min(len(signal) - 1, round(PADDED / period))
     ends = 2 * signal[0] - signal[pad:0:-1], 2 * signal[-1] - signal[-2 : -pad - 2 : -1]
     whole = np.concatenate([ends[0], signal, ends[1]])
@@ -124,8 +126,10 @@ def _low_pass(signal: Floats, cutoff: float, period: float) -> Floats:
 
 
 def _bodies(document: Mapping[str, Any], q: Floats, v: Floats, a: Floats) -> Floats:
-    """Regressors (k, n, 10 n): mass, first moments and inertia of every link about its own frame (recursive Newton and
-    Euler, with Denavit and Hartenberg's standard frames)."""
+    """Returns regressors (k, n, 10 n): mass, first moments and inertia of every link about its own frame.
+
+    Recursive Newton–Euler with standard Denavit–Hartenberg frames.
+    """
     joints = document["joints"]
     n, k = len(joints), len(q)
     up = np.array([0.0, 0.0, 1.0])
@@ -171,7 +175,7 @@ def _bodies(document: Mapping[str, Any], q: Floats, v: Floats, a: Floats) -> Flo
 
 
 def _wrench(omega: Floats, alpha: Floats, lift: Floats) -> tuple[Floats, Floats]:
-    """Force and moment (k, 3, 10) about a link's frame of a unit of each of its ten numbers."""
+    """Returns force and moment (k, 3, 10) about a link's frame for one unit of each of its ten parameters."""
     k = len(omega)
     force, moment = np.zeros((k, 3, 10)), np.zeros((k, 3, 10))
     force[:, :, 0] = lift

@@ -1,4 +1,4 @@
-"""The entries of `rigs.toml`: records, what is known of a rig, and one honest alteration of it."""
+"""The entries of `rigs.toml`: records, known facts of a rig, and one honest alteration of it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Number:
-    """An interval in which a number of an effect has to lie. of: names such as `coulomb_friction.torque`."""
+    """Interval in which a parameter of an effect must lie. of: names such as `coulomb_friction.torque`."""
 
     of: tuple[str, ...]
     low: float
@@ -24,8 +24,9 @@ class Number:
 
 @dataclass(frozen=True)
 class Question:
-    """One thing that is known of a rig. joints: empty where an effect belongs to the whole machine. moved: a number of
-    the file that a warning may say is far off, in place of an effect."""
+    """One known fact of a rig. joints: empty if an effect belongs to the whole machine. moved: a parameter of the file
+    that a warning may call far off, in place of an effect.
+    """
 
     what: str
     names: tuple[str, ...]
@@ -38,8 +39,9 @@ class Question:
 
 @dataclass(frozen=True)
 class Record:
-    """Files of one record, below the rig's folder, and the stretch of it, in s of its own clock. part: what
-    {part} of the mapping stands for: of a JSON file with many records, the way to this one, such as `data.3`."""
+    """Files of one record, below the rig's folder, and a part of it, in s of its own clock. part: replaces {part} of
+    the mapping: in a JSON file with many records, the path to this one, such as `data.3`.
+    """
 
     files: tuple[str, ...]
     start: float
@@ -49,8 +51,9 @@ class Record:
 
 @dataclass(frozen=True)
 class Torque:
-    """A torque that is added to a record, as if the joint had had it. size in N·m/rad (spring) or N·m; cycles a turn
-    (ripple); frequency in Hz (periodic)."""
+    """A torque that is added to a record, as if the joint had had it. size in N·m/rad (spring) or N·m; cycles per turn
+    (ripple); frequency in Hz (periodic).
+    """
 
     kind: str
     joint: int
@@ -61,7 +64,7 @@ class Torque:
 
 @dataclass(frozen=True)
 class Alteration:
-    """One change of a rig whose answer is known: numbers of its machine file, or a torque in its records."""
+    """One change of a rig with a known answer: values of its machine file, or a torque in its records."""
 
     what: str
     question: Question
@@ -72,7 +75,7 @@ class Alteration:
 
 @dataclass(frozen=True)
 class Rig:
-    """One real machine. map: by signal, what the import is told (`rigs.toml`)."""
+    """One real machine. map: by signal, the options of the import (`rigs.toml`)."""
 
     name: str
     title: str
@@ -93,7 +96,7 @@ class Rig:
 
 
 def load_rigs(path: Path = HERE / "rigs.toml") -> tuple[Rig, ...]:
-    """Every entry of a file."""
+    """Returns every entry of a file."""
     return tuple(_rig(entry, path.parent) for entry in tomllib.loads(path.read_text("utf-8"))["rig"])
 
 

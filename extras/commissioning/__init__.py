@@ -1,4 +1,4 @@
-"""Finding out, on a machine that nobody knows yet, what its files only assume. Pure: readings in, verdicts out."""
+"""Commissions an unknown arm: checks by measurement what its files assume."""
 
 from daq.plugins import Command, Plugin
 
@@ -12,7 +12,7 @@ PLUGIN = Plugin(
         ),
         Command(
             "memory",
-            "Watch the shared memory, and find out what lies where.",
+            "Watch the shared memory, and find its registers.",
             "extras.commissioning.memory_command",
             about="computer",
             group="Look",

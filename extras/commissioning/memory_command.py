@@ -1,4 +1,4 @@
-"""`daq memory`: what lies where in the memory that the motor controller shares with its host."""
+"""`daq memory`: finds the registers in the memory that the motor controller shares with its host."""
 
 from __future__ import annotations
 
@@ -22,12 +22,10 @@ if TYPE_CHECKING:
     from extras.commissioning.person.memory_page import LinkPage
 
 WINDOW = 200
-"""Number of readings that the live table looks back on."""
+"""Number of past readings in the live table."""
 ROW = 16
 
-app = typer.Typer(
-    add_completion=False, help="Watch the shared memory, and find out what lies where.", no_args_is_help=True
-)
+app = typer.Typer(add_completion=False, help="Watch the shared memory, and find its registers.", no_args_is_help=True)
 
 
 @app.command()
@@ -37,7 +35,7 @@ def watch(
     once: Annotated[bool, typer.Option("--once", help="Read for a second, print one table, and end.")] = False,
     json: JsonOption = False,
 ) -> None:
-    """Show every byte live: what changes, how fast, and what changes with it. Only reads."""
+    """Show every byte live: which change, how fast, and together with which others. Only reads."""
     from extras.commissioning.memory.watch import watched
 
     call = invocation(context)
@@ -75,14 +73,15 @@ def find(
     ] = True,
     inputs: Annotated[bool, typer.Option("--inputs/--no-inputs", help="Ask for process inputs to be switched.")] = True,
     mock_control: Annotated[
-        str | None, typer.Option(help="Control port of a mock, which then stands in for the person at the arm.")
+        str | None, typer.Option(help="Control port of a mock, which then acts as the person at the arm.")
     ] = None,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Find positions, set points, errors, powers, gains and inputs, with evidence. Asks you to move the arm by hand;
-    writes nothing but set points of which it is proved that they are, and these only at the end. What ends it while the
-    emergency stop is pressed is kept beside the memory map: the next call begins with the safe release."""
+    """Find positions, set points, errors, powers, gains and inputs, with evidence. Asks you to move the arm by hand.
+    Writes only set points at proved addresses, and these only at the end. If the search ends while the emergency stop
+    is pressed, this is noted beside the memory map, and the next call begins with the safe release.
+    """
     from daq.config.robot_files import load_memory_map
     from daq_cli.app.output_file import check_folder
     from extras.commissioning.command.record import Record
@@ -137,10 +136,10 @@ def search(
     when_found: Callable[[Findings], object],
     pressed: Callable[[bool], None],
 ) -> tuple[Findings, list[CommandProof]]:
-    """The whole search; the findings so far are written to `keep` after every stage that changes them.
+    """Runs the whole search; writes the findings so far to `keep` after every stage that changes them.
 
     when_found: called with the findings before anything is moved
-    pressed:    told that the emergency stop is about to be pressed, and that it was released safely
+    pressed:    called when the emergency stop is about to be pressed, and when it was released safely
     """
     from daq_cli.app.output_file import replacing
     from extras.commissioning.memory.findings import judge
@@ -176,12 +175,12 @@ def search(
 
 
 def _released(page: LinkPage, operator: Operator, found: Findings) -> bool:
-    """Whether the emergency stop was released, and the arm has stayed where it was."""
+    """Returns whether the emergency stop was released, and the arm has not moved."""
     from extras.commissioning.memory.procedure import errors_now, is_alive, may_have_power, release
 
     def against() -> str:
         if not is_alive(page.read().data):
-            return "the memory is not alive"
+            return "the memory is not live"
         return may_have_power(errors_now(page, found.joints))
 
     if why := release(page, operator, against):
@@ -190,7 +189,7 @@ def _released(page: LinkPage, operator: Operator, found: Findings) -> bool:
 
 
 def _prove(page: LinkPage, operator: Operator, found: Findings) -> list[CommandProof]:
-    """The proof by command, joint by joint, each with the person's word; nothing where the arm might jump."""
+    """Proves by command, joint by joint, each with the person's consent; does nothing if the arm might jump."""
     from extras.commissioning.memory.commands import prove_by_command
     from extras.commissioning.memory.procedure import Task, errors_now, may_have_power
 
@@ -200,7 +199,7 @@ def _prove(page: LinkPage, operator: Operator, found: Findings) -> list[CommandP
         if place is None or not operator.begin(Task("command", joint=joint.joint)):
             continue
         if against := may_have_power(errors_now(page, found.joints)):
-            operator.show(f"Nothing more is moved, use the emergency stop: {against}.")
+            operator.show(f"Nothing more is moved; use the emergency stop: {against}.")
             break
         page.prove([page.base + place.low])
         proofs.append(prove_by_command(page, found.joints, joint.joint))
@@ -212,8 +211,10 @@ def _prove(page: LinkPage, operator: Operator, found: Findings) -> list[CommandP
 
 
 def keep_map(found: Findings, path: Path) -> bool:
-    """Writes the memory map, and where a register has no place a map to be completed beside it. Returns whether there
-    is a memory map: False while one lacks a place that no map can be without."""
+    """Writes the memory map, and if a register has no place also a map to be completed.
+
+    Returns whether there is a memory map: False while a register that every map needs has no place.
+    """
     from daq_cli.app.output_file import replacing
     from extras.commissioning.memory.findings import begun_map_text
     from firmware_protocol.memory_map import memory_map_text
@@ -224,7 +225,7 @@ def keep_map(found: Findings, path: Path) -> bool:
             part.write_text(begun_map_text(found), "utf-8")
     if memory_map is None:
         return False
-    remarks = ['Found by `daq memory find`. "found": by evidence at the arm; "assumed": agrees with what was seen.']
+    remarks = ['Found by `daq memory find`. "found": by evidence at the arm; "assumed": agrees with all readings.']
     if absent := found.absent():
         remarks.append(f"Left out, because they have no place: {', '.join(absent)}. Nothing reads or writes them.")
     with replacing(path) as part:
@@ -233,26 +234,31 @@ def keep_map(found: Findings, path: Path) -> bool:
 
 
 def until_complete(path: Path, findings: Path, operator: Operator) -> tuple[Path, Path]:
-    """Where a search writes its map and findings: there at once where there is no map yet, so that nothing is lost;
-    beside them where an earlier search has left one, which stays if this one ends early. Then the person is told."""
+    """Returns the files to which a search writes its map and findings.
+
+    Without an earlier map, the final files, so that nothing is lost. Otherwise files beside them: the earlier ones stay
+    if this search ends early, and the person is told so.
+    """
     if not path.exists():
         return path, findings
     new_map, new_findings = (one.with_name(f"{one.stem}.new{one.suffix}") for one in (path, findings))
     operator.show(
-        f"{path.name} and {findings.name} stay as they are until this search is complete. If it ends early, what it "
-        f"has found is in {new_map.name} and {new_findings.name}: saved under the names of the others, they count."
+        f"{path.name} and {findings.name} stay as they are until this search is complete. If it ends early, its "
+        f"results are in {new_map.name} and {new_findings.name}: save them under the first names to use them."
     )
     for one in (new_map, begun_map(new_map), new_findings):
-        one.unlink(missing_ok=True)  # of an earlier search that has ended early
+        one.unlink(missing_ok=True)  # of an earlier search that ended early
     return new_map, new_findings
 
 
 def adopt(found: Findings, files: Mapping[Path, Path]) -> bool:
-    """Has what a complete search has written in place of the earlier result; `files` has the new file → the name under
-    which it counts. Returns whether there is a memory map; without one the earlier result stays."""
+    """Replaces the earlier result by that of a complete search; returns whether there is a memory map.
+
+    Without one the earlier result stays. `files`: new file → final name.
+    """
     new_map, path = next(iter(files.items()))
     if found.memory_map("") is None:
-        keep_map(found, path)  # writes the map to be completed, alone
+        keep_map(found, path)  # only writes the map to be completed
         return False
     for new, one in files.items():
         new.replace(one)
@@ -262,38 +268,38 @@ def adopt(found: Findings, files: Mapping[Path, Path]) -> bool:
 
 
 def begun_map(path: Path) -> Path:
-    """Where the map to be completed is written, beside a memory map."""
+    """Returns the path of the map to be completed, beside a memory map."""
     return path.with_suffix(".begun.toml")
 
 
 def why_no_map(found: Findings, path: Path) -> str:
-    """What has no place, and what to do."""
+    """Says which registers have no place, and what to do."""
     names = found.essential()
     why = f"these have no place: {', '.join(names)}" if names else "errors of some joints have two bytes, of others one"
     return (
-        f"no memory map, for {why}; {begun_map(path).name} has all others: put the addresses from your manual in place "
-        f"of its question marks, and save it as {path.name}"
+        f"no memory map: {why}; {begun_map(path).name} has all others: replace its question marks with the "
+        f"addresses from your manual, and save it as {path.name}"
     )
 
 
 def what_is_absent(found: Findings, path: Path) -> str:
-    """What the memory map leaves out, and what that means; empty where it has everything."""
+    """Says what the memory map leaves out, and the consequences; empty if it is complete."""
     absent = found.absent()
     if not absent:
         return ""
     gains = any(name.startswith("gain") for name in absent)
     lost = ["gains can be neither read nor set: the arm keeps its own"] if gains else []
     if any(not name.startswith("gain") for name in absent):
-        lost.append("process signals and the gripper are not offered")
+        lost.append("process signals and the gripper are not available")
     return (
         f"{path.name} leaves out {', '.join(absent)}, which have no place, so {'; '.join(lost)}. Nothing reads or "
-        f"writes them. With a manual: put the addresses in place of the question marks of {begun_map(path).name}, and "
+        f"writes them. With a manual: replace the question marks of {begun_map(path).name} with the addresses, and "
         f"save it as {path.name}"
     )
 
 
 def findings_data(found: Findings, proofs: list[CommandProof]) -> dict[str, object]:
-    """Everything as plain data."""
+    """Returns everything as plain data."""
     from dataclasses import asdict
 
     return {
@@ -307,7 +313,7 @@ def findings_data(found: Findings, proofs: list[CommandProof]) -> dict[str, obje
 
 
 def findings_text(found: Findings, proofs: list[CommandProof]) -> str:
-    """Every register in one line, and what the commands have proved."""
+    """Returns one line for every register, and the results of the proof by command."""
     lines = []
     for one in found.all:
         name = one.register if one.joint is None else f"{one.register} {one.joint}"
@@ -319,7 +325,7 @@ def findings_text(found: Findings, proofs: list[CommandProof]) -> str:
 
 
 def proof_line(proof: CommandProof) -> str:
-    """One joint's proof for people."""
+    """Returns one joint's proof as a line for people."""
     if proof.problem:
         return f"joint {proof.joint}: NOT PROVED by command: {proof.problem}"
     towards = {1: "towards it: the sign of its drive is right", 0: "not far enough to show the sign of its drive"}
@@ -351,7 +357,7 @@ def _watch_text(found: list[WatchedByte]) -> str:
 
 @contextmanager
 def _screen(live: bool) -> Iterator[Callable[[str], None]]:
-    """A function that shows text in place, in a terminal."""
+    """Yields a function that shows text in place, in a terminal."""
     if not live:
         yield lambda _text: None
         return
@@ -363,7 +369,7 @@ def _screen(live: bool) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def _page(call: Invocation) -> Iterator[LinkPage]:
-    """The memory of the configured robot. Raises ReachError when there is none."""
+    """Opens the memory of the configured robot. Raises ReachError if there is none."""
     from daq.config.robot_files import load_memory_map
     from extras.commissioning.person.memory_page import open_page
 

@@ -1,10 +1,10 @@
-"""Direction, zero, range and bend of a potentiometer, from readings at postures that a protractor has measured.
+"""Estimates direction, zero, range and bend of a potentiometer, from readings at postures measured with a protractor.
 
-A straight line through angles over readings, by generalised least squares; intervals are Student's at 95 %, from the
-scatter that the readings themselves show. A potentiometer bends smoothly, so that neighbouring readings are off alike
-and tell less about the line than as many independent ones: half of the scatter is taken to be such a bend, the other
-half that of the protractor. The bend that is told is the largest departure of a parabola from a line between the
-outermost readings.
+It fits a straight line to angles over readings by generalised least squares. Intervals are Student's at 95 %, from the
+scatter of the readings themselves. A potentiometer bends smoothly, so neighbouring readings have similar errors and
+contain less information on the line than independent ones. Half of the scatter is attributed to such a bend, the other
+half to the protractor. The reported bend is the largest departure of a parabola from a line between the outermost
+readings.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ STUDENT_95 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.
 """Two-sided 95 % points of Student's distribution for 1, 2, … degrees of freedom."""
 NORMAL_95 = 1.96
 BEND_SHARE, BEND_LENGTH = 0.5, 550.0
-"""Share of the variance that is smooth, and over how many ADC counts it stays alike (standard deviation of a Gaussian).
-Both are assumptions; with them intervals held the truth in 92 to 98 % of simulated sensors whose angles were read to
-half a degree, with a scatter of half a degree, or exactly, while independent scatter gave 85 to 96 %."""
+"""Share of the variance that is smooth, and its correlation length in ADC counts (standard deviation of a Gaussian).
+Both are assumptions. With them intervals contained the truth in 92 to 98 % of simulated sensors, whose angles were read
+to half a degree, with a scatter of half a degree, or exactly. With independent scatter it was 85 to 96 %.
+"""
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Interval:
     half_width: float
 
     def holds(self, truth: float) -> bool:
-        """Whether the interval holds a value."""
+        """Whether the interval contains a value."""
         return abs(truth - self.value) <= self.half_width
 
 
@@ -67,20 +68,22 @@ class Potentiometer:
     residuals: tuple[float, ...]
 
     def as_data(self) -> dict[str, Any]:
-        """Plain data."""
+        """Returns plain data."""
         return asdict(self)
 
 
 def student_95(freedom: int) -> float:
-    """Two-sided 95 % point of Student's distribution."""
+    """Returns the two-sided 95 % point of Student's distribution."""
     if freedom < 1:
         return math.inf
     return STUDENT_95[freedom - 1] if freedom <= len(STUDENT_95) else NORMAL_95 * (1 + 1.2 / freedom)
 
 
 def calibrate_potentiometer(joint: int, counts: Sequence[float], angles: Sequence[float]) -> Potentiometer:
-    """The sensor that gave these readings (ADC counts) at these angles (rad). Raises SpecError for too few of them, or
-    too close together."""
+    """Estimates the sensor with these readings (ADC counts) at these angles (rad).
+
+    Raises SpecError for too few, or too close ones.
+    """
     c, a = np.asarray(counts, float), np.asarray(angles, float)
     if len(c) != len(a) or len(c) < FEWEST:
         raise SpecError(f"joint {joint}: {len(c)} postures: at least {FEWEST} are needed")
@@ -106,7 +109,7 @@ def calibrate_potentiometer(joint: int, counts: Sequence[float], angles: Sequenc
 
 
 def _line(c: Any, a: Any) -> tuple[float, float, tuple[float, float], Any]:
-    """Slope, angle at 0, the standard errors of both, and what is left."""
+    """Returns slope, angle at 0, their standard errors, and the residual."""
     matrix = np.column_stack([c / ADC_COUNTS, np.ones_like(c)])
     alike = np.exp(-0.5 * ((c[:, None] - c) / BEND_LENGTH) ** 2)
     root = np.linalg.cholesky((1.0 - BEND_SHARE) * np.eye(len(c)) + BEND_SHARE * alike)
@@ -120,7 +123,7 @@ def _line(c: Any, a: Any) -> tuple[float, float, tuple[float, float], Any]:
 
 
 def _bend(c: Any, a: Any, whole: float) -> tuple[float, float]:
-    """The largest departure of a parabola from a line, and its standard error, as shares of the range."""
+    """Returns the largest departure of a parabola from a line, and its standard error, as shares of the range."""
     half = np.ptp(c) / 2
     x = (c - (c.max() + c.min()) / 2) / half
     matrix = np.column_stack([x**2 - 0.5, x, np.ones_like(x)])

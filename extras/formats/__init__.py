@@ -1,1 +1,1 @@
-"""Robots, records and lines in the formats of others."""
+"""Imports and exports robots, records and tables in the formats of other programs."""

@@ -1,1 +1,1 @@
-"""What a laboratory adds to one arm at one computer."""
+"""Extensions for a laboratory with several arms, computers or people."""

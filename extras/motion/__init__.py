@@ -1,4 +1,4 @@
-"""Set points that make the arm follow a motion: from a model of it, or from a record of the last attempt."""
+"""Computes set points with which the arm follows a motion, from a model of it or from a record of the last attempt."""
 
 from daq.plugins import Command, Name, Plugin
 

@@ -20,17 +20,16 @@ from model.simulation.period import OUT_READING
 from model.simulation.prepared import LONGEST_STEP, Options, Prepared, prepare
 
 LEAD_IN = 1.5
-"""Time (s) for which the simulated arm first holds the posture where it begins, until gravity and drive are in
-balance."""
+"""Time (s) for which the simulated arm first holds its initial posture, until gravity and drive balance."""
 NOISE_SEED = 1
 """Seed of the sensor's noise."""
 CHANGE = 1.0
-"""Change of a set point, in posture units, by which its response is found: the smallest that the controller takes."""
+"""Change of a set point, in posture units, for estimating its response: the smallest that the controller takes."""
 
 
 @dataclass(frozen=True)
 class ArmInLoop:
-    """The simulated arm: set points (k, n) of the modelled joints in posture units in, readings (k, n) out.
+    """The simulated arm: maps set points (k, n) of the modelled joints to readings (k, n), both in posture units.
 
     `smooth` and `rounded` are the run without and with the board's rounding, `lead` periods longer than the motion.
     """
@@ -42,12 +41,15 @@ class ArmInLoop:
     lead: int
 
     def readings(self, candidates: Sequence[Floats]) -> Floats:
-        """Readings (r, k, n) for r courses of set points, nothing rounded. Raises SpecError for an unstable loop."""
+        """Returns readings (r, k, n) for r candidates of set points, nothing rounded. Raises SpecError for an unstable
+        loop.
+        """
         return self._run([self._loaded(self.smooth, one) for one in candidates])
 
     def rounded_readings(self, set_points: Floats, draws: int) -> Floats:
-        """Readings (r, k, n) as the board makes them: set points, readings and powers rounded, with `draws` draws of
-        the noise that the machine file states."""
+        """Returns readings (r, k, n) of the board, with rounded set points, readings and powers, and `draws` draws of
+        the stated noise.
+        """
         machine = self.model.machine
         sensors = [machine.joint(joint).sensor for joint in machine.modelled_joints]
         counts = np.array([s.noise.value if s is not None and s.noise is not None else 0.0 for s in sensors])
@@ -56,10 +58,10 @@ class ArmInLoop:
         return self._run([replace(own, noise=noise) for noise in noises])
 
     def responses(self, set_points: Floats) -> tuple[Response, ...]:
-        """The response of each joint about these set points.
+        """Returns the response of each joint about these set points.
 
-        Every REACH-th set point of all joints is changed in one run, so that REACH runs hold the whole band. What the
-        set points of one joint change on another is left out: it is small, and the next run sees it.
+        One run changes every REACH-th set point of all joints, so that REACH runs give the whole band. The influence of
+        one joint's set points on another is left out: it is small, and the next run includes it.
         """
         count, joints = set_points.shape
         reach = min(REACH, count)
@@ -77,7 +79,7 @@ class ArmInLoop:
         return replace(run, set_points=self._taken(whole, rounded=run is self.rounded))
 
     def _taken(self, postures: Floats, *, rounded: bool) -> Floats:
-        """Set points as the compiled controller takes them: counts for the board's integer PID, angles for others."""
+        """Returns set points in the controller's units: counts for the board's integer PID, angles for others."""
         machine = self.model.machine
         if machine.controller.kind != "board_pid":
             return np.ascontiguousarray(self.scale.angles(postures))
@@ -92,12 +94,12 @@ class ArmInLoop:
         out = BatchRun(self.model, runs, np.arange(count), vectors, initials, LONGEST_STEP).run()
         readings = out[:, OUT_READING, self.lead :]
         if not np.isfinite(readings).all():
-            raise SpecError("the simulated motion does not stay finite: the model's loop is unstable")
+            raise SpecError("the simulated motion does not stay finite: the model's control loop is unstable")
         return self.scale.postures(readings)
 
 
 def arm_in_loop(model: Model, begin: Floats, count: int, gains: Mapping[int, Gain] | None) -> ArmInLoop:
-    """The arm at rest at `begin` (n,) posture units of its modelled joints, for a motion of `count` periods.
+    """Returns the arm at rest at `begin` (n,) posture units of its modelled joints, for a motion of `count` periods.
 
     Args:
         gains: those of the experiment, by joint; the machine's where it has none.
@@ -107,7 +109,7 @@ def arm_in_loop(model: Model, begin: Floats, count: int, gains: Mapping[int, Gai
     machine = model.machine
     controller = machine.controller
     if isinstance(controller, NoController):
-        raise SpecError(f"machine {machine.name} has no controller: it takes no set points")
+        raise SpecError(f"machine {machine.name} has no controller that takes set points")
     joints, period = machine.modelled_joints, controller.period.value
     scale = scale_of(machine, joints)
     lead = round(LEAD_IN / period)

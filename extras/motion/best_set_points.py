@@ -1,4 +1,4 @@
-"""The set points whose linear response comes nearest to a motion, within limits, and their rounding."""
+"""Finds the set points whose linear response comes nearest to a motion, within limits, and rounds them."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from extras.motion.response import Response
 from model.arrays import Floats, Mask
 
 ROUGHNESS = 0.01
-"""Weight of the squared second difference of a correction beside the squared error: keeps set points smooth at
-frequencies that hardly reach the arm, where a model is least certain."""
+"""Weight of a correction's squared second difference relative to the squared error. It keeps set points smooth at
+frequencies that hardly reach the arm, where a model is least certain.
+"""
 RELAXATION = 1.6
 """Over-relaxation of the alternating directions (Boyd et al. 2011, section 3.4.3, recommend 1.5 to 1.8)."""
 MOST_STEPS = 300
-"""Most steps of the alternating directions; what violates a limit then is mended by the rounding."""
+"""Most steps of the alternating directions; rounding then removes any remaining violation of a limit."""
 NEAR = 0.01
 """Violation of a limit, in posture units, that counts as none."""
 HELD_WITHIN = 0.75
@@ -29,7 +30,7 @@ _NEIGHBOURS = np.array([-1.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class Task:
-    """A joint's set points to be found, all (k,) in posture units.
+    """A joint's optimisation problem, all arrays (k,) in posture units.
 
     Args:
         wanted: the motion. plain: the set points of the motion itself. now: those about which the response holds.
@@ -44,9 +45,9 @@ class Task:
 
 
 def best_set_points(task: Task, response: Response, allowed: Allowed) -> Floats:
-    """Set points (k,), not rounded: least squares of error, roughness and change, within the limits.
+    """Returns set points (k,), not rounded: least squares of error, roughness and change, within the limits.
 
-    Limits are kept by the alternating direction method of multipliers (Boyd et al. 2011, Foundations and Trends in
+    Limits are imposed by the alternating direction method of multipliers (Boyd et al. 2011, Foundations and Trends in
     Machine Learning 3(1)), whose every step is one solution of the same banded equations.
     """
     count = len(task.now)
@@ -68,9 +69,9 @@ def best_set_points(task: Task, response: Response, allowed: Allowed) -> Floats:
 def _within(
     matrix: Floats, aim: Floats, box: tuple[Floats, Floats], step: float, weight: float, start: Floats
 ) -> Floats:
-    """Minimum of ½ xᵀ matrix x − aimᵀ x within the box and with differences of at most `step`."""
+    """Returns the minimum of ½ xᵀ matrix x − aimᵀ x within the box and with differences of at most `step`."""
     both = matrix.copy()
-    both[0] += 3.0 * weight  # of I + DᵀD, where D takes differences
+    both[0] += 3.0 * weight  # of I + DᵀD, where D is the difference operator
     both[0, [0, -1]] -= weight
     both[1, :-1] -= weight
     factor = cholesky_banded(both, lower=True)
@@ -95,7 +96,7 @@ def _within(
 
 
 def _second_differences(count: int) -> Floats:
-    """Lower band (3, k) of DᵀD, where D takes second differences."""
+    """Returns the lower band (3, k) of DᵀD, where D is the second difference operator."""
     band = np.zeros((3, count))
     if count < 3:
         return band
@@ -108,7 +109,7 @@ def _second_differences(count: int) -> Floats:
 
 
 def _times(band: Floats, x: Floats) -> Floats:
-    """A symmetric banded matrix, given by its lower band, times x."""
+    """Multiplies x by a symmetric banded matrix, given by its lower band."""
     found = band[0] * x
     for d in range(1, min(len(band), len(x))):
         found[d:] += band[d, :-d] * x[:-d]
@@ -123,19 +124,20 @@ def _padded(band: Floats, rows: int) -> Floats:
 def rounded_set_points(
     wanted: Floats, response: Response, allowed: Allowed, effective: Floats, held: Mask | None = None
 ) -> Floats:
-    """Whole posture units (k,) whose response is nearest to that of `wanted` (k,), as far as one pass finds them.
+    """Returns whole posture units (k,) whose response is nearest to that of `wanted` (k,), as far as one pass finds
+    them.
 
-    effective: what each posture unit is for the controller, which may count more coarsely or finely.
-    held: periods (k,) in which the set point stays at the one before it where that is near enough.
+    effective: value of each posture unit for the controller, whose counts may be coarser or finer.
+    held: periods (k,) in which the set point stays at the previous one if that is near enough.
 
-    Each set point is rounded with the errors of those before it in mind, so that they cancel in what the arm shows:
-    decision feedback, Babai's nearest plane (1986, Combinatorica 6).
+    Each set point is rounded given the errors of those before it, so that their effects on the arm cancel: decision
+    feedback, Babai's nearest plane (1986, Combinatorica 6).
     """
     count = len(wanted)
     normal = response.normal()
     normal[0] += ROUGHNESS * float(normal[0].mean())
     reach = len(normal)
-    turned = np.zeros_like(normal)  # time runs backwards, so that the last unknown solved for is the last period
+    turned = np.zeros_like(normal)  # time is reversed, so that the last unknown solved for is the last period
     for d in range(min(reach, count)):
         turned[d, : count - d] = normal[d, : count - d][::-1]
     factor = cholesky_banded(turned, lower=True)

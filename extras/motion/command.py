@@ -1,4 +1,4 @@
-"""`daq follow`: set points with which the arm follows a motion, computed by a model or corrected by a trace's error."""
+"""`daq follow`: runs set points with which the arm follows a motion, from a model or corrected by a trace's error."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ app = typer.Typer(add_completion=False, help="Follow a motion closely.", no_args
 TraceArgument = Annotated[
     str,
     typer.Argument(
-        help="A file, the beginning of a trace's number or name, or `last`.", autocompletion=completion.traces
+        help="A file, the first characters of a trace's ID or name, or `last`.", autocompletion=completion.traces
     ),
 ]
 
@@ -65,15 +65,18 @@ def from_trace(
     context: typer.Context,
     trace: TraceArgument = "last",
     model: Annotated[
-        str | None, typer.Option("--model", "-m", help="Says how the arm answers (default: estimated from the trace).")
+        str | None,
+        typer.Option(
+            "--model", "-m", help="Model of the arm's response to set points (default: estimated from the trace)."
+        ),
     ] = None,
-    share: Annotated[float, typer.Option(min=0.01, max=1.0, help="Share of the correction that is made.")] = 1.0,
+    share: Annotated[float, typer.Option(min=0.01, max=1.0, help="Share of the correction to apply.")] = 1.0,
     folder: FolderOption = None,
     dry_run: DryRunOption = False,
     yes: YesOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Run the motion of a trace again, with its set points corrected by its error."""
+    """Run the motion of a trace again, with set points corrected by its tracking error."""
     from daq.safety.planned import planned
     from extras.motion.learning import learn
 
@@ -87,7 +90,7 @@ def from_trace(
 def show(
     context: typer.Context, trace: TraceArgument = "last", folder: FolderOption = None, json: JsonOption = False
 ) -> None:
-    """Show how near a trace's arm came to its motion: error before, expected and reached, by joint."""
+    """Show the tracking error of a trace, by joint: before, expected and reached."""
     from daq.safety.planned import motion_of
     from extras.motion.tracking import followed
 
@@ -106,7 +109,7 @@ def show(
 
 
 def _carry_out(robot: RobotAccess, found: ExperimentSpec, options: RunOptions) -> None:
-    """Says which error is expected, and runs the experiment."""
+    """Prints the expected error, and runs the experiment."""
     assert found.feedforward is not None
     console().print(expectation(found.feedforward))
     console().print(_table(_rows(found.feedforward, robot.machine), found.feedforward))
@@ -120,7 +123,7 @@ def _trace(robot: RobotAccess, folder: Path | None, name: str) -> Trace:
 
 
 def _experiment(robot: RobotAccess, folder: Path | None, name: str) -> ExperimentSpec:
-    """The plain experiment that a word of the command line means. Raises SpecError, TraceError."""
+    """Returns the plain experiment that an argument names. Raises SpecError, TraceError."""
     from daq.trajectories.presets import PRESETS
 
     if name in PRESETS:
@@ -134,11 +137,11 @@ def _experiment(robot: RobotAccess, folder: Path | None, name: str) -> Experimen
 
 
 def _of_no_experiment(trace: Trace) -> str:
-    return f"trace {trace.record.trace_id}: does not say which experiment it is of"
+    return f"trace {trace.record.trace_id}: does not state its experiment"
 
 
 def expectation(source: Feedforward) -> str:
-    """A line on where set points come from, above the table of errors."""
+    """Returns a line on the origin of the set points, above the table of errors."""
     by = [f"computed with model {source.model}"] if source.model else []
     by += [f"learned from trace {source.learned_from}"] if source.learned_from else []
     motion = source.asked.trajectory.kind.replace("_", " ")
@@ -148,7 +151,9 @@ def expectation(source: Feedforward) -> str:
 def _rows(
     source: Feedforward | None, machine: Machine, reached: Mapping[int, TrackingError] | None = None
 ) -> list[dict[str, object]]:
-    """Errors of each joint in degrees (mm where a joint slides): before, expected and reached, as far as known."""
+    """Returns errors of each joint in degrees (mm for a sliding joint): before, expected and reached, as far as
+    known.
+    """
     found = []
     known: dict[str, Mapping[int, TrackingError]] = {}
     known |= {} if source is None else {"before": source.before, "expected": source.expected}

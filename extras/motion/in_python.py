@@ -21,14 +21,13 @@ def feedforward(
     *,
     progress: Shown = True,
 ) -> ExperimentSpec:
-    """The experiment whose set points make the arm follow the motion of `experiment`, as the model knows the arm.
+    """Returns an experiment with set points that make the modelled arm follow the motion of `experiment`.
 
     Args:
         experiment: or the name of a preset.
-        machine: the machine that carries it out; None for the MA2000. Its limits hold.
+        machine: the machine that will run it; None for the MA2000. Its limits hold.
 
-    `result.feedforward.expected` has the tracking error that the model expects of each joint. Raises SpecError,
-    SafetyError.
+    `result.feedforward.expected` has the predicted tracking error of each joint. Raises SpecError, SafetyError.
     """
     machine = machine or load_machine("ma2000")
     asked = preset(experiment).spec if isinstance(experiment, str) else experiment
@@ -43,23 +42,25 @@ def learn(
     *,
     share: float = 1.0,
 ) -> ExperimentSpec:
-    """The experiment that corrects the set points of a recorded one by its tracking error: iterative learning.
+    """Returns an experiment with a recorded one's set points corrected by its tracking error: iterative learning.
 
     Args:
-        model: says how the arm answers set points; None: that is estimated from the trace.
-        machine: the machine that carries it out; None for the one that the trace is of.
-        share: of the correction that is made, above 0 and up to 1.
+        model: of the arm's response to set points; None: estimated from the trace.
+        machine: the machine that will run it; None for that of the trace.
+        share: of the correction that is applied, above 0 and up to 1.
 
-    Raises TraceError for a trace that nothing can be learned from; SpecError, SafetyError.
+    Raises TraceError for an unsuitable trace; SpecError, SafetyError.
     """
     own = machine or trace.record.machine
     if own is None:
-        raise TraceError(f"trace {trace.record.trace_id}: does not say of which machine it is")
+        raise TraceError(f"trace {trace.record.trace_id}: does not state its machine")
     return learning.learn(trace, own, lambda one: planned(one, own), model, share)
 
 
 def followed(trace: Trace) -> Followed | None:
-    """The motion that a trace's experiment asked for beside the arm's, with the tracking error of each joint; None for
-    a trace that does not say which experiment it is of. Raises SpecError, TraceError."""
+    """Returns the motion of a trace's experiment beside the arm's, with the tracking error of each joint.
+
+    None for a trace that does not state its experiment. Raises SpecError, TraceError.
+    """
     machine = trace.record.machine
     return None if machine is None else tracking.followed(trace, lambda spec: motion_of(spec, machine))

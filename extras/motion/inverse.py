@@ -1,4 +1,4 @@
-"""Set points with which a model of the arm follows a motion: its closed loop inverted by simulation."""
+"""Computes set points with which a model of the arm follows a motion: inverts its closed loop by simulation."""
 
 from __future__ import annotations
 
@@ -21,38 +21,38 @@ from model.machine_model.model import Model
 MOST_STEPS = 12
 """Most Gauss–Newton steps."""
 SETTLED = 0.01
-"""Relative fall of the squared error below which another step is not worth its time."""
+"""Relative fall of the squared error below which the steps end."""
 FIRST_CAUTION = 1e-3
-"""Weight at first of a set point's squared change in a step, beside the squared error."""
+"""Initial weight of a set point's squared change in a step, relative to the squared error."""
 LARGEST_CAUTION = 10.0
-"""Weight at which a step is given up: it would change next to nothing."""
+"""Weight at which a step is given up, because it would change almost nothing."""
 DRAWS = 4
 """Draws of the sensor's noise over which the error with rounding is averaged."""
 AT_REST = 1e-9
 """Change of a motion in a period, in posture units, that counts as rest."""
 MOST_RESTS = 40
-"""Most rests of a motion at which it is tried whether set points are better held than rounded."""
+"""Largest number of rests for which held set points are compared with rounded ones."""
 MOST_CORRECTIONS = 8
 """Most corrections of rounded set points."""
 LEAST_SHARE = 0.2
-"""Share of a correction below which a joint's set points are left as they are."""
+"""Share of a correction below which a joint's set points are left unchanged."""
 CAUTION = 0.1
-"""Weight of a set point's squared change in such a correction, beside the squared error."""
+"""Weight of a set point's squared change in such a correction, relative to the squared error."""
 
 
 def feedforward(
     model: Model, asked: ExperimentSpec, machine: Machine, plan: Planner, progress: Progress = silent
 ) -> ExperimentSpec:
-    """The experiment whose set points make the arm follow the motion of `asked`, as the model knows the arm.
+    """Returns an experiment with set points that make the modelled arm follow the motion of `asked`.
 
-    The arm is to be where that motion is at each period, without delay; where drive or limits do not allow that, the
-    squared error is least. Set points are found by Gauss–Newton steps on the simulated closed loop, then rounded.
+    The arm shall be at the motion's position in each period, without delay. If drive or limits do not allow that, the
+    squared error is least. Gauss–Newton steps on the simulated closed loop find the set points, which are then rounded.
 
     Args:
-        machine: the machine that will carry it out; its limits hold.
+        machine: the machine that will run it; its limits hold.
 
-    Raises SpecError for a model of another machine, and for an experiment that no set points can be computed for; as
-    the planner does.
+    Raises SpecError for a model of another machine, and for an experiment for which set points cannot be computed;
+    otherwise as the planner does.
     """
     require_same(model, machine)
     motion = motion_of(asked, machine, plan)
@@ -66,11 +66,13 @@ def feedforward(
 
 
 def require_same(model: Model, machine: Machine) -> None:
-    """Raises SpecError for a model of another machine: of another name, or whose set points or readings mean something
-    else. Masses and lengths may differ, since a fit finds them, and so may a load."""
+    """Raises SpecError for a model of another machine: another name, or other set points or readings.
+
+    Masses, lengths and loads may differ, since a fit changes them.
+    """
     own = model.machine
     if own.name != machine.name:
-        raise SpecError(f"the model {model.identity} is of {own.name}, the experiment is for {machine.name}")
+        raise SpecError(f"the model {model.identity} is of {own.name}, but the experiment is for {machine.name}")
     sensors = [[joint.sensor for joint in one.joints] for one in (own, machine)]
     different = (
         "other joints"
@@ -88,7 +90,7 @@ def require_same(model: Model, machine: Machine) -> None:
 
 
 def inverted(arm: ArmInLoop, motion: Motion, progress: Progress = silent) -> Floats:
-    """Whole posture units (k, n) of the modelled joints with which the simulated arm follows the motion."""
+    """Returns whole posture units (k, n) of the modelled joints with which the simulated arm follows the motion."""
     now, caution = motion.wanted.copy(), FIRST_CAUTION
     (reached,) = arm.readings([now])
     cost = _cost(motion, reached)
@@ -117,10 +119,10 @@ def inverted(arm: ArmInLoop, motion: Motion, progress: Progress = silent) -> Flo
 
 
 def _with_rounding(arm: ArmInLoop, motion: Motion, smooth: Floats, responses: Sequence[Response]) -> Floats:
-    """Rounded set points, corrected by what readings and powers that are rounded as well make of them.
+    """Returns rounded set points, corrected for the rounding of readings and powers.
 
-    A drive of whole counts and friction that sticks may hold a joint off the motion, or keep it swinging. What they do
-    on average over draws of the noise is corrected, joint by joint, as long as its squared error falls.
+    A drive of whole counts and stick-slip friction may hold a joint off the motion, or keep it oscillating. Their mean
+    effect over draws of the noise is corrected, joint by joint, as long as the squared error falls.
     """
     shares = dict.fromkeys(motion.columns, 1.0)
     held = np.zeros(smooth.shape, dtype=np.bool_)
@@ -158,7 +160,7 @@ def _with_rounding(arm: ArmInLoop, motion: Motion, smooth: Floats, responses: Se
 
 
 def _rests(motion: Motion) -> list[Mask]:
-    """Stretches (k, n) in which joints are to rest: the first of each joint, then the second, and so on."""
+    """Returns stretches (k, n) in which joints are to rest: the first of each joint, then the second, and so on."""
     still = np.ones(motion.wanted.shape, dtype=np.bool_)
     still[1:] = np.abs(np.diff(motion.wanted, axis=0)) < AT_REST
     begins = still.copy()
@@ -168,12 +170,12 @@ def _rests(motion: Motion) -> list[Mask]:
 
 
 def _costs(motion: Motion, shown: Floats) -> Floats:
-    """(n,) squared error of each joint over draws of readings (r, k, n)."""
+    """Returns (n,) the squared error of each joint over draws of readings (r, k, n)."""
     return np.asarray(np.square(motion.wanted - shown).sum(axis=(0, 1)))
 
 
 def rounded(motion: Motion, set_points: Floats, responses: Sequence[Response], held: Mask | None = None) -> Floats:
-    """Whole posture units (k, n) whose response is nearest to that of these set points."""
+    """Returns whole posture units (k, n) whose response is nearest to that of these set points."""
     found = np.floor(set_points + 0.5)
     for column in motion.columns:
         allowed, effective = motion.allowed[column], motion.effective[column]
@@ -187,6 +189,6 @@ def _cost(motion: Motion, readings: Floats) -> float:
 
 
 def _expected(arm: ArmInLoop, motion: Motion, set_points: Floats) -> dict[int, TrackingError]:
-    """Tracking errors over draws of the sensor's noise."""
+    """Returns tracking errors over draws of the sensor's noise."""
     shown = arm.rounded_readings(set_points, DRAWS)
     return errors_of(motion.joints, np.concatenate([motion.miss(one) for one in shown]))

@@ -1,13 +1,10 @@
-"""Set points that correct those of a recorded attempt: iterative learning, from trace to trace.
+"""Corrects the set points of a recorded attempt by its error: iterative learning, from trace to trace.
 
-The error of the attempt is known; what is needed besides is how readings answer changes of set points. A model gives
-that, or the attempt itself, as a loop of second order. Either has to be only roughly right, since the next attempt
-shows what is left.
+The response of the readings to set points is also needed. A model gives it, or a second-order loop is estimated from
+the attempt itself. An approximate response is enough, since the next attempt shows the remaining error.
 
-The response of a joint's loop, estimated from a record of it: no model of the arm is needed.
-
-Near a motion a position loop answers like a mass on a damped spring with a dead time: gain one, two time constants, a
-delay. Three numbers are determined by almost any motion, where a free response of fifty periods would not be.
+Near a motion a position loop responds like a mass on a damped spring with a dead time: gain one, two time constants, a
+delay. Almost any motion determines these three parameters; it would not determine a free response of fifty periods.
 """
 
 from __future__ import annotations
@@ -35,12 +32,14 @@ from model.machine_model.model import Model
 from model.simulation.inputs import RunInputs, inputs_of
 
 SLOWEST, FASTEST = 0.5, 60.0
-"""Bounds (rad/s) of the loop's natural frequency; the second is that of a loop sampled about five times a period."""
+"""Bounds (rad/s) of the loop's natural frequency; the upper one is that of a loop sampled about five times per
+period.
+"""
 LEAST_DAMPING, MOST_DAMPING = 0.05, 5.0
 MOST_DELAY = 5.0
 """Longest dead time, in periods."""
 STARTS = ((8.0, 0.7, 1.0), (20.0, 0.4, 1.0), (8.0, 2.0, 1.0))
-"""Natural frequency, damping and delay from which the estimate starts; the best end is taken."""
+"""Natural frequency, damping and delay at which estimates start; the best result is used."""
 
 
 @dataclass(frozen=True)
@@ -53,15 +52,15 @@ class SecondOrderLoop:
     explained: float
 
     def response(self, count: int, period: float) -> Response:
-        """The same response in each of `count` periods."""
+        """Returns the same response in each of `count` periods."""
         pulse = _pulse_response((self.frequency, self.damping, self.delay), min(REACH, count), period)
         return response_of(np.tile(pulse, (count, 1)))
 
 
 def estimated_loop(set_points: Floats, readings: Floats, period: float) -> SecondOrderLoop:
-    """The loop that comes nearest to leading from set points (k,) to readings (k,), both in the same unit.
+    """Returns the loop that best maps set points (k,) to readings (k,), both in the same unit.
 
-    A constant offset, which gravity causes, is estimated with it.
+    A constant offset, which gravity causes, is estimated too.
     """
     moved = set_points - set_points[0]
     count = len(moved)
@@ -80,7 +79,9 @@ def estimated_loop(set_points: Floats, readings: Floats, period: float) -> Secon
 
 
 def _pulse_response(loop: Sequence[float] | Floats, count: int, period: float) -> Floats:
-    """(count,) readings after a set point that is one for one period and else zero, at the beginnings of periods."""
+    """Returns (count,) readings after a set point that is one for one period and else zero, at the beginnings of
+    periods.
+    """
     frequency, damping, delay = loop
     edges = period * (np.arange(count + 1) - 1.0 - delay)
     return np.diff(_step_response(frequency, damping, np.maximum(edges, 0.0)))
@@ -93,16 +94,17 @@ def _step_response(frequency: float, damping: float, time: Floats) -> Floats:
 
 
 CAUTION = 0.1
-"""Weight of a set point's squared change beside the squared error."""
+"""Weight of a set point's squared change relative to the squared error."""
 LEAST_EXPLAINED = 0.9
 """Least share of a joint's motion that its estimated loop must explain."""
 MOST_MISSING = 0.02
-"""Largest share of missing samples; a few are bridged by straight lines."""
+"""Largest share of missing samples; a few are interpolated by straight lines."""
 WORSE = 1.1
-"""Ratio to the error of the attempt before from which learning counts as diverging; less is noise."""
+"""Ratio to the error of the previous attempt above which learning counts as diverging; below, it is noise."""
 FINEST = 0.3
-"""Error (rms), in posture units, below which it is that of their rounding: nothing is left to be learned. An error of
-up to twice that may grow by chance, which is no divergence."""
+"""Error (rms), in posture units, that rounding alone causes: nothing remains to be learned. An error of up to twice
+that may grow by chance, which is no divergence.
+"""
 
 
 def learn(
@@ -112,15 +114,15 @@ def learn(
     model: Model | None = None,
     share: float = 1.0,
 ) -> ExperimentSpec:
-    """The experiment that corrects the set points of a recorded attempt at a motion.
+    """Returns an experiment with the corrected set points of a recorded attempt at a motion.
 
     Args:
         trace: of the plain experiment, or of one with computed set points.
-        model: gives the response to set points; None: it is estimated from the trace.
-        share: of the correction that is made.
+        model: gives the response to set points; None: estimated from the trace.
+        share: of the correction that is applied.
 
-    Raises TraceError for a trace that nothing can be learned from, and where the error has grown since the attempt that
-    the trace itself learned from; SpecError as `feedforward` does.
+    Raises TraceError for an unsuitable trace, and if the error is larger than that of the attempt that the trace itself
+    learned from; SpecError as `feedforward` does.
     """
     if model is not None:
         require_same(model, machine)
@@ -128,7 +130,9 @@ def learn(
     motion = motion_of(asked, machine, plan)
     inputs = inputs_of(trace, machine)
     if len(inputs) != len(motion):
-        raise TraceError(f"{_called(trace)}: has {len(inputs)} periods, the motion {len(motion)}: repeat the run")
+        raise TraceError(
+            f"{_called(trace)}: has {len(inputs)} periods, but the motion has {len(motion)}: repeat the run"
+        )
     sent, reached = motion.scale.postures(inputs.set_points), motion.scale.postures(_bridged(inputs, trace))
     before = errors_of(motion.joints, motion.miss(reached))
     _require_converging(trace, before, motion)
@@ -156,7 +160,7 @@ def learn(
 
 
 def _require_converging(trace: Trace, reached: Mapping[int, TrackingError], motion: Motion) -> None:
-    """Raises TraceError where an attempt that was learned has a larger error than the one it was learned from."""
+    """Raises TraceError if a learned attempt has a larger error than the one that it was learned from."""
     spec = trace.record.spec
     if spec is None or spec.feedforward is None or spec.feedforward.learned_from is None:
         return
@@ -172,20 +176,21 @@ def _require_converging(trace: Trace, reached: Mapping[int, TrackingError], moti
 
 
 def asked_of(trace: Trace, machine: Machine) -> ExperimentSpec:
-    """The experiment whose motion a trace attempted. Raises TraceError for a trace that is no whole attempt on this
-    machine."""
+    """Returns the experiment whose motion a trace attempted. Raises TraceError unless it is a whole attempt on this
+    machine.
+    """
     record, called = trace.record, _called(trace)
     if record.spec is None or record.machine is None:
-        raise TraceError(f"{called}: does not say which experiment it is of: learn from one that `daq run` recorded")
+        raise TraceError(f"{called}: does not state its experiment: learn from a trace that `daq run` recorded")
     if record.machine.name != machine.name or record.machine.controller != machine.controller:
-        raise TraceError(f"{called}: is of {record.machine.name}, or of another controller than that of {machine.name}")
+        raise TraceError(f"{called}: is of {record.machine.name}, or of a controller other than that of {machine.name}")
     if record.outcome != "complete":
         raise TraceError(f"{called}: ended as {record.outcome or 'unfinished'}: learn from a complete one")
     if record.every != 1:
-        raise TraceError(f"{called}: has a sample only every {record.every} periods: learning needs each")
+        raise TraceError(f"{called}: has a sample only every {record.every} periods: learning needs every period")
     for kind, what in (("pause", "its set points paused"), ("missed_set_point", "the controller missed set points")):
         if any(event.kind == kind for event in trace.events):
-            raise TraceError(f"{called}: {what}, so it does not show what its set points do: repeat the run")
+            raise TraceError(f"{called}: {what}, so it does not show the effect of its set points: repeat the run")
     if trace.missing > MOST_MISSING * len(trace):
         raise TraceError(f"{called}: lacks {trace.missing} of {len(trace) + trace.missing} samples: repeat the run")
     return record.spec.wanted_motion
@@ -196,7 +201,7 @@ def _called(trace: Trace) -> str:
 
 
 def _bridged(inputs: RunInputs, trace: Trace) -> Floats:
-    """Readings (k, n) rad of every period, with straight lines where samples are missing."""
+    """Returns readings (k, n) rad of every period, with straight lines where samples are missing."""
     readings = inputs.readings.copy()
     periods = np.arange(len(readings))
     for column in readings.T:

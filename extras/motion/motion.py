@@ -1,4 +1,4 @@
-"""A motion that an arm is to follow, and the experiment with the set points that were computed for it."""
+"""A motion that an arm shall follow, and the experiment with the computed set points."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ from extras.motion.posture_units import Allowed, Scale, allowed_postures, effect
 from extras.motion.response import REACH
 
 Planner = Callable[[ExperimentSpec], Floats]
-"""A function that gives the set points (k, joints of the machine) of an experiment in rad, one row per control period.
-It raises a DaqError of one line for an experiment that the limits of the machine do not allow. The caller supplies it,
-since planning belongs to `daq`."""
+"""Computes the set points (k, joints of the machine) of an experiment in rad, one row per control period.
+
+It raises a DaqError of one line for an experiment that the machine's limits do not allow. The caller supplies it, since
+planning belongs to `daq`.
+"""
 
 LONGEST = 600.0
-"""Longest motion (s) that set points are computed for: the runs that find its response fill 250 MB."""
+"""Longest motion (s) for which set points are computed: the runs that estimate its response fill 250 MB."""
 DIGITS = 9
-"""Decimals of the times and angles of a computed path: far more than a posture unit needs, and half the file."""
+"""Decimals of the times and angles of a computed path: far more than a posture unit needs, and half the file size."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +32,8 @@ class Motion:
     """A planned motion on a machine.
 
     planned: (k, joints of the machine) rad. wanted: (k, n) posture units of the modelled joints, not rounded. columns:
-    those of the modelled joints that the experiment moves. allowed: what limits leave of each modelled joint's set
-    points. effective: for each, what a posture unit is for the controller.
+    of the modelled joints that the experiment moves. allowed: set points of each modelled joint within its limits.
+    effective: for each, the value of a posture unit for the controller.
     """
 
     asked: ExperimentSpec
@@ -53,28 +55,30 @@ class Motion:
         return tuple(self.machine.modelled_joints[column] for column in self.columns)
 
     def miss(self, readings: Floats) -> Floats:
-        """Wanted − read (k, j) of those joints in rad, for readings (k, n) in posture units."""
+        """Returns wanted − read (k, j) of those joints in rad, for readings (k, n) in posture units."""
         return np.asarray((self.wanted - readings)[:, self.columns] * self.scale.unit[list(self.columns)])
 
 
 def motion_of(asked: ExperimentSpec, machine: Machine, plan: Planner) -> Motion:
-    """The motion of an experiment with plain set points.
+    """Returns the motion of an experiment with plain set points.
 
-    Raises SpecError for an experiment whose set points are computed already, one that moves no modelled joint, one that
-    is too long, and for a machine that takes no set points; as the planner does.
+    Raises SpecError for an experiment with computed set points, without modelled joints, or too long, and for a machine
+    that takes no set points; otherwise as the planner does.
     """
     if asked.feedforward is not None:
-        raise SpecError("the experiment's set points are computed already: name the one they were computed for")
+        raise SpecError("the experiment's set points are already computed: name the original experiment")
     if isinstance(machine.controller, NoController):
-        raise SpecError(f"machine {machine.name} has no controller: it takes no set points")
+        raise SpecError(f"machine {machine.name} has no controller that takes set points")
     modelled, period = machine.modelled_joints, machine.controller.period.value
     columns = tuple(column for column, joint in enumerate(modelled) if joint in asked.joints)
     if not columns:
         names = ", ".join(map(str, modelled))
-        raise SpecError(f"joints {list(asked.joints)}: set points are computed for joints {names} of {machine.name}")
+        raise SpecError(
+            f"joints {list(asked.joints)}: set points are computed only for joints {names} of {machine.name}"
+        )
     planned = np.asarray(plan(asked), dtype=np.float64)
     if len(planned) * period > LONGEST:
-        raise SpecError(f"a motion of {len(planned) * period:.0f} s: set points are computed for {LONGEST:g} s at most")
+        raise SpecError(f"a motion of {len(planned) * period:.0f} s: set points are computed for at most {LONGEST:g} s")
     scale = scale_of(machine, modelled)
     return Motion(
         asked,
@@ -90,19 +94,22 @@ def motion_of(asked: ExperimentSpec, machine: Machine, plan: Planner) -> Motion:
 
 
 def and_rest(signal: Floats) -> Floats:
-    """A signal (k, n) that keeps its last value for another REACH periods."""
+    """Extends a signal (k, n) by its last value for REACH periods."""
     return np.pad(signal, ((0, REACH), (0, 0)), mode="edge")
 
 
 def with_rest(motion: Motion) -> Motion:
-    """The motion and a rest after its end. Without one the last set points would be free to do harm that shows only
-    later."""
+    """Returns the motion with a rest after its end.
+
+    Without one, the optimisation would ignore the later effect of the last set points.
+    """
     return replace(motion, planned=and_rest(motion.planned), wanted=and_rest(motion.wanted))
 
 
 def gains_for(motion: Motion, present: Mapping[int, Gain] | None) -> dict[int, Gain]:
-    """P, I and D of the joints whose set points are computed: those asked for, else `present` ones, else the
-    machine's."""
+    """Returns P, I and D of the joints whose set points are computed: those of the motion, else `present` ones, else
+    the machine's.
+    """
     controller = motion.machine.controller
     if not isinstance(controller, BoardPid):
         return {}
@@ -114,12 +121,12 @@ def gains_for(motion: Motion, present: Mapping[int, Gain] | None) -> dict[int, G
 def computed_experiment(
     motion: Motion, set_points: Floats, gains: Mapping[int, Gain], feedforward: Feedforward
 ) -> ExperimentSpec:
-    """The experiment that sends these set points (k, n), whole posture units of the modelled joints.
+    """Returns the experiment that sends these set points (k, n), whole posture units of the modelled joints.
 
-    The path holds rests and repeats, too. Joints that are not modelled keep the set points of the motion itself.
+    The path includes rests and repeats. Joints that are not modelled keep the set points of the motion itself.
 
     Args:
-        gains: those that the set points were computed for.
+        gains: those for which the set points were computed.
     """
     asked = motion.asked
     angles = motion.planned.copy()

@@ -1,4 +1,4 @@
-"""Angles in posture units, the steps in which a controller takes set points, and which of them a motion may use."""
+"""Angles in posture units, the steps of a controller's set points, and their limits for a motion."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from daq.contracts.machine import BoardPid, Machine
 from model.arrays import Floats
 
 FOLLOWING_SHARE = 0.6
-"""Largest distance of a set point from the simulated arm, as a share of the error at which set points pause. A margin
-remains for an arm that is slower than its model; beyond half of that error the MA2000's drive is saturated anyway."""
+"""Largest distance of a set point from the simulated arm, as a share of the error at which set points pause. It leaves
+a margin for an arm that is slower than its model; beyond half of that error the MA2000's drive saturates anyway.
+"""
 
 
 @dataclass(frozen=True)
@@ -22,18 +23,19 @@ class Scale:
     unit: Floats
 
     def postures(self, angles: Floats) -> Floats:
-        """Angles (…, n) rad in posture units, not rounded."""
+        """Returns angles (…, n) rad in posture units, not rounded."""
         return np.asarray((angles - self.zero) / self.unit)
 
     def angles(self, postures: Floats) -> Floats:
-        """Posture units (…, n) in rad."""
+        """Returns posture units (…, n) in rad."""
         return np.asarray(self.zero + self.unit * postures)
 
 
 @dataclass(frozen=True)
 class Allowed:
-    """What the limits of a joint leave, in posture units: whole numbers from `low` to `high`, which change by at most
-    `step` from one period to the next and stay within `ahead` of the arm (infinite where there is no such limit)."""
+    """Limits of a joint, in posture units: whole numbers from `low` to `high`, which change by at most `step` from one
+    period to the next and stay within `ahead` of the arm (infinite where there is no such limit).
+    """
 
     low: float
     high: float
@@ -49,8 +51,9 @@ def scale_of(machine: Machine, joints: tuple[int, ...]) -> Scale:
 
 
 def effective_postures(machine: Machine, joint: int) -> Floats:
-    """(units,) what each posture unit is for the controller, in posture units: the board rounds set points to counts of
-    its sensor."""
+    """Returns (units,) the value of each posture unit for the controller, in posture units: the board rounds set points
+    to counts of its sensor.
+    """
     own = machine.calibration(joint)
     postures = np.arange(float(own.posture_units))
     if isinstance(machine.controller, BoardPid):
@@ -60,7 +63,7 @@ def effective_postures(machine: Machine, joint: int) -> Floats:
 
 
 def allowed_postures(machine: Machine, joint: int, period: float) -> Allowed:
-    """What the machine's limits leave of a joint's set points."""
+    """Returns the limits of a joint's set points."""
     own, limits = machine.calibration(joint), machine.limits
     joint_limits, unit = limits.joint(joint), own.rad_per_posture_unit
     low, high = 0.0, float(own.posture_units - 1)

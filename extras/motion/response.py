@@ -1,7 +1,7 @@
-"""How readings answer small changes of set points: one band of a lifted system for each joint.
+"""Response of readings to small changes of set points: one band of a lifted system for each joint.
 
 A change d(i) of the set point of period i changes the reading of period i + m by h(i, m) d(i). The response differs
-from period to period, because posture, friction and a saturated drive change it; it has died away after `REACH`.
+from period to period, because it depends on posture, friction and saturation; it has decayed after `REACH`.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ loop."""
 
 @dataclass(frozen=True)
 class Response:
-    """The response of one joint over k periods: `band` (k, m); what lies beyond the end of the record is zero."""
+    """The response of one joint over k periods: `band` (k, m); entries beyond the end of the record are zero."""
 
     band: Floats
 
     def applied(self, change: Floats) -> Floats:
-        """Change of the readings (k,) for changes (k,) of the set points."""
+        """Returns the change of the readings (k,) for changes (k,) of the set points."""
         count, reach = self.band.shape
         found = np.zeros(count)
         for m in range(min(reach, count)):
@@ -32,13 +32,13 @@ class Response:
         return found
 
     def transposed(self, readings: Floats) -> Floats:
-        """Σ over m of h(i, m) times reading i + m, for each i: (k,)."""
+        """Returns Σ over m of h(i, m) times reading i + m, for each i: (k,)."""
         reach = self.band.shape[1]
         padded = np.concatenate([readings, np.zeros(reach - 1)])
         return np.asarray((self.band * np.lib.stride_tricks.sliding_window_view(padded, reach)).sum(axis=1))
 
     def normal(self) -> Floats:
-        """Lower band (m, k) of the matrix of the normal equations: row d holds the elements (i + d, i)."""
+        """Returns the lower band (m, k) of the matrix of the normal equations: row d holds the elements (i + d, i)."""
         count, reach = self.band.shape
         found = np.zeros((reach, count))
         for d in range(min(reach, count)):
@@ -47,7 +47,7 @@ class Response:
 
 
 def response_of(band: Floats) -> Response:
-    """A response from its band (k, m), without what lies beyond the end of the record."""
+    """Returns a response from its band (k, m), without entries beyond the end of the record."""
     count, reach = band.shape
     inside = np.arange(count)[:, None] + np.arange(reach) < count
     return Response(np.where(inside, band, 0.0))

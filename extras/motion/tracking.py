@@ -1,4 +1,4 @@
-"""How far the arm of a trace was from the motion that was asked for."""
+"""Tracking error of the arm in a trace."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from extras.motion.motion import Planner
 
 @dataclass(frozen=True, eq=False)
 class Followed(WithArrays):
-    """A motion beside the arm that was to follow it, sample by sample.
+    """A motion beside that of the arm, sample by sample.
 
     joints: those of the experiment, one column each. time (m,) s; wanted, reached (m, j) rad.
     """
@@ -26,12 +26,12 @@ class Followed(WithArrays):
 
     @property
     def errors(self) -> dict[int, TrackingError]:
-        """The tracking error of each joint."""
+        """Returns the tracking error of each joint."""
         return errors_of(self.joints, self.wanted - self.reached)
 
 
 def errors_of(joints: tuple[int, ...], difference: Floats) -> dict[int, TrackingError]:
-    """Tracking errors of joints from the differences (m, j) of wanted and reached, rad."""
+    """Returns tracking errors of joints from the differences (m, j) of wanted and reached, rad."""
     squares, largest = np.square(difference).mean(axis=0), np.abs(difference).max(axis=0)
     return {
         joint: TrackingError(rms=float(np.sqrt(square)), largest=float(most))
@@ -40,10 +40,10 @@ def errors_of(joints: tuple[int, ...], difference: Floats) -> dict[int, Tracking
 
 
 def followed(trace: Trace, plan: Planner) -> Followed | None:
-    """What the arm made of the motion asked for; None for a trace that does not say which experiment it is of.
+    """Compares the arm's motion with that of its experiment; None for a trace that does not state its experiment.
 
-    No delay is forgiven: a reading is compared with where the motion is in the period in which it was taken. A pause of
-    the set points counts as error. Samples after the end of the motion are left out. Raises as the planner does.
+    Delay counts as error: a reading is compared with the motion in its own period. So does a pause of the set points.
+    Samples after the end of the motion are left out. Raises as the planner does.
     """
     spec = trace.record.spec
     if spec is None or trace.record.machine is None or len(trace) == 0:
@@ -58,7 +58,7 @@ def followed(trace: Trace, plan: Planner) -> Followed | None:
 
 
 def periods_of(trace: Trace) -> Integers:
-    """Control periods (m,), whole numbers, from the first sample to each."""
+    """Returns control periods (m,), whole numbers, from the first sample to each."""
     if trace.tick is not None:
         return np.asarray(trace.tick - trace.tick[0], dtype=np.int64)
     period = trace.record.period or float(np.median(np.diff(trace.time)))

@@ -1,4 +1,4 @@
-"""The 1991 thesis reproduced: its published tables as data, and this model's results beside them."""
+"""Reproduces the 1991 thesis: its published tables as data, and this model's results beside them."""
 
 from daq.plugins import Command, Name, Plugin
 

@@ -1,4 +1,4 @@
-"""A statement of the source and whether the reproduction bears it out."""
+"""A statement of the source, and whether the reproduction agrees with it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Check(FrozenRecord):
 
 
 class Choice(FrozenRecord):
-    """A number that the source does not give, what was taken for it, and why."""
+    """A value that the source does not give, the value that was chosen, and why."""
 
     what: str
     value: str

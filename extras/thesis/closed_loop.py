@@ -1,4 +1,4 @@
-"""An arm under a control law in continuous time: RK4 over position, speed and the integral of the error."""
+"""Simulates an arm under a control law in continuous time: RK4 over position, speed and the integral of the error."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from model.dynamics.compilation import compiled
 from model.dynamics.linear_solve import solve_3
 
 LONGEST_STEP = 2e-4
-"""Longest step of integration, s; half of it changes no position of chapter 8's runs by more than 1e-5 rad (tests)."""
+"""Longest integration step, s; half of it changes no position of chapter 8's runs by more than 1e-5 rad (tests)."""
 
 PARTITIONED_GAINS = (11.0, 5.0, 7.0)
 """K_P, K_I, K_D of every joint, (8.17) to (8.19): poles at −1, −1 and −5 on a unit inertia."""
@@ -41,7 +41,7 @@ class Sinusoid:
         return np.array([self.centre, self.amplitude, [2 * np.pi / self.period] * 3, self.phase])
 
     def at(self, time: Floats) -> Floats:
-        """Desired positions (k, 3) at times (k,)."""
+        """Returns desired positions (k, 3) at times (k,)."""
         centre, amplitude, rate, phase = self.table()
         return np.asarray(centre + amplitude * np.sin(np.outer(time, rate) + phase))
 
@@ -84,12 +84,13 @@ def control(
     every: int = 50,
     step: float = LONGEST_STEP,
 ) -> ControlledMotion:
-    """Motion of `plant` under `law`, from `start` (rad) with `start_speed` (rad/s), every `every` steps kept.
+    """Returns the motion of `plant` under `law`, from `start` (rad) with `start_speed` (rad/s); every `every`-th step
+    is kept.
 
     The amplifier is linear and without limit, as in the source.
 
     Raises:
-        SpecError: for a duration that is not positive, or when the motion does not stay finite.
+        SpecError: for a duration that is not positive, or if the motion does not stay finite.
     """
     if not (np.isfinite(duration) and duration > 0):
         raise SpecError(f"duration {duration} s: must be positive")
@@ -104,7 +105,7 @@ def control(
     state[0], state[1] = start, start_speed
     _run(plant.vector(), estimate, gains, isinstance(law, Partitioned), wanted.table(), state, step, every, out)
     if not np.isfinite(out).all():
-        raise SpecError("the controlled motion does not stay finite: the loop is unstable at these gains")
+        raise SpecError("the controlled motion does not stay finite: the control loop is unstable at these gains")
     time = np.asarray(step * every * np.arange(kept), dtype=np.float64)
     return ControlledMotion(time, *(np.ascontiguousarray(out[:, k]) for k in range(4)))
 
@@ -141,7 +142,7 @@ def _run(
 def _derivative(
     t: float, state: Floats, plant: Floats, estimate: Floats, gains: Floats, partitioned: bool, reference: Floats
 ) -> Any:
-    """Rates of (position, speed, integral of the error) (3, 3), and motor volts (3)."""
+    """Returns rates of (position, speed, integral of the error) (3, 3), and motor volts (3)."""
     q, v = state[0], state[1]
     error, rate_error, wanted_acceleration = np.empty(3), np.empty(3), np.empty(3)
     for j in range(3):

@@ -1,4 +1,4 @@
-"""`daq thesis`: the 1991 source reproduced, with our numbers beside the published ones."""
+"""`daq thesis`: reproduces the 1991 source, with our values beside the published ones."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def thesis(
 
 
 def recorded_ramp(seed: int, folder: Path | None = None) -> Trace:
-    """The ramp of section 6.5 on a mock of its own, in lock-step: the same seed gives the same record."""
+    """Records the ramp of section 6.5 on a mock of its own, in lock-step: the same seed gives the same record."""
     from daq.contracts.experiment import ExperimentSpec
     from daq.contracts.machine import load_machine
     from daq.traces.reader import read_trace

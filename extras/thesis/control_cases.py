@@ -35,9 +35,9 @@ class ControlCase(FrozenRecord):
     """One run. Angles in rad, one series per joint.
 
     `back_emf`: whether the law compensates the back-EMF with its own table's constants or with the plant's.
-    `amplitude_ratio` is the swing of the position over that of the wanted motion in the first period and in the last;
-    `rms` the root mean square error over the run (rad); `overshoot` how far the position goes beyond the wanted one
-    on the other side of an initial error, or beyond the wanted sinusoid's ends (rad).
+    `amplitude_ratio`: amplitude of the position over that of the wanted motion in the first period and in the last.
+    `rms`: root mean square error over the run (rad). `overshoot`: distance of the position beyond the wanted one on the
+    other side of an initial error, or beyond the wanted sinusoid's ends (rad).
     """
 
     name: str
@@ -56,7 +56,7 @@ class ControlCase(FrozenRecord):
 
 
 class ControlChapter(FrozenRecord):
-    """Chapter 8's runs, with what the source says of them and what had to be chosen."""
+    """Chapter 8's runs, the source's statements on them, and our choices."""
 
     cases: tuple[ControlCase, ...]
     checks: tuple[Check, ...]
@@ -64,7 +64,7 @@ class ControlChapter(FrozenRecord):
     findings: tuple[str, ...]
 
     def case(self, name: str) -> ControlCase:
-        """The run of that name. Raises KeyError."""
+        """Returns the run of that name. Raises KeyError."""
         return {c.name: c for c in self.cases}[name]
 
 
@@ -95,7 +95,7 @@ def control_chapter(progress: Progress = silent, cancel: Cancel | None = None) -
 
 
 def wanted_motion() -> Sinusoid:
-    """The sinusoids of section 8.2.1, through the start posture at time zero."""
+    """Returns the sinusoids of section 8.2.1, through the start posture at time zero."""
     centre = tuple(s - AMPLITUDE * math.sin(p) for s, p in zip(START, PHASE, strict=True))
     return Sinusoid((centre[0], centre[1], centre[2]), (AMPLITUDE, AMPLITUDE, AMPLITUDE), PERIOD, PHASE)
 
@@ -155,7 +155,7 @@ def _overshoot(motion: ControlledMotion, wanted: Sinusoid) -> Triple:
 
 
 def lags(case: ControlCase) -> Triple:
-    """How far the position is behind the wanted sinusoid in the last period (rad of its phase), by joint."""
+    """Returns the lag of the position behind the wanted sinusoid in the last period (rad of its phase), by joint."""
     time = np.array(case.time)
     last = time > time[-1] - PERIOD
     turning = np.exp(-2j * math.pi * time[last] / PERIOD)
@@ -253,7 +253,7 @@ FINDINGS = (
         "numbers."
     ),
 )
-"""What the reproduction shows beyond the source."""
+"""Findings of the reproduction beyond the source."""
 
 
 def _ratios(case: ControlCase) -> str:

@@ -1,4 +1,4 @@
-"""The arm of chapter 8, plant or model inside a control law, as numbers that compiled code reads."""
+"""The arm of chapter 8, plant or model inside a control law, as an array for compiled code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from model.dynamics.rod_arm import RodArm, effective_from_rods
 from model.dynamics.three_joint import mass_matrix_and_bias
 
 SIGN_WIDTH = 0.01
-"""rad/s over which Coulomb friction changes its sign: the reproduction's choice, below all speeds of the runs."""
+"""rad/s over which Coulomb friction changes its sign: our choice, below all speeds of the runs."""
 
 WEIGHT_2 = lumped.SIZE
 """m2 g, N."""
@@ -30,7 +30,7 @@ VISCOUS = lumped.SIZE + 8
 FRICTION_ARM = lumped.SIZE + 11
 """μ̃ of (7.32) to (7.34), m."""
 SIZE = lumped.SIZE + 12
-"""Length of the vector of an arm."""
+"""Length of the array of an arm."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class DrivenArm:
     friction_arm: float = 0.0
 
     def vector(self) -> NDArray[np.float64]:
-        """The numbers in the layout of this module, (SIZE,)."""
+        """Returns the values in the layout of this module, (SIZE,)."""
         gear, torque = np.array(self.gear), np.array(self.torque_constant)
         gain = gear * torque / np.array(self.resistance)
         weight = -self.body.gravity[2]
@@ -68,19 +68,19 @@ class DrivenArm:
         )
 
     def without_friction(self) -> DrivenArm:
-        """The same arm without viscous and Coulomb friction."""
+        """Returns the same arm without viscous and Coulomb friction."""
         return replace(self, viscous=(0.0, 0.0, 0.0), friction_arm=0.0)
 
 
 @inlined
 def smooth_sign(speed: float) -> float:
-    """Sign of a speed, linear within SIGN_WIDTH."""
+    """Returns the sign of a speed, linear within SIGN_WIDTH."""
     return min(1.0, max(-1.0, speed / SIGN_WIDTH))
 
 
 @compiled
 def equation_of_motion(q: NDArray[Any], v: NDArray[Any], arm: NDArray[Any]) -> Any:
-    """D, with rotors, and everything else that the motors' torque at standstill has to supply (7.36, 8.1).
+    """Returns D, with rotors, and all other torques that the motors must supply at standstill (7.36, 8.1).
 
     Returns:
         (6,) d11 d12 d13 d22 d23 d33 in kg·m²; (3,) H + G + friction + back-EMF in N·m.

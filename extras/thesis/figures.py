@@ -24,14 +24,14 @@ from model.kinematics.chain import Chain, Joint, Link, inertia_about
 
 
 class TorqueFigures(FrozenRecord):
-    """Torques along the simulated motion of a trace's set points, and what the source states of them."""
+    """Torques along the simulated motion of a trace's set points, and the source's statements on them."""
 
     analysis: TorqueAnalysis
     checks: tuple[Check, ...]
 
 
 def torque_figures(trace: Trace) -> TorqueFigures:
-    """Figures 7.12 to 7.14 with the parameters of table 7.9, link 3 by (7.28). Raises as `simulate` does."""
+    """Computes figures 7.12 to 7.14 with the parameters of table 7.9, link 3 by (7.28). Raises as `simulate` does."""
     analysis = torques_of_run(model_of(VISCOUS_AND_COULOMB, trace.record.machine or load_machine("ma2000")), trace)
     d = {(e.row, e.column): largest(e.whole) for e in analysis.inertia}
     coupling = [abs(x) for x in analysis.element(2, 3).whole]
@@ -64,7 +64,7 @@ def torque_figures(trace: Trace) -> TorqueFigures:
 
 
 def influence_tables() -> tuple[Influence, ...]:
-    """Tables 5.1 to 5.3 beside the dynamics of the arm's geometry: bodies of any shape, then rods (5.3).
+    """Returns tables 5.1 to 5.3 beside the dynamics of the arm's geometry: bodies of any shape, then rods (5.3).
 
     In table 5.3 entries are by link: the parameters that are not zero and act on any joint.
     """
@@ -81,7 +81,7 @@ GEOMETRY = (Joint(alpha=math.pi / 2), Joint(a=0.285755), Joint(a=0.168410))
 
 
 def _any_body(seed: int) -> Link:
-    """A body without symmetry, made of points, so that every inertial parameter is in play."""
+    """Returns a body without symmetry, made of points, so that every inertial parameter matters."""
     rng = np.random.default_rng(seed)
     points, masses = rng.normal(scale=0.3, size=(5, 3)), rng.uniform(0.1, 0.5, size=5)
     centre = masses @ points / masses.sum()

@@ -19,13 +19,13 @@ def reproduce_thesis(
     progress: Shown = True,
     cancel: Cancel | None = None,
 ) -> Reproduction:
-    """Chapters 5, 7 and 8 of the 1991 thesis again, each number beside the published one (docs/thesis.md).
+    """Repeats chapters 5, 7 and 8 of the 1991 thesis, with each value beside the published one (docs/thesis.md).
 
     Args:
         traces: of the ramp of section 6.5, which is the preset `ramp`.
         methods: of fitting; `nelder_mead` is that of the thesis, and takes minutes.
 
-    Raises TraceError for traces that cannot be simulated, SpecError; CancelledError when asked to end.
+    Raises TraceError for traces that cannot be simulated, SpecError; CancelledError when cancelled.
     """
     with told(progress, "reproducing") as tell:
         return reproduction.reproduce_thesis(traces, methods, progress=tell, cancel=cancel)

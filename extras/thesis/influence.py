@@ -1,4 +1,4 @@
-"""Which inertial parameters act on which joint: the source's tables 5.1 to 5.3 beside those that the dynamics give."""
+"""Finds which inertial parameters act on which joint: the source's tables 5.1 to 5.3 beside the dynamics."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Influence(FrozenRecord):
 def influences(
     chain: Chain, table: str, published: tuple[frozenset[str], ...], *, waist_still: bool = False, states: int = 10
 ) -> tuple[Influence, ...]:
-    """Acting parameters of a chain of revolute joints at random states, beside published ones, one entry per joint.
+    """Returns parameters of a chain of revolute joints that act at random states, beside published ones, by joint.
 
     Raises ChainError for a prismatic joint.
     """

@@ -1,4 +1,4 @@
-"""The four models of chapter 7 fitted one after the other, to see whether each explains more than the one before."""
+"""Fits the four models of chapter 7 one after the other: does each explain more than the previous one?"""
 
 from __future__ import annotations
 
@@ -185,7 +185,10 @@ def _value(model: Model, symbol: str) -> float:
 
 
 def _prior(symbol: str) -> Prior:
-    """The value a parameter keeps if the record does not change it. Hill climbing only takes its first step from it."""
+    """Returns the value that a parameter keeps if the record does not change it.
+
+    Hill climbing uses it only for the first step.
+    """
     if symbol == "Kb2":
         return Prior(expected=DATA_SHEET_BACK_EMF_2, deviation=BACK_EMF_DEVIATION)
     if symbol in FRICTION_SYMBOLS:
@@ -203,7 +206,7 @@ def _bounds(symbol: str) -> tuple[float, float]:
 
 
 def ladder_checks(steps: Sequence[LadderStep]) -> tuple[Check, ...]:
-    """What chapter 7 says of its four models, beside what these fits show."""
+    """Compares chapter 7's statements on its four models with these fits."""
     errors = [s.error for s in steps]
     sums = [s.fidelity.sum_of_contributions for s in steps]
     back_emf = [s.values["Kb2"] for s in steps[1:]]

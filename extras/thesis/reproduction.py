@@ -1,4 +1,4 @@
-"""Everything that `daq thesis` reproduces, as one function and one typed result: ours beside the published one."""
+"""Runs the whole reproduction of `daq thesis` and returns one typed result: our values beside the published ones."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Reproduction(FrozenRecord):
 
     @property
     def failed(self) -> tuple[Check, ...]:
-        """Statements of the source that the reproduction does not bear out."""
+        """Statements of the source with which the reproduction does not agree."""
         return tuple(c for c in self.checks if not c.holds)
 
 

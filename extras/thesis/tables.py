@@ -1,8 +1,7 @@
 """Tables 5.1 to 5.3 and 7.1 to 7.10 of the thesis as data. Symbols as printed, values in SI units.
 
-The models of chapter 7 as models of this library, with the published values or with those that a fit starts from.
-
-Σλ² recomputed from the published tables, in both conventions of τ′.
+It also builds the models of chapter 7 with published or initial values, and recomputes Σλ² from the published tables,
+in both conventions of τ′.
 """
 
 from __future__ import annotations
@@ -84,7 +83,7 @@ class PublishedModel:
         return tuple(s.name for s in SYMBOLS if s.name in self.values)
 
     def arm(self, *, published_inertia: bool = True) -> DrivenArm:
-        """The arm that the table describes."""
+        """Returns the arm that the table describes."""
         v = self.values
         rotor = tuple(g * g * j for g, j in zip(GEAR, ROTOR_INERTIA, strict=True))
         links = (v["m1"], v["R1"], v["m2"], v["m3"], v["MLOAD"], v["A2"], v["A3"])
@@ -189,19 +188,21 @@ FRICTION_SYMBOLS = ("v_eff1", "v_eff2", "v_eff3", "μ̃")
 
 
 def model_of(published: PublishedModel, machine: Machine, *, published_inertia: bool = True) -> Model:
-    """A table of chapter 7 as a model of the machine. Raises SpecError for a machine that is not the MA2000's arm."""
+    """Converts a table of chapter 7 to a model of the machine. Raises SpecError for a machine that is not the MA2000's
+    arm.
+    """
     return _with_values(structure_of(published, machine, published_inertia=published_inertia), published.values)
 
 
 def unfitted(published: PublishedModel, machine: Machine, *, published_inertia: bool = True) -> Model:
-    """The same structure at the values from which the source starts: table 7.2, data-sheet K_b2, no friction."""
+    """Returns the same structure at the source's initial values: table 7.2, data-sheet K_b2, no friction."""
     values = {**UNOPTIMISED.values, "Kb2": DATA_SHEET_BACK_EMF_2, **dict.fromkeys(FRICTION_SYMBOLS, 0.0)}
     structure = structure_of(published, machine, published_inertia=published_inertia)
     return _with_values(structure, {s: v for s, v in values.items() if PARAMETER[s] in structure.by_name})
 
 
 def structure_of(published: PublishedModel, machine: Machine, *, published_inertia: bool = True) -> Model:
-    """Effects and ties of a table's model; values of the machine file."""
+    """Returns effects and ties of a table's model, with values of the machine file."""
     model = base_model(machine, friction=False)
     model = model.tied(SHARED_BACK_EMF, ("joint1.motor.back_emf_constant", "joint3.motor.back_emf_constant"))
     if "v_eff1" in published.values:
@@ -237,12 +238,12 @@ class RecomputedFidelity(FrozenRecord):
 
 
 def recomputed_fidelities(convention: Convention = "source") -> tuple[RecomputedFidelity, ...]:
-    """Σλ² of the four fitted models of chapter 7."""
+    """Returns Σλ² of the four fitted models of chapter 7."""
     return tuple(_recomputed(model, convention) for model in LADDER)
 
 
 def basis_of_symbol(symbol: str) -> Basis:
-    """Which rule gives the expected deviation of a parameter of chapter 7 (section 7.2.2)."""
+    """Returns the rule for the expected deviation of a parameter of chapter 7 (section 7.2.2)."""
     if symbol[0] == "m" or symbol == "MLOAD":
         return "mass"
     return "length" if symbol[0] in "AR" else "gaussian"

@@ -1,4 +1,4 @@
-"""The reproduction as plain text, ours beside the published."""
+"""Formats the reproduction as plain text, our values beside the published ones."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ Series = tuple[float, ...]
 class InertiaElement(FrozenRecord):
     """D_ij along a motion, kg·m² (or kg), joints from 1: translation and rotation of the bodies, and rotors.
 
-    `translation` is what the masses at their centres give, `rotation` their moments about their centres.
+    `translation`: part of the masses at their centres; `rotation`: part of the moments about their centres.
     """
 
     row: int
@@ -57,7 +57,7 @@ class SpeedTorque(FrozenRecord):
 
 
 class TorqueAnalysis(FrozenRecord):
-    """Figures 7.12 to 7.14 for any machine and motion. `source` says where the motion comes from."""
+    """Figures 7.12 to 7.14 for any machine and motion. `source` is the origin of the motion."""
 
     model: str
     source: str
@@ -68,12 +68,14 @@ class TorqueAnalysis(FrozenRecord):
     gravity: tuple[GravityTorque, ...]
 
     def element(self, row: int, column: int) -> InertiaElement:
-        """D_ij, i ≤ j, from 1."""
+        """Returns D_ij, i ≤ j, from 1."""
         return next(e for e in self.inertia if (e.row, e.column) == (row, column))
 
 
 def torques_of_run(model: Model, trace: Trace) -> TorqueAnalysis:
-    """Torques along the model's own motion for the set points of a trace, with accelerations of its exact speeds."""
+    """Computes torques along the model's own motion for the set points of a trace, with accelerations of its exact
+    speeds.
+    """
     run = simulate(model, trace, Options(quantise=False))
     period = float(np.median(np.diff(run.time)))
     acceleration = np.gradient(run.velocity, period, axis=0)
@@ -85,7 +87,7 @@ def torques_of_run(model: Model, trace: Trace) -> TorqueAnalysis:
 def torques_along(
     model: Model, time: Floats, position: Floats, speed: Floats, acceleration: Floats, source: str
 ) -> TorqueAnalysis:
-    """Torques along a motion (k, n) in rad, rad/s and rad/s²; link 3 by (7.28) if the model uses it."""
+    """Computes torques along a motion (k, n) in rad, rad/s and rad/s²; link 3 by (7.28) if the model uses it."""
     joints = range(model.joint_count)
     chain = _as_published(chain_of(model)) if model.published_inertia else chain_of(model)
     whole = np.array([recursive.mass_matrix(chain, q) for q in position])

@@ -29,32 +29,32 @@ from mock_controller.plant import Plant
 
 
 class BoardError(ValueError):
-    """Something the board cannot be asked to do."""
+    """An invalid request to the board."""
 
 
 @dataclass
 class BoardCounters:
-    """What happened since the mock was started; a brown-out does not clear it."""
+    """Counts since the mock was started; a brown-out does not clear them."""
 
     boots: int = 0
     periods: int = 0
     set_points_missed: int = 0
     """Periods in which the host held the memory when the controller wanted it."""
     set_points_invalid: int = 0
-    """Set points above 999 that the controller found in the memory and did not take."""
+    """Set points above 999 in the memory, which the controller ignored."""
     gains_invalid: int = 0
-    """Gains above 20 that the controller found in the memory and did not take."""
+    """Gains above 20 in the memory, which the controller ignored."""
     writes_while_frozen: int = 0
-    """Bytes meant for set points that the freeze kept out."""
+    """Bytes for set points that the freeze blocked."""
 
 
 class Board:
     """Controller and arm, switched on at time 0 with the arm where `plant` has it.
 
-    `arm_seed` draws what belongs to this one arm, its potentiometers' curves; without it `seed` draws them.
-    `told_map` is the memory map that the host's side believes in; without it, the true one.
+    `arm_seed` draws properties of this one arm, its potentiometers' curves; without it `seed` draws them. `told_map` is
+    the memory map that the host's side assumes; without it, the true one.
 
-    Raises BoardError when the plant's step does not divide the period and the computing delay.
+    Raises BoardError if the plant's step does not divide the period and the computing delay.
     """
 
     def __init__(
@@ -109,16 +109,16 @@ class Board:
 
     @property
     def next_event_us(self) -> int:
-        """When the controller next does something by itself."""
+        """Time (µs) of the controller's next event."""
         return self._next_us
 
     @property
     def next_snapshot_us(self) -> int:
-        """Earliest time (µs) at which a further snapshot can join the ring."""
+        """Earliest time (µs) at which another snapshot may be complete."""
         return max(self._next_us, self._complete_us)
 
     def run_until(self, time_us: int) -> None:
-        """Lets time pass up to and including `time_us`. A time already past changes nothing."""
+        """Advances time up to and including `time_us`. A past time changes nothing."""
         while self._next_us <= time_us:
             self._time_us = self._next_us
             self._next_action()
@@ -127,7 +127,7 @@ class Board:
     # --- the host's side of the memory
 
     def read(self, address: int, count: int) -> bytes:
-        """`count` bytes from `address`, one after the other; takes time. Raises MemoryAddressError."""
+        """Returns `count` bytes from `address`, read one after the other; takes time. Raises MemoryAddressError."""
         self.memory.check(address, count)
         self._take_memory(count)
         end_us = self._host_until_us
@@ -142,12 +142,14 @@ class Board:
         return bytes(data)
 
     def write(self, address: int, data: bytes) -> None:
-        """Bytes from `address` on, in one access; takes time. Raises MemoryAddressError."""
+        """Writes bytes from `address` on, in one access; takes time. Raises MemoryAddressError."""
         self.memory.check(address, len(data))
         self._write_pairs([(address + offset, value) for offset, value in enumerate(data)])
 
     def write_set_points(self, postures: Mapping[int, int]) -> None:
-        """Set points (posture units 0–999) of joints (from 1) in one access; takes time. Ignored while frozen."""
+        """Writes set points (posture units 0–999) of joints (from 1) in one access; takes time. Ignored while
+        frozen.
+        """
         for joint, posture in postures.items():
             if not (1 <= joint <= JOINTS and 0 <= posture < POSTURE_UNITS):
                 limit = POSTURE_UNITS - 1
@@ -171,10 +173,10 @@ class Board:
         self._frozen, self._postureless = True, True
 
     def freeze(self, positions: Sequence[int] | None = None) -> tuple[int, ...]:
-        """Set points := measured posture at once, held until `release`; returns the six postures (posture units).
+        """Makes the measured posture the set points, held until `release`; returns the six postures (posture units).
 
-        positions: measured positions (ADC counts) as the host's side has read them; None for the board's own
-        A second freeze changes nothing. The latch outlives a brown-out.
+        A second freeze changes nothing. The latch survives a brown-out. positions: measured positions (ADC counts) as
+        the host's side has read them; None for the board's own
         """
         if self._frozen and self._powered and not self._postureless:
             return tuple(self.host_memory.values("set_point"))
@@ -184,7 +186,7 @@ class Board:
         return postures
 
     def release(self) -> None:
-        """Ends the freeze; set points stay as they are until new ones are written."""
+        """Ends the freeze; set points stay until new ones are written."""
         self._frozen = False
 
     # --- the rest of the panel
@@ -210,13 +212,13 @@ class Board:
         return self._gripper_closed
 
     def set_process_inputs(self, bits: int) -> None:
-        """Puts bits (0–255) on the input ports; the memory shows them from the next period on."""
+        """Sets the input ports to bits (0–255); the memory shows them from the next period on."""
         if not 0 <= bits <= 0xFF:
             raise BoardError(f"process inputs {bits}: allowed are 0 to 255")
         self._process_inputs = bits
 
     def press_emergency_stop(self, pressed: bool) -> None:
-        """Cuts the drives' power, and a person's hand holds the arm from then on; released, the drives have it again.
+        """Cuts the drives' power, and a person's hand then holds the arm; when released, the drives hold it again.
 
         The controller itself stays switched on.
         """
@@ -227,8 +229,10 @@ class Board:
             self.hand.let_go()
 
     def lead(self, angles: Mapping[int, float], seconds: float) -> None:
-        """The hand moves joints (from 1) to angles (rad) within `seconds`. Raises BoardError while the drives have
-        power, and for an angle beyond an end stop."""
+        """Moves joints (from 1) by hand to angles (rad) within `seconds`.
+
+        Raises BoardError while the drives have power, and for an angle beyond an end stop.
+        """
         if not self.hand.has_arm:
             raise BoardError("the drives have power: press the emergency stop before moving the arm by hand")
         for joint, angle in angles.items():
@@ -240,17 +244,17 @@ class Board:
         self.hand.lead({joint - 1: angle for joint, angle in angles.items()}, now, round(seconds * 1e6))
 
     def end_stop(self, joint: int, *, high: bool) -> float:
-        """Where a joint (from 1) meets an end stop (rad)."""
+        """Returns the angle (rad) of an end stop of a joint (from 1)."""
         stops = self.plant.parameters.joints[joint - 1]
         return stops.upper_stop if high else stops.lower_stop
 
     def _now_on_step(self) -> int:
-        """The present, rounded up to a step of the plant (µs)."""
+        """Returns the present, rounded up to a step of the plant (µs)."""
         step = self.plant.step_us
         return -(-self._time_us // step) * step
 
     def brown_out(self) -> None:
-        """The supply sags now: drive off, memory lost; after the reset time the controller powers up again.
+        """Interrupts the supply: drive off, memory lost; after the reset time the controller powers up again.
 
         Until then the memory reads as zero. Ticks start again at 1.
         """
@@ -271,7 +275,7 @@ class Board:
         self._next_action = action
 
     def _power_up(self) -> None:
-        """Set points become the measured posture, so that nothing jumps; gains come from EPROM."""
+        """Makes the measured posture the set points, so that nothing jumps; reads gains from EPROM."""
         self._advance_plant(self._time_us)
         self.counters.boots += 1
         self.memory.clear()
@@ -311,7 +315,7 @@ class Board:
         self._schedule(now + self._timing.computing_delay, partial(self._change_output, results))
 
     def _fetch(self) -> None:
-        """Takes set points, gains and outputs from the memory; what is out of range is left where it is."""
+        """Reads set points, gains and outputs from the memory; ignores those out of range."""
         for index, posture in enumerate(self.memory.values("set_point")):
             if posture < POSTURE_UNITS:
                 self._postures[index] = posture
@@ -346,7 +350,7 @@ class Board:
         )
 
     def _change_output(self, results: PeriodSnapshot) -> None:
-        """The computing delay is over: new drive, and the results begin to appear in the memory."""
+        """Applies the new drive after the computing delay, and begins to store the results in the memory."""
         now = self._time_us
         self._advance_plant(now)
         self._volts = [scale * power for scale, power in zip(self._volts_per_count, results.powers, strict=True)]
@@ -357,7 +361,7 @@ class Board:
         self._schedule(self._complete_us, partial(self._complete_period, results))
 
     def _to_publish(self, results: PeriodSnapshot) -> list[tuple[int, int]]:
-        """(address, byte) pairs of a period's results, in the order in which they are stored."""
+        """Returns (address, byte) pairs of a period's results, in the order in which they are stored."""
         encoded = self.memory.encoded
         return [
             *encoded("position", enumerate(results.positions)),
@@ -372,14 +376,14 @@ class Board:
         self._schedule(self._period_start_us + self._timing.period, self._start_period)
 
     def _as_host_sees(self, results: PeriodSnapshot) -> PeriodSnapshot:
-        """The results as a host decodes them that believes in another memory map."""
+        """Returns the results as a host with another memory map decodes them."""
         set_points, positions, errors, powers = (
             tuple(self.host_memory.values(name)) for name in ("set_point", "position", "error", "power")
         )
         return replace(results, set_points=set_points, positions=positions, errors=errors, powers=powers)
 
     def _store_published(self) -> None:
-        """Brings the memory up to the present: byte k of the results is there k+1 byte times after their start."""
+        """Updates the memory to the present: byte k of the results is there k+1 byte times after their start."""
         total = len(self._published)
         if self._stored == total:
             return
@@ -399,7 +403,7 @@ class Board:
     # --- contention
 
     def _take_memory(self, count: int) -> None:
-        """Begins an access of `count` bytes; in the controller's fetch window the host has to wait for its end."""
+        """Begins an access of `count` bytes; in the controller's fetch window the host must wait for its end."""
         self.run_until(self._period_start_us + self._timing.fetch_window)
         self._host_until_us = self._time_us + count * self._timing.host_byte
 

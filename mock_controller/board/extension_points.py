@@ -42,7 +42,7 @@ class ChangesBoard(Modification, Protocol):
 
 @runtime_checkable
 class ChangesSetPoint(Modification, Protocol):
-    """Changes the set point (ADC counts) that one joint's controller works with. Called every control period."""
+    """Changes the set point (ADC counts) of one joint's controller. Called every control period."""
 
     joint: int
 

@@ -1,4 +1,4 @@
-"""A person's hand that holds the arm while its drives have no power, and leads it from posture to posture."""
+"""A person's hand that holds the arm while its drives have no power, and moves it from posture to posture."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 
 class Hand:
-    """Holds all joints while it has the arm; a joint that is led moves evenly, the others rest."""
+    """Holds all joints while it has the arm; joints that it leads move evenly, the others rest."""
 
     def __init__(self) -> None:
         self.has_arm = False
@@ -16,7 +16,7 @@ class Hand:
         self._duration_us = 0
 
     def take(self, angles: Sequence[float]) -> None:
-        """Takes the arm where it is (rad)."""
+        """Takes the arm at these angles (rad)."""
         self.has_arm = True
         self._from = self._to = list(angles)
         self._duration_us = 0
@@ -26,13 +26,13 @@ class Hand:
         self.has_arm = False
 
     def lead(self, angles: Mapping[int, float], now_us: int, duration_us: int) -> None:
-        """Moves the joints of these indices to these angles (rad), from now on within `duration_us`."""
+        """Moves the joints with these indices to these angles (rad), from now on within `duration_us`."""
         self._from = self.angles(now_us)
         self._to = [angles.get(index, angle) for index, angle in enumerate(self._from)]
         self._begin_us, self._duration_us = now_us, duration_us
 
     def angles(self, time_us: int) -> list[float]:
-        """Where the joints are (rad)."""
+        """Returns the joints' angles (rad)."""
         past = time_us - self._begin_us
         if past >= self._duration_us:
             return list(self._to)

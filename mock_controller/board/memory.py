@@ -1,4 +1,4 @@
-"""The shared memory as bytes, and the registers the controller keeps in it. It knows nothing of time."""
+"""The shared memory as bytes, and the controller's registers in it. It is independent of time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class MemoryAddressError(ValueError):
 
 
 class _Column:
-    """One register of all joints, laid out for the controller, which reads and writes it in every period."""
+    """One register of all joints, in a layout for the controller, which reads and writes it in every period."""
 
     __slots__ = ("high", "highest", "low", "lowest", "mask", "sign")
 
@@ -35,7 +35,7 @@ class SharedMemory:
         self._columns = {name: _Column(register) for name, register in memory_map.registers.items()}
 
     def seen_through(self, memory_map: MemoryMap) -> SharedMemory:
-        """The same bytes under another memory map of the same place and size. Raises MemoryAddressError."""
+        """Returns the same bytes under another memory map of the same place and size. Raises MemoryAddressError."""
         if (memory_map.base, memory_map.size) != (self.map.base, self.map.size):
             raise MemoryAddressError(
                 f"memory map {memory_map.name!r}: must have {self.map.size} bytes from {self.map.base:04X} on"
@@ -53,11 +53,11 @@ class SharedMemory:
             )
 
     def get(self, address: int) -> int:
-        """One byte."""
+        """Returns one byte."""
         return self._bytes[address - self._base]
 
     def block(self, address: int, count: int) -> bytes:
-        """`count` bytes from `address` on."""
+        """Returns `count` bytes from `address` on."""
         start = address - self._base
         return bytes(self._bytes[start : start + count])
 
@@ -72,11 +72,11 @@ class SharedMemory:
             data[address - base] = value
 
     def clear(self) -> None:
-        """All zero, as after a loss of power."""
+        """Sets all bytes to zero, as after a loss of power."""
         self._bytes[:] = bytes(len(self._bytes))
 
     def values(self, name: str) -> list[int]:
-        """Values of a register, one per joint (or a single one)."""
+        """Returns values of a register, one per joint (or a single one)."""
         column, data, base = self._columns[name], self._bytes, self._base
         mask, sign = column.mask, column.sign
         if column.high is None:
@@ -91,9 +91,10 @@ class SharedMemory:
         self.put_all(self.encoded(name, enumerate(values)))
 
     def encoded(self, name: str, values: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-        """(address, byte) pairs for (index, value) pairs, low byte before high: the order in which they are stored.
+        """Returns (address, byte) pairs for (index, value) pairs, low byte before high: the order in which they are
+        stored.
 
-        A value beyond the register's range becomes the nearest that fits.
+        A value outside the register's range becomes the nearest inside.
         """
         column = self._columns[name]
         low, high, lowest, highest = column.low, column.high, column.lowest, column.highest

@@ -1,4 +1,4 @@
-"""The board's constants, read from a data file that gives each one's source."""
+"""The board's constants, read from a data file that states the source of each."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from mock_controller.quantities import DataFileError, Provenance, QuantityReader
 
 @dataclass(frozen=True)
 class BoardTiming:
-    """When the controller does what, in µs.
+    """Times of the controller, in µs.
 
     A period begins with sampling and a fetch window; drive and published values change `computing_delay` later.
-    `host_byte` is how long the host holds the memory for a byte, `reset` how long a brown-out lasts.
+    `host_byte`: time for which the host holds the memory per byte. `reset`: duration of a brown-out.
     """
 
     period: int
@@ -31,8 +31,8 @@ class BoardTiming:
 class BoardParameters:
     """All constants of the board. Element i of the tuples is joint i+1.
 
-    `linearity` is the potentiometers' largest error as a fraction of the range, `noise` the converter's rms in
-    counts before rounding, `dac_full_scale` the volts of 127 DAC counts, `default_gains` (P, I, D) those in EPROM.
+    `linearity` is the potentiometers' largest error as a fraction of the range, `noise` the converter's rms in counts
+    before rounding, `dac_full_scale` the volts of 127 DAC counts, `default_gains` (P, I, D) those in EPROM.
     `controller_scales` multiply the controllers' outputs before their limit; at 1 a gain has its stated meaning.
     """
 
@@ -47,7 +47,7 @@ class BoardParameters:
 
 
 def parse_board(text: str, origin: str = "board file") -> tuple[BoardParameters, tuple[Provenance, ...]]:
-    """Parameters and the source of every number, from TOML text. Raises DataFileError with one clear line."""
+    """Returns parameters and the source of each, from TOML text. Raises DataFileError with one clear line."""
     reader = QuantityReader(text, origin)
 
     def micros(key: str, low: int, high: int) -> int:
@@ -92,10 +92,10 @@ def _calibration(reader: QuantityReader, joint: int) -> JointCalibration:
 
 
 def default_board_text() -> str:
-    """The data file that ships."""
+    """Returns the text of the shipped data file."""
     return resources.files("mock_controller.board").joinpath("ma2000_board.toml").read_text("utf-8")
 
 
 def default_board() -> BoardParameters:
-    """Parameters of the data file that ships."""
+    """Returns parameters of the shipped data file."""
     return parse_board(default_board_text(), "ma2000_board.toml")[0]

@@ -33,7 +33,7 @@ class IntegerPid:
         self._last_power = 0
 
     def update(self, error: int, gains: tuple[int, int, int]) -> int:
-        """Power (DAC counts, −127 to 127) for this period's error (ADC counts) under gains (P, I, D)."""
+        """Returns the power (DAC counts, −127 to 127) for this period's error (ADC counts) under gains (P, I, D)."""
         p, i, d = gains
         if i == 0:
             self._sum = 0

@@ -36,7 +36,7 @@ class LinearityCurve:
         self._table = [scale * value for value in raw] + [scale * raw[-1]]
 
     def at(self, counts: float) -> float:
-        """Error (counts) where a perfect potentiometer would show `counts`."""
+        """Returns the error (counts) where a perfect potentiometer would show `counts`."""
         place = min(max(counts, 0.0), float(ADC_COUNTS)) * (_CELLS / ADC_COUNTS)
         cell = int(place)
         left = self._table[cell]
@@ -46,7 +46,7 @@ class LinearityCurve:
 class PositionSensors:
     """The six potentiometers and their converter; noise is drawn from `seed`, joint by joint.
 
-    The curves are drawn from `arm_seed`, by default `seed`: the same arm on another day has other noise only.
+    The curves are drawn from `arm_seed`, by default `seed`: the same arm on another day differs only in noise.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class PositionSensors:
             curious.know_board(parameters)
 
     def read(self, angles: Sequence[float]) -> tuple[int, ...]:
-        """ADC counts (0–4095) of six joint angles (rad)."""
+        """Returns ADC counts (0–4095) of six joint angles (rad)."""
         # Noise is always drawn, so that a momentary fault does not change later noise.
         noise = [rms * source.gauss(0.0, 1.0) for rms, source in zip(self._noise, self._noise_source, strict=True)]
         counts = [min(max(math.floor(value + 0.5), 0), ADC_COUNTS - 1) for value in self.unrounded(angles, noise)]
@@ -82,7 +82,7 @@ class PositionSensors:
         return tuple(counts)
 
     def unrounded(self, angles: Sequence[float], noise: Sequence[float]) -> list[float]:
-        """What the converter would show of six joint angles (rad) if it did not round, with `noise` (counts) on it."""
+        """Returns the converter's readings of six joint angles (rad) without rounding, with `noise` (counts) added."""
         angles = list(angles)
         for effect in self._effects:
             angles[effect.joint - 1] = effect.sensed_angle(angles[effect.joint - 1])
@@ -95,7 +95,7 @@ class PositionSensors:
         return counts
 
     def stick(self, joint: int) -> None:
-        """Holds the wiper of `joint` (from 1) where it is: the reading no longer follows the arm."""
+        """Holds the wiper of `joint` (from 1): the reading no longer follows the arm."""
         self._stuck[joint - 1] = self._last[joint - 1]
 
     def crackle(self, joint: int, noise: float) -> None:

@@ -1,4 +1,4 @@
-"""One control period as the controller saw it, and the ring that keeps the last of them."""
+"""One control period as the controller saw it, and a ring buffer of the last ones."""
 
 from __future__ import annotations
 
@@ -33,25 +33,25 @@ class SnapshotRing:
         self._snapshots: deque[PeriodSnapshot] = deque(maxlen=depth)
 
     def append(self, snapshot: PeriodSnapshot) -> None:
-        """Adds the newest; the oldest falls out when the ring is full."""
+        """Adds the newest; drops the oldest when the ring is full."""
         self._snapshots.append(snapshot)
 
     def clear(self) -> None:
-        """Forgets all."""
+        """Drops all."""
         self._snapshots.clear()
 
     def newest(self) -> PeriodSnapshot | None:
-        """The latest complete period, None before the first."""
+        """Returns the latest complete period, None before the first."""
         return self._snapshots[-1] if self._snapshots else None
 
     def oldest_after(self, tick: int) -> PeriodSnapshot | None:
-        """The oldest snapshot with a tick above `tick`, None when there is none yet."""
+        """Returns the oldest snapshot with a tick above `tick`, None if there is none yet."""
         if not self._snapshots or self._snapshots[-1].tick <= tick:
             return None
-        # Ticks in the ring are consecutive, so the index follows.
+        # Ticks in the ring are consecutive, so the index can be computed.
         place = max(tick + 1 - self._snapshots[0].tick, 0)
         return self._snapshots[place]
 
     def after(self, tick: int) -> list[PeriodSnapshot]:
-        """All that are kept with a tick above `tick`, oldest first."""
+        """Returns all kept snapshots with a tick above `tick`, oldest first."""
         return [snapshot for snapshot in self._snapshots if snapshot.tick > tick]

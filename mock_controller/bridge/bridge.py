@@ -1,7 +1,7 @@
-"""Decides which request is carried out, refused, or has to wait.
+"""Decides whether a request is carried out, refused, or has to wait.
 
-At most one `Sample` waits at a time (a later one takes its place), and in lock-step one `Advance`; all other requests
-are answered meanwhile, `Stop` at once. Time is the board's: carrying out a request lets it pass.
+At most one `Sample` waits at a time (a later one replaces it), and in lock-step one `Advance`; all other requests are
+answered meanwhile, `Stop` at once. Time is the board's: carrying out a request advances it.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ from mock_controller.timeline import Timeline
 WAIT_LIMIT_PERIODS = 25
 """Periods after which a waiting `Sample` is refused, since the controller evidently does not run."""
 
-# Plain integers: combining the flags themselves costs more than all else about an answer.
+# Plain integers: combining the flags themselves would take longer than the rest of an answer.
 _FROZEN, _RESTARTED, _SET_POINT_MISSED = (
     int(flag) for flag in (StatusFlag.FROZEN, StatusFlag.RESTARTED, StatusFlag.SET_POINT_MISSED)
 )
@@ -80,7 +80,7 @@ class _WaitingSample:
     until_us: int
     opcode: int = Sample.OPCODE
     taken: int | None = None
-    """With a compact answer: the tick after which set points that came with the question are taken."""
+    """With a compact answer: the tick after which set points of the request are used."""
 
 
 @dataclass
@@ -93,7 +93,7 @@ class Bridge:
     """Answers requests. `sees_period` offers `Sample`, with `compact` also `MoveAndSample`; `lock_step` offers
     `Advance`.
 
-    `first_number` is the first number of sessions and stops, which should differ at every start.
+    `first_number` is the first ID of sessions and stops, which should differ at every start.
     """
 
     routines: type[MemoryRoutines] = MemoryRoutines
@@ -128,7 +128,7 @@ class Bridge:
         self._boots_greeted = 0
         self.stops = StopRecord()
         self.answered: Counter[str] = Counter()
-        """Requests that came to be carried out, by name."""
+        """Counts of executed requests, by name."""
         self.refused: Counter[str] = Counter()
         """Refusals by reason."""
         routines = self._routines
@@ -156,14 +156,14 @@ class Bridge:
         return self._board.time_us
 
     def run_until(self, time_us: int) -> None:
-        """Lets board time pass."""
+        """Advances board time."""
         self._timeline.run_until(time_us)
         if self.stops.unused:
             self.stops.look(self._board.snapshots)
 
     @property
     def wake_us(self) -> int | None:
-        """When a waiting request may be answered; None when none waits."""
+        """Returns the time at which a waiting request may be answered; None if none waits."""
         sample, advance = self._sample, self._advance
         if sample is None:
             return None if advance is None else max(advance.until_us, self._board.time_us)
@@ -172,7 +172,7 @@ class Bridge:
         return wake if advance is None else min(wake, max(advance.until_us, now))
 
     def hang_up(self) -> None:
-        """Ends the session with its connection. Commands that were received before keep their effect."""
+        """Ends the session with its connection. Commands that were received before remain in effect."""
         self._session.end()
         self._sample = None
         self._advance = None
@@ -198,7 +198,7 @@ class Bridge:
         return [to_frame(frame.sequence, reply)]
 
     def overdue(self) -> list[Frame]:
-        """Replies to waiting requests whose moment has come."""
+        """Returns replies to waiting requests that are due."""
         replies = []
         if self._sample is not None:
             replies += self._try_sample(self._sample)
@@ -208,7 +208,7 @@ class Bridge:
         return replies
 
     def _understood(self, frame: Frame) -> Request | Refusal:
-        """The request in a frame, or the refusal for a fault of the frame itself, whatever the session."""
+        """Returns the request in a frame, or the refusal for a fault of the frame itself, whatever the session."""
         if frame.opcode in self._incapable:
             return Refusal.NOT_CAPABLE
         if frame.opcode == MoveAndSample.OPCODE and not self._compact:
@@ -231,7 +231,7 @@ class Bridge:
         return self._advances.judge(frame.sequence, request) if self._lock_step else Arrival.NEW
 
     def _fresh(self) -> int:
-        """A number that none of this bridge's sessions and stops has had; never 0."""
+        """Returns an ID that none of this bridge's sessions and stops has had; never 0."""
         number = self._next_number or 1
         self._next_number = (number + 1) & 0xFFFFFFFF
         return number
@@ -240,7 +240,7 @@ class Bridge:
         self.refused[reason.name] += 1
         return to_frame(sequence, Refused(opcode, reason))
 
-    # --- at once
+    # --- requests that are answered at once
 
     def _flags(self, frozen: bool, missed: bool = False) -> int:
         restarted = self._board.counters.boots != self._boots_greeted
@@ -301,7 +301,7 @@ class Bridge:
             self._newest_stop,
         )
 
-    # --- what waits
+    # --- requests that wait
 
     def _sample_now_or_later(self, sequence: int, request: Sample | MoveAndSample) -> list[Frame]:
         if isinstance(request, Sample):

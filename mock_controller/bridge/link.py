@@ -1,7 +1,7 @@
-"""One connection as the bridge sees it: bytes in, bytes out, each at its moment of board time.
+"""One connection to the bridge: bytes in and out, each at its board time.
 
-Bytes travel on a line (which may take time), through the faults of the line, to the bridge; replies go the same way
-back. Everything under way has a time; `run_until` lets it happen in order.
+Bytes pass a line (possibly slow) and the line's faults on their way to the bridge; replies take the same way back.
+Everything in transit has a time; `run_until` processes it in order.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mock_controller.bridge.pieces import PieceSplitter
 
 
 class Responder(Protocol):
-    """What the link needs of a bridge."""
+    """Methods of a bridge that the link uses."""
 
     @property
     def time_us(self) -> int:
@@ -26,7 +26,7 @@ class Responder(Protocol):
         ...
 
     def run_until(self, time_us: int) -> None:
-        """Lets board time pass."""
+        """Advances board time."""
         ...
 
     def receive(self, frame: Frame) -> list[Frame]:
@@ -34,21 +34,21 @@ class Responder(Protocol):
         ...
 
     def overdue(self) -> list[Frame]:
-        """Replies that had to wait for their moment, which has come."""
+        """Returns waiting replies that are now due."""
         ...
 
     @property
     def wake_us(self) -> int | None:
-        """When the next waiting reply may be ready; None when none waits."""
+        """Returns the time at which the next waiting reply may be ready; None if none waits."""
         ...
 
     def hang_up(self) -> None:
-        """Handles the end of the connection: forgets waiting requests."""
+        """Handles the end of the connection: drops waiting requests."""
         ...
 
 
 class WireChunk(Protocol):
-    """Bytes that come `delay_us` late; later ones wait for them where they hold the line."""
+    """Bytes that arrive `delay_us` late; later ones wait for them if they hold the line."""
 
     @property
     def data(self) -> bytes: ...
@@ -59,7 +59,7 @@ class WireChunk(Protocol):
 
 
 class Wire(Protocol):
-    """The faults that act on a frame on its way."""
+    """The faults that act on a frame in transit."""
 
     def on_the_wire(self, data: bytes, direction: Literal["to_controller", "to_host"]) -> Iterable[WireChunk]: ...
 
@@ -99,7 +99,7 @@ class Link:
         self._outbox: deque[_Due] = deque()
 
     def hang_up(self) -> None:
-        """Forgets everything under way: the host is gone."""
+        """Drops everything in transit: the host is gone."""
         self._splitter.reset()
         self._decoder.reset()
         self._bridge.hang_up()
@@ -110,11 +110,11 @@ class Link:
         """Board time."""
         return self._bridge.time_us
 
-    # --- what is under way
+    # --- in transit
 
     @property
     def owes(self) -> bool:
-        """Whether bytes are on the line, or a request waits for its moment."""
+        """Whether bytes are on the line, or a request waits for its time."""
         if self._outbox:
             return True
         if self._arriving and self._arriving[0][0] <= max(self.time_us, self._last_bit_us):
@@ -123,11 +123,11 @@ class Link:
 
     @property
     def delayed(self) -> bool:
-        """Whether a fault keeps anything back."""
+        """Whether a fault delays anything."""
         return bool(self._arriving or self._leaving)
 
     def next_event_us(self) -> int | None:
-        """When something happens next; None when nothing will without the host."""
+        """Returns the time of the next event; None if nothing will happen without the host."""
         event = self._bridge.wake_us
         for queue in (self._arriving, self._leaving, self._outbox):
             if queue and (event is None or queue[0][0] < event):
@@ -152,14 +152,14 @@ class Link:
             heapq.heappush(self._arriving, self._due(at, chunk.data))
 
     def take_output(self) -> bytes:
-        """Bytes that have reached the host's end of the line by now."""
+        """Returns bytes that have reached the host's end of the line by now."""
         output = b""
         while self._outbox and self._outbox[0][0] <= self.time_us:
             output += self._outbox.popleft()[2]
         return output
 
     def run_until(self, time_us: int) -> None:
-        """Carries out everything that is due up to a time (µs); the bridge's own work may end a little later."""
+        """Carries out everything that is due up to a time (µs); the bridge's own work may end slightly later."""
         later = time_us + 1
         while True:
             arriving = self._arriving[0][0] if self._arriving else later

@@ -1,18 +1,18 @@
-"""Cuts the host's bytes into pieces: the bytes between two delimiters, which are a frame unless they are damaged."""
+"""Cuts the host's bytes into pieces. A piece is the bytes between two delimiters: a frame, perhaps damaged."""
 
 from __future__ import annotations
 
 from firmware_protocol.framing import MAX_ENCODED
 
 LONGEST = MAX_ENCODED + 2
-"""Length (bytes) of the longest frame with delimiters. A longer piece is passed on in parts, to bound the memory."""
+"""Length (bytes) of the longest frame with delimiters. A longer piece is passed on in parts, to limit the memory."""
 
 
 class PieceSplitter:
-    """Turns bytes into pieces, which do not depend on how the operating system cut the bytes.
+    """Turns bytes into pieces, however the operating system cut the bytes.
 
-    A piece ends in its delimiter and has one at its beginning too if one came; further delimiters are dropped. Of a
-    piece longer than LONGEST every part but the last has no delimiter at its end.
+    A piece ends with a delimiter and may begin with one; extra delimiters are dropped. A piece longer than LONGEST is
+    split; only its last part ends with a delimiter.
     """
 
     def __init__(self) -> None:
@@ -21,7 +21,7 @@ class PieceSplitter:
         """Whether parts of the present piece have been passed on."""
 
     def feed(self, data: bytes) -> list[bytes]:
-        """The pieces that `data` completes, in order."""
+        """Returns the pieces that `data` completes, in order."""
         self._tail += data
         pieces: list[bytes] = []
         while True:
@@ -38,12 +38,12 @@ class PieceSplitter:
                 self._in_piece = False
 
     def reset(self) -> None:
-        """Forgets an unfinished piece (after a reconnection)."""
+        """Drops an unfinished piece (after a reconnection)."""
         self._tail.clear()
         self._in_piece = False
 
     def _begin(self) -> int:
-        """Where the body begins, after dropping all but one of the delimiters before it."""
+        """Drops all but one of the leading delimiters; returns the index at which the body begins."""
         if self._in_piece or not self._tail.startswith(b"\0"):
             return 0
         zeros = len(self._tail) - len(self._tail.lstrip(b"\0"))

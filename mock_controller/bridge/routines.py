@@ -1,8 +1,8 @@
-"""What the bridge does with the shared memory for each request: the host routines of the source (section 6.4).
+"""Accesses the shared memory for each request: the host routines of the source (section 6.4).
 
-Every access takes board time. A bridge that sees the controller's period keeps its accesses clear of the moment when
-the controller fetches its set points, so that it never causes a missed one. A bridge that does not see the period
-collides with a fetch now and then, as does a host that knows nothing of the period (section 6.3).
+Every access takes board time. A bridge that sees the controller's period avoids the time when the controller fetches
+its set points, so that it never causes a missed one. A bridge that does not see the period collides with a fetch now
+and then, like a host that does not know the period (section 6.3).
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class MemoryRoutines:
     # --- accesses
 
     def _keep_clear(self, count: int) -> None:
-        """Waits, where an access of `count` bytes from now on would meet the controller's fetch, until it is over."""
+        """If an access of `count` bytes would now meet the controller's fetch, waits until that is over."""
         if not self._sees_period:
             return
         period_us = self._timeline.next_period_us()
@@ -65,7 +65,7 @@ class MemoryRoutines:
         self._board.write(address, data)
 
     def _value(self, name: str, index: int = 0) -> int:
-        """A register's value, its bytes read one after the other: it may be torn."""
+        """Returns a register's value. Its bytes are read one after the other, so it may be torn."""
         register = self._map[name]
         low = self._read(register.low[index])[0]
         high = self._read(register.high[index])[0] if register.high else 0
@@ -74,21 +74,21 @@ class MemoryRoutines:
     # --- routines
 
     def read_block(self, request: ReadBlock) -> Reply:
-        """Peek."""
+        """Reads a block of memory."""
         return Block(self._read(request.address, request.count))
 
     def write_block(self, request: WriteBlock) -> Reply:
-        """Poke."""
+        """Writes a block of memory."""
         self._write(request.address, request.data)
         return BlockWritten()
 
     def touches_set_points(self, request: WriteBlock) -> bool:
-        """Whether a poke reaches a set point."""
+        """Whether a block write reaches a set point."""
         touched = range(request.address, request.address + len(request.data))
         return any(address in touched for address in self._map["set_point"].addresses)
 
     def write_set_points(self, request: WriteSetPoints) -> None:
-        """Set points of some joints, in one access."""
+        """Writes set points of some joints, in one access."""
         self._keep_clear(2 * len(request.postures))
         self._board.write_set_points(dict(request.postures))
 
@@ -98,9 +98,9 @@ class MemoryRoutines:
         return self._map.base <= request.address and request.address + count <= self._map.base + self._map.size
 
     def freeze(self) -> tuple[int, ...]:
-        """Set points := measured posture; the six postures.
+        """Makes the measured posture the set points; returns the six postures.
 
-        A bridge that sees the period knows what was measured. Any other reads the memory until two readings agree.
+        A bridge that sees the period knows the measured posture. Any other reads the memory until two readings agree.
         """
         self._keep_clear(2 * JOINTS)
         if self._sees_period or self._board.frozen:
@@ -109,7 +109,7 @@ class MemoryRoutines:
         return self._board.freeze(self._untorn_positions())
 
     def _untorn_positions(self) -> tuple[int, ...] | None:
-        """Positions (ADC counts) of all joints from two readings that agree; None from a memory without supply.
+        """Returns positions (ADC counts) of all joints from two readings that agree; None from a memory without supply.
 
         The second begins when any change that the first has met is complete, and the next change is a period away.
         """
@@ -122,7 +122,7 @@ class MemoryRoutines:
             before = positions
 
     def _read_positions(self) -> tuple[int, ...]:
-        """Positions (ADC counts) from one reading of the memory: they may be torn."""
+        """Returns positions (ADC counts) from one reading of the memory; they may be torn."""
         register = self._map["position"]
         first, last = min(register.addresses), max(register.addresses)
         block = self._read(first, last - first + 1)
@@ -133,7 +133,7 @@ class MemoryRoutines:
         )
 
     def gains(self) -> Reply:
-        """PID gains of all joints."""
+        """Returns PID gains of all joints."""
         return Gains(
             tuple(
                 (self._value("gain_p", index), self._value("gain_i", index), self._value("gain_d", index))
@@ -142,13 +142,13 @@ class MemoryRoutines:
         )
 
     def set_gains(self, request: SetGains) -> Reply:
-        """PID gains of one joint, byte by byte."""
+        """Writes PID gains of one joint, byte by byte."""
         for name, value in zip(_GAINS, (request.p, request.i, request.d), strict=True):
             self._write(self._map[name].low[request.joint - 1], bytes((value,)))
         return GainsSet()
 
     def errors_positions_powers(self, request: ReportErrorsPositionsPowers) -> Reply:
-        """What the memory holds of some joints, byte by byte."""
+        """Returns errors, positions and powers of some joints, read byte by byte."""
         return ErrorsPositionsPowers(
             tuple(
                 (
@@ -165,11 +165,11 @@ class MemoryRoutines:
         )
 
     def read_process(self) -> Reply:
-        """Process inputs, outputs and gripper."""
+        """Returns process inputs, outputs and gripper."""
         return Process(self._value("process_inputs"), self._value("process_outputs"), self._value("gripper"))
 
     def write_outputs(self, request: WriteOutputs) -> Reply:
-        """Outputs in the mask; the others keep what the memory holds."""
+        """Writes outputs in the mask; the others keep their value in the memory."""
         kept = self._value("process_outputs") & ~request.mask
         self._write(self._map["process_outputs"].low[0], bytes((kept | request.values & request.mask,)))
         return OutputsWritten()

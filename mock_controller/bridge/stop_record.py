@@ -1,4 +1,4 @@
-"""Moments of a stop: received, stored in the memory, used by the controller."""
+"""Times of a stop: received, stored in the memory, used by the controller."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from mock_controller.board.snapshot import SnapshotRing
 
 @dataclass
 class StopRecord:
-    """Moments of the latest stop, in board time (µs); None for what has not happened."""
+    """Times of the latest stop, in board time (µs); None for events that have not happened."""
 
     count: int = 0
     received_us: int | None = None
@@ -19,12 +19,12 @@ class StopRecord:
     frozen_tick: int | None = None
     """The last period that had begun by then."""
     first_used_us: int | None = None
-    """When the first period began that took the frozen set points."""
+    """When the first period began that used the frozen set points."""
     first_used_tick: int | None = None
 
     @property
     def unused(self) -> bool:
-        """Whether a stop waits for a period that takes its set points."""
+        """Whether a stop waits for a period that uses its set points."""
         return self.frozen_us is not None and self.first_used_us is None
 
     def note(self, received_us: int, frozen_us: int, tick: int) -> None:
@@ -34,7 +34,7 @@ class StopRecord:
         self.first_used_us = self.first_used_tick = None
 
     def look(self, snapshots: SnapshotRing) -> None:
-        """Looks for the first complete period that took the frozen set points."""
+        """Looks for the first complete period that used the frozen set points."""
         if self.frozen_us is None or self.frozen_tick is None or self.first_used_us is not None:
             return
         candidate = snapshots.oldest_after(self.frozen_tick)

@@ -22,8 +22,8 @@ class Disconnect(PartFault):
     """Cuts the line; it comes back."""
 
     name: ClassVar[str] = "disconnect"
-    seconds: float = parameter("s of the host's clock until it is back", 0.5, 0.0, 1e6)
-    duration: float = parameter("does not matter: `seconds` says when it ends", 0.0, 0.0)
+    seconds: float = parameter("s of the host's clock until it is restored", 0.5, 0.0, 1e6)
+    duration: float = parameter("ignored: `seconds` sets the end", 0.0, 0.0)
 
     def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
         count()

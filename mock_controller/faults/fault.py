@@ -1,4 +1,4 @@
-"""The base of all faults: a name, checked parameters, a span of board time, and the place where it acts."""
+"""The base of all faults: a name, checked parameters, a span of board time, and the place of action."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ Direction = Literal["to_controller", "to_host"]
 
 
 class FaultError(ValueError):
-    """A fault that does not exist, or a parameter it cannot have."""
+    """A fault that does not exist, or an invalid parameter."""
 
 
 def parameter(meaning: str, default: Any, low: float = -math.inf, high: float = math.inf) -> Any:
-    """A dataclass field: a number in [low, high] and what it means (unit included)."""
+    """Returns a dataclass field for a number in [low, high], with its meaning (unit included)."""
     return field(default=default, metadata={"meaning": meaning, "low": low, "high": high})
 
 
 def choice(meaning: str, default: str, allowed: Iterable[str]) -> Any:
-    """A dataclass field: one of several words."""
+    """Returns a dataclass field for one of several words."""
     return field(default=default, metadata={"meaning": meaning, "allowed": tuple(allowed)})
 
 
 class Chunk(NamedTuple):
-    """Bytes on their way, `delay_us` later than they would have come.
+    """Bytes in transit, `delay_us` later than without faults.
 
-    Where `holds_line` is set, everything behind waits for them; else later bytes may overtake them.
+    If `holds_line` is set, everything behind waits for them; else later bytes may overtake them.
     """
 
     data: bytes
@@ -39,33 +39,33 @@ class Chunk(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
-    """Base of all faults. `start` and `duration` are seconds of board time from the moment it is switched on."""
+    """Base of all faults. `start` and `duration` are seconds of board time after it is switched on."""
 
     name: ClassVar[str]
-    start: float = parameter("s of board time until it sets in", 0.0, 0.0, 1e6)
+    start: float = parameter("s of board time until it begins", 0.0, 0.0, 1e6)
     duration: float = parameter("s of board time that it lasts", math.inf, 0.0)
     seed: int = parameter("of its own random numbers; by default made from the mock's seed", -1, -1, 2**63)
 
     @classmethod
     def summary(cls) -> str:
-        """One line: the first of its description."""
+        """Returns the first line of its description."""
         return (cls.__doc__ or "").strip().splitlines()[0]
 
 
 @dataclass(frozen=True, kw_only=True)
 class WireFault(Fault):
-    """A fault of the line: strikes a frame with probability `rate`, in one direction or both."""
+    """A fault of the line: acts on a frame with probability `rate`, in one direction or both."""
 
     rate: float = parameter("probability per frame", 1.0, 0.0, 1.0)
     direction: str = choice("which frames", "both", ("both", "to_controller", "to_host"))
 
     def strike(self, data: bytes, dice: random.Random) -> list[Chunk]:
-        """The chunks that one encoded frame, delimiters included, turns into; independent of time."""
+        """Returns the chunks into which one encoded frame, delimiters included, is changed; independent of time."""
         raise NotImplementedError
 
 
 class FaultyParts(Protocol):
-    """What faults other than those of the line may do to board, arm and connection."""
+    """Actions on board, arm and connection for faults other than those of the line."""
 
     @property
     def time_us(self) -> int:
@@ -77,11 +77,11 @@ class FaultyParts(Protocol):
         ...
 
     def brown_out(self) -> None:
-        """Interrupts the board's supply for a moment; the board restarts, the arm stays where it is."""
+        """Interrupts the board's supply for a moment; the board restarts, the arm does not move."""
         ...
 
     def stall_joint(self, joint: int) -> None:
-        """Jams a joint where it is."""
+        """Jams a joint at its present angle."""
         ...
 
     def free_joint(self, joint: int) -> None:
@@ -107,7 +107,7 @@ class FaultyParts(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class PartFault(Fault):
-    """A fault of board, arm or connection: begins, perhaps acts in every period, ends."""
+    """A fault of board, arm or connection: begins, may act in every period, ends."""
 
     def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:
         """Begins the fault."""
@@ -126,5 +126,5 @@ class Count(Protocol):
 
 
 def fields_of(kind: type[Fault]) -> dict[str, dataclasses.Field[Any]]:
-    """The parameters of a fault class by name."""
+    """Returns the parameters of a fault class by name."""
     return {item.name: item for item in dataclasses.fields(kind)}

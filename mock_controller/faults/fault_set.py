@@ -1,4 +1,4 @@
-"""The faults that are switched on, when each acts, and how often each has struck."""
+"""The active faults, their times, and counts of their actions."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class FaultSet:
     seed: int = 0
     active: list[ActiveFault] = field(default_factory=list)
     injected: Counter[tuple[str, str]] = field(default_factory=Counter)
-    """How often each fault has struck, by its name and by direction (`board` where it has none)."""
+    """How often each fault has acted, by its name and by direction (`board` if it has none)."""
 
     def switch_on(self, text: str) -> ActiveFault:
         """Adds the fault of `name:parameter=value,…`, from now on. Raises FaultError."""
@@ -65,12 +65,12 @@ class FaultSet:
         return [entry.label for entry in ended]
 
     def listing(self) -> list[dict[str, Any]]:
-        """The faults that are switched on, as JSON data."""
+        """Returns the active faults, as JSON data."""
         now = self.parts.time_us
         return [{"label": entry.label, "acting": entry.covers(now), **describe(entry.fault)} for entry in self.active]
 
     def counts(self) -> dict[str, dict[str, int]]:
-        """How often each fault has struck, by name, then by direction."""
+        """Returns how often each fault has acted, by name, then by direction."""
         result: dict[str, dict[str, int]] = {}
         for (name, where), count in sorted(self.injected.items()):
             result.setdefault(name, {})[where] = count
@@ -79,7 +79,7 @@ class FaultSet:
     # --- time
 
     def next_change_us(self) -> int | None:
-        """When the next fault sets in or ends; None when nothing is to come."""
+        """Returns the time at which the next fault begins or ends; None if there is none."""
         times = [entry.end_us if entry.begun else entry.begin_us for entry in self.active]
         due = min(times, default=math.inf)
         return None if due == math.inf else int(due)
@@ -95,7 +95,7 @@ class FaultSet:
                 self._end(entry)
 
     def before_period(self, begins_us: int) -> None:
-        """To be called just before each control period, with the moment (µs) at which it begins."""
+        """Acts before a control period that begins at this time (µs)."""
         self.make_changes(begins_us)
         for entry in self.active:
             if entry.begun and isinstance(entry.fault, PartFault):
@@ -104,7 +104,9 @@ class FaultSet:
     # --- the line
 
     def on_the_wire(self, data: bytes, direction: Direction) -> list[Chunk]:
-        """The chunks that one encoded frame turns into now: all faults of the line act in the order of switching on."""
+        """Returns the chunks into which one encoded frame is changed now: all faults of the line act in the order of
+        switching on.
+        """
         chunks = [Chunk(data)]
         if not self.active:
             return chunks

@@ -24,7 +24,7 @@ class BusyMemory(PartFault):
 
 @dataclass(frozen=True, kw_only=True)
 class StuckPotentiometer(PartFault):
-    """A joint's potentiometer keeps showing what it showed. Counted once a period."""
+    """A joint's potentiometer keeps its last reading. Counted once per period."""
 
     name: ClassVar[str] = "stuck_potentiometer"
     joint: int = parameter("1 to 6", 1, 1, 6)
@@ -41,7 +41,7 @@ class StuckPotentiometer(PartFault):
 
 @dataclass(frozen=True, kw_only=True)
 class NoisyPotentiometer(PartFault):
-    """A worn potentiometer: a joint's readings scatter. Counted once a period."""
+    """A worn potentiometer: a joint's readings scatter. Counted once per period."""
 
     name: ClassVar[str] = "noisy_potentiometer"
     joint: int = parameter("1 to 6", 1, 1, 6)
@@ -59,7 +59,7 @@ class NoisyPotentiometer(PartFault):
 
 @dataclass(frozen=True, kw_only=True)
 class StalledJoint(PartFault):
-    """A joint jams where it is."""
+    """A joint jams at its present angle."""
 
     name: ClassVar[str] = "stalled_joint"
     joint: int = parameter("1 to 6", 1, 1, 6)
@@ -74,10 +74,10 @@ class StalledJoint(PartFault):
 
 @dataclass(frozen=True, kw_only=True)
 class BrownOut(PartFault):
-    """The board's supply fails for a moment: it starts again with its defaults, the arm where it was."""
+    """The board's supply fails for a moment: it restarts with its defaults, and the arm does not move."""
 
     name: ClassVar[str] = "brown_out"
-    duration: float = parameter("does not matter: it happens once", 0.0, 0.0)
+    duration: float = parameter("ignored: it happens once", 0.0, 0.0)
 
     def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
         count()

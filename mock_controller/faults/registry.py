@@ -31,10 +31,10 @@ FAULTS: dict[str, type[Fault]] = {
 
 
 def parse_fault(text: str) -> Fault:
-    """The fault that `name:parameter=value,…` asks for. Raises FaultError with what is allowed."""
+    """Parses `name:parameter=value,…` to a fault. Raises FaultError with the allowed values."""
     name, _, rest = text.strip().partition(":")
     if name not in FAULTS:
-        raise FaultError(f"fault {name!r}: not known; there are {', '.join(FAULTS)}")
+        raise FaultError(f"fault {name!r}: not known; available: {', '.join(FAULTS)}")
     kind = FAULTS[name]
     fields = fields_of(kind)
     values: dict[str, Any] = {}
@@ -65,7 +65,7 @@ def _value(name: str, field: dataclasses.Field[Any], text: str) -> Any:
 
 
 def describe(fault: Fault) -> dict[str, Any]:
-    """Name and parameters of a fault, as JSON data (an endless duration is null)."""
+    """Returns name and parameters of a fault, as JSON data (an endless duration is null)."""
     values = dataclasses.asdict(fault)
     if values["duration"] == float("inf"):
         values["duration"] = None
@@ -73,7 +73,7 @@ def describe(fault: Fault) -> dict[str, Any]:
 
 
 def table() -> str:
-    """Every fault with its parameters, for `--help-faults`."""
+    """Returns every fault with its parameters, for `--help-faults`."""
     lines = []
     for name, kind in FAULTS.items():
         lines.append(f"{name}: {kind.summary()}")

@@ -14,7 +14,7 @@ class Flip(WireFault):
     """Inverts bits; the receiver finds the frame damaged."""
 
     name: ClassVar[str] = "flip"
-    bits: int = parameter("bits turned over in a frame that is struck", 1, 1, 64)
+    bits: int = parameter("inverted bits per affected frame", 1, 1, 64)
 
     def strike(self, data: bytes, dice: random.Random) -> list[Chunk]:
         damaged = bytearray(data)
@@ -38,7 +38,7 @@ class Duplicate(WireFault):
     """Delivers a frame twice."""
 
     name: ClassVar[str] = "duplicate"
-    ms: float = parameter("ms after which the second copy comes; later frames overtake it", 0.0, 0.0, 60_000.0)
+    ms: float = parameter("ms until the second copy comes; later frames overtake it", 0.0, 0.0, 60_000.0)
 
     def strike(self, data: bytes, dice: random.Random) -> list[Chunk]:  # noqa: ARG002
         return [Chunk(data), Chunk(data, round(1000 * self.ms))]
@@ -50,7 +50,7 @@ class Delay(WireFault):
 
     name: ClassVar[str] = "delay"
     ms: float = parameter("ms of delay", 5.0, 0.0, 60_000.0)
-    jitter_ms: float = parameter("ms that may be added, evenly spread", 0.0, 0.0, 60_000.0)
+    jitter_ms: float = parameter("further ms, evenly distributed", 0.0, 0.0, 60_000.0)
 
     def strike(self, data: bytes, dice: random.Random) -> list[Chunk]:
         return [Chunk(data, round(1000 * (self.ms + self.jitter_ms * dice.random())))]
@@ -73,7 +73,7 @@ class Junk(WireFault):
     """Puts random bytes before a frame."""
 
     name: ClassVar[str] = "junk"
-    most: int = parameter("most bytes put in", 16, 1, 1024)
+    most: int = parameter("most bytes inserted", 16, 1, 1024)
 
     def strike(self, data: bytes, dice: random.Random) -> list[Chunk]:
         count = dice.randint(1, self.most)

@@ -1,8 +1,8 @@
-"""An arm that a seed has drawn: its load, its deviations, its hidden effects.
+"""An arm drawn from a seed: its load, its deviations, its hidden effects.
 
 A seed is a whole number, 100·number + 10·kind + load. Its last digit gives the load, which is announced to those who
-diagnose; the digit before it gives the kind of arm, which is not. Everything else is drawn from the whole number, so
-that arms of different kinds have nothing in common.
+diagnose; the digit before it gives the kind of arm, which is not. All else is drawn from the whole number, so that arms
+of different kinds have nothing in common.
 """
 
 from __future__ import annotations
@@ -48,12 +48,13 @@ class Kind(IntEnum):
 
 
 OF_ANY = tuple(kind for kind in Kind if Kind.ANY < kind <= Kind.WRONG_PRIORS)
-"""Kinds that `ANY` draws. Later kinds, and effects that came to the library later, are no part of it: a seed keeps its
-arm."""
+"""Kinds that `ANY` draws. Later kinds, and later effects of the library, are not included, so that a seed keeps its
+arm.
+"""
 
 
 class Load(IntEnum):
-    """Loads that the arm may carry; which one is announced to everybody."""
+    """Loads that the arm may carry; the load is announced to everybody."""
 
     NOMINAL = 0
     LIGHT = 1
@@ -66,7 +67,7 @@ LOAD_KG: dict[Load, float | None] = {Load.NOMINAL: None, Load.LIGHT: 0.4, Load.H
 
 @dataclass(frozen=True)
 class HiddenEffect:
-    """One effect at the joints it acts on (none: on the arm as a whole), a set of parameters for each."""
+    """One effect at its joints (none: on the arm as a whole), with a set of parameters for each."""
 
     name: str
     joints: tuple[int, ...]
@@ -75,17 +76,17 @@ class HiddenEffect:
 
     @property
     def known_as(self) -> str:
-        """Its name in the shared list, or UNKNOWN."""
+        """Returns its name in the shared list, or UNKNOWN."""
         return self.name if known_modifications()[self.name].shared else UNKNOWN
 
     def modifications(self) -> tuple[Modification, ...]:
-        """The effect as modifications of the mock."""
+        """Returns the effect as modifications of the mock."""
         return build_modifications((self.name, values) for values in self.parameters)
 
 
 @dataclass(frozen=True)
 class HiddenArm:
-    """Everything that a seed hides. Deviations are fractions of the data file's values (delay: s)."""
+    """All secrets of a seed. Deviations are fractions of the data file's values (delay: s)."""
 
     seed: int
     kind: Kind
@@ -94,26 +95,26 @@ class HiddenArm:
     effects: tuple[HiddenEffect, ...]
 
     def plant_parameters(self, parameters: PlantParameters) -> PlantParameters:
-        """The arm with its load and deviations, without its effects."""
+        """Returns the arm with its load and deviations, without its effects."""
         return deviating_plant(loaded(parameters, self.load), self.deviations)
 
     def board_parameters(self, parameters: BoardParameters) -> BoardParameters:
-        """The board with its deviations."""
+        """Returns the board with its deviations."""
         return deviating_board(parameters, self.deviations)
 
     def modifications(self, leave_out: int | None = None) -> tuple[Modification, ...]:
-        """The effects as modifications of the mock; without the one of index `leave_out`."""
+        """Returns the effects as modifications of the mock; without that of index `leave_out`."""
         kept = (effect for index, effect in enumerate(self.effects) if index != leave_out)
         return tuple(modification for effect in kept for modification in effect.modifications())
 
     def parts(self, plant: PlantParameters, board: BoardParameters, leave_out: int | None = None) -> LoopParts:
-        """The complete arm, for a loop without rounding."""
+        """Returns the complete arm, for a loop without rounding."""
         return LoopParts(
             self.plant_parameters(plant), self.board_parameters(board), self.modifications(leave_out), self.seed
         )
 
     def truth(self) -> dict[str, Any]:
-        """Everything that is hidden, as JSON data."""
+        """Returns all secrets, as JSON data."""
         return {
             "seed": self.seed,
             "kind": self.kind.name.lower(),
@@ -134,18 +135,18 @@ class HiddenArm:
 
 
 def loaded(parameters: PlantParameters, load: Load) -> PlantParameters:
-    """The arm with one of the announced loads."""
+    """Returns the arm with one of the announced loads."""
     mass = LOAD_KG[load]
     return parameters if mass is None else change_body(parameters, m_load=mass)
 
 
 def compose_seed(number: int, kind: Kind, load: Load) -> int:
-    """The seed of arm `number` of a kind and a load."""
+    """Returns the seed of arm `number` of a kind and a load."""
     return 100 * number + 10 * kind + load
 
 
 def draw_arm(seed: int) -> HiddenArm:
-    """The arm that a seed hides. Raises SecretError for a seed without a meaning."""
+    """Returns the arm of a seed. Raises SecretError for an invalid seed."""
     kind_digit, load_digit = seed // 10 % 10, seed % 10
     if not 0 <= seed < SEED_LIMIT or kind_digit > max(Kind) or load_digit > max(Load):
         raise SecretError(
@@ -187,7 +188,9 @@ def _effects(random: Random, kind: Kind) -> tuple[HiddenEffect, ...]:
 
 
 def _pair(random: Random) -> tuple[HiddenEffect, ...]:
-    """Two different effects. Backlash and compliance are never drawn on the same joint: its gear can have only one."""
+    """Draws two different effects. Backlash and compliance are never drawn on the same joint: its gear can have only
+    one.
+    """
     first, second = (_one(random, size) for size in random.sample(SHARED_SIZES, 2))
     gives = ("backlash", "joint_compliance")
     while first.name in gives and second.name in gives and first.joints == second.joints:
@@ -200,7 +203,7 @@ def _one(random: Random, size: SizeRange) -> HiddenEffect:
 
 
 def _at(random: Random, size: SizeRange, joints: tuple[int, ...]) -> HiddenEffect:
-    """An effect of one strength and sign at all its joints; its other parameters are drawn once."""
+    """Returns an effect of one strength and sign at all its joints; its other parameters are drawn once."""
     strength = random.random()
     sign = random.choice((-1, 1)) if size.signed else 1
     drawn_once = random.getrandbits(64)

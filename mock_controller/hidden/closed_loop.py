@@ -1,9 +1,9 @@
 """The control loop without rounding: an arm's readings as real numbers.
 
-Positions, errors and drive are real numbers here; in place of rounding, each reading carries noise of the same size
-(the converter's own and that of a rounding error, a quantity uniform over one count), drawn from a seed. With the
-same noise, the readings of two arms differ only by what differs between the arms, and neither arm comes to rest where
-rounding would have kept it moving.
+Positions, errors and drive are real numbers here. Instead of rounding, each reading carries noise of the same size,
+drawn from a seed: the converter's own and that of a rounding error, uniform over one count. With the same noise, the
+readings of two arms differ only by the difference of the arms, and neither comes to rest where rounding would have kept
+it moving.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class _SmoothPid:
         self._power = 0.0
 
     def update(self, error: float) -> float:
-        """Power (DAC counts) for this period's error (ADC counts)."""
+        """Returns the power (DAC counts) for this period's error (ADC counts)."""
         p, i, d = self._gains
         if i and self._power * error < DAC_MAX * abs(error):
             limit = DAC_MAX * self._unit
@@ -69,7 +69,9 @@ class _SmoothPid:
 def readings(
     parts: LoopParts, experiment: Experiment, noise_seed: int = 0, step_us: int = STEP_US
 ) -> NDArray[np.float64]:
-    """Readings (counts, one row per period, joints 1 to 6) of the experiment, the settling before it left out."""
+    """Returns readings (counts, one row per period, joints 1 to 6) of the experiment, without the settling before
+    it.
+    """
     board = parts.board
     for change in of_kind(parts.modifications, ChangesBoard):
         board = change.change_board(board)

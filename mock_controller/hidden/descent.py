@@ -1,4 +1,4 @@
-"""Least squares by steps of Levenberg and Marquardt, for residuals that cost a simulation each."""
+"""Levenberg–Marquardt least squares, for residuals that each cost a simulation."""
 
 from __future__ import annotations
 
@@ -13,15 +13,18 @@ Floats = NDArray[np.float64]
 _FIRST_DAMPING, _LESS_DAMPING, _MORE_DAMPING = 1e-3, 5.0, 6.0
 """Initial damping, as a share of the diagonal, and its factors after success and failure."""
 _LEAST_FALL = 0.02
-"""Share by which a step must lower the square; one that does not is idle."""
+"""Share by which a step must lower the sum of squares; a step that does not is idle."""
 _PATIENCE = 2
-"""Idle steps in a row after which the derivatives are formed anew, or the search ends."""
+"""Consecutive idle steps after which the derivatives are recomputed, or the search ends."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A residual (m,) of n numbers within `low` and `high` (n,), and its derivatives (m, n) at a place, given the
-    residual there. A search ends below the square `enough`."""
+    """A residual (m,) of n numbers within `low` and `high` (n,), and its derivatives (m, n) at a point with known
+    residual.
+
+    A search ends below the sum of squares `enough`.
+    """
 
     residual: Callable[[Floats], Floats]
     slopes: Callable[[Floats, Floats], Floats]
@@ -31,21 +34,22 @@ class Problem:
 
 
 def square(values: Floats) -> float:
-    """Sum of squares."""
+    """Returns the sum of squares."""
     return float(values @ values)
 
 
 def descend(
     problem: Problem, start: Floats, steps: int, renewals: int, slopes: Floats | None = None
 ) -> tuple[Floats, Floats]:
-    """The best place that was found, and its residual.
+    """Returns the best point found, and its residual.
 
-    Each step corrects the derivatives by what it shows (Broyden 1965); where that leads no further, they are formed
-    anew.
+    Each step corrects the derivatives by its result (Broyden 1965); if that makes no more progress, they are
+    recomputed.
 
     Args:
-        start: (n,), where to begin. steps: number of steps at most. renewals: times that derivatives are formed anew at
-            most. slopes: the first derivatives, if they are known.
+        start: (n,), initial point. steps: most steps.
+        renewals: most recomputations of the derivatives.
+        slopes: the first derivatives, if they are known.
     """
     place = np.clip(start, problem.low, problem.high)
     left = problem.residual(place)
@@ -75,7 +79,7 @@ def descend(
 
 
 def differences(residual: Callable[[Floats], Floats], at: Floats, left: Floats, high: Floats, step: float) -> Floats:
-    """Derivatives (m, n) of a residual by steps that stay below `high`; `left`: the residual there."""
+    """Returns derivatives (m, n) of a residual by steps that stay below `high`; `left`: the residual there."""
     matrix = np.zeros((left.size, at.size))
     for k in range(at.size):
         moved, by = at.copy(), step if at[k] + step <= high[k] else -step

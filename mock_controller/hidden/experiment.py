@@ -23,9 +23,9 @@ class ExperimentError(ValueError):
 
 @dataclass(frozen=True)
 class Experiment:
-    """Set points (posture units, six per period) from the first period after `settle` periods at the first of them.
+    """Set points (posture units, six per period) that follow `settle` periods at the first of them.
 
-    `gains`: P, I, D of every joint. `joint_gains`: those of each of the six joints, where they are not all the same.
+    `gains`: P, I, D of every joint. `joint_gains`: those of each of the six joints, if they are not all the same.
     """
 
     set_points: tuple[tuple[int, ...], ...]
@@ -59,10 +59,11 @@ class Experiment:
 
 
 def read_experiment(path: Path, gains: Gains = (2, 0, 0)) -> Experiment:
-    """An experiment from CSV with one line per period and columns set_point_1 … set_point_6 (posture units); from a
-    `.json` file with the same in `set_points`, one list per period, and P, I, D of the six joints in `gains`.
+    """Reads an experiment from CSV or JSON.
 
-    Raises ExperimentError with one clear line.
+    CSV has one line per period and columns set_point_1 … set_point_6 (posture units). A `.json` file has the same in
+    `set_points`, one list per period, and P, I, D of the six joints in `gains`. Raises ExperimentError with one clear
+    line.
     """
     if path.suffix == ".json":
         return _from_json(path)
@@ -97,7 +98,7 @@ def _from_json(path: Path) -> Experiment:
 
 
 class _Path:
-    """Set points of joints 1 to 3 put together from moves, in 20 ms periods."""
+    """Builds set points of joints 1 to 3 from moves, in 20 ms periods."""
 
     def __init__(self) -> None:
         self.rows: list[list[float]] = []
@@ -119,7 +120,7 @@ class _Path:
 
 
 def ramp_step() -> Experiment:
-    """8 s: the source's ramp (80 posture units in 0.65 s, joints 1 to 3 together), held, and back."""
+    """Returns 8 s: the source's ramp (80 posture units in 0.65 s, joints 1 to 3 together), held, and back."""
     path = _Path()
     path.hold(0.5)
     path.move((80, 80, 80), 0.65)
@@ -130,7 +131,9 @@ def ramp_step() -> Experiment:
 
 
 def reference_set() -> Experiment:
-    """55 s: one joint at a time, slow reversals, a staircase, fast moves of many sizes, and a second posture."""
+    """Returns 55 s: one joint at a time, slow reversals, a staircase, fast moves of many sizes, and a second
+    posture.
+    """
     path = _Path()
     path.hold(0.5)
     for joint in range(3):  # one at a time, there and back

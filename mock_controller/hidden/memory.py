@@ -1,9 +1,9 @@
-"""A shared memory that a seed has drawn: where each register lies, and what else lies between.
+"""A shared memory drawn from a seed: the address of each register, and the other contents.
 
 Registers lie in rows, side by side or anywhere; a value of two bytes has its halves side by side, in either order, or
-apart. Everything that a controller of this kind may keep in the same page besides is drawn too: constants, counters,
-noise, and quantities that look like a register that the host may use but are none. What a value means (unit, sign,
-rounding) is never drawn: a memory map may move registers, and not change what they mean.
+apart. Other contents of such a controller's page are drawn too: constants, counters, noise, and quantities that look
+like a register of the host but are none. The meaning of a value (unit, sign, rounding) is never drawn: a memory map may
+move registers, but not change their meaning.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ Documented = Literal["kept", "moved"]
 Pairs = list[tuple[int, int]]
 
 _NEVER_CHANGED = ("gain_p", "gain_i", "gain_d", "process_inputs", "process_outputs", "gripper")
-"""Registers that the controller never changes by itself: hardly anything that is read proves where they lie."""
+"""Registers that the controller never changes by itself: readings hardly prove where they are."""
 _KEPT = 1 / 3
-"""Share of memories in which these lie where the shipped map assumes them."""
+"""Share of memories with these at the shipped map's addresses."""
 _ROW = 8
 """Bytes from a row of low bytes to its row of high bytes, as in the documented positions."""
 
 
 @dataclass(frozen=True)
 class OtherRegister:
-    """Something in the page that is not for the host: `kind` names it, `value` gives its bytes after a period."""
+    """A content of the page that is not for the host: `kind` names it, `value` gives its bytes after a period."""
 
     kind: str
     addresses: tuple[int, ...]
@@ -40,13 +40,13 @@ class OtherRegister:
     changes: bool = True
 
     def pairs(self, now: PeriodSnapshot, before: PeriodSnapshot | None) -> Pairs:
-        """(address, byte) pairs after the period `now`, which followed `before`."""
+        """Returns (address, byte) pairs after the period `now`, which followed `before`."""
         return [(address, value & 0xFF) for address, value in zip(self.addresses, self.value(now, before), strict=True)]
 
 
 @dataclass(frozen=True)
 class HiddenMemory:
-    """A memory with everything in it. `flags` are the four upper bits that position's high bytes carry, by joint."""
+    """A memory with all its contents. `flags` are the four upper bits that position's high bytes carry, by joint."""
 
     seed: int
     map: MemoryMap
@@ -55,7 +55,7 @@ class HiddenMemory:
     others: tuple[OtherRegister, ...]
 
     def truth(self) -> dict[str, Any]:
-        """Everything that is hidden, as JSON data."""
+        """Returns all secrets, as JSON data."""
         return {
             "seed": self.seed,
             "registers": {
@@ -75,24 +75,24 @@ class _Page:
         self._free = set(range(base, base + size))
 
     def take(self, addresses: Sequence[int]) -> bool:
-        """Takes these addresses; False where one is not free."""
+        """Reserves these addresses; returns False if one is not free."""
         if not self._free.issuperset(addresses):
             return False
         self._free.difference_update(addresses)
         return True
 
     def give_back(self, addresses: Sequence[int]) -> None:
-        """Makes these addresses free again."""
+        """Frees these addresses."""
         self._free.update(addresses)
 
     def anywhere(self, count: int) -> list[int]:
-        """Any `count` free addresses, in any order."""
+        """Returns any `count` free addresses, in any order."""
         chosen = self._random.sample(sorted(self._free), count)
         self._free.difference_update(chosen)
         return chosen
 
     def shaped(self, offsets: Sequence[int]) -> list[int]:
-        """Free addresses at these offsets from a random place; anywhere, where the shape does not fit any more."""
+        """Returns free addresses at these offsets from a random place; anywhere, if the shape no longer fits."""
         places = [place for place in sorted(self._free) if self._free.issuperset(place + o for o in offsets)]
         if not places:
             return self.anywhere(len(offsets))
@@ -107,7 +107,7 @@ class _Page:
 
 
 def draw_memory(seed: int, documented: Documented = "kept") -> HiddenMemory:
-    """The memory that a seed hides."""
+    """Returns the memory of a seed."""
     random = Random(f"hidden memory {seed} {documented}")
     shipped = default_memory_map()
     page = _Page(random, shipped.base, shipped.size)
@@ -165,7 +165,7 @@ def _one_byte(random: Random, page: _Page) -> list[int]:
 
 
 def _two_bytes(random: Random, page: _Page) -> tuple[list[int], list[int]]:
-    """Addresses of low and high bytes of six joints."""
+    """Returns addresses of low and high bytes of six joints."""
     style = random.choice(("rows", "little", "big", "anywhere"))
     if style == "rows":
         found = page.shaped([*range(JOINTS), *range(_ROW, _ROW + JOINTS)])
@@ -190,11 +190,11 @@ def _gain_columns(random: Random, page: _Page) -> list[list[int]]:
     return [found[row * JOINTS : (row + 1) * JOINTS] for row in range(3)]
 
 
-# --- what else lies in the page
+# --- other contents of the page
 
 
 def _others(random: Random, page: _Page) -> tuple[OtherRegister, ...]:
-    """Fills the page, but for a few bytes that stay zero."""
+    """Fills the page, except for a few bytes that stay zero."""
     others: list[OtherRegister] = []
     empty = random.randrange(4)
     while page.left > empty:
@@ -256,7 +256,7 @@ def _last_error(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
     def value(now: PeriodSnapshot, before: PeriodSnapshot | None) -> tuple[int]:
         return (min(max((before or now).errors[joint], -128), 127),)
 
-    return OtherRegister(f"error {joint + 1} of the period before", addresses, value)
+    return OtherRegister(f"error {joint + 1} of the previous period", addresses, value)
 
 
 def _last_position(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
@@ -266,7 +266,7 @@ def _last_position(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
         counts = (before or now).positions[joint]
         return counts, counts >> 8
 
-    return OtherRegister(f"position {joint + 1} of the period before", addresses, value)
+    return OtherRegister(f"position {joint + 1} of the previous period", addresses, value)
 
 
 def _coarse_position(random: Random, addresses: tuple[int, ...]) -> OtherRegister:
@@ -309,4 +309,4 @@ _MAKERS: tuple[tuple[Callable[[Random, tuple[int, ...]], OtherRegister], int], .
     (_saturated, 1),
     (_sum, 1),
 )
-"""What a byte or two may be, each as often as it is likely."""
+"""Possible contents of one or two bytes, repeated by likelihood."""

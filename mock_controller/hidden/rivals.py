@@ -1,7 +1,7 @@
-"""Rivals of a hidden effect: other effects of the shared list, with every number of their laws that can be refitted.
+"""Rivals of a hidden effect: other effects of the shared list, with all parameters of their laws that can be refitted.
 
-A rival's numbers are changed in coordinates of about 1: a size in units of the largest that arms are drawn with, a
-phase in rad, a positive constant by its logarithm.
+A rival's parameters are changed in coordinates of about 1: a size in units of the largest drawn one, a phase in rad, a
+positive constant by its logarithm.
 """
 
 from __future__ import annotations
@@ -28,33 +28,34 @@ SEEN_IN_NUMBERS = ("wrong_gain", "lost_set_points")
 """Effects that a record shows without any model, in the controller's own set points, errors and power."""
 _RANGES = {size.effect: size for size in (*SHARED_SIZES, *LATER_SIZES)}
 _STRENGTHS = (0.0, 0.5, 1.0)
-"""Sizes to begin with, as places in the range that arms are drawn from."""
+"""Initial sizes, as positions in the range from which arms are drawn."""
 _KEPT = ("offset", "seed")
-"""Numbers that the effect has in the mock alone; they stay at 0."""
+"""Parameters that only the mock's effect has; they stay at 0."""
 _PHASES = (0.0, 0.5 * math.pi)
-"""Phases (rad) to begin with. The size of a tone may have either sign, so these are all four quarters."""
+"""Initial phases (rad). The size of a tone may have either sign, so these cover all four quarters."""
 _CYCLES = (1.5, 3.0, 6.0, 12.0, 20.0, 32.0, 48.0, 64.0)
-"""Periods per turn of a ripple to begin with."""
+"""Initial periods per turn of a ripple."""
 _FREQUENCIES = (0.3, 0.6, 1.0, 1.6, 2.5, 3.5, 4.5, 5.5)
-"""Frequencies (Hz) of a disturbance to begin with."""
+"""Initial frequencies (Hz) of a disturbance."""
 _SCALES = {"phase": 1.0, "periods": 1.0, "frequency": 0.02, "neutral": 0.5, "slack": 0.5, "about_x": 0.05}
-"""Units of the numbers that are not sizes; constants that are not listed are changed by their logarithm."""
+"""Units of the parameters that are not sizes; constants that are not listed are changed by their logarithm."""
 _BENDS = 8
 """Number of terms of a bent potentiometer's sine series."""
 _BEND = 4e-3 * ADC_COUNTS
 """Unit (counts) of a term."""
 _JOINTS = 3
-"""Joints that effects are looked for at: 1 to this."""
+"""Joints that effects are tried at: 1 to this."""
 
 
 class RivalError(ValueError):
-    """A rival that cannot be asked for."""
+    """A rival that does not exist."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """One number of a law. `of_size`: it grows with the effect, from `null` on, by `scale` a unit; others change from
-    `null` by `scale` a unit, or by a factor of e where `scale` is 0. `low`, `high`: bounds, in its unit."""
+    """One parameter of a law. `of_size`: it grows with the effect, from `null` on, by `scale` per unit; others change
+    from `null` by `scale` per unit, or by a factor of e where `scale` is 0. `low`, `high`: bounds, in its unit.
+    """
 
     key: str
     null: float
@@ -63,16 +64,16 @@ class Number:
     high: float
     of_size: bool = False
     begins: tuple[float, ...] = (0.0,)
-    """Coordinates to begin with."""
+    """Initial coordinates."""
 
     def value(self, coordinate: float) -> float:
-        """The number at a coordinate, within its bounds."""
+        """Returns the parameter at a coordinate, within its bounds."""
         found = self.null + self.scale * coordinate if self.scale else self.null * math.exp(coordinate)
         return min(max(found, self.low), self.high)
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Bounds of the coordinate."""
+        """Returns bounds of the coordinate."""
         if self.scale:
             return (self.low - self.null) / self.scale, (self.high - self.null) / self.scale
         return math.log(self.low / self.null), math.log(self.high / self.null)
@@ -87,14 +88,14 @@ class BentCurve:
     terms: tuple[float, ...]
 
     def reading(self, counts: float) -> float:
-        """What the converter shows of `counts`."""
+        """Returns the converter's reading of `counts`."""
         place = math.pi * counts / ADC_COUNTS
         return counts + sum(term * math.sin(k * place) for k, term in enumerate(self.terms, start=1))
 
 
 @dataclass(frozen=True)
 class Rival:
-    """An effect at `joints` (none: on the arm as a whole), and the numbers of its law at each of them."""
+    """An effect at `joints` (none: on the arm as a whole), and the parameters of its law at each of them."""
 
     effect: str
     joints: tuple[int, ...]
@@ -102,27 +103,27 @@ class Rival:
 
     @property
     def every(self) -> tuple[Number, ...]:
-        """The numbers at all joints, in the order of the coordinates."""
+        """Returns the parameters at all joints, in the order of the coordinates."""
         return tuple(number for numbers in self.numbers for number in numbers)
 
     @property
     def reach(self) -> tuple[Floats, Floats]:
-        """Bounds of the coordinates."""
+        """Returns bounds of the coordinates."""
         low, high = zip(*(number.reach for number in self.every), strict=True)
         return np.array(low), np.array(high)
 
     @property
     def sizes(self) -> NDArray[np.bool_]:
-        """Which coordinates grow with the effect."""
+        """Returns which coordinates grow with the effect."""
         return np.array([number.of_size for number in self.every])
 
     def starts(self) -> Iterator[Floats]:
-        """Coordinates to begin with: the same at all joints."""
+        """Yields initial coordinates: the same at all joints."""
         for at_one in product(*(number.begins for number in self.numbers[0])):
             yield np.array(at_one * len(self.numbers))
 
     def modifications(self, coordinates: Floats) -> tuple[Modification, ...]:
-        """The effect at its coordinates."""
+        """Returns the effect at its coordinates."""
         found: list[Modification] = []
         left = iter(coordinates.tolist())
         places: Sequence[int | None] = self.joints or (None,)
@@ -140,7 +141,7 @@ class Rival:
 
 
 def rival_at(effect: str, joints: tuple[int, ...]) -> Rival | None:
-    """The rival of a name at `joints`; None where the mock has no such effect there."""
+    """Returns the rival of a name at `joints`; None if the mock has no such effect there."""
     size = _RANGES.get(effect)
     if size is None or size.acts_on_joints != bool(joints) or any(joint > _JOINTS for joint in joints):
         return None
@@ -152,7 +153,7 @@ def rival_at(effect: str, joints: tuple[int, ...]) -> Rival | None:
 
 
 def places_of(effect: str, own: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """Joints at which a rival is looked for: those of the hidden effect, or each joint where it has none."""
+    """Returns joints at which a rival is tried: those of the hidden effect, or each joint if it has none."""
     size = _RANGES.get(effect)
     if size is None or not size.acts_on_joints:
         return [()]
@@ -171,7 +172,7 @@ def _numbers(size: SizeRange, joint: int | None) -> tuple[Number, ...]:
 
 
 def _main(size: SizeRange, joint: int | None, *, tone: bool) -> Number:
-    """The size itself: either sign where arms are drawn with either."""
+    """Returns the size itself; with either sign if arms are drawn with either."""
     facts = fields_of(known_modifications()[size.effect])[size.parameter].metadata
     smallest, largest = size.ranges[0 if joint is None else joint - 1]
     strengths = _STRENGTHS[1:2] if tone else _STRENGTHS

@@ -1,4 +1,4 @@
-"""A board whose memory is laid out by a secret map, with other registers between those of the host."""
+"""A board whose memory follows a secret map, with other registers between those of the host."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mock_controller.hidden.memory import HiddenMemory
 
 
 class SecretBoard(Board):
-    """A `Board` with everything that a secret memory holds; other arguments are those of `Board`."""
+    """A `Board` with a secret memory; other arguments are those of `Board`."""
 
     def __init__(self, secret: HiddenMemory, *arguments: Any, **options: Any) -> None:
         self._secret = secret
@@ -22,7 +22,7 @@ class SecretBoard(Board):
 
     def _to_publish(self, results: PeriodSnapshot) -> list[tuple[int, int]]:
         own = [(address, value | self._flags.get(address, 0)) for address, value in super()._to_publish(results)]
-        # Constants need storing once, in the first period after power-up.
+        # Constants are stored only once, in the first period after power-up.
         stored = self._changing if results.tick > 1 else self._secret.others
         others = [pair for other in stored for pair in other.pairs(results, self._before)]
         self._before = results

@@ -1,7 +1,7 @@
-"""Potentiometers that a seed has drawn: which way each reading rises, its zero and its range.
+"""Potentiometers drawn from a seed: direction, zero and range of each.
 
-The middle of a range stays within a few degrees of the stated one, so that a joint led from one end of its travel to
-the other crosses nearly all of its readings, as with a sensor that was fitted with care.
+The middle of a range stays within a few degrees of the stated one. A joint led from one end of its travel to the other
+then crosses nearly all of its readings, as with a carefully fitted sensor.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from firmware_protocol.units import JointCalibration
 RANGE_DEVIATION = 0.02
 """Standard deviation of a range, as a share of it; none is drawn beyond two of them."""
 TURNED = math.radians(6)
-"""Largest angle (rad) by which the middle of a range is off the stated one."""
+"""Largest distance (rad) of the middle of a range from the stated one."""
 
 
 def draw_sensors(seed: int, stated: Sequence[JointCalibration]) -> tuple[JointCalibration, ...]:
-    """The sensors that a seed hides, from those of the data file."""
+    """Returns the sensors of a seed, from those of the data file."""
     random = Random(f"hidden sensors {seed}")
     return tuple(_drawn(random, one) for one in stated)
 
@@ -34,7 +34,7 @@ def _drawn(random: Random, stated: JointCalibration) -> JointCalibration:
 
 
 def truth_of(sensors: Sequence[JointCalibration]) -> list[dict[str, Any]]:
-    """What is hidden, as JSON data in degrees."""
+    """Returns the secrets, as JSON data in degrees."""
     return [
         {
             "joint": one.joint,

@@ -130,7 +130,7 @@ def tangents(
     processes: int = 1,
     cache: Path | None = None,
 ) -> Tangents:
-    """Tangents at the arm of the data files; with `cache`, a folder, read from there if they are there."""
+    """Returns tangents at the arm of the data files; with `cache`, a folder, read from there if present."""
     kept = None if cache is None else cache / f"tangents-{_key(plant, board, experiment, priors)}.npz"
     if kept is not None and kept.exists():
         with np.load(kept) as stored:
@@ -153,7 +153,7 @@ def tangents(
     )
     if kept is not None:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        # Written under another name and renamed: another process may look for the file now.
+        # Written under another name and renamed: another process may read the file at any time.
         aside = kept.with_suffix(f".{os.getpid()}.npz")
         np.savez(aside, names=np.array(found.names), matrix=found.matrix, deviations=found.deviations)
         aside.replace(kept)
@@ -168,14 +168,14 @@ def separation(
     refits: int = MOST_REFITS,
     present: NDArray[np.float64] | None = None,
 ) -> Separation:
-    """d′ between `parts` and the same arm with the modifications `without` only (by default none).
+    """Returns d′ between `parts` and the same arm with only the modifications `without` (by default none).
 
     `present`: the result of `modelled_readings` for these parts, if it is known.
 
     The refit takes a step along the tangents and simulates the result. It ends there if the remainder is as they
     predicted, or if d′ is clearly large. Otherwise it continues, up to `refits` times, because a strong effect that
-    tolerances can imitate has its optimum far from where the tangents were taken. Where deviations are known that
-    imitate the effect, exactly or nearly, the refit starts from those.
+    tolerances can imitate has its optimum far from where the tangents were taken. If deviations are known that imitate
+    the effect, exactly or nearly, the refit starts from those.
     """
     one = reading_deviation(parts.board)
     step_us = step_length(parts)
@@ -213,18 +213,20 @@ def separation(
 
 
 def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
-    """d′ of a difference of readings (in their standard deviations, periods·3) after one refit along the tangents."""
+    """Returns d′ of a difference of readings (in their standard deviations, periods·3) after one refit along the
+    tangents.
+    """
     moved = _step(difference, np.zeros(len(known.names)), known.matrix)
     return _separation_of(float(np.linalg.norm(difference)), difference - known.matrix @ moved, moved, known)
 
 
 def modelled_readings(parts: LoopParts, experiment: Experiment) -> NDArray[np.float64]:
-    """Readings (counts, (periods, MODELLED)) of the complete arm."""
+    """Returns readings (counts, (periods, MODELLED)) of the complete arm."""
     return readings(parts, experiment, step_us=step_length(parts))[:, :MODELLED]
 
 
 def step_length(parts: LoopParts) -> int:
-    """Step of the plant (µs): coarse if the drive changes only at coarse steps and every gear is rigid."""
+    """Returns the plant's step (µs): coarse if the drive changes only at coarse steps and every gear is rigid."""
     fine = parts.board.timing.computing_delay % _COARSE_STEP_US or of_kind(parts.modifications, ChangesTransmission)
     return STEP_US if fine else _COARSE_STEP_US
 
@@ -237,7 +239,7 @@ def _refit(
     refits: int,
     damping: float = _FIRST_DAMPING,
 ) -> Separation:
-    """Levenberg–Marquardt from `moved`, where `left` is the residual.
+    """Runs Levenberg–Marquardt from `moved`, where `left` is the residual.
 
     Each step corrects the tangents (Broyden's update). Heavy damping at first makes it begin with the directions that
     explain most; the others follow.
@@ -263,7 +265,7 @@ def _refit(
 def _step(
     left: NDArray[np.float64], moved: NDArray[np.float64], matrix: NDArray[np.float64], damping: float = 0.0
 ) -> NDArray[np.float64]:
-    """The step from `moved`, where `left` is the residual."""
+    """Returns the step from `moved`, where `left` is the residual."""
     normal = matrix.T @ matrix + (1.0 + damping) * np.eye(matrix.shape[1])
     return np.asarray(np.linalg.solve(normal, matrix.T @ left - moved), dtype=np.float64)
 
@@ -277,8 +279,8 @@ def _separation_of(before: float, left: NDArray[np.float64], moved: NDArray[np.f
 def move_parameters(
     parts: LoopParts, known: Tangents, moved: NDArray[np.float64], step_us: int
 ) -> tuple[LoopParts, NDArray[np.float64]]:
-    """The arm with its tolerance parameters moved by a number of their standard deviations, and the remainder of the
-    moves, which is to go along the tangents.
+    """Returns the arm with its tolerance parameters moved by a number of their standard deviations, and the remainder
+    of the moves, which is applied along the tangents.
     """
     rest = np.zeros(len(known.names))
     deviations = dict(zip(known.names, (moved * known.deviations).tolist(), strict=True))

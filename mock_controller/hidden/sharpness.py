@@ -1,12 +1,12 @@
-"""Which effects of the shared list the records of an arm can tell from the one that it hides.
+"""Computes which effects of the shared list an arm's records can distinguish from its hidden effect.
 
-A rival is the arm without its effect, with another one. Its numbers and all tolerance parameters z (in their stated
+A rival is the arm without its effect, with another one. Its parameters and all tolerance parameters z (in their stated
 deviations) are refitted by least squares to the readings of the true arm, in the mock's own plant, with the same noise:
 
-    d′² = min over the rival's numbers and z of |y_rival(z) − y_true|² + |z|².
+    d′² = min over the rival's parameters and z of |y_rival(z) − y_true|² + |z|².
 
-First the rival's numbers are sought from several starts while z answers linearly, then both together by simulation.
-What was tried is an upper bound of d′. Below 5 the search ends, since the records do not tell.
+First the rival's parameters are searched from several starts with a linear response to z, then both together by
+simulation. Every trial is an upper bound of d′. Below 5 the search ends, since the records do not distinguish them.
 """
 
 from __future__ import annotations
@@ -27,38 +27,38 @@ from mock_controller.hidden.separation import MODELLED, Tangents, move_parameter
 from mock_controller.plant import default_plant
 
 NOT_TOLD = 4.9
-"""d′ below which a search ends, since the records do not tell (the threshold is 5)."""
+"""d′ below which a search ends, since the records do not distinguish (the threshold is 5)."""
 _DECIDES = 30.0
 """d′ with linear tolerances above which they are not refitted by simulation."""
 _MOSTLY_EXPLAINED = 0.2
-"""Share of the difference: below it, tolerances do most of the work, and are refitted whatever is left."""
+"""Share of the difference below which tolerances explain most, and are refitted whatever remains."""
 _BEGUN = 3
 """Number of starts that a search continues from."""
 _SIZE_STEPS, _SIZE_RENEWALS = 12, 3
-"""Steps, and renewals of derivatives, of the search for a rival's numbers."""
+"""Steps, and recomputations of derivatives, of the search for a rival's parameters."""
 _SAME = 0.05
-"""Difference of coordinates below which two searches have come to the same end."""
+"""Difference of coordinates below which two searches have the same end."""
 _REFITTED = 2
 """Number of ends for which tolerances are refitted."""
 _STEPS = 12
 """Steps of a refit of everything from one start."""
 _AS_PREDICTED = 0.1
-"""Share by which a refit may deviate from what linear tolerances predict for that to count as confirmed."""
+"""Share by which a refit may deviate from the prediction of linear tolerances for that to count as confirmed."""
 _CLEAR = 10.0
 """d′ above which a prediction that one simulation confirms is not refined."""
 _WORTH = 15.0
-"""d′ below which all derivatives are formed anew once, which costs a simulation for each of 44 parameters."""
+"""d′ below which all derivatives are recomputed once, which costs a simulation for each of 44 parameters."""
 _STEP, _TOLERANCE_STEP = 0.02, 0.2
 """Steps of differences: in a rival's coordinates, and in deviations of the tolerances."""
 _SEEN_WELL = 0.5
-"""d′ at which the search for a rival's numbers ends."""
+"""d′ at which the search for a rival's parameters ends."""
 _FARTHEST = 1e4
-"""Largest difference of a reading, in deviations: a rival that is not stable has no more than this."""
+"""Largest difference of a reading, in deviations; the difference of an unstable rival is limited to it."""
 
 
 @dataclass(frozen=True)
 class Told:
-    """d′ of a rival at its joints, and the same with tolerances that answer linearly."""
+    """d′ of a rival at its joints, and the same with tolerances of linear effect."""
 
     effect: str
     joints: tuple[int, ...]
@@ -67,7 +67,7 @@ class Told:
 
 
 class Comparison:
-    """The true arm of one hidden effect in some experiments, recorded together, to be compared with rivals.
+    """The true arm of one hidden effect in some experiments, recorded together, for comparison with rivals.
 
     `known`: the tangents of each experiment, for the arm's load.
     """
@@ -87,15 +87,18 @@ class Comparison:
         self._basis, self._triangle = np.linalg.qr(np.vstack([-self.known.matrix, np.eye(count)]))
 
     def rival(self, effect: str, joints: tuple[int, ...]) -> Told:
-        """d′ of a rival. One that the controller's own numbers disprove (or prove the hidden one against), or that the
-        mock has not at these joints, is no nearer than the sound arm."""
+        """Returns d′ of a rival.
+
+        If the controller's own values disprove the rival (or prove the hidden effect against it), or if the mock lacks
+        it at these joints, it is no nearer than the healthy arm.
+        """
         seen = {effect, self._hidden.name} & set(SEEN_IN_NUMBERS)
         found = None if seen else rival_at(effect, joints)
         least, linear = self._least(found)
         return Told(effect, joints, least, linear)
 
     def _least(self, rival: Rival | None) -> tuple[float, float]:
-        """Least d′ of a rival (None: of the sound arm), and its value by linear tolerances."""
+        """Returns the least d′ of a rival (None: of the healthy arm), and its value by linear tolerances."""
         step_us = step_length(self._true)
         if rival is not None:
             step_us = min(step_us, step_length(self._parts(rival, next(rival.starts()))))
@@ -113,7 +116,7 @@ class Comparison:
         return least, best
 
     def _sought(self, rival: Rival, step_us: int) -> list[Floats]:
-        """Coordinates of the rival at which it is nearest while tolerances answer linearly, best first."""
+        """Returns coordinates at which the rival is nearest with tolerances of linear effect, best first."""
         none = self.less_tolerances(self.apart(None, np.zeros(0), step_us))
 
         def left(place: Floats) -> Floats:
@@ -126,7 +129,7 @@ class Comparison:
             if not response.any():
                 begun.append((square(none), start))
                 continue
-            # Most laws are proportional to their size: a start is moved to the size that would fit best.
+            # Most laws are proportional to their size: a start is moved to the size that fits best.
             share = -float(response @ none) / square(response)
             moved = np.clip(np.where(rival.sizes, share * start, start), low, high)
             begun += [(square(none + response), start), (square(none) + share * float(response @ none), moved)]
@@ -141,12 +144,12 @@ class Comparison:
         return [place for place, _ in ends[:_REFITTED]]
 
     def less_tolerances(self, apart: Floats) -> Floats:
-        """What of a difference the tolerances cannot take away, with what they cost."""
+        """Returns the part of a difference that the tolerances cannot remove, with their cost."""
         both = np.concatenate([apart, np.zeros(len(self.known.names))])
         return np.asarray(both - self._basis @ (self._basis.T @ both))
 
     def answer(self, apart: Floats) -> Floats:
-        """The tolerances (deviations) that take most of a difference away, if they answer linearly."""
+        """Returns the tolerances (deviations) that remove most of a difference, if their effect is linear."""
         both = np.concatenate([apart, np.zeros(len(self.known.names))])
         return np.asarray(-np.linalg.solve(self._triangle, self._basis.T @ both), dtype=np.float64)
 
@@ -154,7 +157,7 @@ class Comparison:
         return self._sound if rival is None else replace(self._sound, modifications=rival.modifications(place))
 
     def apart(self, rival: Rival | None, place: Floats, step_us: int, moved: Floats | None = None) -> Floats:
-        """Readings of the true arm less those of a rival, in their deviations (periods·3 of all experiments)."""
+        """Returns readings of the true arm − those of a rival, in their deviations (periods·3 of all experiments)."""
         key = ("true", step_us)
         if key not in self._kept:
             self._kept[key] = self._readings(self._true, step_us)
@@ -164,7 +167,7 @@ class Comparison:
             if moved is not None:
                 parts, rest = move_parameters(parts, self.known, moved, step_us)
             apart = self._kept[key] - self._readings(parts, step_us) - self.known.matrix @ rest
-        except (ValueError, ArithmeticError):  # no such arm
+        except (ValueError, ArithmeticError):  # the rival's arm is impossible
             apart = np.full(self._kept[key].size, _FARTHEST)
         return np.clip(np.nan_to_num(apart, nan=_FARTHEST), -_FARTHEST, _FARTHEST)
 
@@ -174,7 +177,7 @@ class Comparison:
 
 
 class _Refit:
-    """The refit of a rival's numbers and of the tolerances by simulation, begun at one place."""
+    """The refit of a rival's parameters and of the tolerances by simulation, started at one point."""
 
     def __init__(self, compared: Comparison, rival: Rival | None, place: Floats, step_us: int) -> None:
         self._compared, self._rival, self._place, self._step_us = compared, rival, place, step_us
@@ -184,7 +187,9 @@ class _Refit:
         self._low, self._high = np.concatenate([low, reach[0]]), np.concatenate([high, reach[1]])
 
     def least(self, linear: float) -> float:
-        """Least d′, from where tolerances would answer linearly and from nowhere; `linear`: what they promise there."""
+        """Returns the least d′, starting with the tolerances of the linear estimate and with none; `linear`: d′ of that
+        estimate.
+        """
         problem = Problem(self._left, self._slopes, self._low, self._high, NOT_TOLD**2)
         answer = self._compared.answer(self._compared.apart(self._rival, self._place, self._step_us))
         best, least = np.zeros(0), math.inf
@@ -209,7 +214,7 @@ class _Refit:
         return np.concatenate([apart, moved])
 
     def _first_slopes(self, at: Floats) -> Floats:
-        """Derivatives by the rival's numbers, and the tangents of the tolerances."""
+        """Returns derivatives by the rival's parameters, and the tangents of the tolerances."""
         ahead, high = at[self._count :], self._high[: self._count]
         own = differences(
             lambda place: self._left(np.concatenate([place, ahead])), at[: self._count], self._left(at), high, _STEP
@@ -217,7 +222,7 @@ class _Refit:
         return np.hstack([own, np.vstack([-self._compared.known.matrix, np.eye(self._names)])])
 
     def _slopes(self, at: Floats, left: Floats) -> Floats:
-        """All derivatives by simulation."""
+        """Returns all derivatives by simulation."""
         units = np.concatenate([np.ones(self._count), np.full(self._names, _TOLERANCE_STEP / _STEP)])
         found = differences(lambda steps: self._left(steps * units), at / units, left, self._high / units, _STEP)
         return np.asarray(found / units)

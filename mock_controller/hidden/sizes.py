@@ -1,7 +1,7 @@
-"""How large a hidden effect may be: from barely detectable to obvious.
+"""Sizes of hidden effects: from barely detectable to obvious.
 
 The ranges are for the arm of the data files at gains 2, 0, 0 and were chosen with `separation` on the 55 s reference
-set (docs/mock.md tells how); at their upper ends the loop is still stable. A size is drawn evenly on a logarithmic
+set (docs/mock.md describes how); at their upper ends the loop is still stable. A size is drawn evenly on a logarithmic
 scale. It is the distance from the effect's null value: a factor of 1 ± size, a mass of ± size.
 """
 
@@ -20,10 +20,10 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class SizeRange:
-    """Sizes of one effect: those of joints 1 to 3, or a single range where it acts on no joint in particular.
+    """Sizes of one effect: those of joints 1 to 3, or a single range if it acts on no joint in particular.
 
     `signed` effects are drawn with either sign, negative ones `negative` times as large. `also` gives the ranges of
-    further parameters, drawn evenly (whole numbers where both ends are), `per_joint` those that depend on the joint.
+    further parameters, drawn evenly (whole numbers if both ends are), `per_joint` those that depend on the joint.
     """
 
     effect: str
@@ -42,7 +42,7 @@ class SizeRange:
 
 
 def draw_values(random: Random, size: SizeRange, joint: int | None, strength: float, sign: int) -> dict[str, float]:
-    """Parameters of an effect at `joint`, its size at `strength` (0 to 1) of the range there."""
+    """Returns parameters of an effect at `joint`, with a size at `strength` (0 to 1) of the range there."""
     low, high = size.ranges[0 if joint is None else joint - 1]
     amount = low * (high / low) ** strength * (size.negative if sign < 0 else 1.0)
     field = fields_of(known_modifications()[size.effect])[size.parameter]
@@ -118,8 +118,9 @@ SHARED_SIZES: tuple[SizeRange, ...] = (
     SizeRange("wrong_gain", "factor", ((0.03, 0.45), (0.02, 0.4), (0.05, 0.35)), signed=True),
     SizeRange("lost_set_points", "share", _alike(0.01, 0.4), also={"seed": (0, 2**31)}),
 )
-"""Sizes of the effects whose names are shared, those of `LATER_SIZES` apart. Where a joint is left out, its readings do
-not depend on the effect."""
+"""Sizes of the effects with shared names, except those of `LATER_SIZES`. Joints whose readings do not depend on the
+effect are left out.
+"""
 
 LATER_SIZES: tuple[SizeRange, ...] = (
     SizeRange("gravity_torque_friction", "share", _alike(0.06, 0.6), joints=(2, 3)),
@@ -136,8 +137,9 @@ LATER_SIZES: tuple[SizeRange, ...] = (
     ),
     SizeRange("constant_torque", "torque", ((0.07, 2), (0.16, 5), (0.04, 1.2)), signed=True),
 )
-"""Sizes of effects whose names are shared and that came after eight trials had been registered. They are arms of a kind
-of their own, so that every seed of those trials hides what it always hid."""
+"""Sizes of effects with shared names that came after eight trials had been registered. They are a separate kind of arm,
+so that every seed of those trials keeps its secret.
+"""
 
 OPEN_SIZES: tuple[SizeRange, ...] = (
     SizeRange(
@@ -161,4 +163,4 @@ OPEN_SIZES: tuple[SizeRange, ...] = (
     SizeRange("converter_bit_weight", "error", _alike(0.7, 8), signed=True, also={"bit": (5, 8)}),
     SizeRange("stuck_converter_bit", "bit", _alike(1, 4)),
 )
-"""Sizes of the effects that only the mock knows."""
+"""Sizes of the effects that only the mock has."""

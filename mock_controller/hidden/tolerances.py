@@ -1,4 +1,4 @@
-"""What may differ between two sound arms, and by how much.
+"""Quantities in which two healthy arms may differ, and by how much.
 
 A deviation is a fraction of the data file's value; that of the computing delay is in seconds. Each potentiometer
 deviates by a smooth curve; for a refit it is represented by three harmonics (`LinearityHarmonic`).
@@ -49,7 +49,9 @@ class Tolerance:
 
 @cache
 def tolerances() -> tuple[Tolerance, ...]:
-    """Every quantity of the arm that may deviate: `m1` … `a3`, `resistance_1` … `coulomb_arm_3`, `computing_delay`."""
+    """Returns every quantity of the arm that may deviate: `m1` … `a3`, `resistance_1` … `coulomb_arm_3`,
+    `computing_delay`.
+    """
     text = resources.files("mock_controller.hidden").joinpath("tolerances.toml").read_text("utf-8")
     reader = QuantityReader(text, "tolerances.toml")
 
@@ -69,7 +71,7 @@ def tolerances() -> tuple[Tolerance, ...]:
 
 
 def draw_deviations(random: Random, scale: float = 1.0) -> dict[str, float]:
-    """Deviations of a sound arm, normal within two standard deviations, times `scale`."""
+    """Draws deviations of a healthy arm, normal within two standard deviations, times `scale`."""
     return {tolerance.name: scale * tolerance.drawn * _within(random) for tolerance in tolerances()}
 
 
@@ -81,7 +83,7 @@ def _within(random: Random) -> float:
 
 
 def deviating_plant(parameters: PlantParameters, deviations: Mapping[str, float]) -> PlantParameters:
-    """The arm with its deviations; zero deviations give the very same numbers."""
+    """Returns the arm with its deviations; zero deviations give exactly the same numbers."""
     body = parameters.rigid_body
     changed = {name: getattr(body, name) * (1.0 + deviations.get(name, 0.0)) for name in (*_MASSES, *_LENGTHS)}
     parameters = change_body(parameters, **changed)
@@ -97,7 +99,7 @@ def deviating_plant(parameters: PlantParameters, deviations: Mapping[str, float]
 
 
 def deviating_board(parameters: BoardParameters, deviations: Mapping[str, float]) -> BoardParameters:
-    """The board with its deviations: the computing delay, to the nearest ms."""
+    """Returns the board with its deviations: the computing delay, to the nearest ms."""
     steps = round(deviations.get("computing_delay", 0.0) / _STEP_S)
     timing = parameters.timing
     late = timing.computing_delay + steps * round(_STEP_S * 1e6)
@@ -120,9 +122,10 @@ class LinearityHarmonic:
 
 
 def harmonic_deviation(linearity: float, harmonic: int) -> float:
-    """Standard deviation (counts) of one share of a harmonic of curves within `linearity` (fraction of the range).
+    """Returns the standard deviation (counts) of one share of a harmonic of curves within `linearity` (fraction of the
+    range).
 
-    Curves have three harmonics of random phase and size falling with their order, and are scaled to 40 to 100 % of
-    the limit at their largest; the numbers are those of 4000 such curves.
+    Curves have three harmonics of random phase and size falling with their order, and are scaled to 40 to 100 % of the
+    limit at their largest; the numbers are those of 4000 such curves.
     """
     return linearity * ADC_COUNTS * {1: 0.33, 2: 0.17, 3: 0.12}[harmonic]

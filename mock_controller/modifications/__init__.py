@@ -1,6 +1,6 @@
 """Hidden physical effects: named modifications of the plant and the board, absent by default.
 
-`registry` knows them by name. A new effect is a class in a file here, named in the file's SHARED or OPEN_SET; it acts
+`registry` finds them by name. A new effect is a class in a file here, named in the file's SHARED or OPEN_SET; it acts
 through the extension points of plant and board.
 """
 

@@ -1,4 +1,4 @@
-"""A bristle for effects that need one of their own."""
+"""A bristle for effects that need their own."""
 
 from __future__ import annotations
 
@@ -18,6 +18,6 @@ class Bristle:
         self._deflection = 0.0
 
     def advance(self, rate: float) -> float:
-        """The deflection after a step at `rate` (rad/s)."""
+        """Returns the deflection after a step at `rate` (rad/s)."""
         (self._deflection,) = deflect([self._deflection], [self._step_s * rate], self._presliding)
         return self._deflection

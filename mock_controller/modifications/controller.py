@@ -44,7 +44,7 @@ class InputDelay:
 
 @dataclass
 class WrongGain:
-    """`joint`'s controller gives `factor` times the power that its gains stand for, before the limit of the DAC."""
+    """`joint`'s controller gives `factor` times the power of its gains, before the limit of the DAC."""
 
     name: ClassVar[str] = "wrong_gain"
     shared: ClassVar[bool] = True
@@ -61,14 +61,14 @@ class WrongGain:
 
 @dataclass
 class LostSetPoints:
-    """In a `share` of all periods `joint`'s controller goes on with the set point it had. `seed` draws the periods.
+    """In a `share` of all periods `joint`'s controller keeps its previous set point. `seed` draws the periods.
 
-    Effects of one seed lose the same periods, as when a whole fetch is missed.
+    Effects with one seed lose the same periods, as when a whole fetch is missed.
     """
 
     name: ClassVar[str] = "lost_set_points"
     shared: ClassVar[bool] = True
-    line: ClassVar[str] = "set point of the period before, in a share of periods"
+    line: ClassVar[str] = "set point of the previous period, in a share of periods"
     source: ClassVar[str] = "section 6.3: the controller does not wait"
     joint: int = joint_parameter()
     share: float = parameter(0.0, 0.99, null=0.0)

@@ -1,4 +1,4 @@
-"""Friction at a joint beyond what the arm already has, as the model's list knows it."""
+"""Friction at a joint in addition to the arm's own, for effects of the model's list."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mock_controller.plant.parameters import PlantParameters
 
 @dataclass
 class ViscousFriction:
-    """Torque −`coefficient` · q̇ more at `joint`; carried to the motor's side by n² as in (7.30)."""
+    """Adds torque −`coefficient` · q̇ at `joint`; converted to the motor's side by n² as in (7.30)."""
 
     name: ClassVar[str] = "viscous_friction"
     shared: ClassVar[bool] = True
@@ -31,7 +31,7 @@ class ViscousFriction:
 
 @dataclass
 class CoulombFriction:
-    """`torque` more of Coulomb friction at `joint`, whatever its load; the arm's own bristle carries it."""
+    """Adds `torque` of Coulomb friction at `joint`, whatever its load; the arm's own bristle carries it."""
 
     name: ClassVar[str] = "coulomb_friction"
     shared: ClassVar[bool] = True
@@ -47,7 +47,7 @@ class CoulombFriction:
 
 @dataclass
 class LoadDependentFriction:
-    """`arm` more of the effective arm μ̃ at `joint`: friction in proportion to the weights it carries."""
+    """Adds `arm` to the effective arm μ̃ at `joint`: friction in proportion to the weights that it carries."""
 
     name: ClassVar[str] = "load_dependent_friction"
     shared: ClassVar[bool] = True
@@ -64,10 +64,10 @@ class LoadDependentFriction:
 
 @dataclass
 class GravityTorqueFriction:
-    """At `joint`, a `share` of the torque with which gravity loads it is Coulomb friction more.
+    """Adds at `joint` Coulomb friction of a `share` of the torque with which gravity loads it.
 
-    Gravity's torque is taken of the rigid bodies as they are, with payload, shifted masses and a base that leans; the
-    arm's own bristle carries the friction.
+    Gravity's torque is that of the rigid bodies as they are, with payload, shifted masses and a tilted base; the arm's
+    own bristle carries the friction.
     """
 
     name: ClassVar[str] = "gravity_torque_friction"
@@ -83,7 +83,7 @@ class GravityTorqueFriction:
 
 @dataclass
 class StribeckFriction:
-    """At `joint`, `torque` more at rest, which fades as the joint gets faster than `speed`."""
+    """Adds at `joint` friction `torque` at rest, which fades as the speed exceeds `speed`."""
 
     name: ClassVar[str] = "stribeck_friction"
     shared: ClassVar[bool] = True
@@ -134,7 +134,7 @@ class Stiction:
 
 @dataclass
 class DirectionDependentFriction:
-    """At `joint`, |`torque`| more of Coulomb friction in one direction only: that of the sign of `torque`."""
+    """Adds at `joint` |`torque`| of Coulomb friction in one direction only: that of the sign of `torque`."""
 
     name: ClassVar[str] = "direction_dependent_friction"
     shared: ClassVar[bool] = True
@@ -156,7 +156,7 @@ class DirectionDependentFriction:
 
 @dataclass
 class DirectionDependentViscousFriction:
-    """At `joint`, |`coefficient`| more of viscous friction in one direction only: that of the sign of `coefficient`."""
+    """Adds at `joint` |`coefficient`| of viscous friction in one direction only: that of the sign of `coefficient`."""
 
     name: ClassVar[str] = "direction_dependent_viscous_friction"
     shared: ClassVar[bool] = True

@@ -1,4 +1,4 @@
-"""The modifications that exist, collected from the files of this folder."""
+"""All modifications, collected from the files of this folder."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SHARED: tuple[type[Any], ...] = (
     *sensor.SHARED,
     *controller.SHARED,
 )
-"""Effects whose names the diagnosis also knows."""
+"""Effects whose names the diagnosis also uses."""
 
 OPEN_SET: tuple[type[Any], ...] = (
     *strange_friction.OPEN_SET,
@@ -32,6 +32,6 @@ OPEN_SET: tuple[type[Any], ...] = (
     *amplifier.OPEN_SET,
     *sensor.OPEN_SET,
 )
-"""Effects that only the mock knows; to the diagnosis they are unknown."""
+"""Effects that only the mock has; to the diagnosis they are unknown."""
 
 LIBRARY: tuple[type[Any], ...] = SHARED + OPEN_SET

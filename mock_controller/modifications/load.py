@@ -31,7 +31,7 @@ class Payload:
 
 @dataclass
 class LinkMass:
-    """Link `joint` is heavier by `mass`, spread as its own mass is."""
+    """Link `joint` is heavier by `mass`, distributed like its own mass."""
 
     name: ClassVar[str] = "link_mass"
     shared: ClassVar[bool] = True
@@ -63,7 +63,7 @@ class CentreOfMass:
 
 @dataclass
 class BaseTilt:
-    """The base leans: gravity is turned by `about_x`, then by `about_y`, of the base's axes."""
+    """The base is tilted: gravity is turned by `about_x`, then by `about_y`, of the base's axes."""
 
     name: ClassVar[str] = "base_tilt"
     shared: ClassVar[bool] = True
@@ -117,7 +117,7 @@ class OneSidedSpring:
 
 @dataclass
 class ConstantTorque:
-    """A preload turns `joint` with `torque`, wherever it is."""
+    """A preload turns `joint` with `torque`, at any angle."""
 
     name: ClassVar[str] = "constant_torque"
     shared: ClassVar[bool] = True

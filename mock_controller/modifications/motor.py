@@ -1,4 +1,4 @@
-"""Motors that are not what the data sheet says."""
+"""Motors that differ from the data sheet."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ _COPPER_PER_KELVIN = 0.0039
 
 @dataclass
 class WeakenedMagnet:
-    """The magnet of `joint`'s motor has lost a share of its flux: an ampere gives less torque, and a turn less
-    back-EMF."""
+    """The magnet of `joint`'s motor has lost a share of its flux: less torque per ampere, and less back-EMF per
+    turn.
+    """
 
     name: ClassVar[str] = "weakened_magnet"
     shared: ClassVar[bool] = True
@@ -95,10 +96,10 @@ class ResistanceDrift:
 
 @dataclass
 class ResistanceRise:
-    """The winding of `joint`'s motor is warmed from outside: in the end its resistance is larger by a share `rise`.
+    """The winding of `joint`'s motor is warmed from outside: its resistance finally rises by a share `rise`.
 
-    Whatever warms it begins with the simulation: R = R₀ (1 + r (1 − exp(−t/τ))). The current that the cold winding
-    would carry is divided by R/R₀, and the torque falls with it; the drive's own current plays no part.
+    The warming begins with the simulation: R = R₀ (1 + r (1 − exp(−t/τ))). The current that the cold winding would
+    carry is divided by R/R₀, and the torque falls with it; the drive's own current has no influence.
     """
 
     name: ClassVar[str] = "resistance_rise"

@@ -1,4 +1,4 @@
-"""Modifications by name, with their parameters checked.
+"""Finds modifications by name, and checks their parameters.
 
 A modification class is a dataclass; its fields are its parameters. It also states its `name`, whether that name is
 `shared` with those who diagnose, one `line` of physics, and its `source`.
@@ -18,17 +18,17 @@ from mock_controller.modifications.parameter import fields_of
 
 
 class ModificationError(ValueError):
-    """A modification that does not exist, or a parameter it cannot have."""
+    """A modification that does not exist, or an invalid parameter."""
 
 
 @cache
 def known_modifications() -> Mapping[str, type[Any]]:
-    """Every modification class of the library by its name."""
+    """Returns every modification class of the library by its name."""
     return {kind.name: kind for kind in LIBRARY}
 
 
 def build_modification(name: str, values: Mapping[str, object]) -> Modification:
-    """The modification `name` with its parameters. Raises ModificationError with what is allowed."""
+    """Returns the modification `name` with its parameters. Raises ModificationError with the allowed values."""
     known = known_modifications()
     if name not in known:
         raise ModificationError(f"modification {name!r}: not known; there are {', '.join(sorted(known))}")
@@ -46,19 +46,19 @@ def build_modification(name: str, values: Mapping[str, object]) -> Modification:
 
 
 def build_modifications(requests: Iterable[tuple[str, Mapping[str, object]]]) -> tuple[Modification, ...]:
-    """Several modifications, in the order given; those at their null value are left out, so that they cost nothing."""
+    """Returns several modifications, in the given order; those at their null value are left out, to save time."""
     built = (build_modification(name, values) for name, values in requests)
     return tuple(modification for modification in built if not is_null(modification))
 
 
 def is_null(modification: Modification) -> bool:
-    """Whether all sizes of a modification are those at which it is absent."""
+    """Whether all sizes of a modification are at their null value."""
     sizes = [field for field in fields_of(type(modification)).values() if field.metadata.get("null") is not None]
     return bool(sizes) and all(getattr(modification, field.name) == field.metadata["null"] for field in sizes)
 
 
 def table() -> str:
-    """All modifications with their parameters, for people."""
+    """Returns all modifications with their parameters, for people."""
     lines = []
     for name, kind in known_modifications().items():
         lines.append(f"{name}{'' if kind.shared else '  (not in the shared list)'}: {kind.line}")

@@ -1,4 +1,4 @@
-"""Potentiometers and converters that show something else than the angle."""
+"""Potentiometers and converters with errors."""
 
 from __future__ import annotations
 
@@ -46,11 +46,10 @@ class PotentiometerOffset:
 
 @dataclass
 class PotentiometerNonlinearity:
-    """`joint`'s reading bends as that of a potentiometer whose wiper is loaded.
+    """`joint`'s reading bends like that of a potentiometer with a loaded wiper.
 
-    With x the wiper's place (0 to 1) and k the potentiometer's resistance over the load's, it shows
-    x/(1 + k x (1 − x)).
-    A negative k is the same circuit fed from the other end.
+    With x the wiper's position (0 to 1) and k the potentiometer's resistance over the load's, it shows x/(1 + k x (1 −
+    x)). A negative k is the same circuit fed from the other end.
     """
 
     name: ClassVar[str] = "potentiometer_nonlinearity"
@@ -73,7 +72,7 @@ class PotentiometerNonlinearity:
 
 @dataclass
 class PotentiometerZeroDrift:
-    """`joint`'s reading wanders by `drift` as the track warms, with `time_constant`, from power-up on."""
+    """`joint`'s reading drifts by `drift` as the track warms, with `time_constant`, from power-up on."""
 
     name: ClassVar[str] = "potentiometer_zero_drift"
     shared: ClassVar[bool] = False
@@ -114,7 +113,7 @@ class ConverterBitWeight:
 
 @dataclass
 class StuckConverterBit:
-    """Bit `bit` of `joint`'s converter always reads 0 (`level` 0) or 1 (`level` 1). There is no size to it."""
+    """Bit `bit` of `joint`'s converter always reads 0 (`level` 0) or 1 (`level` 1). It has no size."""
 
     name: ClassVar[str] = "stuck_converter_bit"
     shared: ClassVar[bool] = False

@@ -1,4 +1,4 @@
-"""Losses at a joint that the shared list of effects does not have."""
+"""Losses at a joint that are not in the shared list of effects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mock_controller.plant.parameters import PlantParameters
 
 @dataclass
 class TightSpot:
-    """At `joint`, viscous friction of `coefficient` more around the angle `centre`, within about ±`width`."""
+    """Adds at `joint` viscous friction `coefficient` around the angle `centre`, within about ±`width`."""
 
     name: ClassVar[str] = "tight_spot"
     shared: ClassVar[bool] = False
@@ -31,7 +31,7 @@ class TightSpot:
 
 @dataclass
 class QuadraticDrag:
-    """At `joint`, friction that rises with the square of speed."""
+    """Adds at `joint` friction that rises with the square of speed."""
 
     name: ClassVar[str] = "quadratic_drag"
     shared: ClassVar[bool] = False
@@ -68,10 +68,10 @@ class CableHysteresis:
 
 @dataclass
 class AgeingFriction:
-    """At `joint`, friction that grows the longer the joint rests, and is worn off over a few mrad of motion.
+    """Adds at `joint` friction that grows the longer the joint rests, and is worn off over a few mrad of motion.
 
-    The age a of the contact obeys da/dt = 1 − |q̇| a/D, solved exactly over a step; the level rises
-    by `torque` · ln(1 + a/`onset`).
+    The age a of the contact obeys da/dt = 1 − |q̇| a/D, solved exactly over a step; the level rises by `torque` · ln(1
+    + a/`onset`).
     """
 
     name: ClassVar[str] = "ageing_friction"

@@ -1,4 +1,4 @@
-"""Gears with play, elasticity, losses or uneven torque."""
+"""Gears with backlash, elasticity, losses or uneven torque."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class TorqueRipple:
     name: ClassVar[str] = "torque_ripple"
     shared: ClassVar[bool] = True
     line: ClassVar[str] = "torque + A sin(N q + φ)"
-    source: ClassVar[str] = "meshing error of the last gear stages (6 to 12 pinion turns a joint turn)"
+    source: ClassVar[str] = "meshing error of the last gear stages (6 to 12 pinion turns per joint turn)"
     joint: int = joint_parameter()
     amplitude: float = parameter(0.0, 50.0, unit="N·m", null=0.0)
     periods: float = parameter(1.0, 400.0, default=12.0, unit="1/turn")
@@ -81,9 +81,9 @@ class DetentCogging:
 
 @dataclass
 class GearLoss:
-    """`joint`'s gear loses a share `loss` of the torque it transmits, whichever way the power flows.
+    """`joint`'s gear loses a share `loss` of the torque that it transmits, in either direction of power.
 
-    The loss is friction between teeth, so it rides on the arm's own bristle and opposes the motion.
+    The loss is friction between teeth, so the arm's own bristle carries it, and it opposes the motion.
     """
 
     name: ClassVar[str] = "gear_loss"
@@ -111,8 +111,8 @@ class GearLoss:
 class DirectionDependentGearLoss:
     """`joint`'s gear loses a share |`difference`| only while its motor drives, or, if negative, only while driven.
 
-    Which of the two it is depends on the torque through the gear and on the way in which its teeth slide, which a
-    bristle of its own remembers at rest.
+    The case depends on the torque through the gear and on the direction in which its teeth slide; a bristle of its own
+    keeps that direction at rest.
     """
 
     name: ClassVar[str] = "direction_dependent_gear_loss"

@@ -27,9 +27,9 @@ class DriveTrain:
             self.settled = 1.0 - (1.0 - self.decay) / ratio
         self.torque_per_ampere = n * joint.torque_constant
         self.torque_per_volt = self.settled * self.torque_per_ampere / joint.resistance
-        """Joint torque (N·m) a volt gives within the same step."""
+        """Joint torque (N·m) per volt within the same step."""
         self.torque_per_held_ampere = (1.0 - self.settled) * self.torque_per_ampere
-        """Joint torque (N·m) that an ampere flowing at the step's start still gives during it."""
+        """Joint torque (N·m) during the step per ampere at its start."""
         self.damping = n**2 * (
             self.settled * joint.torque_constant * joint.back_emf_constant / joint.resistance + joint.viscous_friction
         )
@@ -38,6 +38,6 @@ class DriveTrain:
         self._volts_per_rate = n * joint.back_emf_constant
 
     def next_current(self, current: float, volts: float, rate: float) -> float:
-        """Current (A) a step later at constant volts and joint rate (rad/s)."""
+        """Returns the current (A) a step later at constant volts and joint rate (rad/s)."""
         steady = (volts - self._volts_per_rate * rate) / self._resistance
         return steady + (current - steady) * self.decay

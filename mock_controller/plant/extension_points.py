@@ -1,4 +1,4 @@
-"""Protocols by which a modification changes the plant: its constants, drives, gears, friction, or the torques on it."""
+"""Protocols by which a modification changes the plant: its constants, drives, gears, friction, or joint torques."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class RubsUnderGravity(Modification, Protocol):
 
 @runtime_checkable
 class ChangesTransmission(Modification, Protocol):
-    """Replaces one joint's rigid gear by one that yields: rotor and link move apart."""
+    """Replaces one joint's rigid gear by a flexible one: rotor and link move apart."""
 
     joint: int
 
@@ -96,6 +96,6 @@ class AddsJointTorque(Modification, Protocol):
 
 @runtime_checkable
 class AddsTorque(Modification, Protocol):
-    """Adds torques from outside on all joints, functions of time and state (six values). Called every step."""
+    """Adds external torques on all joints, functions of time and state (six values). Called every step."""
 
     def external_torque(self, time_s: float, angles: Sequence[float], rates: Sequence[float]) -> Sequence[float]: ...

@@ -16,8 +16,8 @@ from mock_controller.plant.parameters import PlantParameters
 class CoulombLevel:
     """Largest Coulomb torque (N·m) of each joint at a posture.
 
-    The weights of link 2 and of link 3 with its load, projected as in (7.32)–(7.34), are normal forces; μ̃ is an
-    arm in metres. The source prints no sign: the magnitude of each joint's sum is taken.
+    The weights of link 2 and of link 3 with its load, projected as in (7.32)–(7.34), are normal forces; μ̃ is an arm in
+    metres. The source prints no sign, so the magnitude of each joint's sum is used.
     """
 
     def __init__(self, parameters: PlantParameters) -> None:
@@ -31,7 +31,7 @@ class CoulombLevel:
         """What comes on top (N·m), of all six joints."""
 
     def at(self, q: list[float]) -> list[float]:
-        """Levels (N·m, ≥ 0) of the six joints at angles `q` (rad)."""
+        """Returns levels (N·m, ≥ 0) of the six joints at angles `q` (rad)."""
         s2 = sin(q[1])
         s23 = sin(q[1] + q[2])
         link2, link3 = self.link2, self.link3
@@ -45,8 +45,8 @@ class CoulombLevel:
 
 
 def deflect(bristles: list[float], displacements: list[float], presliding: float) -> list[float]:
-    """The bristles' deflections ζ after their joints have moved, displacements and δ being in the same unit."""
-    # Called in every step: one loop over all joints costs a third of a call for each.
+    """Returns the bristles' deflections ζ after their joints have moved, with displacements and δ in the same unit."""
+    # Called in every step: one loop over all joints takes a third of the time of one call per joint.
     return [
         1.0 + (bristle - 1.0) * exp(-displacement / presliding)
         if displacement > 0.0

@@ -1,4 +1,4 @@
-"""The plant's constants, in SI units, read from a data file that gives each one's source."""
+"""The plant's constants, in SI units, read from a data file that states the source of each."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class RigidBodyParameters:
 class JointParameters:
     """Motor, gear, friction, end stops and start angle (rad) of one joint.
 
-    `gear_ratio` is motor turns per joint turn; `viscous_friction` acts on the motor's speed (7.30);
-    `constant_friction` (N·m, at the joint) comes on top of the load-dependent Coulomb friction.
+    `gear_ratio` is motor turns per joint turn; `viscous_friction` acts on the motor's speed (7.30); `constant_friction`
+    (N·m, at the joint) is added to the load-dependent Coulomb friction.
     """
 
     resistance: float
@@ -65,7 +65,7 @@ class JointParameters:
 class FrictionParameters:
     """Coulomb friction: effective arm μ̃ (m) of (7.32)–(7.34) and the displacement (rad) over which it builds up.
 
-    `extra_arms` (m) come on top of the common arm at joints 1 to 3, each at its own joint.
+    `extra_arms` (m) are added to the common arm at joints 1 to 3, each at its own joint.
     """
 
     effective_arm: float
@@ -118,7 +118,7 @@ def _joint(reader: QuantityReader, number: int) -> JointParameters:
 
 
 def parse_plant(text: str, origin: str = "plant file") -> tuple[PlantParameters, tuple[Provenance, ...]]:
-    """Parameters and the source of every number, from TOML text. Raises DataFileError with one clear line."""
+    """Returns parameters and the source of each, from TOML text. Raises DataFileError with one clear line."""
     reader = QuantityReader(text, origin)
 
     def body(key: str, unit: str, low: float, high: float) -> float:
@@ -157,10 +157,10 @@ def parse_plant(text: str, origin: str = "plant file") -> tuple[PlantParameters,
 
 
 def default_plant_text() -> str:
-    """The data file that ships: the model with viscous and Coulomb friction, table 7.9."""
+    """Returns the text of the shipped data file: the model with viscous and Coulomb friction, table 7.9."""
     return resources.files("mock_controller.plant").joinpath("ma2000_plant.toml").read_text("utf-8")
 
 
 def default_plant() -> PlantParameters:
-    """Parameters of the data file that ships."""
+    """Returns parameters of the shipped data file."""
     return parse_plant(default_plant_text(), "ma2000_plant.toml")[0]

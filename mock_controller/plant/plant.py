@@ -39,13 +39,13 @@ STEP_US = 1000
 """Integration step (µs); halving it changes the default ramp by less than a hundredth of an ADC count."""
 
 _PARTS_OF_A_STEP = 4
-"""Substeps of a step where a gear is elastic or has play: the light waist of an upright arm oscillates in its teeth."""
+"""Substeps of a step with an elastic gear or backlash: the light waist of an upright arm oscillates in its teeth."""
 _STALL_INERTIA = 1e9
 """Inertia (kg·m²) of a stalled joint, large enough to hold it still against any torque of the arm."""
 
 
 class PlantError(ValueError):
-    """Something the plant cannot be or do."""
+    """An invalid state of the plant or request to it."""
 
 
 class Plant:
@@ -91,7 +91,7 @@ class Plant:
         self._friction_effects: list[ChangesFriction] = of_kind(self._modifications, ChangesFriction)
         self._gravity_effects: list[RubsUnderGravity] = of_kind(self._modifications, RubsUnderGravity)
         self._still = mujoco.MjData(self._model)
-        """The arm at rest, of which gravity's torques are asked."""
+        """The arm at rest, for computing gravity's torques."""
         self._joint_effects: list[AddsJointTorque] = of_kind(self._modifications, AddsJointTorque)
         self._outside_effects: list[AddsTorque] = of_kind(self._modifications, AddsTorque)
         self._is_modified = any(
@@ -165,7 +165,7 @@ class Plant:
         return frozenset(self._stalled)
 
     def stall(self, joint: int) -> None:
-        """Jams a joint (from 1) where it is, at once."""
+        """Jams a joint (from 1) at once, at its present angle."""
         index = _index(joint)
         self._q[index] -= 0.5 * self._step_s * self._v[index]
         self._v[index] = 0.0
@@ -173,7 +173,7 @@ class Plant:
         self._stalled.add(joint)
 
     def release(self, joint: int) -> None:
-        """Frees a jammed joint (from 1); one that is free stays so."""
+        """Frees a jammed joint (from 1); a free one stays free."""
         index = _index(joint)
         rigid = index not in self._rotors
         self._model.dof_armature[index] = self.parameters.joints[index].reflected_inertia if rigid else 0.0
@@ -199,7 +199,9 @@ class Plant:
         self._steps += steps
 
     def place(self, angles: Sequence[float], duration_us: int) -> None:
-        """Puts the arm at rest at six angles (rad) after `duration_us`, in which something else held and moved it."""
+        """Puts the arm at rest at six angles (rad) after `duration_us`, during which something else held and moved
+        it.
+        """
         self._q[:] = angles
         self._v[:] = 0.0
         self._bristle = [0.0] * JOINTS
@@ -210,7 +212,7 @@ class Plant:
         self._steps += duration_us // self._inner_us
 
     def _pushed_by(self, volts: list[float]) -> list[float]:
-        """Joint torques (N·m) that volts at the motors give within a step, before any damping."""
+        """Returns the joint torques (N·m) of the motors' volts within a step, before any damping."""
         return [drive.torque_per_volt * value for drive, value in zip(self._drives, volts, strict=True)]
 
     def _amplify(self, volts_in: Sequence[float]) -> list[float]:
@@ -225,7 +227,9 @@ class Plant:
         return [min(max(value, -limit), limit) for value in volts]
 
     def _step_modified(self, asked: list[float]) -> None:
-        """One step with everything that a modification or an inductance may add; `asked` are the amplifiers' volts."""
+        """Does one step with everything that a modification or an inductance may add; `asked` are the amplifiers'
+        volts.
+        """
         v: list[float] = self._v.tolist()
         q: list[float] = self._q.tolist()
         time_s = self.time_us * 1e-6
@@ -270,7 +274,7 @@ class Plant:
         self._steps += 1
 
     def _weights(self, q: list[float]) -> list[float]:
-        """Torques (N·m) with which gravity loads the joints at six angles (rad)."""
+        """Returns the torques (N·m) with which gravity loads the joints at six angles (rad)."""
         self._still.qpos[:] = q
         mujoco.mj_kinematics(self._model, self._still)
         mujoco.mj_comPos(self._model, self._still)
@@ -280,7 +284,7 @@ class Plant:
         return weights
 
     def _deflect(self, v: list[float]) -> list[float]:
-        """Bristles after the displacement h·v that brought each joint to where it is now."""
+        """Updates the bristles after the displacement h·v that brought each joint to its present angle."""
         self._bristle = deflect(self._bristle, v, self._presliding_rate)
         return self._bristle
 
@@ -291,7 +295,9 @@ class Plant:
             self._current[i] = self._drives[i].next_current(self._current[i], self._motor_volts[i], mid)
 
     def _free_rotors(self) -> dict[int, FreeRotor]:
-        """Rotors that a modification has parted from their links, by index; their inertia leaves the rigid body."""
+        """Returns rotors that a modification has separated from their links, by index; their inertia leaves the rigid
+        body.
+        """
         rotors: dict[int, FreeRotor] = {}
         for change in of_kind(self._modifications, ChangesTransmission):
             index = _index(change.joint)
@@ -302,7 +308,7 @@ class Plant:
         return rotors
 
     def _check_stiffness(self) -> None:
-        """Refuses a coupling whose natural frequency an explicit step cannot follow."""
+        """Rejects a coupling whose natural frequency an explicit step cannot follow."""
         inertias = np.zeros((JOINTS, JOINTS))
         mujoco.mj_fullM(self._model, self._data, inertias)
         for index, rotor in self._rotors.items():
@@ -316,7 +322,7 @@ class Plant:
             if coupling.stiffness > allowed or coupling.damping > damping_allowed:
                 raise PlantError(
                     f"joint {index + 1}: coupling of {coupling.stiffness:g} N·m/rad and {coupling.damping:g} N·m·s/rad "
-                    f"is too hard for steps of {self._inner_us} µs: allowed are {allowed:.3g} and {damping_allowed:.3g}"
+                    f"is too stiff for {self._inner_us} µs steps: allowed are {allowed:.3g} and {damping_allowed:.3g}"
                 )
 
 

@@ -17,7 +17,7 @@ _NO_INERTIA = 1e-12
 
 
 def build_model(parameters: PlantParameters, step_s: float, free_rotors: Collection[int] = ()) -> mujoco.MjModel:
-    """The rigid bodies with end stops and reflected rotor inertia; no drive, damping or friction.
+    """Returns the rigid bodies with end stops and reflected rotor inertia; no drive, damping or friction.
 
     Joints (from 1) in `free_rotors` move without their rotors.
     """
@@ -49,7 +49,7 @@ def _mjcf(parameters: PlantParameters, step_s: float, free_rotors: Collection[in
     upper_arm = _inertial(body.a2 / 2 + body.centre_shift_2, body.b2, body.m2, (0.0, rod2, rod2))
     forearm = _inertial(body.a3 / 2 + body.centre_shift_3, -body.b3, body.m3, (0.0, rod3, rod3))
     own = (body.wrist_inertia,) * 3
-    # Only the last body carries weight, so that a hand at any angle is the published point load.
+    # Only the last body has weight, so that a hand at any angle is the published point load.
     massless = _inertial(0.0, 0.0, 1e-6, own)
     hand = _inertial(body.load_offset, 0.0, body.m_load - 2e-6, own)
     gravity = " ".join(repr(value) for value in body.gravity)

@@ -1,4 +1,4 @@
-"""A gear that yields, between rotor and link; a rigid gear needs no state and none of this."""
+"""A flexible gear, between rotor and link; a rigid gear needs no state and none of this."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Transmission:
-    """Coupling of rotor and link, all at the joint: stiffness (N·m/rad), damping (N·m·s/rad), full play (rad)."""
+    """Coupling of rotor and link, all at the joint: stiffness (N·m/rad), damping (N·m·s/rad), full backlash (rad)."""
 
     stiffness: float
     damping: float
     backlash: float
 
     def torque(self, twist: float, twist_rate: float) -> float:
-        """Torque (N·m) on the link for rotor minus link angle (rad) and its rate (rad/s).
+        """Returns the torque (N·m) on the link for rotor − link angle (rad) and its rate (rad/s).
 
-        Inside the play nothing is transmitted. Damping never pulls: teeth only push.
+        Inside the backlash nothing is transmitted. Damping never pulls: teeth only push.
         """
         half = 0.5 * self.backlash
         if twist > half:
@@ -42,7 +42,9 @@ class FreeRotor:
         self._damping = damping
 
     def advance(self, drive_torque: float, link_angle: float, link_rate: float, step_s: float) -> float:
-        """One step under `drive_torque` (N·m, back-EMF and viscous friction excluded); torque on the link."""
+        """Does one step under `drive_torque` (N·m, back-EMF and viscous friction excluded); returns the torque on the
+        link.
+        """
         coupling = self.transmission.torque(self.angle - link_angle, self.rate - link_rate)
         accelerating = drive_torque - self._damping * self.rate - coupling
         self.rate += step_s * accelerating / (self._inertia + 0.5 * step_s * self._damping)

@@ -1,7 +1,7 @@
 """`python -m mock_controller.servos`: a bench in real time on a pseudo-terminal or a TCP port.
 
-Exit code 0 when interrupted or no longer owned, 2 for wrong options. Standard input of one that is not owned takes
-commands, one a line: `drop ID`, `back ID`, `fail ID BIT`, `reboot ID`.
+Standard input takes commands, one per line: `drop ID`, `back ID`, `fail ID BIT`, `reboot ID`. With `--owned` the bench
+ends when standard input ends. Exit code 0 after an interrupt or the end of the input, 2 for wrong options.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mock_controller.servos.secret import NONE, draw_secret
 
 _STDIN = 0
 _WAKE_S = 0.02
-"""Longest time (s) until the bench is brought up to date, so that it is never far behind when it is asked."""
+"""Longest wait (s) between two advances of the simulation."""
 
 
 def main(arguments: list[str]) -> int:
@@ -58,7 +58,7 @@ def _parser() -> argparse.ArgumentParser:
         "--secret",
         type=int,
         metavar="SEED",
-        help="a bench with a secret effect; python -m mock_controller.reveal --servos SEED tells it",
+        help="a bench with a secret effect; python -m mock_controller.reveal --servos SEED reveals it",
     )
     parser.add_argument("--torque", action="store_true", help="start with the torque on (default: off, as at power-up)")
     parser.add_argument("--owned", action="store_true", help="end when standard input ends")
@@ -76,25 +76,25 @@ def _ids(text: str) -> tuple[int, ...]:
 def _serve(bench: Bench, port: Port, owned: bool) -> None:
     with contextlib.suppress(BrokenPipeError):
         print(json.dumps({"ready": True, "url": port.url, "control": None}), flush=True)
-    zero_us, heard = time.monotonic_ns() // 1000, [_STDIN]
+    zero_us, inputs = time.monotonic_ns() // 1000, [_STDIN]
     try:
         while True:
-            readable, _, _ = select.select([*port.watched, *heard], port.waiting_to_write, [], _WAKE_S)
+            readable, _, _ = select.select([*port.watched, *inputs], port.waiting_to_write, [], _WAKE_S)
             bench.advance_to(time.monotonic_ns() // 1000 - zero_us)
             for descriptor in readable:
                 if descriptor != _STDIN:
                     port.send(bench.receive(port.read(descriptor) or b""))
-                elif not _commanded(bench, os.read(_STDIN, 4096)):
+                elif not _run_commands(bench, os.read(_STDIN, 4096)):
                     if owned:
                         return
-                    heard = []
-            port.send(b"")
+                    inputs = []
+            port.send(b"")  # flush bytes that are still waiting
     finally:
         port.cut()
 
 
-def _commanded(bench: Bench, said: bytes) -> bool:
-    """Carries out what stands on standard input; False at its end."""
+def _run_commands(bench: Bench, said: bytes) -> bool:
+    """Runs commands from standard input; returns whether it is still open."""
     for line in said.decode(errors="replace").splitlines():
         match line.split():
             case ["drop", device]:

@@ -1,4 +1,4 @@
-"""The bench: servos on one bus and the head that they move, advanced by whoever keeps the time."""
+"""The bench: servos on one bus and the head that they move, advanced by its caller."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from mock_controller.servos.servo import Servo
 
 PERIOD_US = 1000
 _START = (math.pi, 2.4)
-"""Where the head stands at first, rad of the servos: ahead, and the bar hanging at an angle."""
+"""First posture of the head, rad of the servos: ahead, and the bar hanging at an angle."""
 LEVEL = math.pi
 """Angle (rad) of the second servo at which the bar is horizontal."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """What a bench is made of."""
+    """Options of a bench."""
 
     ids: tuple[int, ...] = (1, 2)
     supply: float = 12.0
@@ -57,7 +57,7 @@ class Bench:
                 servo.write(Table.TORQUE_ENABLE.address, b"\1")
 
     def advance_to(self, time_us: int) -> None:
-        """Lets the bench's time pass."""
+        """Advances the bench's time."""
         while self.time_us < time_us:
             if self.time_us % PERIOD_US == 0:
                 self._control()
@@ -65,16 +65,16 @@ class Bench:
             self.time_us += STEP_US
 
     def receive(self, data: bytes) -> bytes:
-        """What the servos answer to bytes on the bus, one after the other."""
+        """Returns the servos' answers to bytes on the bus, one after the other."""
         answers = [answer for packet in self._decoder.feed(data) for answer in self._obey(packet)]
         return b"".join(map(encode, answers))
 
     def fail(self, device: int, error: HardwareError) -> None:
-        """A hardware error of one servo."""
+        """Sets a hardware error of one servo."""
         self._servo(device).fail(error)
 
     def reboot(self, device: int) -> None:
-        """One servo loses its supply for a moment."""
+        """Interrupts the supply of one servo for a moment."""
         servo = self._servo(device)
         servo.power_up(servo[Table.PRESENT_POSITION])
 
@@ -124,13 +124,13 @@ class Bench:
         return answers if alone else ()
 
     def _write(self, packet: Packet, by_id: dict[int, Servo]) -> None:
-        """Writes that nobody answers."""
+        """Carries out writes without an answer."""
         for device, address, data in areas_written(packet):
             for servo in by_id.values() if device == BROADCAST else [by_id[device]] if device in by_id else []:
                 servo.write(address, data)
 
     def _other(self, packet: Packet, servo: Servo) -> StatusError | None:
-        """Instructions that have no data of their own."""
+        """Carries out instructions without data of their own."""
         match packet.instruction:
             case Instruction.REG_WRITE:
                 self._waiting[servo.device] = packet

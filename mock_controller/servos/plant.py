@@ -6,8 +6,8 @@ its moment of weight w (N·m when it is horizontal), Lagrange's equations are
     (I1 + J cos² q2) q1'' = 2 J sin q2 cos q2 q1' q2' + τ1
                   J q2''  = −J sin q2 cos q2 q1'²  − w cos q2 + τ2
 
-Each motor's torque at the joint is k N (V − k_e N q') / R, less friction; its rotor adds N² times its inertia.
-Written for this mock alone, and with no thought of how a model describes the same.
+Each motor's torque at the joint is k N (V − k_e N q') / R − friction; its rotor adds N² times its inertia. Written for
+this mock alone, independently of how a model describes the same.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from mock_controller.servos.secret import NONE, Secret
 
 GRAVITY = 9.81
 STEP_US = 250
-"""Step of integration, µs: with a time constant of the motors of some 10 ms its error is far below a count."""
+"""Integration step, µs: with motor time constants of about 10 ms its error is far below a count."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Motor:
     """N·m at the joint."""
 
     def torque(self, volts: float, speed: float) -> float:
-        """Torque at the joint (N·m) without Coulomb friction."""
+        """Returns the torque at the joint (N·m) without Coulomb friction."""
         current = (volts - self.back_emf * self.gear * speed) / self.resistance
         return self.torque_constant * self.gear * current - self.viscous * speed
 
@@ -74,7 +74,7 @@ class PanTilt:
         self._weight = GRAVITY * head.length * (head.bar / 2.0 + load)
 
     def step(self) -> None:
-        """One step: the speed first, then the position with the new speed."""
+        """Does one step: the speed first, then the position with the new speed."""
         pan, tilt = self.speed
         sine, cosine = math.sin(self.position[1]), math.cos(self.position[1])
         torques = [self._driven(joint) for joint in (0, 1)]
@@ -90,7 +90,7 @@ class PanTilt:
         return hidden + self._motor.torque(self._secret.lost(joint, volts), speed)
 
     def _accelerate(self, joint: int, torque: float, inertia: float) -> None:
-        """Coulomb friction takes from the speed what it can within the step, but never turns it round."""
+        """Applies Coulomb friction: it reduces the speed as far as it can within the step, but never reverses it."""
         seconds = STEP_US * 1e-6
         free = self.speed[joint] + seconds * torque / inertia
         lost = seconds * (self._motor.coulomb + self._secret.friction(joint, free)) / inertia

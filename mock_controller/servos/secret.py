@@ -1,7 +1,8 @@
-"""Benches with a secret: one effect that the machine file does not have, drawn from a seed and told only afterwards.
+"""Benches with a secret: one effect that the machine file does not have, drawn from a seed and revealed only
+afterwards.
 
-`python -m mock_controller.reveal --servos SEED` tells it. Sizes are drawn evenly on a logarithmic scale, from one that
-a record of some ten seconds should barely show up to an obvious one.
+`python -m mock_controller.reveal --servos SEED` reveals it. Sizes are drawn evenly on a logarithmic scale, from one
+that a record of ten seconds barely shows to an obvious one.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ _RANGES: dict[str, tuple[tuple[int, ...], float, float, str]] = {
     "dead_zone": ((1, 2), 0.15, 0.80, "V"),
     "spring_torque": ((1, 2), 0.15, 1.00, "N·m/rad"),
 }
-"""Of each effect: the joints at which it may be, its least and its largest size, and their unit."""
+"""For each effect: possible joints, least and largest size, and unit."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,8 @@ class Secret:
     """An effect at a joint (from 1) of the head.
 
     Sizes: a mass at the bar's end, kg; friction beyond the motor's own, N·m and N·m·s/rad; friction when turning
-    forward less friction when turning backward, N·m; volts to either side of zero that the bridge does not switch; a
-    cable's stiffness, N·m/rad, without torque where the head stands at first.
+    forward minus friction when turning backward, N·m; volts to either side of zero that the bridge does not switch; a
+    cable's stiffness, N·m/rad, without torque at the head's first posture.
     """
 
     effect: str
@@ -36,7 +37,7 @@ class Secret:
     size: float
 
     def truth(self, seed: int) -> dict[str, Any]:
-        """What `reveal` tells."""
+        """Returns the data for `reveal`."""
         return {
             "seed": seed,
             "effects": [
@@ -45,16 +46,18 @@ class Secret:
         }
 
     def lost(self, joint: int, volts: float) -> float:
-        """The volts that reach the motor of a joint (from 0)."""
+        """Returns the volts that reach the motor of a joint (from 0)."""
         width = self._at("dead_zone", joint)
         return math.copysign(max(0.0, abs(volts) - width), volts)
 
     def torque(self, joint: int, angle: float, speed: float) -> float:
-        """Torque at a joint (from 0) that the sound bench lacks, N·m; `angle` from where it stood at first, rad."""
+        """Returns the torque at a joint (from 0) that the healthy bench lacks, N·m; `angle` from its first posture,
+        rad.
+        """
         return -self._at("viscous_friction", joint) * speed - self._at("spring_torque", joint) * angle
 
     def friction(self, joint: int, speed: float) -> float:
-        """Dry friction of a joint (from 0) beyond the motor's own while it turns with that sign of the speed, N·m."""
+        """Returns the dry friction of a joint (from 0) beyond the motor's own for the sign of the speed, N·m."""
         sense = 0.0 if speed == 0.0 else math.copysign(0.5, speed)
         return self._at("coulomb_friction", joint) + sense * self._at("direction_dependent_friction", joint)
 
@@ -68,11 +71,11 @@ class Secret:
 
 
 NONE = Secret("", 0, 0.0)
-"""A sound bench."""
+"""A healthy bench."""
 
 
 def draw_secret(seed: int) -> Secret:
-    """The secret of a seed. Raises ValueError for a negative one."""
+    """Returns the secret of a seed. Raises ValueError for a negative one."""
     if seed < 0:
         raise ValueError(f"secret {seed}: a whole number from 0 on is allowed")
     random = Random(f"servos {seed}")

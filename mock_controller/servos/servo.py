@@ -1,4 +1,4 @@
-"""One servo: its control table, its position control, and what protects it. It knows neither bus nor time of day."""
+"""One servo: its control table, position control and protection. It is independent of bus and time of day."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from firmware_protocol.dynamixel.control_table import (
 from firmware_protocol.dynamixel.instructions import StatusError
 
 SIZE = 700
-"""Bytes of the table: its last item that has a meaning is at 661."""
+"""Bytes of the table: its last used item is at 661."""
 INFORMATION = int.from_bytes(b"MOCK", "little")
-"""Model Information, by which a host knows that no motor is behind this servo."""
+"""Model Information, by which a host recognises a servo without a motor."""
 XM430_W350, FIRMWARE = 1020, 45
 WATCHDOG_MS = 20
 _DEFAULTS = {
@@ -56,8 +56,8 @@ _MILLIAMPERE = 2.69
 class Servo:
     """An XM430-W350 in position control, as the e-manual describes it.
 
-    Where the manual is silent the mock takes the worse for a host: the goal that was written while the torque was off
-    stays, and the servo turns to it when the torque comes on.
+    Where the manual is silent the mock assumes the worse case for a host: a goal that was written while the torque was
+    off stays, and the servo turns to it when the torque comes on.
     """
 
     def __init__(self, device: int, supply: float) -> None:
@@ -84,7 +84,7 @@ class Servo:
         return self[Table.TORQUE_ENABLE] == 1
 
     def power_up(self, position: int) -> None:
-        """RAM as after a reset, at a position in counts."""
+        """Resets the RAM, at a position in counts."""
         self._values |= {item.address: 0 for item in Table if item.address >= FIRST_IN_RAM}
         for item, value in (_AT_POWER_UP | {Table.PRESENT_INPUT_VOLTAGE: round(10 * self.supply)}).items():
             self._set(item, value)
@@ -96,17 +96,17 @@ class Servo:
         self.volts = None
 
     def fail(self, error: HardwareError) -> None:
-        """A hardware error: told, and with its bit in Shutdown the torque goes off until a reboot."""
+        """Sets a hardware error; if its bit in Shutdown is set, the torque goes off until a reboot."""
         self._set(Table.HARDWARE_ERROR_STATUS, self[Table.HARDWARE_ERROR_STATUS] | error)
         if self[Table.SHUTDOWN] & error:
             self._set(Table.TORQUE_ENABLE, 0)
 
     def heard(self) -> None:
-        """Any instruction on the bus ends its silence."""
+        """Resets the watchdog's silence, on any instruction on the bus."""
         self._silent = 0
 
     def read(self, address: int, count: int) -> bytes | StatusError:
-        """Bytes of the table, or why not."""
+        """Returns bytes of the table, or the error."""
         if not count or address + count > SIZE:
             return StatusError.DATA_LENGTH if not count else StatusError.ACCESS
         table = bytearray(SIZE)
@@ -115,7 +115,7 @@ class Servo:
         return bytes(table[address : address + count])
 
     def write(self, address: int, data: bytes) -> StatusError | None:
-        """Writes whole items; None when all are written, else nothing is, and why."""
+        """Writes whole items; None if all are written, else nothing is, and the error is returned."""
         items = _items(address, len(data))
         if isinstance(items, StatusError):
             return items
@@ -131,7 +131,7 @@ class Servo:
         return None
 
     def control(self, position: float) -> None:
-        """One period of 1 ms: measures the position (rad), and forms the motor's voltage."""
+        """Runs one period of 1 ms: measures the position (rad), and computes the motor's voltage."""
         self._clock = (self._clock + 1) % TICKS
         self._set(Table.REALTIME_TICK, self._clock)
         counts = math.floor(COUNTS_A_TURN * position / math.tau + 0.5)
@@ -153,13 +153,13 @@ class Servo:
         self.volts = taken / FULL_PWM * self.supply
 
     def show(self, speed: float, current: float) -> None:
-        """Measured speed (rad/s) and current (A)."""
+        """Stores measured speed (rad/s) and current (A)."""
         self._set(Table.PRESENT_VELOCITY, round(speed * 60 / math.tau / _RPM))
         self._set(Table.PRESENT_CURRENT, round(current * 1000 / _MILLIAMPERE))
         self._set(Table.MOVING, int(abs(speed * 60 / math.tau / _RPM) > self[Table.MOVING_THRESHOLD]))
 
     def _watch(self, counts: int) -> None:
-        """Bus Watchdog: after silence the servo holds where it is."""
+        """Implements Bus Watchdog: after silence the servo holds its position."""
         self._silent += 1
         limit = self[Table.BUS_WATCHDOG]
         if limit > 0 and self.torque and self._silent > limit * WATCHDOG_MS:
@@ -194,7 +194,7 @@ _RANGES = {
 
 
 def _items(address: int, count: int) -> list[Table] | StatusError:
-    """The items that exactly fill `count` bytes from `address` on."""
+    """Returns the items that exactly fill `count` bytes from `address` on."""
     at, found = address, []
     while at < address + count:
         item = next((one for one in Table if one.address == at), None)

@@ -1,1 +1,1 @@
-"""Which parameter moves which joint, and when."""
+"""Sensitivity analysis: which parameter changes which joint's motion, and when."""

@@ -1,4 +1,4 @@
-"""Sensitivity curves: how much each parameter changes the readings along a run."""
+"""Computes sensitivity curves: how much each parameter changes the readings along a run."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class SensitivityCurve(FrozenRecord):
 
     @property
     def moves_most(self) -> int:
-        """Index of the joint whose reading it moves most."""
+        """Index of the joint whose reading the parameter changes most."""
         largest = [abs(series[k]) for series, k in zip(self.by_joint, self.peaks, strict=True)]
         return largest.index(max(largest))
 
@@ -54,10 +54,10 @@ class SensitivityCurves(FrozenRecord):
 def sensitivity_curves(
     model: Model, trace: Trace, names: Sequence[str], options: Options | None = None
 ) -> SensitivityCurves:
-    """Exact first-order effect of the named parameters on the readings of a run that repeats the trace.
+    """Returns the exact first-order effect of the named parameters on the readings of a run that repeats the trace.
 
-    The loop is closed unless `options` say otherwise: what the controller compensates does not show.
-    Raises SpecError for no or an unknown parameter, or one without an expected deviation; TraceError as `simulate`.
+    The loop is closed unless `options` say otherwise, so effects that the controller compensates do not appear. Raises
+    SpecError for no or an unknown parameter, or one without an expected deviation; TraceError as `simulate`.
     """
     if not names:
         raise SpecError("no parameters: name at least one")

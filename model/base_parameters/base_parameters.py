@@ -1,4 +1,6 @@
-"""The base parameters of a machine, by QR of a regressor at random admissible postures; what records tell of them."""
+"""Computes the base parameters of a machine by QR of a regressor at random admissible postures, and which of them
+records determine.
+"""
 
 from __future__ import annotations
 
@@ -29,9 +31,9 @@ from model.record_check.check import as_used
 from model.simulation.chain_of_model import chain_of
 
 POSTURES_PER_PARAMETER = 3
-"""Random postures for each standard parameter: every one gives as many rows as there are joints."""
+"""Random postures for each standard parameter: each gives as many rows as there are joints."""
 SLIDING_RANGE = 1.0
-"""Range of positions (m) drawn for a joint that slides and has no limits."""
+"""Range of positions (m) drawn for a prismatic joint without limits."""
 HIGHEST_SPEED = 3.0
 """Largest speed drawn, rad/s (m/s), unless the joint's own limit is lower."""
 REVERSAL = 0.2
@@ -45,18 +47,19 @@ LINEAR = (
     "centre_of_mass",
     "base_tilt",
 )
-"""Effects that the standard parameters, or gravity's direction, have in them."""
+"""Effects that the standard parameters, or gravity's direction, already contain."""
 
 
 def base_parameters(model: Model, traces: Sequence[Trace] = (), *, seed: int = 0) -> BaseParameters:
-    """The base parameters of a model's machine: the fewest combinations of inertial and friction parameters that its
-    joint torques depend on, and, for traces with a recorded drive, what these tell of each.
+    """Returns the base parameters of a model's machine.
 
-    Postures, speeds and accelerations are drawn within the machine's limits (Gautier 1991; Khalil and Dombre 2002,
-    chapter 12). The parameters of links are about the foot of the common normal on their own joint's axis.
+    They are the fewest combinations of inertial and friction parameters that determine its joint torques. For traces
+    with a recorded drive, the result also states which of them the traces determine. Postures, speeds and accelerations
+    are drawn within the machine's limits (Gautier 1991; Khalil and Dombre 2002, chapter 12). The parameters of links
+    are about the foot of the common normal on their own joint's axis.
 
     Args:
-        traces: of the model's machine. Where they cannot be judged (no drive, too short), `no_excitation` says why.
+        traces: of the model's machine. If they cannot be judged (no drive, too short), `no_excitation` says why.
         seed: of the drawn postures.
     """
     chain = chain_of(model)
@@ -89,13 +92,15 @@ def base_parameters(model: Model, traces: Sequence[Trace] = (), *, seed: int = 0
 
 
 def regressor(chain: ChainArrays, standards: Sequence[Standard], motion: Motion) -> Floats:
-    """Columns (k, n, p) of joint torques by standard parameters: all of `link_parameters`, then some of joints."""
+    """Returns columns (k, n, p) of joint torques by standard parameters: all of `link_parameters`, then some of
+    joints.
+    """
     links = 10 * len(chain.geometry)
     return np.concatenate((inertial_regressor(chain, motion), joint_regressor(standards[links:], motion)), axis=2)
 
 
 def random_motion(machine: Machine, count: int, seed: int) -> Motion:
-    """Postures, speeds and accelerations (count, n) drawn evenly within a machine's limits."""
+    """Returns postures, speeds and accelerations (count, n) drawn evenly within a machine's limits."""
     rng = np.random.default_rng(seed)
     low, high, speed = [], [], []
     for number in machine.modelled_joints:

@@ -1,8 +1,8 @@
-"""Numbers with which a parameter is taken over by another, as products of the arm's lengths: `a_1²`, `−d_3`.
+"""Expresses the coefficients of combined parameters as products of the arm's lengths: `a_1²`, `−d_3`.
 
-A coefficient is a polynomial in Denavit and Hartenberg's lengths, homogeneous of the power that the units ask for. Its
-numbers are found by least squares over arms of the same angles and other lengths, so that two lengths that happen to be
-equal are not confused.
+A coefficient is a polynomial in the Denavit–Hartenberg lengths, homogeneous of the power that the units require. Its
+factors are found by least squares over arms with the same angles and other lengths, so that two equal lengths are not
+confused.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ROUND = 1e-5
 NO_LENGTH = 1e-9
 """Length (m) that counts as zero."""
 ENOUGH = 3
-"""Rows of a regressor for each of its columns from which its dependences are computed again."""
+"""Rows of a regressor per column at which its dependences are computed again."""
 _STRETCH = (0.6, 1.6)
 
 
@@ -40,9 +40,9 @@ class Term:
 def named_shares(
     chain: ChainArrays, motion: Motion, standards: Sequence[Standard], grouping: Grouping, seed: int
 ) -> dict[tuple[int, int], tuple[Term, ...]]:
-    """The terms of every share that is not zero, by its row and column in `grouping.shares`.
+    """Returns the terms of every nonzero share, by its row and column in `grouping.shares`.
 
-    A share that is no polynomial of the lengths stays a number.
+    A share that is not a polynomial of the lengths stays a number.
     """
     found: dict[tuple[int, int], tuple[Term, ...]] = {
         (int(row), int(column)): (Term(float(grouping.shares[row, column]), ()),)
@@ -84,7 +84,7 @@ def _first_postures(motion: Motion, count: int) -> Motion:
 
 
 def _lengths(chain: ChainArrays) -> list[tuple[int, int]]:
-    """Places in `geometry` of the lengths that are not zero; d of a joint that slides is its position."""
+    """Returns places in `geometry` of the nonzero lengths; d of a prismatic joint is its position."""
     return [
         (joint, column)
         for joint in range(len(chain.geometry))
@@ -98,7 +98,7 @@ def _name(place: tuple[int, int]) -> str:
 
 
 def _power(standards: Sequence[Standard], grouping: Grouping, place: tuple[int, int]) -> int:
-    """Power of length of a share, by the units; 0 for friction."""
+    """Returns the power of length of a share, by the units; 0 for friction."""
     base, other = standards[grouping.base[place[0]]], standards[grouping.regrouped[place[1]]]
     return 0 if base.degree is None or other.degree is None else base.degree - other.degree
 
@@ -106,8 +106,10 @@ def _power(standards: Sequence[Standard], grouping: Grouping, place: tuple[int, 
 def _shares(
     chain: ChainArrays, motion: Motion, grouping: Grouping, lengths: Sequence[tuple[int, int]], values: Floats
 ) -> Floats:
-    """The shares that an arm with other lengths has for the same base columns; those of joints' parameters are left
-    out, since none of them depends on a length."""
+    """Returns the shares of an arm with other lengths for the same base columns.
+
+    Those of joints' parameters are left out, since none of them depends on a length.
+    """
     geometry = chain.geometry.copy()
     for place, value in zip(lengths, values, strict=True):
         geometry[place] = value

@@ -1,4 +1,6 @@
-"""Which base parameters records tell: their columns along the recorded motion, weighed by the torque that is left."""
+"""Determines which base parameters records determine: their columns along the recorded motion, weighted by the residual
+torque.
+"""
 
 from __future__ import annotations
 
@@ -24,28 +26,31 @@ from model.machine_model.nominal import joint_scale
 from model.simulation.chain_of_model import chain_of
 
 TOLD = 0.1
-"""Largest deviation with which a base parameter counts as told, as a share of its size. The size is the largest value
-of its unit at its joint, so that a moment that is zero can be told to be zero."""
+"""Largest deviation of a base parameter that counts as determined, as a share of its size. The size is the largest
+value of its unit at its joint, so that a moment of zero can be determined to be zero.
+"""
 STANDS = 10.0
-"""Counts of its sensor that a joint must go in a record for its torques to say anything of its friction."""
+"""Counts of its sensor that a joint must move in a record for its torques to contain information on its friction."""
 LEAST_LEFT = 1e-6
-"""Least residual torque that weighs a record, as a share of its torque: a record without noise leaves next to none."""
+"""Least residual torque used as a weight of a record, as a share of its torque: a record without noise leaves almost
+none.
+"""
 
 
 def excitation_of(
     model: Model, traces: Sequence[Trace], standards: Sequence[Standard], grouping: Grouping, values: Floats
 ) -> Excitation:
-    """What records tell of base parameters with these values (r,).
+    """Returns the deviations with which records determine base parameters with these values (r,).
 
-    The deviations are those of least squares on torques; they take the correlation of the residual into account, as
-    those of a fit of torques do, and no prior.
+    They are those of least squares on torques, without a prior; they allow for the correlation of the residual, like
+    those of a fit of torques.
 
     Raises:
         TraceError, SpecError: for traces without a drive, of another machine, without motion, or too short.
     """
     motions = recorded_motions(traces, model.machine, CUTOFF)
     balance = TorqueBalance(model, motions)
-    # columns are joint torques, and so is what is compared with them
+    # columns are joint torques, and so is the compared signal
     told = balance.told_per_torque({})
     torques = [one / told for one in balance.supplied_by_drive()]
     residuals = [
@@ -74,7 +79,7 @@ def excitation_of(
 
 
 def _natural(standards: Sequence[Standard], grouping: Grouping, values: Floats) -> Floats:
-    """Sizes (r,) of base parameters: the largest value of the same unit at the same joint."""
+    """Returns sizes (r,) of base parameters: the largest value of the same unit at the same joint."""
     kinds = [(standards[index].joint, standards[index].unit) for index in grouping.base]
     return np.array([max(abs(v) for v, other in zip(values, kinds, strict=True) if other == own) for own in kinds])
 
@@ -91,26 +96,26 @@ def _recorded(deviation: float, value: float, natural: float, *, excited: bool) 
 
 
 def _columns(model: Model, record: RecordedMotion, standards: Sequence[Standard], grouping: Grouping) -> Floats:
-    """Columns (m, n, r) of the base parameters along a record, low-passed as the torques are."""
+    """Returns columns (m, n, r) of the base parameters along a record, low-passed like the torques."""
     joints = np.ascontiguousarray(model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT))
     links = link_motion(record, joints)
     motion = Motion(links.position, links.speed, links.acceleration, links.contact)
     inertial = inertial_regressor(chain_of(model), motion)
     of_joints = joint_regressor(standards[inertial.shape[2] :], motion)
     whole = np.concatenate((inertial, of_joints), axis=2)[:, :, list(grouping.base)]
-    # of a joint at rest, friction takes whatever torque holds it: such samples say nothing
+    # at rest, friction takes any torque that holds the joint: such samples contain no information
     return record.compared(whole) * _moving(model, record)[:, :, None]
 
 
 def _moving(model: Model, record: RecordedMotion) -> Mask:
-    """(m, n) where a joint moves; a joint that goes less than `STANDS` counts in all does not."""
+    """Returns (m, n) True where a joint moves; a joint that moves less than `STANDS` counts in all does not."""
     far = np.ptp(record.position, axis=0)
     counts = [joint_scale(model.machine, joint).resolution for joint in model.machine.modelled_joints]
     return np.asarray(record.moving & (far > STANDS * np.array(counts)))
 
 
 def _deviations(residuals: Sequence[Floats], torques: Sequence[Floats], columns: Sequence[Floats]) -> Floats:
-    """Standard deviations (r,) of the base parameters."""
+    """Returns standard deviations (r,) of the base parameters."""
     floor = LEAST_LEFT * np.sqrt(np.mean(np.concatenate(torques) ** 2, axis=0)) + 1e-12
     whiteners = [
         fitted_whitener([one[:, joint] for one in residuals], LONGEST_MEMORY, float(least))

@@ -1,8 +1,8 @@
-"""Which columns of a regressor are independent, and how the others depend on them: QR with column pivoting.
+"""Finds independent columns of a regressor, and how the others depend on them, by QR with column pivoting.
 
 After Gautier (1991, Numerical calculation of the base inertial parameters of robots, J. Robotic Systems 8). The pivoted
-factorisation tells the rank and gives every column r coordinates. Which r columns represent them is then a choice: the
-textbook's, which keeps a parameter about its own joint before those that are taken over from further links.
+factorisation gives the rank and r coordinates of every column. Which r columns represent them is then a choice: the
+textbook's, which prefers a parameter of its own joint to those combined from later links.
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ from model.base_parameters.standard import Standard
 
 DEPENDENT = 1e-7
 """Largest part of a column outside the span of others, as a share of the column, that counts as rounding. Published
-geometry is itself rounded: π as 3.1416 is 7e-6 off."""
+geometry is itself rounded: π as 3.1416 is 7e-6 off.
+"""
 ZERO = 1e-9
-"""Largest coefficient of a dependent column, in columns brought to one size, that counts as none."""
+"""Largest coefficient of a dependent column, in columns scaled to one size, that counts as zero."""
 _FIRST, _LAST = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY"), ("YY", "MZ", "m")
 _OF_SLIDING = ("m",)
 
 
 @dataclass(frozen=True)
 class Grouping:
-    """What a regressor's columns depend on.
+    """Dependences of a regressor's columns.
 
     Args:
         base: indices of the r independent columns. regrouped: those of the columns that depend on them.
@@ -45,10 +46,10 @@ class Grouping:
 
 
 def preferred_order(parameters: Sequence[Standard], slides: Sequence[bool]) -> tuple[int, ...]:
-    """Indices of parameters in the order in which they are to represent a base parameter, base of the arm first.
+    """Returns indices of parameters in the order of preference as representatives, base of the arm first.
 
-    Khalil and Dombre's rule: of a joint that turns, YY, MZ and m are taken over by links before it; of one that slides,
-    its six moments of inertia are.
+    Khalil and Dombre's rule: of a revolute joint, YY, MZ and m are combined with earlier links; of a prismatic one, its
+    six moments of inertia are.
     """
 
     def rank(index: int) -> tuple[int, int, int]:
@@ -65,7 +66,7 @@ def preferred_order(parameters: Sequence[Standard], slides: Sequence[bool]) -> t
 
 
 def grouped(regressor: Floats, order: Sequence[int], tolerance: float = DEPENDENT) -> Grouping:
-    """The grouping of the columns of a regressor (rows, p), represented by the first independent ones of `order`."""
+    """Groups the columns of a regressor (rows, p), represented by the first independent ones of `order`."""
     sizes = np.linalg.norm(regressor, axis=0)
     shown = sizes > tolerance * sizes.max()
     zero = tuple(int(k) for k in np.flatnonzero(~shown))
@@ -92,8 +93,10 @@ def grouped(regressor: Floats, order: Sequence[int], tolerance: float = DEPENDEN
 
 
 def _first_independent(coordinates: Floats, rank: int, tolerance: float) -> list[int]:
-    """The first `rank` columns (in their order) of which none depends on those before it. Where rounding leaves too
-    few, the tolerance is lowered."""
+    """Returns the first `rank` columns (in their order) of which none depends on those before it.
+
+    If rounding leaves too few, the tolerance is lowered.
+    """
     while True:
         left, chosen = coordinates.copy(), list[int]()
         for k in range(left.shape[1]):

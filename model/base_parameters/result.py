@@ -1,4 +1,4 @@
-"""Base parameters of a machine, and what records tell about them: data first, words last."""
+"""Base parameters of a machine, and which of them records determine: data first, words last."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from daq.contracts.frozen import FrozenRecord
 
 
 class BaseMember(FrozenRecord):
-    """A standard parameter's part in a base parameter: its `factor`, and the same written with the arm's lengths."""
+    """A standard parameter's part in a base parameter: its `factor`, and the same in terms of the arm's lengths."""
 
     symbol: str
     factor: float
@@ -16,7 +16,7 @@ class BaseMember(FrozenRecord):
 
 
 class BaseParameter(FrozenRecord):
-    """A combination of standard parameters that torques depend on, the first of which represents it.
+    """A combination of standard parameters that determines torques; the first of them represents it.
 
     `value` is that of the model, in `unit`.
     """
@@ -30,11 +30,11 @@ class BaseParameter(FrozenRecord):
 
 
 class RecordedBaseParameter(FrozenRecord):
-    """What records tell of one base parameter.
+    """Information of records on one base parameter.
 
-    `deviation` is what they leave of it, every other base parameter being free, in its unit; `relative` is its share of
-    the value, None where the value is 0. Both are None where the records do not excite it. `told`: the deviation is at
-    most a tenth of the largest value of this unit at the joint, so that a moment that is zero can be told as well.
+    `deviation`: in its unit, with all other base parameters free; `relative`: its share of the value, None if the value
+    is 0. Both are None if the records do not excite it. `told`: the deviation is at most a tenth of the largest value
+    of this unit at the joint, so that a moment of zero can be determined as well.
     """
 
     deviation: float | None
@@ -43,11 +43,11 @@ class RecordedBaseParameter(FrozenRecord):
 
 
 class Excitation(FrozenRecord):
-    """What records tell of base parameters, in their order.
+    """Information of records on base parameters, in their order.
 
-    `condition` is the condition number of the base parameters' columns along the records, each column brought to unit
-    size, and `rank` the number of base parameters that they excite at all: numerically, whatever the noise. `residual`
-    is the root mean square of the torque that the model leaves, N·m (N), by joint: it stands for the noise.
+    `condition`: condition number of the base parameters' columns along the records, each scaled to unit size. `rank`:
+    number of base parameters that they excite at all, numerically, whatever the noise. `residual`: root mean square of
+    the model's residual torque, N·m (N), by joint, used as the noise.
     """
 
     traces: tuple[str, ...]
@@ -59,15 +59,16 @@ class Excitation(FrozenRecord):
 
     @property
     def told(self) -> int:
-        """How many base parameters the records tell."""
+        """Number of base parameters that the records determine."""
         return sum(one.told for one in self.parameters)
 
 
 class BaseParameters(FrozenRecord):
-    """The base parameters of a machine: independent of any record, and, with records, what these tell of them.
+    """The base parameters of a machine, independent of any record, and optionally the information of records on them.
 
-    `standard` counts the standard parameters, `without_effect` names those that no motion shows. `smallest_kept` and
-    `largest_dropped` are pivots of the factorisation, as shares of the first: far apart, the rank is certain.
+    `standard` counts the standard parameters, `without_effect` names those that influence no motion. `smallest_kept`
+    and `largest_dropped` are pivots of the factorisation, as shares of the first: if they differ widely, the rank is
+    certain.
     """
 
     machine: str
@@ -80,10 +81,10 @@ class BaseParameters(FrozenRecord):
     smallest_kept: float
     largest_dropped: float
     left_out: tuple[str, ...] = ()
-    """Effects of the model that no base parameter has in it: they are held at the model's values."""
+    """Effects of the model that are not part of the base parameters: they are held at the model's values."""
     excitation: Excitation | None = None
     no_excitation: str | None = None
-    """Why records could not be judged; one line."""
+    """Why records could not be judged, in one line."""
 
     shown = ("machine", "standard", "inertial", "friction")
 
@@ -99,17 +100,17 @@ class BaseParameters(FrozenRecord):
 
 
 def headline(found: BaseParameters) -> str:
-    """One line for people: how many base parameters there are, and how many the records tell."""
+    """Returns one line for people: the number of base parameters, and how many the records determine."""
     text = f"base parameters: {len(found.parameters)} of {found.standard}"
     text += f" ({found.inertial} inertial, {found.friction} friction)"
     if (records := found.excitation) is not None:
         condition = "" if records.condition is None else f", condition number {records.condition:.3g}"
-        text += f"; told by these traces: {records.told}{condition}"
+        text += f"; determined by these traces: {records.told}{condition}"
     return text
 
 
 def written(first: str, members: Sequence[BaseMember]) -> str:
-    """A combination as a sum, after its first member: `ZZ_1 + Ia_1 + a_2² m_3`."""
+    """Returns a combination as a sum, after its first member: `ZZ_1 + Ia_1 + a_2² m_3`."""
     text = first
     for one in members:
         sign, size = ("−", one.written[1:]) if one.written.startswith("−") else ("+", one.written)

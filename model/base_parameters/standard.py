@@ -1,9 +1,9 @@
 """Standard parameters of an arm, and the regressor: the columns by which its joint torques depend on them, linearly.
 
 τ = W(q, q̇, q̈) χ (Khalil and Dombre 2002, Modeling, Identification and Control of Robots, chapter 12). A link has ten
-inertial parameters, here about the foot of the common normal on its own joint's axis, the frame in which the textbook
-groups them: z along the axis, x along the common normal to the next axis. A joint has its rotor's inertia, friction and
-a DC motor's damping by its back-EMF.
+inertial parameters. Here they are about the foot of the common normal on its own joint's axis, the frame in which the
+textbook groups them: z along the axis, x along the common normal to the next axis. A joint has its rotor's inertia,
+friction and a DC motor's damping by its back-EMF.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from model.simulation.chain_of_model import chain_of
 OF_LINK = ("m", "MX", "MY", "MZ", "XX", "XY", "XZ", "YY", "YZ", "ZZ")
 """Mass, first moments and moments of inertia of a link, in the order of `ChainArrays.inertial`."""
 OF_JOINT = ("Ia", "Fv", "Ke", "Fc")
-"""Rotor's inertia, viscous friction, damping by back-EMF and Coulomb friction, all as seen at the joint."""
+"""Rotor's inertia, viscous friction, damping by back-EMF and Coulomb friction, all at the joint."""
 WORDS = {
     "m": "mass of a link",
     "MX": "mass times x of its centre (MY, MZ alike), from the foot of the common normal on the link's own joint axis; "
@@ -36,7 +36,7 @@ WORDS = {
     "Fc": "Coulomb friction",
     "a": "Denavit and Hartenberg's length from the joint's axis to the next (d: along the axis)",
 }
-"""What the symbols mean."""
+"""Meanings of the symbols."""
 _DEGREE = dict(zip(OF_LINK, (0, 1, 1, 1, 2, 2, 2, 2, 2, 2), strict=True))
 _MASS_UNITS = ("kg", "kg·m", "kg·m²")
 
@@ -55,13 +55,13 @@ class Standard:
 
     @property
     def symbol(self) -> str:
-        """Such as `ZZ_1`."""
+        """Symbol such as `ZZ_1`."""
         return f"{self.kind}_{self.joint}"
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Samples of a motion, each (k, n), SI. contact: direction of motion as friction has it, in [−1, 1]."""
+    """Samples of a motion, each (k, n), SI. contact: direction of motion for friction, in [−1, 1]."""
 
     position: Floats
     speed: Floats
@@ -70,7 +70,7 @@ class Motion:
 
 
 def link_parameters(joints: int) -> tuple[Standard, ...]:
-    """The ten inertial parameters of every link, base first."""
+    """Returns the ten inertial parameters of every link, base first."""
     return tuple(
         Standard(kind, joint, _MASS_UNITS[_DEGREE[kind]], _DEGREE[kind])
         for joint in range(1, joints + 1)
@@ -79,7 +79,7 @@ def link_parameters(joints: int) -> tuple[Standard, ...]:
 
 
 def joint_parameters(model: Model) -> tuple[Standard, ...]:
-    """Parameters of the joints of a model: a rotor's inertia only where one is stated, back-EMF only of DC motors."""
+    """Returns parameters of the joints of a model: a rotor's inertia only if stated, back-EMF only for DC motors."""
     found, rotors = [], chain_of(model).rotor_inertia
     for number, joint in enumerate(model.machine.modelled_joints, start=1):
         own = model.machine.joint(joint)
@@ -95,7 +95,9 @@ def joint_parameters(model: Model) -> tuple[Standard, ...]:
 
 
 def inertial_regressor(chain: ChainArrays, motion: Motion) -> Floats:
-    """Columns (k, n, 10 n) of joint torques by the links' inertial parameters, in the order of `link_parameters`."""
+    """Returns columns (k, n, 10 n) of joint torques by the links' inertial parameters, in the order of
+    `link_parameters`.
+    """
     joints = chain.geometry.shape[0]
     columns = np.empty((*motion.position.shape, 10 * joints))
     rest = np.zeros(joints)
@@ -115,18 +117,22 @@ def inertial_regressor(chain: ChainArrays, motion: Motion) -> Floats:
 
 
 def to_link_frame(chain: ChainArrays, link: int) -> Floats:
-    """(10, 10) from inertial parameters about the joint's own axis to those about the origin of the link's frame."""
+    """Returns (10, 10) from inertial parameters about the joint's own axis to those about the origin of the link's
+    frame.
+    """
     return np.stack([_moved(chain, link, unit, to_axis=False) for unit in np.eye(10)], axis=1)
 
 
 def about_own_axis(chain: ChainArrays, link: int) -> Floats:
-    """The inertial parameters (10,) of a link about the foot of the common normal on its own joint's axis."""
+    """Returns the inertial parameters (10,) of a link about the foot of the common normal on its own joint's axis."""
     return _moved(chain, link, chain.inertial[link], to_axis=True)
 
 
 def _moved(chain: ChainArrays, link: int, body: Floats, *, to_axis: bool) -> Floats:
-    """A body's ten parameters in the other of its two frames, which a along x and α about x separate, by its 4 × 4
-    pseudo-inertia (Wensing, Kim and Slotine 2018)."""
+    """Transforms a body's ten parameters between its two frames, which differ by a along x and α about x.
+
+    It uses the 4 × 4 pseudo-inertia (Wensing, Kim and Slotine 2018).
+    """
     length, twist = chain.geometry[link, 2:]
     frame = np.eye(4)  # the link's frame in the one at its axis
     frame[1:3, 1:3] = [[np.cos(twist), -np.sin(twist)], [np.sin(twist), np.cos(twist)]]
@@ -144,7 +150,7 @@ def _moved(chain: ChainArrays, link: int, body: Floats, *, to_axis: bool) -> Flo
 
 
 def joint_regressor(parameters: Sequence[Standard], motion: Motion) -> Floats:
-    """Columns (k, n, p) of joint torques by parameters of the joints."""
+    """Returns columns (k, n, p) of joint torques by parameters of the joints."""
     columns = np.zeros((*motion.position.shape, len(parameters)))
     along = {"Ia": motion.acceleration, "Fv": motion.speed, "Ke": motion.speed, "Fc": motion.contact}
     for place, one in enumerate(parameters):
@@ -153,7 +159,7 @@ def joint_regressor(parameters: Sequence[Standard], motion: Motion) -> Floats:
 
 
 def standard_values(model: Model, parameters: Sequence[Standard]) -> Floats:
-    """Values (p,) that a model has for its standard parameters; load and payload belong to the last link."""
+    """Returns values (p,) of a model's standard parameters; load and payload belong to the last link."""
     chain = chain_of(model)
     joints = model.vector[at.SHARED :].reshape(model.joint_count, at.PER_JOINT)
     links = [about_own_axis(chain, link) for link in range(model.joint_count)]

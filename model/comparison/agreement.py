@@ -1,4 +1,4 @@
-"""How far simulated motion is from measured motion, by model, trace and joint."""
+"""Errors of simulated against measured motion, by model, trace and joint."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from daq.contracts.frozen import FrozenRecord
 class JointAgreement(FrozenRecord):
     """One joint over one or more traces.
 
-    `rmse` and `largest` of measured − simulated, `floor` its noise: what the model would leave of records that it had
-    made itself, noise of the sensors included (of speeds: its own). `count`: one count of the sensor, None
-    where it has none. All are in `unit`. `share` is `rmse` divided by the root mean square of the measured motion about
-    its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
+    `rmse` and `largest` are of measured − simulated. `floor` is its noise: the error of records that the model itself
+    makes, sensor noise included (for speeds: only that). `count`: one count of the sensor, None without one. All are in
+    `unit`. `share` is `rmse` divided by the root mean square of the measured motion about its mean: 0 for a perfect
+    model, 1 for one that predicts no motion at all.
     """
 
     joint: int
@@ -38,7 +38,7 @@ class JointAgreement(FrozenRecord):
 
 
 class TraceAgreement(FrozenRecord):
-    """One trace; `held_out` tells whether the model was fitted to it, None where nothing was fitted."""
+    """One trace; `held_out` states whether the model was fitted to it, None if nothing was fitted."""
 
     trace: str
     held_out: bool | None
@@ -52,7 +52,7 @@ class TraceAgreement(FrozenRecord):
 
 
 class ModelAgreement(FrozenRecord):
-    """One model on all traces: `held_out` pools those that are marked so, `in_sample` the others; None for none."""
+    """One model on all traces: `held_out` pools those marked so, `in_sample` the others; None for none."""
 
     label: str
     model: str
@@ -62,13 +62,13 @@ class ModelAgreement(FrozenRecord):
     held_out: tuple[JointAgreement, ...] | None
 
     def mean_squared_error(self, kind: Literal["in_sample", "held_out"]) -> float | None:
-        """MSQE pooled over traces of one kind, rad²; None where there are none."""
+        """Returns the MSQE pooled over traces of one kind, rad²; None if there are none."""
         joints = self.in_sample if kind == "in_sample" else self.held_out
         return None if joints is None else sum(j.rmse**2 for j in joints)
 
 
 def pooled(traces: Sequence[TraceAgreement]) -> tuple[JointAgreement, ...] | None:
-    """Agreement over all samples of all traces, each counting the same; None for no traces."""
+    """Returns the agreement over all samples of all traces, with equal weights; None for no traces."""
     if not traces:
         return None
     total = sum(t.samples for t in traces)

@@ -1,4 +1,4 @@
-"""Simulation of traces with one or more models, and how much of the motion each leaves unexplained."""
+"""Simulates traces with one or more models, and computes how much of the motion each leaves unexplained."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ class TraceSignals:
 
     @property
     def words(self) -> tuple[str, str]:
-        """What the record and the models are to it: efforts are recorded, and predicted from a motion."""
+        """Verbs for the record and the models: efforts are recorded, and predicted from a motion."""
         return ("recorded", "predicted") if self.signal == "effort" else ("measured", "simulated")
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """`models` in numbers and `signals` trace by trace, both in the order they were given in."""
+    """`models` in numbers and `signals` trace by trace, both in the given order."""
 
     models: tuple[ModelAgreement, ...]
     signals: tuple[TraceSignals, ...]
@@ -73,12 +73,12 @@ def compare(
     """Simulates every trace with every model, driven by the controller or by the recorded drive.
 
     Args:
-        models: labels and models, all of the same machine's joints. held_out: identities of traces not fitted to;
-            None where nothing was fitted.
+        models: labels and models, all of the same machine's joints.
+        held_out: identities of traces not fitted to; None if nothing was fitted.
 
     Raises:
         TraceError, SpecError: for traces that cannot be simulated, or models that move different joints.
-        CancelledError: when asked to end.
+        CancelledError: when cancelled.
     """
     cancel = cancel or Never()
     if not models:

@@ -1,4 +1,4 @@
-"""Which parameters of two models differ, and by how much."""
+"""Finds parameters that differ between models, and by how much."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ SAME = 1e-12
 
 
 class ParameterDifference(FrozenRecord):
-    """One parameter with its value in each model, None where a model does not have it.
+    """One parameter with its value in each model, None if a model does not have it.
 
-    `deviations` is the spread of the values in expected deviations; None where a model lacks the
-    parameter or no deviation is expected.
+    `deviations` is the range of the values in expected deviations; None if a model lacks the parameter or no deviation
+    is expected.
     """
 
     name: str
@@ -25,7 +25,7 @@ class ParameterDifference(FrozenRecord):
 
 
 def differences(models: Sequence[Model]) -> tuple[ParameterDifference, ...]:
-    """Parameters whose values differ between models, in the order of the first model that has them."""
+    """Returns parameters whose values differ between models, in the order of the first model that has them."""
     names: dict[str, None] = {}
     for model in models:
         names |= dict.fromkeys(p.name for p in model.parameters)

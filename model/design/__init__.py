@@ -1,1 +1,1 @@
-"""Experiments that make chosen parameters best known, and what a proposed experiment would add."""
+"""Designs experiments that determine chosen parameters best, and predicts the gain of proposed ones."""

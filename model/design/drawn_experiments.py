@@ -1,4 +1,4 @@
-"""Experiments drawn at random within the limits: the candidates of a search for good ones."""
+"""Draws experiments at random within the limits: the candidates of a search for good ones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from daq.contracts.experiment import (
 from daq.contracts.machine import BoardPid, Machine
 
 MARGIN = math.radians(5.0)
-"""Distance that start postures keep from the limits of a joint."""
+"""Distance of start postures from the limits of a joint."""
 AMPLITUDES = (math.radians(4.0), math.radians(25.0))
 """Range of amplitudes, drawn evenly in their logarithm."""
 HIGHEST_FREQUENCIES = (0.5, 2.0)
@@ -32,9 +32,9 @@ SLOW_SPEEDS = (math.radians(2.0), math.radians(8.0))
 
 
 def drawn_experiment(machine: Machine, number: int, duration: float, seed: int) -> ExperimentSpec:
-    """Candidate `number` of a seed: a multisine, slow ramps, or a sequence, at a posture and with gains of its own.
+    """Returns candidate `number` of a seed: a multisine, slow ramps, or a sequence, at a random posture and gains.
 
-    It may lie outside the limits; planning it is then refused.
+    It may exceed the limits; planning then rejects it.
     """
     rng = np.random.default_rng([seed, number])
     kind = KINDS[number % len(KINDS)]
@@ -63,7 +63,9 @@ def _start(rng: np.random.Generator, machine: Machine) -> dict[int, float]:
 
 
 def _gains(rng: np.random.Generator, machine: Machine) -> dict[int, Gain]:
-    """The machine's own gains, with P one step lower or higher on some joints, so that gain can be told from load."""
+    """Returns the machine's own gains, with P one step lower or higher on some joints, so that gain and load can be
+    distinguished.
+    """
     if not isinstance(machine.controller, BoardPid):
         return {}
     gains = {}

@@ -1,7 +1,7 @@
-"""What an experiment will tell about a model's parameters: Fisher information of simulated records.
+"""Predicts the information of an experiment on a model's parameters: Fisher information of simulated records.
 
 Samples are weighted by the sensor's noise alone. The real residual is smaller than that at low frequencies, where the
-loop suppresses it, and larger near the loop's bandwidth, so widths are predicted within a factor of about two.
+loop suppresses it, and larger near the loop's bandwidth. So widths are predicted within a factor of about two.
 """
 
 from __future__ import annotations
@@ -32,13 +32,16 @@ from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 
 Planner = Callable[[ExperimentSpec], Floats]
-"""A function that gives the set points (k, joints of the machine) of an experiment in rad, one row per control period.
-It raises a DaqError of one line for an experiment that the limits of the machine do not allow. The caller supplies it,
-since planning belongs to `daq`."""
+"""Computes the set points (k, joints of the machine) of an experiment in rad, one row per control period.
+
+It raises a DaqError of one line for an experiment that the machine's limits do not allow. The caller supplies it, since
+planning belongs to `daq`.
+"""
 
 FOLLOWING_SHARE = 0.6
 """Largest following error of a design, as a share of the error at which set points pause. It leaves a margin for a real
-arm that is slower than the model."""
+arm that is slower than the model.
+"""
 
 
 class ParameterGain(FrozenRecord):
@@ -51,12 +54,12 @@ class ParameterGain(FrozenRecord):
 
     @property
     def share(self) -> float:
-        """Share of the width that is left."""
+        """Share of the width that remains."""
         return self.after / self.before
 
 
 class InformationGain(FrozenRecord):
-    """What proposed experiments would add. `nats`: half the log of the ratio of the determinants of information."""
+    """Predicted gain of proposed experiments. `nats`: half the log of the ratio of the determinants of information."""
 
     parameters: tuple[ParameterGain, ...]
     nats: float
@@ -70,13 +73,13 @@ def information_gain(
     options: FitOptions | None = None,
     fitted: FitResult | None = None,
 ) -> InformationGain:
-    """How much narrower the intervals would be after the proposed experiments.
+    """Predicts how much narrower the intervals would be after the proposed experiments.
 
     Args:
-        model: stands for the real arm.
-        options: which parameters count (`FitOptions.parameters`). fitted: what is known already; None: the priors.
+        model: used in place of the real arm.
+        options: selects parameters (`FitOptions.parameters`). fitted: prior knowledge; None: the priors.
 
-    Raises SpecError when the experiments are not possible, or the fit was of other parameters.
+    Raises SpecError if the experiments are not possible, or the fit was of other parameters.
     """
     if not specs:
         raise SpecError("no experiments: there is nothing to judge")
@@ -89,7 +92,7 @@ def information_gain(
 
 
 def gain_of(unknowns: Sequence[Unknown], known: Floats, total: Floats) -> InformationGain:
-    """What becomes known between two informations (p, p) in natural sizes."""
+    """Returns the gain between two informations (p, p) in natural sizes."""
     widths = [np.sqrt(np.diag(np.linalg.inv(information))) for information in (known, total)]
     parameters = tuple(
         ParameterGain(name=u.name, unit=u.unit, before=2 * INTERVAL * s * b, after=2 * INTERVAL * s * a)
@@ -99,12 +102,14 @@ def gain_of(unknowns: Sequence[Unknown], known: Floats, total: Floats) -> Inform
 
 
 def log_det(information: Floats) -> float:
-    """Half of the logarithm of the determinant, in nats."""
+    """Returns half of the logarithm of the determinant, in nats."""
     return 0.5 * float(np.linalg.slogdet(information)[1])
 
 
 def prior_information(unknowns: Sequence[Unknown]) -> Floats:
-    """(p, p) information of the priors in natural sizes; without a stated deviation, that of 100 natural sizes."""
+    """Returns (p, p) information of the priors in natural sizes; without a stated deviation, that of 100 natural
+    sizes.
+    """
     precision = prior_precision(tuple(unknowns)) * scales(tuple(unknowns)) ** 2
     return np.diag(np.maximum(precision, 1e-4))
 
@@ -112,9 +117,9 @@ def prior_information(unknowns: Sequence[Unknown]) -> Floats:
 def experiment_information(
     model: Model, spec: ExperimentSpec, plan: Planner, options: FitOptions
 ) -> tuple[tuple[Unknown, ...], Floats]:
-    """Unknowns (nuisances of the experiment itself marginalised) and their information (p, p) in natural sizes.
+    """Returns unknowns (nuisances of the experiment itself marginalised) and their information (p, p) in natural sizes.
 
-    Raises SpecError or SafetyError from the planner, and SpecError when the loop is unstable under it.
+    Raises SpecError or SafetyError from the planner, and SpecError if the loop is unstable.
     """
     trace = imagined_trace(model, spec, plan)
     problem = fit_problem(model, [trace], options)
@@ -128,12 +133,10 @@ def experiment_information(
 
 
 def imagined_trace(model: Model, spec: ExperimentSpec, plan: Planner) -> Trace:
-    """The record that the experiment would give on this model without noise. Raises as the planner does."""
+    """Returns the record that the experiment would give on this model without noise. Raises as the planner does."""
     machine = model.machine
     if isinstance(machine.controller, NoController):
-        raise SpecError(
-            f"machine {machine.name} has no controller: no experiment with set points can be imagined on it"
-        )
+        raise SpecError(f"machine {machine.name} has no controller, so experiments with set points cannot be simulated")
     angles = np.asarray(plan(spec), dtype=np.float64)
     period = machine.controller.period.value
     record = TraceRecord(
@@ -154,7 +157,7 @@ def imagined_trace(model: Model, spec: ExperimentSpec, plan: Planner) -> Trace:
 
 
 def check_followed(model: Model, trace: Trace) -> None:
-    """Raises SpecError when the arm would fall so far behind that set points pause."""
+    """Raises SpecError if the arm would fall so far behind that set points pause."""
     if model.machine.limits.following_error_counts is None:
         return
     assert trace.set_point is not None  # of an imagined trace
@@ -164,8 +167,10 @@ def check_followed(model: Model, trace: Trace) -> None:
 
 
 def falls_behind(machine: Machine, set_points: Floats, error: Floats) -> str | None:
-    """Why set points might pause, where the modelled joints have these errors (k, n) behind their set points (k, n),
-    rad, on an arm that is a little slower; None where they would not."""
+    """Returns why set points might pause on an arm that is slightly slower than the model; None if they would not.
+
+    The modelled joints have these errors (k, n) behind their set points (k, n), rad.
+    """
     most = machine.limits.following_error_counts
     if most is None or isinstance(machine.controller, NoController):
         return None
@@ -187,11 +192,11 @@ def falls_behind(machine: Machine, set_points: Floats, error: Floats) -> str | N
 
 
 def _falls_behind(error: Floats, change: Floats, smooth: float, most: float) -> int | None:
-    """The first sample at which set points might pause on an arm that is slower than the model; None where there is
-    none. All in ADC counts: `error` and `change` of the set point (n,), and the largest change of a smooth motion.
+    """Returns the first sample at which set points might pause on a slower arm than the model; None without one.
 
-    The lag in a smooth motion depends on the arm, so a margin is kept. A step's size does not: it is judged as the
-    runner judges it, by the limit itself, and its error may die away as long as it does not grow again.
+    All in ADC counts: `error` and `change` of the set point (n,), and the largest change of a smooth motion. The lag in
+    a smooth motion depends on the arm, so a margin is kept. A step's size does not. It is judged as the runner judges
+    it, by the limit itself, and its error may decay as long as it does not grow again.
     """
     dying_away = False
     for k in range(len(error)):
@@ -208,7 +213,7 @@ def _falls_behind(error: Floats, change: Floats, smooth: float, most: float) -> 
 
 
 def _marginal(problem: SimulatedProblem, information: Floats) -> tuple[tuple[Unknown, ...], Floats]:
-    """Information about the unknowns of interest; nuisances are marginalised, known as far as their priors say."""
+    """Returns information about the unknowns of interest; nuisances are marginalised with their priors."""
     nuisance = np.array([u.nuisance for u in problem.unknowns])
     own = tuple(u for u in problem.unknowns if not u.nuisance)
     if not nuisance.any():
@@ -220,13 +225,11 @@ def _marginal(problem: SimulatedProblem, information: Floats) -> tuple[tuple[Unk
 
 
 def _fitted_information(unknowns: Sequence[Unknown], fitted: FitResult) -> Floats:
-    """Information (p, p) in natural sizes that a fit left behind, its priors included."""
+    """Returns information (p, p) in natural sizes from a fit, its priors included."""
     rows = []
     for u in unknowns:
         if u.name not in fitted.names:
-            raise SpecError(
-                f"{u.name}: the fit did not find it; fitted were {', '.join(p.name for p in fitted.parameters)}"
-            )
+            raise SpecError(f"{u.name}: was not fitted; fitted were {', '.join(p.name for p in fitted.parameters)}")
         rows.append(fitted.names.index(u.name))
     natural = scales(tuple(unknowns))
     covariance = fitted.covariance_matrix[np.ix_(rows, rows)] / np.outer(natural, natural)

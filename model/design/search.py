@@ -1,4 +1,4 @@
-"""D-optimal choice of experiments: the set that makes the ellipsoid of uncertainty smallest."""
+"""Chooses D-optimal experiments: the set with the smallest ellipsoid of uncertainty."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class DesignOptions(UserRecord):
 
 
 class DesignedExperiments(FrozenRecord):
-    """The chosen experiments, the one that adds most first, and the information that they give together.
+    """The chosen experiments, the most informative first, and their joint information.
 
     `nats[i]` is the information of the first i+1 experiments, beyond that of the priors. `refused` counts candidates
     outside the limits.
@@ -59,13 +59,13 @@ def design(
     progress: Progress = silent,
     cancel: Cancel | None = None,
 ) -> DesignedExperiments:
-    """Experiments within the limits that make the parameters of `fit_options` best known together.
+    """Returns experiments within the limits that together determine the parameters of `fit_options` best.
 
     Greedy choice of the candidate that adds most to log det of the information (priors included), then exchanges as
     long as one helps (Fedorov 1972). The same seed gives the same experiments.
 
     Raises:
-        SpecError: when no candidate is within the limits. CancelledError: when asked to end.
+        SpecError: if no candidate is within the limits. CancelledError: when cancelled.
     """
     options, fit_options, cancel = options or DesignOptions(), fit_options or FitOptions(), cancel or Never()
     specs, informations, refused = [], [], 0
@@ -101,7 +101,7 @@ def design(
 
 
 def best_set(prior: Floats, informations: Sequence[Floats], count: int) -> list[int]:
-    """Indices of `count` different experiments (fewer where there are fewer) with the largest log det together."""
+    """Returns indices of `count` different experiments (or all, if fewer) with the largest joint log det."""
     chosen: list[int] = []
     for _ in range(min(count, len(informations))):
         total = prior + sum(informations[k] for k in chosen)

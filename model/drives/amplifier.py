@@ -1,4 +1,4 @@
-"""The power amplifier and the warming of the winding it feeds."""
+"""The power amplifier, and the warming of its winding."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from model.dynamics.compilation import borrowing
 
 @borrowing
 def motor_volts(command: complex, joint: NDArray[Any]) -> Any:
-    """Volts at the motor for commanded volts: threshold, dead zone, then the supply's limit."""
+    """Returns volts at the motor for commanded volts: threshold, dead zone, then the supply's limit."""
     return clamped(outside(passed(command, joint[at.THRESHOLD]), joint[at.DEAD_ZONE]), joint[at.SUPPLY])
 
 
@@ -23,11 +23,11 @@ def motor_volts(command: complex, joint: NDArray[Any]) -> Any:
 def warmed(
     rise: Any, hot: Any, volts: Any, begun: Any, ended: Any, mean: Any, duration: Any, joint: NDArray[Any]
 ) -> Any:
-    """Relative rise of the winding's resistance after `duration` s at constant volts: heated by i², cooled with a time
-    constant.
+    """Returns the relative rise of the winding's resistance after `duration` s at constant volts.
 
-    i is the settled current for the joint's speeds at the beginning, at the end and on average, through a winding whose
-    rise is `hot` meanwhile. The mean of i² is the square of its mean and the variance of a current that changes evenly.
+    It is heated by i² and cooled with a time constant. i is the settled current for the joint's speeds at the
+    beginning, at the end and on average, through a winding with the rise `hot` meanwhile. The mean of i² is the square
+    of its mean plus the variance of a linearly changing current.
     """
     resistance = joint[at.RESISTANCE] * (1.0 + hot)
     back_emf = back_emf_constant(joint) * joint[at.GEAR]
@@ -40,7 +40,7 @@ def warmed(
 
 @borrowing
 def risen(time: Any, joint: NDArray[Any]) -> Any:
-    """Relative rise of the winding's resistance that time alone has made in `time` s, whatever the current."""
+    """Returns the relative rise of the winding's resistance over `time` s that does not depend on the current."""
     if joint[at.TIMED_RISE] == 0.0:
         return 0.0 * time
     return joint[at.TIMED_RISE] * (1.0 - np.exp(-time / joint[at.RISING_TIME]))

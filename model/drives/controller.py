@@ -16,7 +16,7 @@ POWER_MAX = 127.0
 INTEGRAL_SHARE = 64.0
 """Counts of summed error for one DAC count at I = 1: an assumption, the source does not give the scale."""
 
-# Memory of a controller between periods.
+# State of a controller between periods.
 SUM, LAST_ERROR, INNER_SUM, LAST_INNER_ERROR, LAST_READING = range(5)
 MEMORY = 5
 
@@ -28,9 +28,9 @@ GAINS = 9
 
 @compiled_borrowing
 def board_pid(error: complex, gains: NDArray[Any], joint: NDArray[Any], quantise: bool, memory: NDArray[Any]) -> Any:
-    """Power (DAC counts, ±127) for an error in ADC counts, as the board's integer arithmetic forms it (section 6.2).
+    """Returns the power (DAC counts, ±127) for an error in ADC counts, by the board's integer arithmetic (section 6.2).
 
-    power = P e + ⌊S/64⌋ + D (e − e₋₁), and S grows by I e except further into a limit that is reached.
+    power = P e + ⌊S/64⌋ + D (e − e₋₁), and S grows by I e except beyond an active limit.
     """
     proportional = gains[SCALE] * (1.0 + joint[at.GAIN_ERROR])
     share = memory[SUM] / INTEGRAL_SHARE
@@ -49,7 +49,7 @@ def board_pid(error: complex, gains: NDArray[Any], joint: NDArray[Any], quantise
 
 @compiled_borrowing
 def linear_board_pid(error: complex, gains: NDArray[Any], memory: NDArray[Any]) -> Any:
-    """The same without rounding, limit and wrong gain."""
+    """Returns the same without rounding, limit and wrong gain."""
     power = gains[SCALE] * (gains[P] * error + memory[SUM] / INTEGRAL_SHARE + gains[D] * (error - memory[LAST_ERROR]))
     memory[SUM] += gains[I] * error
     memory[LAST_ERROR] = error
@@ -58,13 +58,13 @@ def linear_board_pid(error: complex, gains: NDArray[Any], memory: NDArray[Any]) 
 
 @compiled_borrowing
 def outside_band(error: complex, gains: NDArray[Any]) -> Any:
-    """The error that a sampled controller acts on: none within its dead band."""
+    """Returns the error that a sampled controller uses: zero within its dead band."""
     return 0.0 * error if abs(error.real) <= gains[DEAD_BAND].real else error
 
 
 @compiled_borrowing
 def sampled_pid(error: complex, period: complex, gains: NDArray[Any], memory: NDArray[Any]) -> Any:
-    """P e + I ∫e dt + D de/dt in SI units, rectangles for the integral and a backward difference."""
+    """Returns P e + I ∫e dt + D de/dt in SI units, with rectangles for the integral and a backward difference."""
     memory[SUM] += error * period
     slope = (error - memory[LAST_ERROR]) / period
     memory[LAST_ERROR] = error
@@ -73,7 +73,9 @@ def sampled_pid(error: complex, period: complex, gains: NDArray[Any], memory: ND
 
 @compiled_borrowing
 def cascade(error: complex, speed: complex, period: complex, gains: NDArray[Any], memory: NDArray[Any]) -> Any:
-    """Outer PID on position gives a speed set point, inner PID on speed gives the drive; SI units."""
+    """Returns the drive of a cascade in SI units: an outer PID on position gives a speed set point for an inner PID on
+    speed.
+    """
     inner_error = sampled_pid(error, period, gains, memory) - speed
     memory[INNER_SUM] += inner_error * period
     slope = (inner_error - memory[LAST_INNER_ERROR]) / period
@@ -91,8 +93,10 @@ def given_out(
     quantise: bool,
     memory: NDArray[Any],
 ) -> Any:
-    """The drive for a sampled controller's output: rounded to its resolution, then limited. At the limit the error is
-    not integrated further into it."""
+    """Returns the drive for a sampled controller's output: rounded to its resolution, then limited.
+
+    At the limit the error is not integrated beyond it.
+    """
     resolution = gains[RESOLUTION]
     if quantise and resolution > 0.0:
         output = resolution * rounded_half_up(output / resolution)

@@ -1,4 +1,4 @@
-"""A DC motor's two constants. Both are in proportion to the flux of its one magnet, so they weaken together."""
+"""A DC motor's two constants. Both are proportional to the flux of its magnet, so they weaken together."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from model.dynamics.compilation import inlined
 
 @inlined
 def torque_constant(joint: NDArray[Any]) -> Any:
-    """N·m/A, with the flux that is left."""
+    """Returns N·m/A, with the remaining flux."""
     return joint[at.TORQUE_CONSTANT] * (1.0 - joint[at.FLUX_LOSS])
 
 
 @inlined
 def back_emf_constant(joint: NDArray[Any]) -> Any:
-    """V·s/rad, with the flux that is left."""
+    """Returns V·s/rad, with the remaining flux."""
     return joint[at.BACK_EMF] * (1.0 - joint[at.FLUX_LOSS])

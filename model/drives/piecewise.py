@@ -1,4 +1,4 @@
-"""Functions with corners, for real and for dual numbers: comparisons look at the real part alone."""
+"""Functions with corners, for real and for dual numbers: comparisons use only the real part."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ import numpy as np
 from model.dynamics.compilation import inlined
 
 EDGE = 0.1
-"""Width of the edge by which a jump is differentiated, in thresholds. So wide that a record has samples within it: a
-drive that swings evenly by ten thresholds has one in a hundred there."""
+"""Width of the edge that replaces a jump in derivatives, in thresholds. It is wide enough for a record to have samples
+within it: a drive that swings evenly by ten thresholds has one in a hundred there.
+"""
 
 
 @inlined
 def magnitude(x: Any) -> Any:
-    """|x|, with the derivative sign(x)."""
+    """Returns |x|, with the derivative sign(x)."""
     return x if x.real >= 0.0 else -x
 
 
 @inlined
 def clamped(x: Any, limit: Any) -> Any:
-    """x within ±limit (limit ≥ 0)."""
+    """Returns x within ±limit (limit ≥ 0)."""
     if x.real > limit.real:
         return limit + 0.0 * x
     if x.real < -limit.real:
@@ -31,7 +32,7 @@ def clamped(x: Any, limit: Any) -> Any:
 
 @inlined
 def outside(x: Any, half_width: Any) -> Any:
-    """The part of x beyond ±half_width; zero inside."""
+    """Returns the part of x beyond ±half_width; zero inside."""
     if x.real > half_width.real:
         return x - half_width
     if x.real < -half_width.real:
@@ -41,9 +42,9 @@ def outside(x: Any, half_width: Any) -> Any:
 
 @inlined
 def passed(x: Any, threshold: Any) -> Any:
-    """x where |x| is above a threshold (≥ 0), else zero.
+    """Returns x if |x| exceeds a threshold (≥ 0), else zero.
 
-    A jump has no derivative of use to a fit; the derivative is that of a straight edge of `EDGE` thresholds instead.
+    The derivative of a jump is of no use to a fit; that of a straight edge of `EDGE` thresholds replaces it.
     """
     size = magnitude(x)
     result = x + 0.0 * threshold
@@ -59,5 +60,5 @@ def passed(x: Any, threshold: Any) -> Any:
 
 @inlined
 def rounded_half_up(x: Any) -> Any:
-    """floor(x + 1/2): the project's one rounding rule. Its derivative is taken as zero."""
+    """Returns floor(x + 1/2), the project's only rounding rule. Its derivative is set to zero."""
     return np.floor(x.real + 0.5) + 0.0 * x

@@ -1,4 +1,4 @@
-"""What the controller reads of a joint's angle: a potentiometer with its errors, and the converter."""
+"""The controller's reading of a joint's angle: a potentiometer with its errors, and the converter."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from model.dynamics.dual import sin_cos
 
 @compiled_borrowing
 def sensed_angle(angle: complex, joint: NDArray[Any]) -> Any:
-    """Angle (rad) that the potentiometer reports: scale, shift and bend about the middle of its range."""
+    """Returns the potentiometer's angle (rad): scale, shift and bend about the middle of its range."""
     middle = joint[at.AT_ZERO] + 0.5 * joint[at.RANGE]
     sensed = angle + joint[at.POTENTIOMETER_GAIN] * (angle - middle) + joint[at.POTENTIOMETER_OFFSET]
     bent = False
@@ -33,9 +33,9 @@ def sensed_angle(angle: complex, joint: NDArray[Any]) -> Any:
 
 @compiled_borrowing
 def reading(angle: complex, noise: float, quantise: bool, joint: NDArray[Any]) -> Any:
-    """Reading in counts (12 bits on the MA2000), or rad where the joint has no converter.
+    """Returns the reading in counts (12 bits on the MA2000), or rad if the joint has no converter.
 
-    `noise` (same unit) is added before rounding. Without `quantise` rounding is the identity.
+    `noise` (same unit) is added before rounding. If `quantise` is False, nothing is rounded.
     """
     sensed = sensed_angle(angle, joint)
     if joint[at.RAD_PER_COUNT].real == 0.0:

@@ -1,11 +1,11 @@
-"""Compiles the functions of the model, and decides where their machine code is kept.
+"""Compiles the functions of the model, and decides where their machine code is stored.
 
-numba decides whether cached code is still valid by the source file of the function alone, not by the files of
-the functions it calls: after an edit of the dynamics it would go on running the old dynamics inside an
-unchanged simulation kernel. The machine code of a function is therefore kept in a folder named by a hash of its
-module and of every module of ours that this one reaches by imports: an edit of any of them gives a fresh folder, an
-edit of a report does not. What is compiled must take functions and constants by import, never by name at run time.
-Since that name tells all, it does not matter where the sources lie: another clone of them finds the same machine code.
+numba checks cached code only against the source file of the function, not the files of the functions that it calls.
+After an edit of the dynamics it would still run the old dynamics inside an unchanged simulation kernel. The machine
+code of a function is therefore in a folder named by a hash of its module and of all our modules that it imports,
+directly or not. An edit of any of them gives a new folder; an edit of a report does not. Compiled functions must import
+their functions and constants, never look them up by name at run time. Since the hash identifies all sources, their
+location does not matter: another clone finds the same machine code.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvid
 from daq.contracts.file_lock import take_lock
 
 CACHE_DAYS = 30
-"""Caches of older sources that have not been written for this long are removed."""
+"""Time after which caches of older sources that are no longer written are removed."""
 
 PACKAGES = ("model", "daq", "firmware_protocol")
 """Our packages that compiled code may import from. numba itself watches its own version and the processor."""
@@ -42,8 +42,9 @@ _numba_settings: Any = numba.config
 
 
 def _cache_folder() -> Path:
-    """The folder of compiled code: numba's own setting, or this user's; of a user without a home, one that cannot be
-    written."""
+    """Returns the folder of compiled code: numba's own setting, or this user's; for a user without a home, one that
+    cannot be written.
+    """
     try:
         return Path(_numba_settings.CACHE_DIR or platformdirs.user_cache_path("ma2000-daq") / "compiled")
     except RuntimeError:
@@ -54,9 +55,10 @@ _PARENT = _cache_folder()
 
 
 def dependencies(module: str, root: Path = _ROOT) -> dict[str, Path]:
-    """Sources that a module of ours reaches by imports, itself and the packages around them included, by name.
+    """Returns sources that a module of ours imports, directly or not, with itself and the packages around them, by
+    name.
 
-    Imports inside functions and for type checking count too. Empty for a module that does not lie below `root`.
+    Imports inside functions and for type checking count too. Empty for a module outside `root`.
     """
     found: dict[str, Path] = {}
     to_do = [module]
@@ -70,7 +72,7 @@ def dependencies(module: str, root: Path = _ROOT) -> dict[str, Path]:
 
 
 def source_hash(module: str, root: Path = _ROOT) -> str:
-    """Hash of the sources that a module reaches, names included, as 16 hexadecimal digits.
+    """Returns the hash of the sources that a module imports, names included, as 16 hexadecimal digits.
 
     For a module outside the project, such as a user's own: hash of its file, if it is imported, and of all of `model`.
     """
@@ -89,9 +91,9 @@ def source_hash(module: str, root: Path = _ROOT) -> str:
 
 @cache
 def cache_folder(module: str) -> Path:
-    """Folder of the compiled code of a module as it is now; NUMBA_CACHE_DIR, where set, moves its parent.
+    """Returns the folder of the compiled code of a module; NUMBA_CACHE_DIR, if set, moves its parent.
 
-    It does not exist where it cannot be made.
+    It may not exist if it cannot be created.
     """
     folder = _PARENT / source_hash(module)
     with suppress(OSError):
@@ -103,9 +105,9 @@ def cache_folder(module: str) -> Path:
 
 @contextmanager
 def one_process_at_a_time(module: str) -> Iterator[None]:
-    """While one process compiles a module's functions, others wait: they then find them on disk.
+    """While one process compiles a module's functions, others wait and then find them on disk.
 
-    Where the file system has no room for the lock or refuses it, each compiles by itself.
+    If the file system has no room for the lock or refuses it, each compiles by itself.
     """
     with ExitStack() as held:
         with suppress(OSError):
@@ -115,7 +117,7 @@ def one_process_at_a_time(module: str) -> Iterator[None]:
 
 
 def _source(module: str, root: Path) -> Path | None:
-    """File of a module or a package; None where the name is that of something inside a module."""
+    """Returns the file of a module or a package; None for a name inside a module."""
     path = root.joinpath(*module.split("."))
     return next((p for p in (path.with_suffix(".py"), path / "__init__.py") if p.is_file()), None)
 
@@ -145,7 +147,7 @@ def _remove_old(parent: Path, before: float) -> None:
 
 
 class SharedCacheLocator(UserProvidedCacheLocator):
-    """Tells numba where to keep machine code: for sources of ours by their place in the project, not on the disk."""
+    """Tells numba where to store machine code: for our sources by their place in the project, not on the disk."""
 
     def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
         """Below the folder of the function's module."""
@@ -155,7 +157,7 @@ class SharedCacheLocator(UserProvidedCacheLocator):
 
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> SharedCacheLocator:
-        """Also where the folder cannot be written to: what it has is read."""
+        """Accepts the folder also if it cannot be written: its content is read."""
         return cls(py_func, py_file)
 
     @classmethod
@@ -168,27 +170,27 @@ class SharedCacheLocator(UserProvidedCacheLocator):
         return ".".join(path.relative_to(_ROOT).parts[:-1])
 
     def get_source_stamp(self) -> str:
-        """Of the content of the function's file; older versions of numba take its time."""
+        """Returns a stamp of the content of the function's file; older versions of numba use its time."""
         return hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
 
 
 class _SharedCacheFiles(CompileResultCacheImpl):
-    _locator_classes = [SharedCacheLocator]  # numba declares it so
+    _locator_classes = [SharedCacheLocator]  # numba declares this type
 
 
 class SharedCache(FunctionCache):
-    """A function's machine code on disk. Where the disk refuses to read or write it, this process does without."""
+    """A function's machine code on disk. If the disk refuses reading or writing, this process works without."""
 
     _impl_class = _SharedCacheFiles
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Compiled code for the signature; None where the disk has none."""
+        """Returns compiled code for the signature; None if the disk has none."""
         with suppress(OSError):
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keeps compiled code; where that fails, one line on standard error says so for all functions."""
+        """Stores compiled code; if that fails, one line on standard error says so for all functions."""
         try:
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
         except OSError as error:
@@ -197,17 +199,20 @@ class SharedCache(FunctionCache):
 
 @cache
 def _tell_once(reason: str) -> None:
-    """Says that nothing is cached: by the process that a person has started, not by each of its workers as well."""
+    """Reports that nothing is cached, only from the process that a person has started, not from its workers."""
     if multiprocessing.parent_process() is None:
         sys.stderr.write(
-            f"Compiled code cannot be kept in {_PARENT} ({reason}): every start compiles it again, some 20 s. "
-            "Set NUMBA_CACHE_DIR to a folder that can be written to.\n"
+            f"Compiled code cannot be stored in {_PARENT} ({reason}): every start compiles it again (20 s). "
+            "Set NUMBA_CACHE_DIR to a writable folder.\n"
         )
 
 
 def _compile(function: Callable[..., Any], *, cached: bool, **options: Any) -> Any:
-    """Compiles so that division by zero gives inf or nan instead of raising, and a product may be fused with a sum, as
-    a C compiler does with -march=native. So results repeat to the bit on one machine, not across machines."""
+    """Compiles so that division by zero gives inf or nan, and a product may be fused with a sum, as in C with
+    -march=native.
+
+    Results thus repeat exactly on one machine, but not across machines.
+    """
     dispatcher: Any = numba.njit(error_model="numpy", fastmath={"contract"}, **options)(function)
     if cached and not _numba_settings.DISABLE_JIT:
         dispatcher._cache = SharedCache(function)  # type: ignore[no-untyped-call]  # what its enable_caching does, with numba's own cache
@@ -228,28 +233,30 @@ def compiled_borrowing(function: Callable[..., Any]) -> Any:
 
 
 def internal(function: Callable[..., Any]) -> Any:
-    """Compiles a function that only compiled code calls: no entry from Python, and kept only within its callers."""
+    """Compiles a function that only compiled code calls: without an entry from Python, and stored only within its
+    callers.
+    """
     return _compile(function, cached=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 def borrowing(function: Callable[..., Any]) -> Any:
     """Compiles, like `internal`, a function that neither makes nor returns an array.
 
-    It borrows its caller's arrays and counts no references to them. Counting took longer than the arithmetic of a
-    control period, which is handed some twenty arrays. numba refuses to compile one that makes an array after all.
+    It borrows its caller's arrays without counting references to them. Counting took longer than the arithmetic of a
+    control period, which gets about twenty arrays. numba rejects one that makes an array after all.
     """
     return _compile(function, cached=False, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Compiles a small scalar function that must disappear into its caller."""
+    """Compiles a small scalar function that must be inlined into its caller."""
     return _compile(function, cached=False, forceinline=True)
 
 
 def _import_without_looking_for_blas() -> None:
-    """Keeps numba from importing scipy.linalg in search of a BLAS, which takes a fifth of the time of a first use.
+    """Prevents numba from importing scipy.linalg in search of a BLAS, which takes a fifth of the time of a first use.
 
-    Nothing here uses one; a user's own effect that multiplies matrices imports it again by itself.
+    Nothing here needs one; a user's effect that multiplies matrices imports it automatically.
     """
     name = "scipy.linalg.cython_blas"
     if name in sys.modules:

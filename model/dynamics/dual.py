@@ -17,11 +17,11 @@ from numba.extending import overload
 
 from model.dynamics.compilation import inlined
 
-# numba asks that an overload and its implementations agree in their annotations, hence Any throughout.
+# numba requires that an overload and its implementations have equal annotations, hence Any throughout.
 _OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}}
 
 DUAL_STEP = 1e-20
-"""Imaginary part that stands for a unit derivative; its square is far below the rounding of any quantity."""
+"""Imaginary part that represents a unit derivative; its square is far below the rounding of any quantity."""
 
 LARGEST_ANGLE = 1e5
 """Up to here, in rad, sine and cosine are right to 2.3e-16. Joints turn a few radians."""
@@ -62,7 +62,7 @@ def _sin_cos_real(x: float) -> tuple[float, float]:
 
 
 def sin_cos(x: float | complex) -> tuple[Any, Any]:
-    """Sine and cosine of an angle in rad, |x| ≤ `LARGEST_ANGLE`."""
+    """Returns sine and cosine of an angle in rad, |x| ≤ `LARGEST_ANGLE`."""
     if isinstance(x, complex):
         s, c = math.sin(x.real), math.cos(x.real)
         return complex(s, x.imag * c), complex(c, -x.imag * s)
@@ -70,7 +70,7 @@ def sin_cos(x: float | complex) -> tuple[Any, Any]:
 
 
 def reciprocal(x: float | complex) -> Any:
-    """1 / x."""
+    """Returns 1 / x."""
     if isinstance(x, complex):
         r = 1.0 / x.real
         return complex(r, -x.imag * r * r)

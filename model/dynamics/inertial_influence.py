@@ -1,8 +1,8 @@
-"""Which inertial parameters of which link act on which joint (thesis 5.2, tables 5.1 to 5.3).
+"""Finds which inertial parameters of which link act on which joint (thesis 5.2, tables 5.1 to 5.3).
 
 The parameters are those of (5.3): mass, centre of mass c̄ and inertia I* of a link about the joint that carries it, in
-link axes. Their effect on the joint torques is differentiated exactly, state by state, so that the tables of the
-source can be compared with its own model.
+link axes. Their effect on the joint torques is differentiated exactly, state by state, so that the tables of the source
+can be compared with its own model.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ State = tuple[FloatArray, FloatArray, FloatArray]
 
 
 def torque_sensitivities(chain: Chain, state: State) -> FloatArray:
-    """∂τ/∂parameter at one state, (n torques, n links, 10 parameters), in SI units.
+    """Returns ∂τ/∂parameter at one state, (n torques, n links, 10 parameters), in SI units.
 
     Raises:
         ChainError: if a joint is prismatic; the joint that carries such a link is not a point of it.
@@ -47,7 +47,7 @@ def torque_sensitivities(chain: Chain, state: State) -> FloatArray:
 
 
 def acting_parameters(chain: Chain, states: Iterable[State]) -> list[list[str]]:
-    """Names of the parameters that act on each joint's torque in any of the states, such as "m3" or "I2zz".
+    """Returns names of the parameters that act on each joint's torque in any of the states, such as "m3" or "I2zz".
 
     One list per joint, in the order of the links. Raises as `torque_sensitivities`.
     """
@@ -60,13 +60,15 @@ def acting_parameters(chain: Chain, states: Iterable[State]) -> list[list[str]]:
 
 
 def parameter_name(link: int, which: int) -> str:
-    """Name of a parameter with its link's number: m3, c3x, I3yy."""
+    """Returns the name of a parameter with its link's number: m3, c3x, I3yy."""
     name = PARAMETERS[which]
     return f"{name[0]}{link}{name[1:]}"
 
 
 def parameters_about_joint(chain: Chain, link: int) -> FloatArray:
-    """m, c̄ and I* of a link (numbered from 1, load included in the last) about the joint that carries it, (10,)."""
+    """Returns m, c̄ and I* of a link (numbered from 1, load included in the last) about the joint that carries it,
+    (10,).
+    """
     arrays = chain.arrays()
     body = arrays.inertial[link - 1]
     shift = _origin_from_joint(chain, link)
@@ -76,7 +78,7 @@ def parameters_about_joint(chain: Chain, link: int) -> FloatArray:
 
 
 def _with_parameters(chain: Chain, parameters: NDArray[np.complex128]) -> ChainArrays:
-    """Packed chain in dual numbers with its links' parameters about their joints replaced."""
+    """Returns the packed chain in dual numbers with its links' parameters about their joints replaced."""
     packed = chain.arrays(np.complex128)
     for i, (mass, *centre) in enumerate(parameters[:, :4]):
         shift = _origin_from_joint(chain, i + 1)
@@ -86,14 +88,14 @@ def _with_parameters(chain: Chain, parameters: NDArray[np.complex128]) -> ChainA
 
 
 def _steiner(mass: complex, first: NDArray, shift: FloatArray) -> NDArray:
-    """What an inertia gains when its reference point moves by −shift, as xx xy xz yy yz zz."""
+    """Returns the increase of an inertia when its reference point moves by −shift, as xx xy xz yy yz zz."""
     along = 2.0 * (first @ shift) + mass * (shift @ shift)
     gain = along * np.eye(3) - np.outer(first, shift) - np.outer(shift, first) - mass * np.outer(shift, shift)
     return np.asarray(gain[np.triu_indices(3)])
 
 
 def _origin_from_joint(chain: Chain, link: int) -> FloatArray:
-    """Origin of a link's frame from the one before, in link axes: p of (7.11) to (7.13)."""
+    """Returns the origin of a link's frame from the previous one, in link axes: p of (7.11) to (7.13)."""
     joint = chain.joints[link - 1]
     return np.array([joint.a, joint.d * np.sin(joint.alpha), joint.d * np.cos(joint.alpha)])
 

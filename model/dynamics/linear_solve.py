@@ -26,9 +26,9 @@ def solve_3(
     b2: complex,
     b3: complex,
 ) -> Any:
-    """Solution (x1, x2, x3) of a symmetric 3 × 3 system; one pivot, then a 2 × 2 system by its determinant.
+    """Returns the solution (x1, x2, x3) of a symmetric 3 × 3 system: one pivot, then a 2 × 2 system by its determinant.
 
-    It has two divisions instead of three: they are its slowest instructions.
+    It has two divisions instead of three; they are its slowest instructions.
     """
     pivot = reciprocal(d11)
     l2 = d12 * pivot

@@ -23,8 +23,8 @@ from model.kinematics.chain import ChainArrays
 
 Array = NDArray[Any]
 
-# Columns of the table that a recursion keeps per link: sine and cosine of θ and α, then the origin of the
-# frame from the one before it, in own axes (p), then force and moment about the frame's origin.
+# Columns of the table that a recursion keeps per link: sine and cosine of θ and α, then the origin of the frame from
+# the previous one, in own axes (p), then force and moment about the frame's origin.
 _ST, _CT, _SA, _CA, _P, _F, _N = 0, 1, 2, 3, 4, 7, 10
 _COLUMNS = 13
 
@@ -36,7 +36,7 @@ def _cross(ax: complex, ay: complex, az: complex, bx: complex, by: complex, bz: 
 
 @inlined
 def _to_link(table: Array, i: int, x: complex, y: complex, z: complex) -> Any:
-    """Components of a vector in link axes, from those in the axes of the frame before (transpose of 3.8)."""
+    """Returns components of a vector in link axes, from those in the axes of the previous frame (transpose of 3.8)."""
     turned_x = table[i, _CT] * x + table[i, _ST] * y
     turned_y = table[i, _CT] * y - table[i, _ST] * x
     return turned_x, table[i, _CA] * turned_y + table[i, _SA] * z, table[i, _CA] * z - table[i, _SA] * turned_y
@@ -44,7 +44,7 @@ def _to_link(table: Array, i: int, x: complex, y: complex, z: complex) -> Any:
 
 @inlined
 def _to_previous(table: Array, i: int, x: complex, y: complex, z: complex) -> Any:
-    """Components in the axes of the frame before, from those in link axes (3.8)."""
+    """Returns components in the axes of the previous frame, from those in link axes (3.8)."""
     tilted_y = table[i, _CA] * y - table[i, _SA] * z
     tilted_z = table[i, _SA] * y + table[i, _CA] * z
     return table[i, _CT] * x - table[i, _ST] * tilted_y, table[i, _ST] * x + table[i, _CT] * tilted_y, tilted_z
@@ -52,7 +52,7 @@ def _to_previous(table: Array, i: int, x: complex, y: complex, z: complex) -> An
 
 @inlined
 def _tensor_times(body: Array, i: int, x: complex, y: complex, z: complex) -> Any:
-    """Product of the tensor in columns 4 to 9 (xx xy xz yy yz zz) of row i with a vector."""
+    """Multiplies the tensor in columns 4 to 9 (xx xy xz yy yz zz) of row i by a vector."""
     return (
         body[i, 4] * x + body[i, 5] * y + body[i, 6] * z,
         body[i, 5] * x + body[i, 7] * y + body[i, 8] * z,
@@ -62,7 +62,7 @@ def _tensor_times(body: Array, i: int, x: complex, y: complex, z: complex) -> An
 
 @compiled
 def _link_table(chain: ChainArrays, q: Array) -> Array:
-    """(n, 13) table with the geometry columns filled for the posture `q`."""
+    """Returns the (n, 13) table with the geometry columns filled for the posture `q`."""
     n = q.shape[0]
     table = np.empty((n, _COLUMNS), dtype=q.dtype)
     for i in range(n):
@@ -81,7 +81,7 @@ def _link_table(chain: ChainArrays, q: Array) -> Array:
 
 @compiled
 def newton_euler(chain: ChainArrays, q: Array, velocity: Array, acceleration: Array, gravity: Array) -> Array:
-    """Joint torques or forces for a given motion (appendix B; 3.30 to 3.39).
+    """Returns joint torques or forces for a given motion (appendix B; 3.30 to 3.39).
 
     Args:
         chain: packed chain.
@@ -100,7 +100,7 @@ def newton_euler(chain: ChainArrays, q: Array, velocity: Array, acceleration: Ar
 
 @compiled
 def _forward(chain: ChainArrays, table: Array, velocity: Array, acceleration: Array, gravity: Array) -> None:
-    """Velocities and accelerations from the base outwards; leaves each link's own force and moment."""
+    """Computes velocities and accelerations from the base outwards, and each link's own force and moment."""
     zero = 0.0 * gravity[0]
     wx, wy, wz = zero, zero, zero
     ux, uy, uz = zero, zero, zero  # angular acceleration
@@ -145,7 +145,7 @@ def _turning_acceleration(
     y: complex,
     z: complex,
 ) -> Any:
-    """ω̇ × r + ω × (ω × r)."""
+    """Returns ω̇ × r + ω × (ω × r)."""
     ax, ay, az = _cross(ux, uy, uz, x, y, z)
     bx, by, bz = _cross(wx, wy, wz, x, y, z)
     cx, cy, cz = _cross(wx, wy, wz, bx, by, bz)
@@ -154,7 +154,7 @@ def _turning_acceleration(
 
 @compiled
 def _backward(chain: ChainArrays, table: Array, acceleration: Array) -> Array:
-    """Sum forces and moments from the end inwards and project them on the joint axes (3.37 to 3.39)."""
+    """Sums forces and moments from the end inwards and projects them on the joint axes (3.37 to 3.39)."""
     n = acceleration.shape[0]
     torque = np.empty_like(acceleration)
     zero = 0.0 * acceleration[0]
@@ -172,7 +172,7 @@ def _backward(chain: ChainArrays, table: Array, acceleration: Array) -> Array:
 
 @inlined
 def _add_to_previous(table: Array, bodies: Array, i: int) -> None:
-    """Add body i + 1, given in frame i + 1 (about its origin), to body i in frame i; the joint between is i."""
+    """Adds body i + 1, given in frame i + 1 (about its origin), to body i in frame i; the joint between is i."""
     k = i + 1
     mass = bodies[k, 0]
     px, py, pz = table[i, _P], table[i, _P + 1], table[i, _P + 2]
@@ -214,7 +214,7 @@ def _add_to_previous(table: Array, bodies: Array, i: int) -> None:
 
 @compiled
 def _composites(chain: ChainArrays, table: Array) -> Array:
-    """(n + 1, 10): row i is link i with everything beyond it as one rigid body, in frame i about its origin.
+    """Returns (n + 1, 10): row i is link i with everything beyond it as one rigid body, in frame i about its origin.
 
     Links are numbered from 1; row 0 is the whole arm in the base frame.
     """
@@ -230,7 +230,7 @@ def _composites(chain: ChainArrays, table: Array) -> Array:
 
 @inlined
 def _unit_acceleration_wrench(prismatic: bool, table: Array, bodies: Array, j: int) -> Any:
-    """Force and moment, in link axes about its origin, that give joint j of the composite unit acceleration."""
+    """Returns force and moment, in link axes about its origin, that give joint j of the composite unit acceleration."""
     k = j + 1
     mass, sx, sy, sz = bodies[k, 0], bodies[k, 1], bodies[k, 2], bodies[k, 3]
     zy, zz = table[j, _SA], table[j, _CA]  # the joint's axis in link axes; its x component is zero
@@ -267,20 +267,20 @@ def _mass_matrix(chain: ChainArrays, table: Array) -> Array:
 
 @compiled
 def mass_matrix(chain: ChainArrays, q: Array) -> Array:
-    """D(q) by composite bodies (Walker and Orin 1982), (n, n), reflected rotor inertia on the diagonal."""
+    """Returns D(q) by composite bodies (Walker and Orin 1982), (n, n), reflected rotor inertia on the diagonal."""
     return _mass_matrix(chain, _link_table(chain, q))
 
 
 @compiled
 def gravity_torques(chain: ChainArrays, q: Array) -> Array:
-    """G(q): rates and accelerations zero, (n,)."""
+    """Returns G(q): rates and accelerations zero, (n,)."""
     rest = np.zeros_like(q)
     return newton_euler(chain, q, rest, rest, chain.gravity)
 
 
 @compiled
 def gravity_along(chain: ChainArrays, positions: Array) -> Array:
-    """G(q) at every row of positions, (k, n)."""
+    """Returns G(q) at every row of positions, (k, n)."""
     found = np.empty_like(positions)
     for k in range(positions.shape[0]):
         found[k] = gravity_torques(chain, positions[k])
@@ -289,19 +289,19 @@ def gravity_along(chain: ChainArrays, positions: Array) -> Array:
 
 @compiled
 def velocity_torques(chain: ChainArrays, q: Array, velocity: Array) -> Array:
-    """H(q, q̇), Coriolis and centrifugal: accelerations and gravity zero, (n,)."""
+    """Returns H(q, q̇), Coriolis and centrifugal: accelerations and gravity zero, (n,)."""
     return newton_euler(chain, q, velocity, np.zeros_like(q), np.zeros_like(chain.gravity))
 
 
 @compiled
 def inverse_dynamics(chain: ChainArrays, q: Array, velocity: Array, acceleration: Array) -> Array:
-    """τ = D(q) q̈ + H(q, q̇) + G(q) (3.40), (n,)."""
+    """Returns τ = D(q) q̈ + H(q, q̇) + G(q) (3.40), (n,)."""
     return newton_euler(chain, q, velocity, acceleration, chain.gravity)
 
 
 @compiled
 def inverse_dynamics_along(chain: ChainArrays, positions: Array, velocities: Array, accelerations: Array) -> Array:
-    """τ at every row of a motion, (k, n) each."""
+    """Returns τ at every row of a motion, (k, n) each."""
     found = np.empty_like(positions)
     for k in range(positions.shape[0]):
         found[k] = inverse_dynamics(chain, positions[k], velocities[k], accelerations[k])
@@ -310,7 +310,7 @@ def inverse_dynamics_along(chain: ChainArrays, positions: Array, velocities: Arr
 
 @compiled
 def forward_dynamics(chain: ChainArrays, q: Array, velocity: Array, torque: Array) -> Array:
-    """q̈ for given joint torques or forces, (n,); inf or nan where D(q) is singular."""
+    """Returns q̈ for given joint torques or forces, (n,); inf or nan if D(q) is singular."""
     table = _link_table(chain, q)
     rest = np.zeros_like(q)
     _forward(chain, table, velocity, rest, chain.gravity)
@@ -322,7 +322,7 @@ def forward_dynamics(chain: ChainArrays, q: Array, velocity: Array, torque: Arra
 
 @compiled
 def kinetic_energy(chain: ChainArrays, q: Array, velocity: Array) -> Any:
-    """½ q̇ᵀ D(q) q̇, rotors included, J."""
+    """Returns ½ q̇ᵀ D(q) q̇, rotors included, J."""
     matrix = mass_matrix(chain, q)
     total = 0.0 * velocity[0]
     for i in range(q.shape[0]):
@@ -333,6 +333,6 @@ def kinetic_energy(chain: ChainArrays, q: Array, velocity: Array) -> Any:
 
 @compiled
 def potential_energy(chain: ChainArrays, q: Array) -> Any:
-    """Energy in the field of gravity, zero for mass at the base's origin, J."""
+    """Returns the energy in the field of gravity, zero for mass at the base's origin, J."""
     whole = _composites(chain, _link_table(chain, q))[0]
     return -(chain.gravity[0] * whole[1] + chain.gravity[1] * whole[2] + chain.gravity[2] * whole[3])

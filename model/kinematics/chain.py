@@ -1,7 +1,7 @@
 """A serial chain of revolute or prismatic joints, as data.
 
-The chain is what every dynamics routine starts from. It is immutable and does no more than check
-itself and pack its numbers into the arrays that compiled code reads.
+Every dynamics routine starts from a chain. It is immutable, validates itself, and packs its values into the arrays that
+compiled code reads.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ STANDARD_GRAVITY = 9.80665
 
 
 class ChainError(ValueError):
-    """A chain that cannot exist; the message names the link or joint, the value and what is allowed."""
+    """A physically impossible chain; the message names the link or joint, the value and what is allowed."""
 
 
 class JointKind(Enum):
-    """How a joint moves along or about the z axis of the frame before it."""
+    """Motion of a joint along or about the z axis of the previous frame."""
 
     REVOLUTE = "revolute"
     PRISMATIC = "prismatic"
@@ -73,7 +73,7 @@ class Link:
 
 
 class ChainArrays(NamedTuple):
-    """The numbers of a chain as the compiled recursions read them; all of one dtype but the first.
+    """The values of a chain for the compiled recursions; all of one dtype except the first.
 
     Copy with another dtype (complex128) and perturb any entry to obtain an exact sensitivity to it.
     """
@@ -130,7 +130,7 @@ class Chain:
         return len(self.joints)
 
     def arrays(self, dtype: DTypeLike = np.float64) -> ChainArrays:
-        """Pack the chain for compiled code; the load is lumped into the last link."""
+        """Packs the chain for compiled code; the load is lumped into the last link."""
         geometry = np.array([[j.theta, j.d, j.a, j.alpha] for j in self.joints], dtype=dtype)
         inertial = np.array(
             [_about_frame_origin(link.mass, link.centre_of_mass, link.inertia) for link in self.links],
@@ -147,7 +147,7 @@ class Chain:
 
 
 def inertia_about(mass: float, position: FloatArray, inertia: FloatArray) -> FloatArray:
-    """Move an inertia tensor from the centre of mass to a point it lies `position` away from (Steiner).
+    """Moves an inertia tensor from the centre of mass to a point at distance `position` (Steiner).
 
     Args:
         mass: kg.
@@ -218,10 +218,10 @@ def _check_load_and_gravity(chain: Chain) -> None:
 
 
 def _check_every_joint_moves_something(chain: Chain) -> None:
-    """Refuse a joint with no inertia at all: its acceleration would be a division by zero.
+    """Rejects a joint with no inertia at all: its acceleration would be a division by zero.
 
-    Prismatic: no mass beyond it. Revolute: nothing beyond it that has mass off its axis or inertia. Whether
-    distal masses lie on the axis depends on the posture, so only what holds in every posture is refused here.
+    Prismatic: no mass beyond it. Revolute: nothing beyond it that has mass off its axis or inertia. Whether distal
+    masses lie on the axis depends on the posture, so only chains without inertia in every posture are rejected here.
     """
     arrays = chain.arrays()
     for i, joint in enumerate(chain.joints):
@@ -237,7 +237,7 @@ def _check_every_joint_moves_something(chain: Chain) -> None:
 
 
 def _inertia_about_joint_axis(joint: Joint, inertial: FloatArray) -> float:
-    """Inertia of a single link about the z axis of the frame before it (independent of the posture)."""
+    """Returns the inertia of a single link about the z axis of the previous frame (independent of the posture)."""
     mass, first = float(inertial[0]), inertial[1:4]
     tensor = np.zeros((3, 3))
     tensor[np.triu_indices(3)] = inertial[4:]

@@ -1,1 +1,1 @@
-"""A machine file as a model: named parameters, the effects in it, the vector that the simulation reads."""
+"""Converts a machine file to a model: named parameters, effects, and the vector that the simulation reads."""

@@ -1,4 +1,4 @@
-"""The parameters that an effect brings into a model, with bounds and deviations that suit the machine."""
+"""Parameters that an effect adds to a model, with bounds and deviations that suit the machine."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def effect_parameters(
     beyond: int = 0,
     scales: Mapping[int, JointScale] | None = None,
 ) -> tuple[Parameter, ...]:
-    """Parameters of effect `name` on `joints`: one set per joint, or one set for all when `shared`.
+    """Returns parameters of effect `name` on `joints`: one set per joint, or one set for all if `shared`.
 
-    `beyond` columns of a joint are taken by effects of the user's own that come before this one. `scales`: natural
-    sizes of joints (from 1) that are known better than from the machine file.
+    `beyond`: number of a joint's columns that earlier user effects occupy. `scales`: natural sizes of joints (from 1)
+    that are known better than from the machine file.
     """
     known_scales = scales or {}
     kind = effect(name)
@@ -53,23 +53,27 @@ def effect_parameters(
 
 
 def _unit_on(joint: Joint, unit: str) -> str:
-    """The unit that a number of an effect has on a joint: of lengths and forces where it slides, and of its drive,
-    where the file says which that is, for what a motor has in volts."""
+    """Returns the unit of an effect's parameter on a joint.
+
+    On a prismatic joint it is of lengths and forces; units of a motor's volts become those of the drive, if the file
+    states them.
+    """
     if unit == "V" and len(joint.drive_units) == 1:
         return joint.drive_units[0]
     return sliding(unit) if joint.kind == "prismatic" else unit
 
 
 def suits_drive(machine: Machine, name: str, joint: int) -> bool:
-    """Whether the file describes what the effect changes: a winding and a magnet are those of a DC motor driven by
-    volts."""
+    """Whether the file describes what the effect changes: winding and magnet exist only in a DC motor driven by
+    volts.
+    """
     kind = effect(name)
     of_motor = kind.file is None and kind.shared_name.family == "motor"
     return not of_motor or isinstance(machine.joint(joint).drive, DcMotor)
 
 
 def _parameter(kind: Effect, p: EffectParameter, scale: JointScale, place: str) -> Parameter:
-    """The parameter at its starting value, on no joint yet."""
+    """Returns the parameter at its starting value, not yet on a joint."""
     return Parameter(
         name=f"{place}.{kind.name}.{p.name}",
         kind=Kind.EFFECT,
@@ -86,7 +90,7 @@ def _parameter(kind: Effect, p: EffectParameter, scale: JointScale, place: str) 
 
 
 def _with_known(p: Parameter, known: Quantity) -> Parameter:
-    """The parameter with the number that the machine file states, and with the file's bounds and deviation."""
+    """Returns the parameter with the value in the machine file, and with the file's bounds and deviation."""
     return replace(
         p,
         value=known.value,
@@ -98,7 +102,7 @@ def _with_known(p: Parameter, known: Quantity) -> Parameter:
 
 
 def _known(friction: Friction, name: str, scale: JointScale) -> Quantity | None:
-    """The machine file's own number for a friction effect, in the effect's unit and on its side of the gear."""
+    """Returns the machine file's own value for a friction effect, in the effect's unit and on its side of the gear."""
     if name == "viscous_friction" and friction.viscous_motor_side is None and friction.viscous is not None:
         return _divided(friction.viscous, scale.gear**2)
     return {
@@ -109,6 +113,6 @@ def _known(friction: Friction, name: str, scale: JointScale) -> Quantity | None:
 
 
 def _divided(quantity: Quantity, by: float) -> Quantity:
-    """A quantity at the joint, converted to the motor's side."""
+    """Converts a quantity at the joint to the motor's side."""
     scaled = {n: getattr(quantity, n) for n in ("value", "low", "high", "deviation")}
     return quantity.model_copy(update={n: None if v is None else v / by for n, v in scaled.items()})

@@ -31,20 +31,20 @@ from model.machine_model.nominal import base_parameters, joint_scale, nominal_ve
 from model.machine_model.parameter import Parameter
 
 MODEL_FORMAT = 1
-"""Version of the model file; a reader refuses newer ones."""
+"""Version of the model file; a reader rejects newer ones."""
 
 FRICTION_OF_MACHINE = {
     "viscous_friction": ("viscous_motor_side", "viscous"),
     "load_dependent_friction": ("coulomb_arm",),
     "coulomb_friction": ("coulomb",),
 }
-"""Effects that a machine file gives values for, and its entries for them."""
+"""Effects for which a machine file gives values, and its entries for them."""
 
 
 class EffectUse(FrozenRecord):
-    """An effect in a model: on which joints (none for the whole machine), with values of their own or shared ones.
+    """An effect in a model: its joints (none for the whole machine), with values of their own or shared ones.
 
-    `file` is the one that an effect of the user's own needs, as it was when the model was made.
+    `file` is the file of a user's effect, as it was when the model was made.
     """
 
     name: str
@@ -54,7 +54,7 @@ class EffectUse(FrozenRecord):
 
     @model_serializer(mode="wrap")
     def _without_no_file(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Files are written only if there are any, so that models without files keep their identity."""
+        """Omits missing files, so that models without files keep their identity."""
         data: dict[str, Any] = handler(self)
         if self.file is None:
             del data["file"]
@@ -62,7 +62,7 @@ class EffectUse(FrozenRecord):
 
 
 class Lineage(FrozenRecord):
-    """Where a model comes from: identity of the model it was made from, traces and a summary of the fit."""
+    """Origin of a model: identity of its parent model, traces, and a summary of the fit."""
 
     parent: str | None = None
     traces: tuple[str, ...] = ()
@@ -108,7 +108,7 @@ class Model(FrozenRecord):
 
     @property
     def disturbances(self) -> tuple[tuple[Parameter, Parameter], ...]:
-        """Sine and cosine of every torque that repeats over time; where joints share one, only that of the first."""
+        """Sine and cosine of every torque that repeats over time; only those of the first joint if joints share one."""
         own = [p for p in self.parameters if p.effect is not None and effect(p.effect).tone is Tone.OVER_TIME]
         cosines = {p.joints: p for p in own if p.part == "cosine"}
         return tuple((p, cosines[p.joints]) for p in own if p.part == "sine" and p.joints in cosines)
@@ -128,7 +128,7 @@ class Model(FrozenRecord):
 
     @cached_property
     def own_columns(self) -> dict[str, int]:
-        """For each effect of the user's own: how many of a joint's columns for such effects lie before its own."""
+        """For each user effect: the number of a joint's user-effect columns before its own."""
         columns, taken = {}, 0
         for use in self.effects:
             if use.file is not None and use.name not in columns:
@@ -142,7 +142,7 @@ class Model(FrozenRecord):
         return {p.name: p for p in self.parameters}
 
     def parameter(self, name: str) -> Parameter:
-        """The parameter of that name. Raises SpecError with the names that come closest."""
+        """Returns the parameter of that name. Raises SpecError with the most similar names."""
         if name not in self.by_name:
             last = name.rpartition(".")[2]
             near = [n for n in self.by_name if n.partition(".")[0] == name.partition(".")[0] or n.endswith(last)]
@@ -176,11 +176,11 @@ class Model(FrozenRecord):
 
     @cached_property
     def identity(self) -> str:
-        """Twelve hexadecimal digits that stand for everything in the model's file, its lineage included."""
+        """Twelve hexadecimal digits that identify the content of the model's file, its lineage included."""
         return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:12]
 
     def with_values(self, values: Mapping[str, float]) -> Model:
-        """The same model with other values. Raises SpecError for an unknown name, or a value outside its bounds."""
+        """Returns the model with other values. Raises SpecError for an unknown name, or a value outside its bounds."""
         for name, value in values.items():
             p = self.parameter(name)
             if not math.isfinite(value):
@@ -190,7 +190,7 @@ class Model(FrozenRecord):
     def with_effect(
         self, name: str, joints: tuple[int, ...] = (), values: Mapping[str, float] | None = None, shared: bool = False
     ) -> Model:
-        """The model with one more effect. It starts at its null values, where it does nothing; shapes are typical.
+        """Returns the model with one more effect, at its null values, where it does nothing; shapes are typical.
 
         `values` are by full name, or by the parameter's last part, then for every joint of the effect.
         """
@@ -207,7 +207,9 @@ class Model(FrozenRecord):
         return wider.with_values(chosen) if chosen else wider
 
     def without_effect(self, name: str, joints: tuple[int, ...] | None = None) -> Model:
-        """The model without an effect, on the given joints or anywhere. Raises SpecError when it is not there."""
+        """Returns the model without an effect, on the given joints or anywhere. Raises SpecError if it lacks the
+        effect.
+        """
         uses = [u for u in self.effects if u.name == name and (joints is None or set(u.joints) & set(joints))]
         if not uses:
             raise SpecError(
@@ -224,7 +226,7 @@ class Model(FrozenRecord):
         return self._changed(effects=tuple(kept), values={n: v for n, v in self.values.items() if n in names})
 
     def tied(self, name: str, members: tuple[str, ...]) -> Model:
-        """The model with several parameters sharing one value, that of the first, under a new name."""
+        """Returns the model with several parameters sharing one value, that of the first, under a new name."""
         value = self.parameter(members[0]).value
         for member in members[1:]:
             self.parameter(member)
@@ -232,7 +234,7 @@ class Model(FrozenRecord):
         return self._changed(ties={**self.ties, name: members}, values=values)
 
     def with_lineage(self, lineage: Lineage) -> Model:
-        """The model with another lineage."""
+        """Returns the model with another lineage."""
         return self._changed(lineage=lineage)
 
     def _changed(self, **changes: Any) -> Model:
@@ -241,7 +243,7 @@ class Model(FrozenRecord):
 
 
 def base_model(machine: Machine, *, friction: bool = True) -> Model:
-    """The model that a machine file describes: rigid bodies, motors and the friction it gives values for."""
+    """Returns the model of a machine file: rigid bodies, motors and the friction that it states."""
     uses = []
     if friction:
         for name, entries in FRICTION_OF_MACHINE.items():
@@ -252,17 +254,17 @@ def base_model(machine: Machine, *, friction: bool = True) -> Model:
             )
             uses += [EffectUse(name=name, joints=joints)] if joints else []
     for joint in machine.modelled_joints:
-        joint_scale(machine, joint)  # refuses a joint without inertia
+        joint_scale(machine, joint)  # rejects a joint without inertia
     return Model(machine=machine, effects=tuple(uses))
 
 
 def _check_own(uses: tuple[EffectUse, ...]) -> None:
     own = {use.name: use for use in uses if effect(use.name).file is not None}
     if unnamed := [name for name, use in own.items() if use.file is None]:
-        raise SpecError(f"effect {unnamed[0]}: the model does not say which file it comes from")
+        raise SpecError(f"effect {unnamed[0]}: the model does not state its file")
     if (taken := sum(len(effect(name).parameters) for name in own)) > at.USER_COLUMNS:
         raise SpecError(
-            f"effects {', '.join(own)}: {taken} parameters; a model has room for {at.USER_COLUMNS} of the user's own"
+            f"effects {', '.join(own)}: {taken} parameters; a model has room for {at.USER_COLUMNS} of users' effects"
         )
 
 
@@ -274,19 +276,21 @@ def _check_use(machine: Machine, use: EffectUse) -> None:
         raise SpecError(f"effect {use.name}: name the joints it acts on, of {list(machine.modelled_joints)}")
     for joint in use.joints:
         if not 1 <= joint <= len(machine.modelled_joints):
-            raise SpecError(f"effect {use.name} on joint {joint}: modelled are joints {list(machine.modelled_joints)}")
+            raise SpecError(
+                f"effect {use.name} on joint {joint}: not modelled; modelled joints are {list(machine.modelled_joints)}"
+            )
         if kind.joints and joint not in kind.joints:
-            raise SpecError(f"effect {use.name} on joint {joint}: its file has it on joints {list(kind.joints)} alone")
+            raise SpecError(f"effect {use.name} on joint {joint}: its file allows only joints {list(kind.joints)}")
 
 
 def _not_taken(own: tuple[Parameter, ...], taken: set[int]) -> list[Parameter]:
-    """Leaves out parameters whose place an earlier effect fills: backlash and compliance of a joint share a damping."""
+    """Leaves out parameters whose column an earlier effect uses: backlash and compliance of a joint share a damping."""
     left = [replace(p, slots=tuple(s for s in p.slots if s not in taken)) for p in own]
     return [p for p in left if p.slots]
 
 
 def _tied(found: list[Parameter], ties: Mapping[str, tuple[str, ...]]) -> list[Parameter]:
-    """Puts one parameter in the place of the first of those that share its value, tie by tie."""
+    """Replaces the first of the parameters that share a value by one parameter, tie by tie."""
     left: list[Parameter | None] = [*found]
     places = {p.name: place for place, p in enumerate(found)}
     for name, members in ties.items():
@@ -296,7 +300,7 @@ def _tied(found: list[Parameter], ties: Mapping[str, tuple[str, ...]]) -> list[P
             raise SpecError(f"tie {shown(name)}: names a parameter twice")
         own = sorted(places.pop(member) for member in members)
         if name in places:
-            raise SpecError(f"tie {shown(name)}: the model has a parameter of this name")
+            raise SpecError(f"tie {shown(name)}: the model already has a parameter of this name")
         tied = [p for place in own if (p := left[place]) is not None]
         for place in own:
             left[place] = None

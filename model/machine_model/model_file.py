@@ -1,4 +1,4 @@
-"""Models as files: JSON, with a version that a reader checks before anything else."""
+"""Reads and writes models as JSON files, with a version that is checked before anything else."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from model.machine_model.model import MODEL_FORMAT, Model
 
 
 class ModelFile(FrozenRecord):
-    """What is kept of a model: its number, its file's text, and the model and the traces that it is made from."""
+    """Stored data of a model: its ID, its file's text, and its parent model and traces."""
 
     identity: Annotated[str, Field(pattern=r"^[0-9a-f]{12}$")]
     text: str
@@ -24,13 +24,13 @@ class ModelFile(FrozenRecord):
 
 
 def file_of(model: Model) -> ModelFile:
-    """The file of a model."""
+    """Returns the file of a model."""
     lineage = model.lineage
     return ModelFile(identity=model.identity, text=_text(model), parent=lineage.parent, traces=lineage.traces)
 
 
 def save_model(model: Model, path: Path | str) -> Path:
-    """Writes a model. Returns `path`. Raises SpecError when the file cannot be written."""
+    """Writes a model. Returns `path`. Raises SpecError if the file cannot be written."""
     path = Path(path)
     try:
         path.write_text(_text(model), "utf-8")
@@ -40,15 +40,15 @@ def save_model(model: Model, path: Path | str) -> Path:
 
 
 def load_model(path: Path | str) -> Model:
-    """The model in a file: a model of its own, or the one that a saved fit carries.
+    """Loads the model in a file: a model of its own, or that of a saved fit.
 
-    Raises SpecError, in one line, for no such file, another kind of file, or a model of a newer version.
+    Raises SpecError, in one line, for a missing file, another kind of file, or a model of a newer version.
     """
     return model_of(parse_json(read_text(Path(path), f"model {path}"), f"model {path}"), str(path))
 
 
 def model_of(data: Any, called: str) -> Model:
-    """The model in the data of a file, likewise. called: what messages call the file."""
+    """Returns the model in a file's data, likewise. called: name of the file in messages."""
     if isinstance(data, dict) and isinstance(data.get("model"), dict):
         data = data["model"]
     if not isinstance(data, dict) or "machine" not in data:
@@ -66,8 +66,6 @@ def _text(model: Model) -> str:
 
 def _check_version(called: str, version: Any) -> None:
     if not isinstance(version, int) or version < 1:
-        raise SpecError(f"model {called}: says no version (format {shown(version)})")
+        raise SpecError(f"model {called}: states no version (format {shown(version)})")
     if version > MODEL_FORMAT:
-        raise SpecError(
-            f"model {called}: has format {version}, this version of the program reads up to {MODEL_FORMAT}; update it"
-        )
+        raise SpecError(f"model {called}: has format {version}, but this program reads up to {MODEL_FORMAT}; update it")

@@ -1,4 +1,4 @@
-"""A machine file's numbers as parameters, and the sizes that follow from them."""
+"""Converts a machine file's values to parameters, and computes sizes from them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from model.effects.transmission import contact_compliance
 from model.machine_model.parameter import Kind, Parameter
 
 NO_LIMIT = 1e9
-"""Number that stands in the vector for a limit that is not set."""
+"""Value in the vector for a limit that is not set."""
 SENSOR_COUNTS = 4096
 DAC_COUNTS = 127
 PRESLIDING_COUNTS = 0.5
@@ -41,7 +41,7 @@ PRESLIDING_COUNTS = 0.5
 def parameter(
     component: str, kind: Kind, part: str, quantity: Quantity, slot: int, low: float = -math.inf
 ) -> Parameter:
-    """A parameter of the whole machine from a number of its file; `low` bounds it where the file does not."""
+    """Returns a parameter of the whole machine from a value of its file; `low` bounds it if the file does not."""
     return Parameter(
         name=f"{component}.{part}",
         kind=kind,
@@ -58,7 +58,7 @@ def parameter(
 
 
 def base_parameters(machine: Machine) -> tuple[Parameter, ...]:
-    """Parameters that every model of the machine has: geometry, inertia, motors, controller delay."""
+    """Returns parameters that every model of the machine has: geometry, inertia, motors, controller delay."""
     found = [p for number in machine.modelled_joints for p in _of_joint(number, machine.joint(number))]
     if machine.load is not None:
         found.append(parameter("load", Kind.INERTIA, "mass", machine.load, at.LOAD, 0.0))
@@ -68,7 +68,7 @@ def base_parameters(machine: Machine) -> tuple[Parameter, ...]:
 
 
 def _of_controller(machine: Machine) -> Iterator[Parameter]:
-    """Gains and limits of the controller, where the file says how far off they may be."""
+    """Yields gains and limits of the controller, if the file states their deviations."""
     for number in machine.modelled_joints:
         numbers = (
             ("gain_error", gain_error(machine, number), at.GAIN_ERROR, -0.95),
@@ -81,7 +81,7 @@ def _of_controller(machine: Machine) -> Iterator[Parameter]:
 
 
 def gain_error(machine: Machine, number: int) -> Quantity | None:
-    """Relative error of the controller's gains on a joint (from 1), as far as the file states one."""
+    """Returns the relative error of the controller's gains on a joint (from 1), if the file states one."""
     controller = machine.controller
     if isinstance(controller, SampledPid):
         return of_joint(controller.gain_error, number)
@@ -95,7 +95,7 @@ def gain_error(machine: Machine, number: int) -> Quantity | None:
 
 
 def output_limit(machine: Machine, number: int) -> Quantity | None:
-    """Limit of the controller's output on a joint (from 1), as far as the file states one."""
+    """Returns the limit of the controller's output on a joint (from 1), if the file states one."""
     controller = machine.controller
     return of_joint(controller.output_limit, number) if isinstance(controller, SampledPid) else None
 
@@ -112,7 +112,7 @@ def _of_joint(number: int, joint: Joint) -> Iterator[Parameter]:
 
 
 def _of_link(joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
-    """Arguments of `parameter`, with the joint's column in place of the slot."""
+    """Yields arguments of `parameter`, with the joint's column in place of the slot."""
     geometry, link = joint.geometry, joint.link
     if geometry.a.value != 0.0:
         yield "link", Kind.GEOMETRY, "length", geometry.a, at.A, 0.0
@@ -130,7 +130,7 @@ def _of_link(joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, floa
 
 
 def _of_sensor(joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
-    """The same. A zero that is off turns (or shifts) the link against what its sensor shows."""
+    """Yields the same for a sensor. A wrong zero turns (or shifts) the link against the reading of its sensor."""
     stated = None if joint.sensor is None else joint.sensor.at_zero
     if stated is None or stated.deviation is None:
         return
@@ -142,7 +142,7 @@ def _of_sensor(joint: Joint) -> Iterator[tuple[str, Kind, str, Quantity, int, fl
 
 
 def _of_drive(drive: DcMotor | CurrentDrive | PlainGain) -> Iterator[tuple[str, Kind, str, Quantity, int, float]]:
-    """Arguments of `parameter`, with the joint's column in place of the slot."""
+    """Yields arguments of `parameter`, with the joint's column in place of the slot."""
     if isinstance(drive, DcMotor):
         yield "motor", Kind.DRIVE, "resistance", drive.resistance, at.RESISTANCE, 1e-6
         yield "motor", Kind.DRIVE, "torque_constant", drive.torque_constant, at.TORQUE_CONSTANT, 1e-9
@@ -165,7 +165,7 @@ def _of_drive(drive: DcMotor | CurrentDrive | PlainGain) -> Iterator[tuple[str, 
 
 
 def nominal_vector(machine: Machine) -> NDArray[np.float64]:
-    """The flat vector of the machine file alone: every effect, friction included, at its null value."""
+    """Returns the flat vector of the machine file alone: every effect, friction included, at its null value."""
     n = len(machine.modelled_joints)
     vector = np.zeros(at.size(n))
     vector[at.GRAVITY_X : at.GRAVITY_Z + 1] = machine.gravity
@@ -227,7 +227,7 @@ def _fill_drive(row: NDArray[np.float64], drive: DcMotor | CurrentDrive | PlainG
 
 
 def joint_scale(machine: Machine, number: int) -> JointScale:
-    """Natural sizes of a joint (from 1)."""
+    """Returns natural sizes of a joint (from 1)."""
     joint = machine.joint(number)
     drive = joint.drive
     range_ = 2 * math.pi if joint.sensor is None else joint.sensor.range.value
@@ -282,7 +282,9 @@ def _radius(joint: Joint) -> float:
 
 
 def _transmission_inertia(machine: Machine, number: int) -> float:
-    """Inertia of rotor and link in series (kg·m²), with the link's least inertia: its own bodies, the arm folded."""
+    """Returns the inertia of rotor and link in series (kg·m²), with the link's least inertia: its own bodies, the arm
+    folded.
+    """
     joint = machine.joint(number)
     link = joint.link
     own = link.mass.value

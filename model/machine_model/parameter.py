@@ -12,10 +12,10 @@ from model.effects.library import effect
 
 
 class Kind(StrEnum):
-    """What sort of number a parameter is."""
+    """Kind of a parameter."""
 
     GEOMETRY = "geometry"
-    """Length, offset or radius of a link: what a ruler measures."""
+    """Length, offset or radius of a link: measurable with a ruler."""
     INERTIA = "inertia"
     """Mass, centre of mass or moment of inertia of a link, mass of the load, inertia of a rotor or of a plain drive."""
     DRIVE = "drive"
@@ -23,15 +23,15 @@ class Kind(StrEnum):
     CONTROLLER = "controller"
     """Delay of the controller."""
     EFFECT = "effect"
-    """A number that an effect of the library brings with it; friction is one of them."""
+    """A parameter of an effect of the library, friction included."""
     PRESLIDING = "presliding"
     """Distance over which a joint's friction builds up."""
     PRESLIDING_SHAPE = "presliding shape"
     """Shape of that rise, from 0 (Prandtl) to 1 (Dahl)."""
     INITIAL_POSITION = "initial position"
-    """Where a joint starts, relative to the posture that was read."""
+    """Initial position of a joint, relative to its first reading."""
     INITIAL_VELOCITY = "initial velocity"
-    """How fast a joint starts, relative to the speed that was read."""
+    """Initial speed of a joint, relative to the measured speed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,8 +77,9 @@ class Parameter:
 
     @property
     def initial(self) -> tuple[int, int] | None:
-        """Its place in an initial state (n, 2): row of the joint, column 0 for position and 1 for velocity. None for
-        a number of the model itself."""
+        """Its place in an initial state (n, 2): row of the joint, column 0 for position and 1 for velocity. None for a
+        parameter of the model itself.
+        """
         if self.kind is Kind.INITIAL_POSITION:
             return self.joints[0] - 1, 0
         if self.kind is Kind.INITIAL_VELOCITY:
@@ -87,28 +88,32 @@ class Parameter:
 
     @property
     def is_gain_error(self) -> bool:
-        """Whether it says by how much a gain of the controller is wrong."""
+        """Whether it is the relative error of a gain of the controller."""
         return any(at.column(slot) == at.GAIN_ERROR for slot in self.slots if slot >= at.SHARED)
 
     @property
     def rate_of(self) -> Tone | None:
-        """The kind of tone whose cycles or frequency it is; None for any other number."""
+        """The kind of tone whose rate (cycles or frequency) it is; None for any other parameter."""
         tone = None if self.effect is None else effect(self.effect).tone
         return tone if self.part == tone else None
 
     @property
     def sets_torque_scale(self) -> bool:
-        """Whether it is a data-sheet number that fixes the scale of all torques, which motion alone cannot show."""
+        """Whether it is a data-sheet value that fixes the scale of all torques, which motion alone does not
+        determine.
+        """
         return self.kind is Kind.DRIVE and self.part in ("torque_constant", "resistance", "gain", "gear_ratio")
 
 
 def initial_position(joint: int, trace: int | None = None) -> Parameter:
-    """How far a joint starts off the posture that was read, rad. `trace`: number (from 1) of the trace, if of one."""
+    """Returns the distance of a joint's start from its first reading, rad. `trace`: number (from 1) of its only
+    trace.
+    """
     return _initial(Kind.INITIAL_POSITION, "position", "rad", joint, trace)
 
 
 def presliding(joint: int, value: float) -> Parameter:
-    """The distance over which a joint's friction builds up, rad."""
+    """Returns the distance over which a joint's friction builds up, rad."""
     slots = (at.slot(joint, at.PRESLIDING),)
     return Parameter(
         name=f"presliding.joint{joint}",
@@ -122,7 +127,7 @@ def presliding(joint: int, value: float) -> Parameter:
 
 
 def presliding_shape(joint: int, value: float) -> Parameter:
-    """The shape of a joint's presliding, from 0 (Prandtl) to 1 (Dahl)."""
+    """Returns the shape of a joint's presliding, from 0 (Prandtl) to 1 (Dahl)."""
     slots = (at.slot(joint, at.PRESLIDING_SHAPE),)
     return Parameter(
         name=f"presliding_shape.joint{joint}",

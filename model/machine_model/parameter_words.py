@@ -1,4 +1,4 @@
-"""A parameter as people write it: whose it is, what it is, and both together."""
+"""Describes a parameter in words: its owner, its meaning, and both together."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from model.machine_model.parameter import Kind, Parameter
 
 
 def words_of(parameter: Parameter) -> ParameterWords:
-    """The words for a parameter: of `joint2.motor.back_emf_constant`, J2 motor back-EMF constant."""
+    """Returns the words for a parameter: of `joint2.motor.back_emf_constant`, J2 motor back-EMF constant."""
     joints, component = parameter.joints, parameter.component
     only = joints[0] if len(joints) == 1 else None
     if component == "link":
@@ -25,7 +25,7 @@ def words_of(parameter: Parameter) -> ParameterWords:
 
 
 def words_by_name(parameters: Iterable[Parameter]) -> dict[str, ParameterWords]:
-    """The words for each of the parameters, by its name."""
+    """Returns the words for each of the parameters, by its name."""
     return {parameter.name: words_of(parameter) for parameter in parameters}
 
 

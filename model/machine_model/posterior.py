@@ -1,4 +1,4 @@
-"""How well a model's numbers are known from the fits that it comes from."""
+"""Standard deviations of a model's parameters after the fits in its lineage."""
 
 from __future__ import annotations
 
@@ -13,21 +13,22 @@ from daq.contracts.frozen import FrozenRecord
 from model.machine_model.model import Lineage, Model
 
 LEAST_SHARE = 0.25
-"""Least share of an expected deviation that an earlier fit leaves: other records are of another day, with warmer gears
-and another mounting, and the model that was fitted is not exact. An assumption."""
+"""Least share of an expected deviation that remains after an earlier fit: other records are of another day, with warmer
+gears and another mounting, and the fitted model is not exact. An assumption.
+"""
 
 
 class Estimate(FrozenRecord):
-    """A number after a fit, with its standard deviation, in the number's unit."""
+    """A parameter's value after a fit, with its standard deviation, in its unit."""
 
     value: FiniteFloat
     deviation: Annotated[FiniteFloat, Field(gt=0)]
 
 
 class Learnt(FrozenRecord):
-    """What a model file keeps of the fits that it comes from, as a part of `Lineage.fit`.
+    """Results of the fits in a model's lineage, stored in `Lineage.fit`.
 
-    posterior: estimates by the number's name. learnt_from: identities of the traces of all fits.
+    posterior: estimates by the parameter's name. learnt_from: identities of the traces of all fits.
     """
 
     posterior: dict[str, Estimate] = {}
@@ -37,12 +38,12 @@ class Learnt(FrozenRecord):
 def summarise_posterior(
     before: Lineage, traces: Iterable[str], estimates: Iterable[tuple[str, float, float | None]]
 ) -> dict[str, Any]:
-    """What a fitted model keeps of its fit for the next diagnosis, as a part of `Lineage.fit`.
+    """Returns results of a fit for the next diagnosis, to be stored in `Lineage.fit`.
 
     Args:
         before: lineage of the model that was fitted. traces: identities of the traces that it was fitted to.
-        estimates: name, value and standard deviation of each number; a deviation is None, or not finite, where the
-            records do not determine the number.
+        estimates: name, value and standard deviation of each parameter; a deviation is None, or not finite, if the
+            records do not determine it.
     """
     posterior = {
         name: {"value": float(value), "deviation": float(deviation)}
@@ -53,14 +54,14 @@ def summarise_posterior(
 
 
 def load_posterior(model: Model, traces: Iterable[str]) -> Mapping[str, float]:
-    """Standard deviations of the model's numbers after the fits that it comes from, by name, where they are smaller
-    than what is expected of the machine.
+    """Returns standard deviations of the model's parameters after its fits, by name, if smaller than the machine's
+    expected ones.
 
-    A number that was changed since then has none. Nor has any, where one of the traces (identities; fitted or held out)
-    is one that the model has learnt from: what a record says counts once.
+    A parameter that was changed since then has none. Empty if one of the traces (identities; fitted or held out) was
+    used in those fits: a record must not count twice.
 
     Raises:
-        SpecError: for a model file whose lineage holds something else in their place.
+        SpecError: for a model file with invalid data in its lineage.
     """
     if set(traces) & _learnt_from(model.lineage):
         return {}
@@ -75,12 +76,12 @@ def load_posterior(model: Model, traces: Iterable[str]) -> Mapping[str, float]:
 
 
 def _learnt_from(lineage: Lineage) -> set[str]:
-    """Identities of the traces of all fits that a model comes from."""
+    """Returns identities of the traces of all fits in a model's lineage."""
     return {*lineage.traces, *_learnt(lineage).learnt_from}
 
 
 def _learnt(lineage: Lineage) -> Learnt:
-    """The part of `Lineage.fit`, in which a file may hold anything. Raises SpecError."""
+    """Returns the part of `Lineage.fit`, in which a file may hold anything. Raises SpecError."""
     kept = {name: part for name, part in (lineage.fit or {}).items() if name in Learnt.model_fields}
     try:
         return Learnt.model_validate(kept)

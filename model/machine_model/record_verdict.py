@@ -1,4 +1,4 @@
-"""Whether a model explains records: what is left beside its noise, and numbers that went far from the file. Pure."""
+"""Judges whether a model explains records: the residual beyond noise, and parameters far from the file. Pure."""
 
 from __future__ import annotations
 
@@ -11,18 +11,20 @@ from model.machine_model.model import Model, base_model
 from model.units import shown_unit, with_unit
 
 FAR_OFF = 4.0
-"""Deviations from what a file states, beyond which a number is taken for another than the file's."""
+"""Number of stated deviations beyond which a parameter counts as different from the file's."""
 MORE_THAN_NOISE = 0.3
-"""Excess variance of a joint's error, relative to its noise, above which something is missing: what a nearly right law
-leaves stays below. Chosen on tuning arms, none of which is among those that report rates."""
+"""Excess variance of a joint's error, relative to its noise, above which something is missing: a nearly right law
+leaves less. Chosen on tuning arms, none of which is used to report rates.
+"""
 SCATTER = 4.0
 """Standard deviations of an estimated variance, within which it may exceed its noise by chance."""
 
 
 class JointLeft(FrozenRecord):
-    """What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left
-    of records that the model itself had made; `there`: of the recorded torque, or of the recorded motion about its mean
-    (None where that is hardly more than noise of the readings); in `unit`."""
+    """Residual of a model on one joint's records, in `unit`. `rms`: root mean square of the residual; `noise`: that of
+    records that the model itself makes; `there`: of the recorded torque, or of the recorded motion about its mean (None
+    if that hardly exceeds noise of the readings).
+    """
 
     joint: int
     unit: str
@@ -32,18 +34,19 @@ class JointLeft(FrozenRecord):
 
     @property
     def is_more_than_there(self) -> bool:
-        """Whether nothing is explained, however large the noise seems to be: false readings raise that as well."""
+        """Whether nothing is explained, however large the estimated noise: false readings increase that as well."""
         return self.there is not None and self.rms >= self.there > 0.0
 
     @property
     def in_noises(self) -> float:
-        """Residual over noise: about 1 where the model is right."""
+        """Residual over noise: about 1 for a right model."""
         return self.rms / self.noise if self.noise > 0.0 else math.inf
 
 
 class FarNumber(FrozenRecord):
-    """A number of the model at least 4 stated deviations from the machine file. `value`: of the model; `stated`,
-    `deviation`: of the file; all in `unit`."""
+    """A parameter of the model at least 4 stated deviations from the machine file. `value`: of the model; `stated`,
+    `deviation`: of the file; all in `unit`.
+    """
 
     name: str
     unit: str
@@ -57,7 +60,7 @@ class FarNumber(FrozenRecord):
         return abs(self.value - self.stated) / self.deviation
 
     def __str__(self) -> str:
-        """The number beside that of the file."""
+        """Returns the parameter beside that of the file."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"{self.name} {self.value:.3g}{unit} (file: {self.stated:.3g} ± {self.deviation:.2g})"
 
@@ -65,8 +68,8 @@ class FarNumber(FrozenRecord):
 class RecordVerdict(FrozenRecord):
     """Whether a model explains records within their noise.
 
-    `left`: joints with more than noise, the worst first. `far`: numbers of the model far from the machine file, the
-    furthest first: they may have taken the place of an effect. `text`: the same in one to three sentences.
+    `left`: joints with more than noise, the worst first. `far`: parameters far from the machine file, the farthest
+    first; they may compensate for an effect. `text`: the same in one to three sentences.
     """
 
     explains: bool
@@ -74,13 +77,13 @@ class RecordVerdict(FrozenRecord):
     far: tuple[FarNumber, ...]
     text: str
     doubt: str = ""
-    """What makes the records themselves doubtful, as a clause; nothing is said of the model then."""
+    """Reason to doubt the records themselves, as a clause; the model is then not judged."""
 
     def doubted(self, doubt: str) -> Self:
-        """The verdict beside a doubt about the records; an empty one changes nothing."""
+        """Returns the verdict with a doubt about the records; an empty one changes nothing."""
         if not doubt:
             return self
-        text = f"Check the record first: {doubt}. Nothing is said of the model until then."
+        text = f"Check the record first: {doubt}. The model is not judged until then."
         return self.model_copy(update={"explains": False, "doubt": doubt, "text": text})
 
     @property
@@ -98,10 +101,11 @@ class RecordVerdict(FrozenRecord):
 
     @classmethod
     def of(cls, model: Model, errors: Sequence[JointLeft], samples: int) -> Self:
-        """The verdict on a model that leaves these errors of records with so many samples a joint.
+        """Returns the verdict on a model with these errors on records of so many samples per joint.
 
-        A joint is left with more than noise where its excess variance is beyond the line from which a diagnosis looks
-        for a missing effect, and beyond the scatter of a variance of so many samples; or as large as what was recorded.
+        A joint has more than noise if its excess variance exceeds two limits: the threshold at which a diagnosis looks
+        for a missing effect, and the scatter of a variance of so many samples. The same holds if it is as large as the
+        recorded signal.
         """
         line = 1.0 + max(MORE_THAN_NOISE, SCATTER * math.sqrt(2.0 / max(samples, 1)))
         beyond = (e for e in errors if not e.in_noises**2 <= line or e.is_more_than_there)
@@ -111,7 +115,7 @@ class RecordVerdict(FrozenRecord):
 
 
 def far_numbers(model: Model) -> tuple[FarNumber, ...]:
-    """Numbers of a model that are far from what its machine file states, the furthest first."""
+    """Returns parameters of a model that are far from the machine file, the farthest first."""
     stated = base_model(model.machine).by_name
     found = [
         FarNumber(name=p.name, unit=p.unit, value=p.value, stated=s.value, deviation=s.deviation)

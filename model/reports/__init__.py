@@ -1,1 +1,1 @@
-"""Typed results as HTML pages: each is a list of sections, rendered into one self-contained file."""
+"""Renders typed results as HTML pages: each is a list of sections in one self-contained file."""

@@ -1,4 +1,6 @@
-"""Base parameters in a report of a fit: the combinations that torques depend on, and what the records tell of each."""
+"""Base parameters in a report of a fit: the combinations that determine torques, and the records' information on
+each.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +12,16 @@ from model.reports.page import listed
 
 
 def base_parameter_section(found: BaseParameters) -> Section:
-    """The section; without records that could be judged, the machine's part alone, and why."""
+    """Returns the section; without suitable records only the machine's part, and why."""
     blocks: list[Text | Points | Table] = [
         Text(
-            "Whatever the records: torques at the joints depend on these combinations of inertial and friction "
-            "parameters alone. No record of motion and torque can tell more of the arm."
+            "Torques at the joints depend only on these combinations of inertial and friction parameters. "
+            "No record of motion and torque can determine more of the arm."
         ),
         Text(headline(found).capitalize() + "."),
     ]
     if found.no_excitation is not None:
-        blocks.append(Text(f"What these traces tell of them is not known: {found.no_excitation}", "warning"))
+        blocks.append(Text(f"The information of these traces on them is not known: {found.no_excitation}", "warning"))
     blocks.append(_table(found))
     if found.without_effect:
         blocks.append(Text(f"No motion shows {listed(found.without_effect)}."))
@@ -43,7 +45,7 @@ def _table(found: BaseParameters) -> Table:
     ]
     caption = (
         f"Values are those of the fitted model; deviations, those of least squares on the torques of "
-        f"{listed(told.traces)}, without priors. Told: to {100 * TOLD:.0f} % or better of the largest value "
+        f"{listed(told.traces)}, without priors. Determined: to {100 * TOLD:.0f} % or better of the largest value "
         "of that unit at the joint."
     )
     return Table((*head, "deviation", "of the value", "these traces"), tuple(rows), caption)
@@ -52,6 +54,6 @@ def _table(found: BaseParameters) -> Table:
 def _recorded(one: RecordedBaseParameter) -> tuple[Cell, ...]:
     deviation = "–" if one.deviation is None else f"{one.deviation:.2g}"
     relative = "–" if one.relative is None else f"{100 * one.relative:.2g} %" if one.relative < 10 else "over 1000 %"
-    verdict, tone = ("told", "plain") if one.told else ("not told", "warning")
+    verdict, tone = ("told", "plain") if one.told else ("not determined", "warning")
     shown: Tone = "plain" if tone == "plain" else "warning"
     return (*(Cell(text, number=True) for text in (deviation, relative)), Cell(verdict, shown))

@@ -14,7 +14,7 @@ from model.units import squared
 
 
 def comparison_report(found: Comparison, differences: Sequence[ParameterDifference] = ()) -> Report:
-    """The page of models beside the measurement; `differences` are between the parameters of two models."""
+    """Returns the page of models beside the measurement; `differences` are between the parameters of two models."""
     labels = [m.label for m in found.models]
     sections = [
         Section("How large the error is", (agreement_table(found.models), _squared_errors(found.models))),
@@ -46,7 +46,7 @@ def _answer(models: Sequence[ModelAgreement]) -> str:
 
 
 def total_error(model: ModelAgreement) -> float:
-    """Error summed over the joints, in the square of their unit; of held-out traces if there are any."""
+    """Returns the error summed over the joints, in the square of their unit; of held-out traces if there are any."""
     held = model.mean_squared_error("held_out")
     return held if held is not None else model.mean_squared_error("in_sample") or 0.0
 
@@ -65,11 +65,11 @@ def _squared_errors(models: Sequence[ModelAgreement]) -> Table:
 
 
 def differences_table(differences: Sequence[ParameterDifference], labels: Sequence[str]) -> Table:
-    """Parameters whose values differ between models."""
+    """Returns a table of parameters whose values differ between models."""
     rows = []
     for d in differences:
         values = ("–" if v is None else f"{v:.5g}" for v in d.values)
         apart = "–" if d.deviations is None else f"{d.deviations:.2f}"
         rows.append((*cells(d.name, *values), Cell(d.unit), *numbers(apart)))
     head = ("parameter", *labels, "unit", "in expected deviations")
-    return Table(head, tuple(rows), "Parameters whose values differ; a dash where a model has no such parameter.")
+    return Table(head, tuple(rows), "Parameters whose values differ; a dash if a model has no such parameter.")

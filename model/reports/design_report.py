@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 
 LITTLE = 0.9
-"""Share of a width from which an interval counts as not having become narrower."""
+"""Share of a width above which an interval counts as not narrower."""
 
 
 @dataclass(frozen=True)
 class PlannedExperiment:
     """An experiment with its set points (k, joints of the machine), rad or m, one row per control period.
 
-    nats: information of this experiment and those before it; None where they have no order.
+    nats: information of this experiment and those before it; None if they have no order.
     """
 
     spec: ExperimentSpec
@@ -39,7 +39,7 @@ class PlannedExperiment:
 
 
 def design_report(model: Model, planned: Sequence[PlannedExperiment], gain: InformationGain, how: str) -> Report:
-    """The page. `how` is a sentence on how the experiments were chosen."""
+    """Returns the page. `how` is a sentence on how the experiments were chosen."""
     machine = model.machine
     sections = (
         Section("What becomes known", (gain_table(gain), *_gain_picture(gain), *_left_open(gain))),
@@ -71,7 +71,7 @@ def _answer(planned: Sequence[PlannedExperiment], gain: InformationGain) -> str:
 
 
 def gain_table(gain: InformationGain) -> Table:
-    """How much narrower each interval becomes."""
+    """Returns a table of the width of each interval, before and after."""
     rows = []
     for p in gain.parameters:
         left = Cell(f"{100 * p.share:.0f} %", "good" if p.share <= 0.5 else "plain", number=True)
@@ -96,17 +96,17 @@ def _gain_picture(gain: InformationGain) -> tuple[Picture, ...]:
         axes.set_xlabel("width after / width before")
         axes.grid(visible=False, axis="y")
 
-    return (Picture(drawn(draw, 0.6 + 0.19 * len(shown)), "What is left of each interval; before is 1."),)
+    return (Picture(drawn(draw, 0.6 + 0.19 * len(shown)), "Remaining width of each interval; 1 before."),)
 
 
 def _left_open(gain: InformationGain) -> tuple[Text | Points, ...]:
     def told(p: ParameterGain) -> str:
-        return f"{p.name}: {100 * p.share:.3g} % of its width is left"
+        return f"{p.name}: {100 * p.share:.3g} % of its width remains"
 
     little = [p for p in gain.parameters if p.share >= LITTLE]
     if not little:
         return ()
-    return (Text("These experiments say little about:", "warning"), Points(tuple(told(p) for p in little)))
+    return (Text("These experiments contain little information on:", "warning"), Points(tuple(told(p) for p in little)))
 
 
 def _experiment(one: PlannedExperiment, model: Model) -> tuple[Text | Picture, ...]:

@@ -1,4 +1,4 @@
-"""Figures of where a model disagrees: the map in time, and the quantities that the residual depends on."""
+"""Figures of a model's errors: the map over time, and the quantities on which the residual depends."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ SHADES = (
 )
 """Colour and strength of a cell of the map, from noise to the strongest."""
 NOISE = 1.25
-"""Ratio of a cell to its noise, up to which it is drawn as noise."""
+"""Ratio of a cell to its noise up to which it is drawn as noise."""
 
 
 def map_picture(where: Where, residual: str, trace: int = 0, *, small: bool = False) -> Picture:
-    """The ratio of the residual to its noise, by joint and phase, against time. residual: its name."""
+    """Draws the ratio of the residual to its noise, by joint and phase, against time. residual: its name."""
     cells = [c for c in where.cells if c.trace == trace]
     joints = sorted({c.joint for c in cells})
     limits = shade_limits(cells)
@@ -89,15 +89,16 @@ def _map(axes: Axes, cells: Sequence[PhaseCell], joint: int, limits: Sequence[fl
 
 
 def shade_limits(cells: Sequence[PhaseCell]) -> tuple[float, ...]:
-    """Upper limits of the shades, in terms of the noise: noise, then doublings up to 64, or up to more where a cell is
-    further off, so that a strong map keeps its structure."""
+    """Returns upper limits of the shades, in terms of the noise: noise, then doublings up to 64, or farther if a cell
+    needs it, so that a strong map keeps its structure.
+    """
     most = max((float(np.sqrt(c.mean_square)) for c in cells), default=1.0)
     top = max(64.0, 2.0 ** np.ceil(np.log2(most)))
     return (NOISE, *(float(top) / 2**k for k in range(len(SHADES) - 2, -1, -1)))
 
 
 def by_shade(cells: Sequence[PhaseCell], limits: Sequence[float]) -> list[list[PhaseCell]]:
-    """Cells of the map, grouped by shade."""
+    """Returns cells of the map, grouped by shade."""
     groups: list[list[PhaseCell]] = [[] for _ in limits]
     for cell in cells:
         groups[int(np.searchsorted(limits, np.sqrt(cell.mean_square)))].append(cell)
@@ -115,7 +116,7 @@ def _shade_legend(limits: Sequence[float]) -> list[object]:
 
 
 def dependence_picture(where: Where, joint: int, residual: str, unit: str) -> Picture | None:
-    """The mean residual of a joint against each quantity. residual, unit: its name and unit."""
+    """Draws the mean residual of a joint against each quantity. residual, unit: its name and unit."""
     own = [d for d in where.dependences if d.joint == joint]
     if not own:
         return None

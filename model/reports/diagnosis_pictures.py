@@ -19,15 +19,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHOWN, PROBED_SHOWN, PROBED_ALONE = 10, 4, 8
-"""Most candidates in a picture: fitted ones; probed ones beside them; probed ones where none was fitted."""
+"""Most candidates in a picture: fitted ones; probed ones beside them; probed ones if none was fitted."""
 Key = tuple[str, tuple[int, ...]]
 
 
 def shown_candidates(
     candidates: Sequence[Candidate], named: Collection[Key] = ()
 ) -> tuple[list[Candidate], list[Candidate]]:
-    """The fitted and the probed candidates that a picture has room for; those that the answer names are always among
-    them."""
+    """Returns the fitted and the probed candidates for a picture, always including those that the answer names."""
     fitted, probed = in_order(candidates)
     first = [c for k, c in enumerate(fitted) if k < SHOWN or (c.effect, c.joints) in named]
     most = PROBED_SHOWN if fitted else PROBED_ALONE
@@ -37,11 +36,10 @@ def shown_candidates(
 def evidence_picture(
     candidates: Sequence[Candidate], chosen: Sequence[Candidate] = (), needed: float | None = None
 ) -> Picture:
-    """Fitted candidates by evidence of fitted and held-out traces, those that the answer names in full colour; probed
-    ones below them.
+    """Draws fitted candidates by evidence of fitted and held-out traces, named ones in full colour; probed ones below.
 
     Args:
-        needed: evidence from which an effect is named, drawn as a line.
+        needed: least evidence at which an effect is named, drawn as a line.
     """
     named = {(c.effect, c.joints) for c in chosen}
     fitted, probed = shown_candidates(candidates, named)
@@ -78,7 +76,7 @@ def evidence_picture(
 
 
 def _bar(axes: Axes, place: float, c: Candidate, scale: float, *, named: bool) -> None:
-    """The bar of a candidate. A probe beyond the scale of the fits is cut off; its number stands beside the bar."""
+    """Draws the bar of a candidate. A probe beyond the scale of the fits is cut off; its value is beside the bar."""
     colour = COLOURS[(c.joints[0] - 1) % len(COLOURS)] if c.joints else COLOURS[5]
     length = min(max(c.total, 0.0), scale)
     if c.refitted:
@@ -111,7 +109,7 @@ def _evidence_caption(more: int, *, has_fits: bool, has_chosen: bool) -> str:
 
 
 def remaining_picture(shapes: Sequence[RemainingShape]) -> Picture:
-    """The torque that would explain what is left, against the quantity that it depends on most."""
+    """Draws the torque that would explain the remaining error, against the quantity on which it depends most."""
     shown = shapes[:4]
 
     def draw(figure: Figure) -> None:

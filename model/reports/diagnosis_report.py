@@ -48,12 +48,12 @@ def diagnosis_report(
     efforts: Sequence[TraceSignals] = (),
     more: Sequence[Section] = (),
 ) -> Report:
-    """The page of a diagnosis.
+    """Returns the page of a diagnosis.
 
     Args:
-        comparison: of the models before and after (labelled `LABELS`), on the traces fitted to and held out; overlays
-            are left out without it.
-        files: names of the traces' files, by number, where they are known.
+        comparison: of the models before and after (labelled `LABELS`), on the traces fitted to and held out; without it
+            there are no overlays.
+        files: names of the traces' files, by ID, if known.
         efforts: recorded beside predicted torques (forces) of a diagnosis in torques, of the models `LABELS`.
         more: sections of plug-ins (`daq.plugins.report_sections`), shown behind the comparisons.
     """
@@ -115,12 +115,14 @@ def _facts(found: Diagnosis, files: Mapping[str, str]) -> tuple[tuple[str, str],
 
 
 def diagnosis_page(found: Diagnosis, comparison: Comparison | None = None) -> str:
-    """The page as one HTML text."""
+    """Returns the page as one HTML text."""
     return html(diagnosis_report(found, comparison))
 
 
 def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
-    """The basis of an answer in which no effect was added: the map, what was tried, and errors beside the noise."""
+    """Returns the basis of an answer in which no effect was added: the map, tried effects, and errors beside the
+    noise.
+    """
     sections = []
     if not found.steps:
         if found.where is not None:
@@ -128,7 +130,7 @@ def _nothing_added(found: Diagnosis, of: Compared) -> list[Section]:
         if found.candidates:
             needed = found.significant
             fitted, _ = in_order(found.candidates)
-            own = fitted[0].needed if fitted else None  # the others may need more or less
+            own = fitted[0].needed if fitted else None  # the other sections may need more or less
             picture = evidence_picture(found.candidates, needed=needed if own is None else own)
             words = () if needed is None else (Text(best_tried(found.candidates, needed)),)
             sections.append(Section("What was tried", (*words, picture)))
@@ -254,7 +256,7 @@ def _next(found: Diagnosis) -> Section:
 
 
 def _without_experiment(found: Diagnosis) -> str:
-    """Why no experiment is asked for."""
+    """Returns why no experiment is requested."""
     if found.verdict == "nothing-significant" and not found.examined_nothing:
         return "Nothing is left to tell apart."
     if found.verdict == "named" or found.method == "output-error":

@@ -1,4 +1,4 @@
-"""Sections of a diagnosis's page about one step, and their blocks: where, what, and what adding it did."""
+"""Sections of a diagnosis's page about one step, and their blocks: location, effect, and result of adding it."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ from model.reports.numbers import estimate
 
 
 def step_sections(number: int, steps: Sequence[Step], of: Compared, stated: Mapping[str, Parameter]) -> list[Section]:
-    """Sections of a step, counted from 1; `stated` are the numbers of the machine file, by name. Where
-    the step before added nothing, the map is not shown again."""
+    """Returns sections of a step, counted from 1; `stated` are the parameters of the machine file, by name.
+
+    If the step before added nothing, the map is not shown again.
+    """
     step, before = steps[number - 1], steps[: number - 1]
     turn = f"Step {number}: " if len(steps) > 1 else ""
     if before and before[-1].where == step.where:
@@ -34,7 +36,7 @@ def step_sections(number: int, steps: Sequence[Step], of: Compared, stated: Mapp
 
 
 def where_blocks(where: Where, errors: Sequence[SignalError], of: Compared) -> tuple[Block, ...]:
-    """The location in words, the map of every trace, and what the residual depends on."""
+    """Returns the location in words, the map of every trace, and the dependences of the residual."""
     blocks: list[Block] = [Text(where.summary, "plain" if where.joint is None else "warning")]
     if where.cells:
         blocks.append(Text(of.errors, "quiet"))
@@ -55,7 +57,9 @@ def _what(step: Step, before: Sequence[Step]) -> tuple[Block, ...]:
     chosen = list(step.group)
     if step.effect is not None:
         chosen.append(Candidate(effect=step.effect, joints=step.joints, evidence=step.evidence))
-    refused = {(s.effect, s.joints) for s in before if not s.adopted}  # fitted and refused, so no promise any more
+    refused = {
+        (s.effect, s.joints) for s in before if not s.adopted
+    }  # fitted and rejected, so it promises nothing any more
     candidates = [c for c in step.candidates if c.refitted or (c.effect, c.joints) not in refused]
     if candidates and step.proof is None:
         blocks.append(evidence_picture(candidates, chosen))
@@ -82,7 +86,7 @@ def _refused(step: Step, stated: Mapping[str, Parameter]) -> tuple[Block, ...]:
 
 
 def _parameters(step: Step, stated: Mapping[str, Parameter], caption: str) -> Table:
-    """The parameters of a step; with what the machine file states, where it does of any."""
+    """Returns a table of the parameters of a step; with the machine file's values, if it states any."""
     of_file = {name: stated_beside(step.effect, name, v, stated) for name, v in step.parameters.items()}
     rows = []
     for name, v in step.parameters.items():

@@ -1,4 +1,4 @@
-"""Words of a diagnosis's report: what its numbers are of, and what its steps did."""
+"""Words of a diagnosis's report: the meaning of its numbers, and the results of its steps."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from model.discrepancy.explanation.step_words import removed_words
 
 @dataclass(frozen=True)
 class Compared:
-    """What a diagnosis compared. residual: its name. errors: what the map is of. overlays: why there are none;
-    empty where there are some."""
+    """Quantity that a diagnosis compared. residual: its name. errors: of the map. overlays: why there are none; empty
+    if there are some.
+    """
 
     residual: str
     errors: str
@@ -38,7 +39,7 @@ TORQUES, FORCES = _balanced("torque"), _balanced("force")
 
 
 def compared(found: Diagnosis) -> Compared:
-    """Positions (speeds) where the loop was simulated, else torques, or forces where all joints slide."""
+    """Returns positions (speeds) if the loop was simulated, else torques, or forces if all joints are prismatic."""
     if found.method == "output-error":
         return POSITIONS
     machine = found.model_before.machine
@@ -47,7 +48,7 @@ def compared(found: Diagnosis) -> Compared:
 
 
 def gap(step: Step) -> str:
-    """What an adopted step does on traces that it was not fitted to."""
+    """Describes the result of an adopted step on traces that it was not fitted to."""
     if step.proof is not None:
         return "Taken into the model: the recorded numbers of the controller prove it, and nothing was fitted for it."
     if step.excess_removed_holdout is None:

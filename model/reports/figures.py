@@ -1,4 +1,4 @@
-"""Figures for print and screen: one style, colours that the colour-blind can tell apart, light or dark as the page."""
+"""Figures for print and screen: one style, colours for the colour-blind, light or dark like the page."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#a07800", "#4b4b9b")
 """Colours of the joints, as in the plots of traces: those of Okabe and Ito, the yellow darkened to show on paper."""
 
 MODEL_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
-"""Colours of models that are drawn together."""
+"""Colours of models in the same picture."""
 
 WIDTH = 7.2
 """Width of a page's text, inches."""
@@ -38,7 +38,9 @@ _INKS |= {"axes.edgecolor": QUIET, "grid.color": GRID}
 
 
 def drawn(draw: Callable[[Figure], None], height: float, width: float = WIDTH) -> str:
-    """SVG of what `draw` puts on a figure of that size (inches). Its colours are variables of the page's style."""
+    """Returns SVG of a figure of that size (inches) that `draw` fills. Its colours are variables of the page's
+    style.
+    """
     from daq.contracts.notebook_figure import NotebookFigure
 
     with _style():
@@ -57,7 +59,7 @@ def drawn(draw: Callable[[Figure], None], height: float, width: float = WIDTH) -
 
 
 def saved(draw: Callable[[Figure], None], height: float, path: Path, kind: str, width: float = WIDTH) -> None:
-    """The same as a file of that kind (png, svg, pdf), on white. Raises OSError."""
+    """Saves the same as a file of that kind (png, svg, pdf), on white. Raises OSError."""
     from daq.contracts.notebook_figure import NotebookFigure
 
     with _style():
@@ -77,12 +79,12 @@ def _style() -> AbstractContextManager[None]:
 
 
 def as_label(text: str) -> str:
-    """A text for a legend as it is: matplotlib leaves out what begins with an underline."""
+    """Returns a text that a legend shows: matplotlib omits labels that begin with an underline."""
     return f"\N{NO-BREAK SPACE}{text}" if text.startswith("_") else text
 
 
 def _plain_powers(figure: Figure) -> None:
-    """Labels logarithmic axes with plain numbers: matplotlib writes powers as formulas, which no text here is."""
+    """Labels logarithmic axes with plain numbers: matplotlib would write powers as formulas."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
     for axes in figure.axes:
@@ -93,7 +95,7 @@ def _plain_powers(figure: Figure) -> None:
 
 
 def thinned(time: Floats, *signals: Floats, most: int = 1500) -> tuple[Floats, ...]:
-    """About `most` samples of each signal, evenly picked: a printed page resolves no more."""
+    """Returns about `most` samples of each signal, evenly picked: a printed page resolves no more."""
     stride = max(1, -(-len(time) // most))
     return (time[::stride], *(s[::stride] for s in signals))
 
@@ -112,7 +114,7 @@ def band(axes: Axes, time: Floats, signal: Floats, colour: str, most: int = 300)
 
 
 def panels(figure: Figure, rows: int, columns: int, **options: Any) -> Any:
-    """Axes (rows, columns), never squeezed."""
+    """Returns axes (rows, columns), always as a two-dimensional array."""
     return figure.subplots(rows, columns, squeeze=False, **options)
 
 

@@ -1,4 +1,4 @@
-"""The report of a fit: the parameters and how well they are known, what the data cannot tell, and the residual."""
+"""The report of a fit: the parameters with their intervals, undetermined combinations, and the residual."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def fit_report(
     base: BaseParameters | None = None,
     files: Mapping[str, str] | None = None,
 ) -> Report:
-    """The page of a fit.
+    """Returns the page of a fit.
 
     `comparison` is of the model before and after, on the traces fitted to and held out; `base`, the base parameters of
-    the fitted model on the traces fitted to; `files`, the names of the traces' files by number, where they are known.
+    the fitted model on the traces fitted to; `files`, the names of the traces' files by ID, if known.
     """
     files = files or {}
     sections = [

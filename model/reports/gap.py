@@ -1,4 +1,4 @@
-"""The gap of a diagnosis, from the model as given to the resulting one: its words, its picture and its table."""
+"""Error by stage of a diagnosis, from the given model to the resulting one: its words, its picture and its table."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ EXPLAINED = {
     "torques": "What drives supply is compared with what the recorded motion needs; no simulation enters these errors. "
     "A dash: what is needed is not finite.",
 }
-"""How the errors come about, by `Gap.measure`."""
+"""Origin of the errors, by `Gap.measure`."""
 MOST_COLUMNS = 3
 """Panels side by side."""
 
 
 def gap_section(gap: Gap) -> Section:
-    """Picture and table: how far each model is from the measurement."""
+    """Returns picture and table of each model's error."""
     without = () if gap.without is None else (Text(gap.without.text),)
     return Section("How the gap shrinks", (_picture(gap), *without, _table(gap)))
 
@@ -91,7 +91,7 @@ def _joint(axes: Axes, gap: Gap, place: int) -> None:
 
 
 def _short(gap: Gap, place: int) -> str:
-    """Label of a stage in the picture: effects are counted."""
+    """Returns the label of a stage in the picture: effects are counted."""
     kinds = [stage.kind for stage in gap.stages]
     kind = kinds[place]
     return f"+{kinds[: place + 1].count(kind)}" if kind == "effect" else {"refitted": "all"}.get(kind, kind)

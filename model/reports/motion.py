@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 ABREAST = 3
 """Number of joints side by side."""
 USUAL = 2.5
-"""Largest reach of a picture of a residual, over its 99.5th percentile; no outlier may hide the rest."""
+"""Largest range of a picture of a residual, over its 99.5th percentile; no outlier may hide the rest."""
 ROLES = {True: "held out", False: "fitted to", None: "all"}
 """Roles of a trace: whether it was held out from the fit of a model."""
 
@@ -46,11 +46,12 @@ def motion_section(
     closer: bool = False,
     files: Mapping[str, str] | None = None,
 ) -> Section:
-    """A section with one figure for each of the first traces: position above, residual below, one column per joint.
+    """Returns a section with one figure for each of the first traces: position above, residual below, one column per
+    joint.
 
     Args:
-        closer: also the stretch in which the first model is furthest off.
-        files: names of the traces' files, by number, where they are known.
+        closer: also the part with the first model's largest error.
+        files: names of the traces' files, by ID, if known.
     """
     pictures: list[Picture] = []
     for signal in signals[:most]:
@@ -95,8 +96,10 @@ def _picture(one: TraceSignals, labels: Sequence[str]) -> Picture:
 
 
 def _reach(one: TraceSignals) -> tuple[float, float]:
-    """The reach of a residual's picture, and the residual's largest size. The reach is smaller where a short peak, such
-    as that of a wrong start posture, would hide the rest."""
+    """Returns the range of a residual's picture, and the residual's largest size.
+
+    The range is smaller if a short peak, such as that of a wrong start posture, would hide the rest.
+    """
     sizes = [np.abs(one.measured - s) for s in one.simulated]
     widest = max(float(s.max()) for s in sizes)
     usual = max(float(np.quantile(s, 0.995, axis=0).max()) for s in sizes)
@@ -124,7 +127,9 @@ def _joint(
         above.plot(time, own, color=shade, lw=1.4, ls=style, label=as_label(label))
         band(below, one.time, (one.measured - simulated)[:, column] * factor, shade)
     time, measured = thinned(one.time, one.measured[:, column] * factor)
-    above.plot(time, measured, color=INK, lw=0.6, label=one.words[0])  # thin and on top: neither hides the other
+    above.plot(
+        time, measured, color=INK, lw=0.6, label=one.words[0]
+    )  # thin and on top, so that neither hides the other
     below.set_xlabel("time / s")
     for axes in (above, below):
         axes.margins(x=0.01)
@@ -134,11 +139,11 @@ def _joint(
 
 
 AGREEMENT = ("model", "traces", "joint", "rms", "in counts", "largest", "noise")
-"""What a terminal shows of an agreement."""
+"""Agreement in a terminal."""
 
 
 def agreement_table(models: Sequence[ModelAgreement]) -> Table:
-    """By model, kind of trace and joint: root mean square, largest, and the noise beside it."""
+    """Returns by model, kind of trace and joint: root mean square, largest, and the noise."""
     rows = []
     for model in models:
         for kind, joints in ((in_sample(model), model.in_sample), (ROLES[True], model.held_out)):
@@ -146,8 +151,8 @@ def agreement_table(models: Sequence[ModelAgreement]) -> Table:
     return Table(
         (*AGREEMENT, "noise in counts", "of the motion"),
         tuple(rows),
-        "Measured − simulated over all samples of these traces. Noise is what a right model would leave: the "
-        "sensor's noise and rounding, as they go round the loop. Of the motion: rms of the residual over that of the "
+        "Measured − simulated over all samples of these traces. Noise is the error of a right model: the "
+        "sensor's noise and rounding in the control loop. Of the motion: rms of the residual over that of the "
         "motion about its mean.",
     )
 
@@ -161,10 +166,10 @@ def _row(label: str, kind: str, one: JointAgreement) -> tuple[Cell, ...]:
 
 
 def in_sample(model: ModelAgreement) -> str:
-    """The role of the traces that are not held out from a model."""
+    """Returns the role of the traces that are not held out from a model."""
     return ROLES[next((t.held_out for t in model.traces if not t.held_out), None)]
 
 
 def counted(value: float | None) -> str:
-    """Counts of a sensor, or a dash where there is none."""
+    """Returns counts of a sensor, or a dash without a sensor."""
     return "–" if value is None else f"{value:.2f}"

@@ -1,4 +1,4 @@
-"""A closer look at the stretch of a trace where a simulation and the measurement differ most."""
+"""Shows the part of a trace with the largest difference between simulation and measurement."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 STRETCH = 4.0
-"""Length of the stretch that is shown, s."""
+"""Length of the part that is shown, s."""
 
 
 def stretch_of_most(residual: Floats, period: float) -> tuple[slice, int]:
-    """The samples and the column in which `STRETCH` of a residual (m, n) has the largest sum of squares."""
+    """Returns the samples and the column in which `STRETCH` of a residual (m, n) has the largest sum of squares."""
     size = min(len(residual), max(2, round(STRETCH / period)))
     sums = np.cumsum(np.vstack([np.zeros(residual.shape[1]), residual**2]), axis=0)
     squares = sums[size:] - sums[:-size]
@@ -31,7 +31,7 @@ def stretch_of_most(residual: Floats, period: float) -> tuple[slice, int]:
 
 
 def what_is_shown(one: TraceSignals) -> tuple[str, str]:
-    """The curves of a trace, and what is left of them, in words."""
+    """Names the curves of a trace, and their residuals."""
     measured, simulated = one.words
     between = " and " if one.set_point is None else ", set point and "
     quantity = f" {one.quantity}" if one.signal == "effort" else ""
@@ -39,7 +39,7 @@ def what_is_shown(one: TraceSignals) -> tuple[str, str]:
 
 
 def closer_picture(one: TraceSignals, labels: Sequence[str]) -> Picture | None:
-    """Position and residual of one joint in that stretch; None where the first simulation does not stay finite."""
+    """Draws position and residual of one joint in that part; None if the first simulation does not stay finite."""
     left = one.measured - one.simulated[0]
     if len(one.time) < 2 or not np.isfinite(left).all():
         return None

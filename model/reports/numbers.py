@@ -1,4 +1,4 @@
-"""Numbers as text, with the same decimals throughout a column or an interval."""
+"""Formats numbers, with the same decimals throughout a column or an interval."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ MOST_DECIMALS = 8
 
 
 def decimals(size: float, digits: int) -> int:
-    """Decimals that show so many digits of a size; none where it is 0 or not finite."""
+    """Returns the decimals that show so many digits of a size; none if it is 0 or not finite."""
     if size == 0.0 or not math.isfinite(size):
         return 0
     return min(MOST_DECIMALS, max(0, digits - 1 - math.floor(math.log10(abs(size)))))
 
 
 def column(values: Sequence[float], digits: int = 3) -> list[str]:
-    """Numbers of one unit with the same decimals: so many digits of the smallest, or one less where the largest has
-    more digits than that without it."""
+    """Formats numbers of one unit with the same decimals: so many digits of the smallest, or one less if the largest
+    then has more digits than that.
+    """
     sizes = [abs(v) for v in values if v]
     least, largest = (decimals(f(sizes, default=0.0), digits) for f in (min, max))
     places = min(least, max(largest + 1, least - 1))
@@ -25,7 +26,9 @@ def column(values: Sequence[float], digits: int = 3) -> list[str]:
 
 
 def estimate(value: float, low: float | None, high: float | None, digits: int = 2) -> tuple[str, str | None]:
-    """A value and its interval, to so many digits of the interval's half width; no interval where there is none."""
+    """Formats a value and its interval, with so many digits of the interval's half width; no interval if there is
+    none.
+    """
     if low is None or high is None:
         return fixed(value, decimals(value, 3)), None
     places = decimals((high - low) / 2.0, digits)
@@ -33,10 +36,10 @@ def estimate(value: float, low: float | None, high: float | None, digits: int = 
 
 
 def fixed(value: float, places: int) -> str:
-    """A number with so many decimals, with the minus sign that print has, and never −0."""
+    """Formats a number with so many decimals, with a printed minus sign, and never −0."""
     return f"{round(value, places) + 0.0:.{places}f}".replace("-", "−")
 
 
 def whole(value: float) -> str:
-    """A number without decimals."""
+    """Formats a number without decimals."""
     return fixed(value, 0)

@@ -1,4 +1,4 @@
-"""A report as an HTML file: without scripts or outside resources, for light or dark screens and print."""
+"""Renders a report as an HTML file: without scripts or outside resources, for light or dark screens and print."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from model.effects.names import effect_name
 
 
 def html(report: Report) -> str:
-    """The page as text; the same report gives the same text."""
+    """Returns the page as text; the same report gives the same text."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -25,9 +25,9 @@ def html(report: Report) -> str:
 
 
 def write_report(report: Report, path: Path) -> Path:
-    """Writes the page. Returns `path`. Raises SpecError when it is not an .html file or cannot be written."""
+    """Writes the page. Returns `path`. Raises SpecError if it is not an .html file or cannot be written."""
     if path.suffix != ".html":
-        raise SpecError(f"report {path}: is written as .html")
+        raise SpecError(f"report {path}: must be an .html file")
     try:
         path.write_text(html(report), "utf-8")
     except OSError as error:
@@ -36,16 +36,16 @@ def write_report(report: Report, path: Path) -> Path:
 
 
 def trace_names(traces: Iterable[str], files: Mapping[str, str]) -> list[str]:
-    """What a page calls traces: their files by number, where they are known, else their numbers."""
+    """Returns a page's names of traces: their files by ID, if known, else their IDs."""
     return [files.get(trace) or trace for trace in traces]
 
 
 def listed(names: Sequence[str], most: int = 6) -> str:
-    """Names in a sentence; those beyond `most` are only counted."""
+    """Returns names for a sentence; those beyond `most` are only counted."""
     shown = ", ".join(names[:most])
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 
 
 def effect_list(effects: Sequence[str]) -> str:
-    """Names of effects, as a sentence lists them."""
+    """Returns names of effects for a sentence."""
     return ", ".join(effect_name(e) for e in effects) or "no effects"

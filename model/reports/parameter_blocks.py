@@ -1,4 +1,4 @@
-"""The parameters in a report of a fit: a picture of the intervals, and what the data leave open."""
+"""Parameters in a report of a fit: a picture of the intervals, and undetermined parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def interval_picture(model: Model, parameters: Sequence[FittedParameter]) -> tuple[Picture, ...]:
-    """Intervals of parameters of the model, in expected deviations from the expected value."""
+    """Draws intervals of parameters of the model, in expected deviations from the expected value."""
     shown = [p for p in parameters if p.value is not None and p.expected is not None and p.expected_deviation]
     if not shown:
         return ()
@@ -48,7 +48,7 @@ def interval_picture(model: Model, parameters: Sequence[FittedParameter]) -> tup
 
 
 def undetermined_blocks(report: IdentifiabilityReport) -> tuple[Text | Points, ...]:
-    """Combinations that the data leave open, and the reasons why parameters are not known."""
+    """Returns combinations that the data do not determine, and the reasons why parameters are not known."""
     weak = [p for p in report.parameters if p.verdict != "known"]
     if not weak and not report.undetermined:
         return (Text("Every parameter is determined by the traces alone, without the help of the priors."),)
@@ -60,6 +60,6 @@ def undetermined_blocks(report: IdentifiabilityReport) -> tuple[Text | Points, .
         blocks.append(Text("By parameter:"))
         blocks.append(Points(tuple(f"{p.name}: {p.reason}" for p in weak)))
     if report.correlated:
-        blocks.append(Text("Estimates that move together (correlation above 0.95):"))
+        blocks.append(Text("Correlated estimates (correlation above 0.95):"))
         blocks.append(Points(tuple(", ".join(group) for group in report.correlated)))
     return tuple(blocks)

@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 PANEL_HEIGHT = 2.1
 """Height of a panel, inches."""
 HIGHEST = 2.5
-"""Top of a panel, in rises that end the interval."""
+"""Top of a panel, in units of the rise that ends the interval."""
 
 
 def profile_report(fitted: FitResult, profiles: Sequence[Profile]) -> Report:
-    """The page of some parameters' profiles about a fit."""
+    """Returns the page of some parameters' profiles about a fit."""
     picture = Picture(
         drawn(lambda figure: _draw(figure, fitted, profiles), PANEL_HEIGHT * len(profiles)),
-        "Rise of −2 ln L when the parameter is moved and all others are fitted again. The line is the rise at which "
-        "the 95 % interval ends; the band is the interval. Dashed: the parabola that the fit's covariance stands for.",
+        "Rise of −2 ln L when the parameter is fixed elsewhere and all others are refitted. The line is the rise at which "
+        "the 95 % interval ends; the band is the interval. Dashed: the parabola of the fit's covariance.",
     )
     blocks: list[Table | Text] = [bounds_table(profiles)]
     if better := [one.name for one in profiles if one.better]:
@@ -39,12 +39,12 @@ def profile_report(fitted: FitResult, profiles: Sequence[Profile]) -> Report:
     )
     sections = (Section("Intervals", tuple(blocks)), Section("Profiles", (picture,)))
     answer = " ".join(f"{one.name}: {bounded(one)}." for one in profiles)
-    errors = "The parameter's own prior takes no part; those of all others do."
+    errors = "The parameter's own prior is left out; those of all others are used."
     return Report(f"Profile likelihoods of {fitted.model.machine.title}", answer, facts, sections, errors)
 
 
 def bounded(one: Profile) -> str:
-    """What the data bound, for people."""
+    """Returns the bounds that the data give, in words."""
     low, high = (None if end is None else f"{end:.4g}" for end in (one.low, one.high))
     if low is not None and high is not None:
         return f"{low} to {high} {one.unit}"
@@ -54,7 +54,7 @@ def bounded(one: Profile) -> str:
 
 
 def better_fit(names: Sequence[str]) -> str:
-    """The line about profiles that found a better fit than the one that they are about."""
+    """Returns the line about profiles that found a better fit than the fit itself."""
     return (
         f"{listed(names)}: another value fits better than the fit's own, which had ended in a local minimum. "
         "Search from more starting values (--starts)."
@@ -62,12 +62,12 @@ def better_fit(names: Sequence[str]) -> str:
 
 
 def save_profiles(fitted: FitResult, profiles: Sequence[Profile], path: Path, kind: str) -> None:
-    """The profiles as a picture of that kind (png, svg, pdf), one panel a parameter. Raises OSError."""
+    """Saves the profiles as a picture of that kind (png, svg, pdf), one panel per parameter. Raises OSError."""
     saved(lambda figure: _draw(figure, fitted, profiles), PANEL_HEIGHT * len(profiles), path, kind)
 
 
 def bounds_table(profiles: Sequence[Profile]) -> Table:
-    """The best value of each parameter, and what the data bound."""
+    """Returns the best value of each parameter, and its bounds from the data."""
     rows = tuple(
         (*cells(one.name, f"{one.value:.5g}"), *(_end(end) for end in (one.low, one.high)), Cell(one.unit))
         for one in profiles

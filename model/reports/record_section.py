@@ -1,4 +1,4 @@
-"""What a check of the records found, as a section of a report."""
+"""Findings of the check of the records, as a section of a report."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from model.record_check.finding import RecordFinding, doubts_in, lines_of
 
 
 def record_sections(findings: Sequence[RecordFinding]) -> list[Section]:
-    """Doubts as warnings, notes as a list; nothing where nothing was found."""
+    """Returns doubts as warnings, notes as a list; nothing without findings."""
     notes = [finding for finding in findings if finding.consequence == "note"]
     sections = [Section("Check the record", tuple(Text(line, "warning") for line in lines_of(doubts_in(findings))))]
     kept = sections if doubts_in(findings) else []

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from daq.contracts.machine import Machine
 
 SHOWN = len(COLOURS)
-"""Number of curves that are drawn for a joint: those of the parameters that move it most."""
+"""Number of curves that are drawn for a joint: those of the parameters that change it most."""
 PANEL_HEIGHT = 1.9
 """Height of a panel, inches."""
 
 
 def sensitivity_report(label: str, found: SensitivityCurves, machine: Machine) -> Report:
-    """The page; `machine` is the model's and tells the units of its joints."""
+    """Returns the page; `machine` is the model's and gives the units of its joints."""
     strongest = found.curves[0]
     joint = found.joints[strongest.moves_most]
     answer = (
@@ -33,8 +33,8 @@ def sensitivity_report(label: str, found: SensitivityCurves, machine: Machine) -
     )
     facts = (("model", f"{label}, {found.model}"), ("trace", found.trace), ("parameters", str(len(found.curves))))
     caption = (
-        "Change of each joint's reading when one parameter changes by its expected deviation, the others held. Of "
-        f"each joint the {SHOWN} parameters that move it most."
+        "Change of each joint's reading when one parameter changes by its expected deviation, the others held. For "
+        f"each joint, the {SHOWN} parameters that change it most."
     )
     picture = Picture(drawn(lambda figure: _draw(figure, found, machine), PANEL_HEIGHT * len(found.joints)), caption)
     sections = (Section("How much, and when", (changes_table(found, machine),)), Section("Curves", (picture,)))

@@ -13,7 +13,7 @@ KINDS: dict[str, int] = {"clean": 1, "single": 2, "open-set": 3, "pair": 4, "sha
 LOADS: dict[str, int] = {"nominal": 0, "light": 1, "heavy": 2}
 """Announced loads, and the digit of each in a secret."""
 LOAD_CYCLE = ("nominal", "nominal", "nominal", "light", "heavy")
-"""Loads that arms carry in turn, by their number."""
+"""Loads of arms, in turn by their number."""
 LARGEST_NUMBER = 10**15
 """Largest number of an arm: those that a commit draws have 48 bits."""
 MOST_NUMBERS = 100_000
@@ -23,7 +23,7 @@ _FIRST_DRAWN = 10**6
 
 
 def parse_numbers(text: str) -> list[int]:
-    """Numbers of arms from `FIRST:LAST` (both included) or `1,2,5`. Raises SpecError."""
+    """Parses numbers of arms from `FIRST:LAST` (both included) or `1,2,5`. Raises SpecError."""
     refusal = f"seeds {shown(text)}: write FIRST:LAST or numbers with commas, from 0 to {LARGEST_NUMBER}"
     try:
         first, *others = (int(part) for part in text.split(":" if ":" in text else ","))
@@ -37,12 +37,12 @@ def parse_numbers(text: str) -> list[int]:
     if len(named) != 2 or first > named[1]:
         raise SpecError(refusal)
     if (count := named[1] - first + 1) > MOST_NUMBERS:
-        raise SpecError(f"seeds {shown(text)}: {count} arms; at most {MOST_NUMBERS} are taken at once")
+        raise SpecError(f"seeds {shown(text)}: {count} arms; at most {MOST_NUMBERS} are allowed at once")
     return list(range(first, named[1] + 1))
 
 
 def parse_choice(text: str, allowed: Iterable[str], what: str) -> tuple[str, ...]:
-    """Words separated by commas, each one of `allowed`. Raises SpecError."""
+    """Parses words separated by commas, each one of `allowed`. Raises SpecError."""
     words = tuple(word.strip() for word in text.split(","))
     for word in words:
         if word not in allowed:
@@ -51,17 +51,17 @@ def parse_choice(text: str, allowed: Iterable[str], what: str) -> tuple[str, ...
 
 
 def compose(number: int, kind: str, load: str) -> int:
-    """The mock's seed for an arm."""
+    """Returns the mock's seed for an arm."""
     return 100 * number + 10 * KINDS[kind] + LOADS[load]
 
 
 def arms(numbers: Sequence[int], kinds: Sequence[str], loads: Sequence[str] = LOAD_CYCLE) -> list[int]:
-    """Seeds of all kinds for each number; the loads take turns by number."""
+    """Returns seeds of all kinds for each number; the loads take turns by number."""
     return [compose(number, kind, loads[number % len(loads)]) for number in numbers for kind in kinds]
 
 
 def sample_arms(seeds: Sequence[int], count: int) -> list[int]:
-    """At most `count` of the seeds, kinds and loads mixed: those whose SHA-256 comes first.
+    """Returns at most `count` of the seeds, kinds and loads mixed: those whose SHA-256 comes first.
 
     A larger sample contains the smaller ones.
     """
@@ -69,7 +69,9 @@ def sample_arms(seeds: Sequence[int], count: int) -> list[int]:
 
 
 def drawn_arms(commit: str, cases: dict[str, int], loads: Sequence[str] = LOAD_CYCLE) -> list[int]:
-    """Seeds drawn from the hash of a commit: the n-th of a kind from SHA-256 of `commit kind n`, its load in turn."""
+    """Returns seeds drawn from the hash of a commit: the n-th of a kind from SHA-256 of `commit kind n`, its load in
+    turn.
+    """
     found = []
     for kind, count in cases.items():
         for index in range(count):

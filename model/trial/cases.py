@@ -32,7 +32,7 @@ COLUMNS = (*_FIELDS[:3], *list(_DERIVED)[:4], *_FIELDS[3:5], *list(_DERIVED)[4:]
 
 
 def as_csv(scores: Iterable[Score]) -> str:
-    """CSV with one line per case, in the order of their seeds; empty where a question does not arise."""
+    """Returns CSV with one line per case, in the order of their seeds; empty if a question does not apply."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(COLUMNS)

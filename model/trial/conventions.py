@@ -1,7 +1,8 @@
 """Converts the mock's parameters to the model's conventions, so that stated intervals can be compared with the truth.
 
 The two were written independently: they measure the same quantity from different zeros, with other signs or on the
-other side of a gear. `TRANSLATIONS` says how, effect by effect; `LEFT_OUT` lists what has no counterpart, and why.
+other side of a gear. `TRANSLATIONS` converts effect by effect; `LEFT_OUT` lists parameters without a counterpart, and
+why.
 """
 
 from __future__ import annotations
@@ -17,42 +18,42 @@ Translation = Callable[[Values, int, Truth, Machine], dict[str, float]]
 
 
 def _same(**names: str) -> Translation:
-    """Translations of parameters that differ in name only, given as model=mock."""
+    """Returns translations of parameters that differ in name only, given as model=mock."""
     return lambda values, _joint, _truth, _machine: {ours: values[theirs] for ours, theirs in names.items()}
 
 
 def _viscous(values: Values, joint: int, truth: Truth, machine: Machine) -> dict[str, float]:
-    """All of the joint's viscous friction, on the motor's side: the machine's with its deviation, and c/n²."""
+    """Returns all of the joint's viscous friction, on the motor's side: the machine's with its deviation, plus c/n²."""
     stated = machine.joint(joint).friction.viscous_motor_side
     present = 0.0 if stated is None else stated.value * (1.0 + truth.deviations[f"viscous_friction_{joint}"])
     return {"coefficient": present + values["coefficient"] / _gear(machine, joint) ** 2}
 
 
 def _viscous_difference(values: Values, joint: int, _truth: Truth, machine: Machine) -> dict[str, float]:
-    """The difference of the two directions on the motor's side, c/n²."""
+    """Returns the difference of the two directions on the motor's side, c/n²."""
     return {"difference": values["coefficient"] / _gear(machine, joint) ** 2}
 
 
 def _load_dependent(values: Values, joint: int, truth: Truth, machine: Machine) -> dict[str, float]:
-    """The whole arm μ̃ of the joint: the machine's with its deviation, and what was added."""
+    """Returns the whole arm μ̃ of the joint: the machine's with its deviation, plus the added one."""
     stated = machine.joint(joint).friction.coulomb_arm
     present = 0.0 if stated is None else stated.value * (1.0 + truth.deviations[f"coulomb_arm_{joint}"])
     return {"arm": present + values["arm"]}
 
 
 def _supply(values: Values, joint: int, _truth: Truth, machine: Machine) -> dict[str, float]:
-    """The voltage limit that the reduction leaves."""
+    """Returns the voltage limit after the reduction."""
     limit = _motor(machine, joint).supply_limit
     return {} if limit is None else {"voltage": limit.value - values["reduction"]}
 
 
 def _factor(values: Values, _joint: int, _truth: Truth, _machine: Machine) -> dict[str, float]:
-    """A factor as a relative error."""
+    """Returns a factor as a relative error."""
     return {"relative": values["factor"] - 1.0}
 
 
 def _tilt(values: Values, _joint: int, _truth: Truth, _machine: Machine) -> dict[str, float]:
-    """The mock turns gravity; the model turns the base, and so gravity the other way."""
+    """Returns the tilt: the mock turns gravity; the model turns the base, and so gravity the other way."""
     return {"about_x": -values["about_x"], "about_y": -values["about_y"]}
 
 
@@ -104,7 +105,7 @@ LEFT_OUT: dict[str, str] = {
 
 
 def true_parameters(effect: HiddenEffect, joint: int | None, truth: Truth, machine: Machine) -> dict[str, float]:
-    """The truth at a joint by part of the model's effect; empty for effects in `LEFT_OUT`."""
+    """Returns the truth at a joint by part of the model's effect; empty for effects in `LEFT_OUT`."""
     translation = TRANSLATIONS.get(effect.known_as)
     if translation is None:
         return {}

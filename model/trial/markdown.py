@@ -1,4 +1,4 @@
-"""The trial's table as Markdown."""
+"""Formats the trial's table as Markdown."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from model.trial.table import EffectLine, Quantiles, TrialTable
 
 
 def as_markdown(table: TrialTable) -> str:
-    """The whole content of a page about the trial: rates, quantiles, effects, and which were taken for which."""
+    """Returns the whole content of a page about the trial: rates, quantiles, effects, and confusions."""
     if not table.cases:
         return "No case has been scored yet.\n"
     kinds = ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in table.kinds.items())

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict
 
 
 class Rate(BaseModel):
-    """`hits` of `cases` with the exact 95 % interval (Clopper and Pearson 1934); None where there are no cases."""
+    """`hits` of `cases` with the exact 95 % interval (Clopper and Pearson 1934); None without cases."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -25,7 +25,7 @@ class Rate(BaseModel):
 
 
 def rate(outcomes: Iterable[bool | None]) -> Rate:
-    """The share of True; None is not counted."""
+    """Returns the share of True; None is not counted."""
     from scipy.stats import binomtest  # imported late, so that the command line starts without it
 
     counted = [outcome for outcome in outcomes if outcome is not None]

@@ -1,4 +1,4 @@
-"""A trial that is written down before it is run: cases, experiments, and hashes of the code under trial."""
+"""Registration of a trial before it is run: cases, experiments, and hashes of the code under trial."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Experiment = Literal["diagnostic", "ramp"]
 
 
 class Run(FrozenRecord):
-    """One table of the trial: how many arms of each kind, by which experiment, whether more may be asked for."""
+    """One table of the trial: how many arms of each kind, by which experiment, and whether more may be requested."""
 
     experiment: Experiment = "diagnostic"
     acquire: bool = False
@@ -33,7 +33,7 @@ class Run(FrozenRecord):
 
 
 class RegisteredCode(FrozenRecord):
-    """The part of every registration that says which code and libraries it is of.
+    """The part of every registration that identifies its code and libraries.
 
     `hashes`: SHA-256 of files and folders of the source tree, by path. `versions`: of libraries; the first
     registrations have none.
@@ -45,18 +45,18 @@ class RegisteredCode(FrozenRecord):
     versions: dict[str, str] = {}
 
     def check_code(self, hashes: dict[str, str], versions: dict[str, str], origin: str) -> None:
-        """Raises SpecError when part of the present code is not registered, or differs from what was registered.
+        """Raises SpecError if part of the present code is not registered, or differs from the registration.
 
         Args:
-            hashes, versions: of all that decides the outcome, as they are found. origin: the file, for the message.
+            hashes, versions: of all that determines the outcome, at present. origin: the file, for the message.
         """
         found, registered = {**hashes, **versions}, {**self.hashes, **self.versions}
         missing = [name for name in found if name not in registered]
         if missing:
             more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
             raise SpecError(
-                f"registration {origin}: lacks {', '.join(missing[:3])}{more}, which decide the outcome; "
-                "`daq blind --folder trial --hashes` prints all that it has to hold"
+                f"registration {origin}: lacks {', '.join(missing[:3])}{more}, which determine the outcome; "
+                "`daq blind --folder trial --hashes` prints all that it must contain"
             )
         changed = [name for name, value in registered.items() if found.get(name) != value]
         if changed:
@@ -76,7 +76,7 @@ class Registration(RegisteredCode):
     @classmethod
     def _as_scored(cls, value: float) -> float:
         if value != DETECTABLE:
-            raise ValueError(f"{value}: the scoring takes d′ ≥ {DETECTABLE:g} as detectable")
+            raise ValueError(f"{value}: the scoring uses d′ ≥ {DETECTABLE:g} as detectable")
         return value
 
     @field_validator("loads")
@@ -88,18 +88,18 @@ class Registration(RegisteredCode):
         return loads
 
     def run(self, name: str) -> Run:
-        """The run of that name. Raises SpecError."""
+        """Returns the run of that name. Raises SpecError."""
         if name not in self.runs:
             raise SpecError(f"run {name!r}: the registration has {', '.join(self.runs)}")
         return self.runs[name]
 
     def arms(self, name: str, commit: str) -> list[int]:
-        """Seeds of a run, drawn from the commit that registered it."""
+        """Returns seeds of a run, drawn from the commit that registered it."""
         return drawn_arms(commit, self.run(name).cases, self.loads)
 
 
 def parse_registration(text: str, origin: str) -> Registration:
-    """A registration from TOML. Raises SpecError with one line."""
+    """Parses a registration from TOML. Raises SpecError with one line."""
     try:
         return Registration.model_validate(parse_toml(text, origin))
     except ValidationError as error:

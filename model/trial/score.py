@@ -36,12 +36,12 @@ class Covered(FrozenRecord):
 
 
 class Score(FrozenRecord):
-    """The score of one answer. None means that the question does not arise for this case.
+    """The score of one answer. None means that the question does not apply to this case.
 
-    `named_right`: every effect that was there was named, and no other. `merged_right`: the same with all friction kinds
-    as one, for which a group of friction kinds alone is that one name. `in_first`: the effect is among the
-    first three of the first step's ranking. `honest`: for an effect outside the library, no name was given and the
-    answer is "unknown effect" or a group.
+    `named_right`: every hidden effect was named, and no other. `merged_right`: the same with all friction kinds as one,
+    for which a group of friction kinds alone is that one name. `in_first`: the effect is among the first three of the
+    first step's ranking. `honest`: for an effect outside the library, no name was given and the answer is "unknown
+    effect" or a group.
     """
 
     seed: int
@@ -54,14 +54,14 @@ class Score(FrozenRecord):
     d_primes: tuple[float, ...]
     detectable: bool
     verdict: Verdict | None
-    """None where the diagnosis failed."""
+    """None if the diagnosis failed."""
     place: Place
     answered: tuple[str, ...]
     """Names in the answer; of a group, all of them."""
     named_right: bool | None = None
     merged_right: bool | None = None
     in_answer: bool | None = None
-    """The effect was named, or is in the group that was given."""
+    """The effect was named, or is in the given group."""
     in_first: bool | None = None
     joint_right: bool | None = None
     at_least_one: bool | None = None
@@ -75,7 +75,7 @@ class Score(FrozenRecord):
     groups: int = 0
     """Number of adopted steps that gave a group instead of a name."""
     rivals: dict[str, float] = {}
-    """d′ of effects that the answer names beside or instead of the hidden one, where it has been worked out."""
+    """d′ of effects that the answer names besides or instead of the hidden one, if it has been computed."""
     seconds: float
     robot_seconds: float
 
@@ -117,7 +117,7 @@ def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine
 
 
 def score_of_failure(truth: Truth, seen: Detectability, seconds: float) -> Score:
-    """The score of a diagnosis that gave no answer: it is wrong in every question."""
+    """Returns the score of a diagnosis without an answer: it is wrong in every question."""
     known = truth.kind not in ("clean", "open_set")
     wrong = False if known else None
     return Score(
@@ -153,7 +153,9 @@ def _case(truth: Truth, seen: Detectability) -> dict[str, Any]:
 
 
 def named_effects(answer: Diagnosis) -> tuple[str, ...]:
-    """Effects of the adopted steps that gave one name; a group of one effect at several joints counts as a name."""
+    """Returns effects of the adopted steps that gave one name; a group of one effect at several joints counts as a
+    name.
+    """
     found = [step.effect for step in answer.steps if step.adopted and step.effect is not None and _one_name(step)]
     return tuple(dict.fromkeys(found))
 
@@ -164,24 +166,24 @@ def _one_name(step: Step) -> bool:
 
 
 def group_of(answer: Diagnosis) -> tuple[str, ...]:
-    """Effects of the group that was given instead of a name, in an adopted step of an ambiguous answer.
+    """Returns effects of the group that was given instead of a name, in an adopted step of an ambiguous answer.
 
-    Groups that were withdrawn, or refused by held-out traces, are no answer.
+    Groups that were withdrawn, or rejected by held-out traces, are no answer.
     """
     return tuple(dict.fromkeys(candidate.effect for step in grouping_steps(answer) for candidate in step.group))
 
 
 def grouping_steps(answer: Diagnosis) -> list[Step]:
-    """The adopted steps of an ambiguous answer that gave a group instead of a name."""
+    """Returns the adopted steps of an ambiguous answer that gave a group instead of a name."""
     if answer.verdict != "ambiguous":
         return []
     return [step for step in answer.steps if step.adopted and not _one_name(step)]
 
 
 def excess_removed(answer: Diagnosis) -> float | None:
-    """Share of the held-out variance above the noise floor that all adopted steps removed.
+    """Returns the share of the held-out variance above the noise floor that all adopted steps removed.
 
-    None without a held-out trace or an adopted step, and where no joint showed enough of it before.
+    None without a held-out trace or an adopted step, and if no joint showed enough of it before.
     """
     adopted = [step for step in answer.steps if step.adopted and step.rmse_holdout]
     if not adopted:
@@ -191,7 +193,9 @@ def excess_removed(answer: Diagnosis) -> float | None:
 
 
 def excess_removed_whole(answer: Diagnosis) -> float | None:
-    """The same share from the model as given to the resulting one, so that fitted tolerance parameters count too."""
+    """Returns the same share from the given model to the resulting one, so that fitted tolerance parameters count
+    too.
+    """
     return share_removed(answer.rmse_holdout)
 
 
@@ -233,7 +237,8 @@ def _joint_right(effect: HiddenEffect, answer: Diagnosis) -> bool | None:
 
 
 def _answered_joints(effect: HiddenEffect, answer: Diagnosis) -> set[int]:
-    """Joints of the adopted steps that name the effect; else those of the first step, which may know the place alone.
+    """Returns joints of the adopted steps that name the effect; else those of the first step, which may know only the
+    place.
 
     Without any step, the joint whose remaining torque comes first in the answer; none if it names no joint.
     """

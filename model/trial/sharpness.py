@@ -1,4 +1,4 @@
-"""What the records of an arm can tell apart, and whether an answer is as sharp as they allow."""
+"""Computes what the records of an arm can distinguish, and whether an answer is as sharp as they allow."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.trial.score import SINGLE, Score
 
 TOLD = 5.0
-"""Least d′ at which the records tell a rival from the hidden effect."""
+"""Least d′ at which the records distinguish a rival from the hidden effect."""
 
 
 class Rival(BaseModel):
-    """An effect that an answer names beside or instead of the hidden one; d′ at the joints where it is least."""
+    """An effect that an answer names besides or instead of the hidden one; d′ at the joints where it is least."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
@@ -31,7 +31,7 @@ class Sharpness(BaseModel):
 
 
 def asks_for_rivals(score: Score) -> bool:
-    """Whether d′ of the rivals is wanted: of a group with the right name in it, and of a single wrong name."""
+    """Whether d′ of the rivals is needed: for a group with the right name in it, and for a single wrong name."""
     if score.kind not in SINGLE or not score.detectable or score.named_right:
         return False
     if score.place == "group":
@@ -40,7 +40,9 @@ def asks_for_rivals(score: Score) -> bool:
 
 
 def named_rivals(score: Score, answer: Diagnosis) -> tuple[tuple[str, tuple[int, ...]], ...]:
-    """Effects other than the hidden one that the adopted steps of an answer name or group, with their joints there."""
+    """Returns effects other than the hidden one that the adopted steps of an answer name or group, with their
+    joints.
+    """
     steps = [step for step in answer.steps if step.adopted]
     named = [(step.effect, step.joints) for step in steps if step.effect is not None]
     named += [(candidate.effect, candidate.joints) for step in steps for candidate in step.group]
@@ -49,8 +51,11 @@ def named_rivals(score: Score, answer: Diagnosis) -> tuple[tuple[str, tuple[int,
 
 
 def as_sharp(score: Score) -> bool | None:
-    """Whether the answer is as sharp as the records allow: the right name alone, or a group that holds nothing but it
-    and rivals that cannot be told from it. None where that is not asked, or depends on a d′ that is not known."""
+    """Whether the answer is as sharp as the records allow.
+
+    It is if it is the right name alone, or a group of it and indistinguishable rivals. None if the question does not
+    apply, or depends on an unknown d′.
+    """
     if score.kind not in SINGLE or not score.detectable:
         return None
     if score.named_right:

@@ -1,4 +1,4 @@
-"""The trial's table: every rate with its interval, effect by effect, and which effect was taken for which."""
+"""The trial's table: every rate with its interval, effect by effect, and confusions between effects."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from model.trial.truth import is_mock_friction
 
 
 class Line(FrozenRecord):
-    """One line of the table: what it counts, the rate, and the rate to be reached (None: only reported)."""
+    """One line of the table: its question, the rate, and the target (None: only reported)."""
 
     what: str
     rate: Rate
@@ -42,7 +42,7 @@ class EffectLine(FrozenRecord):
     in_first: Rate
     joint_right: Rate
     answers: dict[str, int]
-    """What was answered instead of the right name, and how often."""
+    """Answers other than the right name, and how often."""
 
 
 class TrialTable(FrozenRecord):
@@ -62,7 +62,7 @@ class TrialTable(FrozenRecord):
 
 
 def trial_table(scores: Iterable[Score], not_acquired: int = 0) -> TrialTable:
-    """The table over scored cases."""
+    """Returns the table over scored cases."""
     every = sorted(scores, key=lambda s: s.seed)
     seen = [s for s in every if s.detectable]
 
@@ -118,7 +118,7 @@ def _sharpness_line(single: Sequence[Score]) -> Line:
 
 
 def quantiles(values: Iterable[float | None]) -> Quantiles:
-    """Median, 10th and 95th percentile, largest; None does not count."""
+    """Returns median, 10th and 95th percentile, largest; None does not count."""
     found = [value for value in values if value is not None]
     if not found:
         return Quantiles(cases=0, median=None, tenth=None, ninety_fifth=None, largest=None)
@@ -153,7 +153,7 @@ def _confusion(scores: Sequence[Score]) -> dict[str, dict[str, int]]:
 
 
 def answer_in_words(score: Score) -> str:
-    """What was answered, as a column of the confusion matrix."""
+    """Returns the answer in words, as a column of the confusion matrix."""
     if score.place == "named":
         return " + ".join(score.answered)
     if score.place == "group":

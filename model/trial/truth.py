@@ -13,9 +13,9 @@ Kind = Literal["clean", "single", "open_set", "pair", "shared_by_joints", "wrong
 DETECTABLE = 5.0
 """Least d′ at which an effect counts as detectable."""
 MERGED_FRICTION = "friction"
-"""Name of all kinds of friction where they are merged."""
+"""Name of all kinds of friction when they are merged."""
 FRICTION_OF_MOCK = ("tight_spot", "quadratic_drag", "cable_hysteresis", "ageing_friction")
-"""Effects that only the mock knows and that are friction too."""
+"""Effects that only the mock has and that are friction too."""
 
 
 class _Part(BaseModel):
@@ -33,7 +33,7 @@ class HiddenEffect(_Part):
     strength: float
 
     def at(self, joint: int | None) -> dict[str, float]:
-        """Its parameters at a joint."""
+        """Returns its parameters at a joint."""
         return self.parameters[0 if joint is None else self.joints.index(joint)]
 
 
@@ -69,16 +69,16 @@ class Detectability(_Part):
 
 
 def merged(name: str) -> str:
-    """The effect's name, or one common name for all kinds of friction."""
+    """Returns the effect's name, or one common name for all kinds of friction."""
     known = effect_names().get(name)
     return MERGED_FRICTION if known is not None and known.family == "friction" else name
 
 
 def is_mock_friction(name: str) -> bool:
-    """Whether an effect that only the mock knows is friction."""
+    """Whether an effect that only the mock has is friction."""
     return name in FRICTION_OF_MOCK
 
 
 def parse_truth(data: dict[str, Any]) -> Truth:
-    """The truth from one line of `reveal`. Raises pydantic's ValidationError for anything else."""
+    """Parses the truth from one line of `reveal`. Raises pydantic's ValidationError for anything else."""
     return Truth.model_validate(data)

@@ -1,4 +1,4 @@
-"""The blind trial of `daq blind`: its stages, each in a process of its own, and the data between them."""
+"""The blind trial of `daq blind`: its stages, each in a separate process, and the data between them."""
 
 from daq.plugins import Command, Plugin
 

@@ -1,5 +1,6 @@
-"""The trial, case by case: detectability, recording, diagnosis, scoring. Each stage is carried out once, and its
-result kept."""
+"""Runs the trial, case by case: detectability, recording, diagnosis, scoring. Each stage runs once, and its result is
+kept.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +41,7 @@ Progress = Callable[[int, str], None]
 
 @contextmanager
 def _alone(folder: Path, load: int) -> Iterator[None]:
-    """Keeps other processes that use this folder from working on the same load within the block."""
+    """Prevents other processes with this folder from working on the same load within the block."""
     folder.mkdir(exist_ok=True)
     with (folder / f".load-{load}").open("ab") as lock:
         take_lock(lock, waits=True)
@@ -49,7 +50,7 @@ def _alone(folder: Path, load: int) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class CaseStage:
-    """A stage of a case, to be carried out by any process; `folder` has the results of the case's stages before."""
+    """A stage of a case, for any process; `folder` has the results of the case's earlier stages."""
 
     stage: Stage
     seed: int
@@ -58,21 +59,21 @@ class CaseStage:
 
 @dataclass
 class Campaign:
-    """One trial. `machine` describes the arm from which every diagnosis begins, before a load is announced."""
+    """One trial. `machine` describes the initial model of every diagnosis, before a load is announced."""
 
     folder: TrialFolder
     machine: Machine
     diagnoser: Sequence[str] = DIAGNOSER
     until: Stage = "score"
     experiment: Callable[[str], ExperimentSpec] = trial_experiment
-    """The experiment of a name."""
+    """Returns the experiment of a name."""
     recorder: Callable[[int, str, ExperimentSpec, Machine, Path], Recorded] = record
 
     def run(self, seeds: Sequence[int], workers: Workers, progress: Progress, seconds: float | None = None) -> int:
-        """Carries out the stages that are left of all cases; `progress` is called after every case. This process alone
-        writes the lines; the workers must see the folder. After `seconds` no further stage is begun.
+        """Runs the remaining stages of all cases; calls `progress` after every case.
 
-        Returns how many are not done, because a process of theirs failed; they are tried again next time.
+        Only this process writes the lines; the workers must see the folder. After `seconds` no further stage is begun.
+        Returns how many cases are not done because one of their processes failed; they are tried again next time.
         """
         end = math.inf if seconds is None else time.monotonic() + seconds
         write_set_points(self.experiment(self._seen_by), self.machine, self._set_points)
@@ -108,11 +109,11 @@ class Campaign:
 
     @property
     def _set_points(self) -> Path:
-        """File of the set points for which effects must be detectable."""
+        """Returns the file of the set points for which effects must be detectable."""
         return self.folder.path / f"{self._seen_by}.csv"
 
     def _next_stage(self, seed: int) -> Stage | None:
-        """The first stage of a case that is left; None where there is none, or the case ended before it."""
+        """Returns the first remaining stage of a case; None without one, or if the case ended before it."""
         for stage in STAGES[: STAGES.index(self.until) + 1]:
             if self.folder.row(stage, seed) is None:
                 recorded = self.folder.row("record", seed)
@@ -120,7 +121,7 @@ class Campaign:
         return None
 
     def _carry_out(self, task: CaseStage) -> dict[str, Any]:
-        """Carries out a stage in a worker, and returns its line."""
+        """Runs a stage in a worker, and returns its line."""
         return replace(self, folder=task.folder)._stage(task.stage, task.seed)
 
     def scores(self) -> list[Score]:
@@ -137,7 +138,7 @@ class Campaign:
     def _stage(self, stage: Stage, seed: int) -> dict[str, Any]:
         if stage == "detect":
             tangents = self.folder.path / "tangents"
-            # The first of a load works out its tangents, which takes a minute; the others read them.
+            # The first case of a load computes its tangents, which takes a minute; the others read them.
             with _alone(tangents, seed % 10):
                 return detect(seed, self._set_points, tangents)
         if stage == "record":
@@ -152,7 +153,7 @@ class Campaign:
         return row
 
     def _machine(self, seed: int) -> Machine:
-        """The machine with the load that this arm is announced to carry."""
+        """Returns the machine with the load that this arm is announced to carry."""
         return machine_with_load(self.machine, self._row("detect", seed)["load_kg"])
 
     def _record(self, seed: int) -> dict[str, Any]:
@@ -174,8 +175,9 @@ class Campaign:
         return self.recorder(seed, name, self.experiment(name), self._machine(seed), self.folder.path / "traces")
 
     def _diagnose(self, seed: int) -> dict[str, Any]:
-        """The sealed answer, the last one where further experiments were run. Its file and hash are written before
-        the truth is revealed."""
+        """Diagnoses a case; returns its last answer, sealed: its file and hash are written before the truth is
+        revealed.
+        """
         recorded, case = self._row("record", seed), self.folder.name_of(seed)
         traces = [self.folder.path / "traces" / recorded["trace"]]
         row: dict[str, Any] = {"seed": seed, "case": case}
@@ -210,7 +212,7 @@ class Campaign:
         return diagnose_sealed(traces, self.folder.path / "traces" / held_out, model, self.diagnoser, left)
 
     def _further(self, seed: int, asked: NextExperiment, number: int) -> Acquired:
-        """Runs the experiment that an answer asks for on the same arm."""
+        """Runs the experiment that an answer requests on the same arm."""
         made = self.recorder(seed, f"further {number}", asked.spec, self._machine(seed), self.folder.path / "traces")
         return as_run(asked, read_trace(made.file), made.file, made.outcome)
 

@@ -24,7 +24,7 @@ def blind(
     context: typer.Context,
     folder: Annotated[Path, typer.Option(help="Folder that keeps everything; an interrupted trial continues there.")],
     seeds: Annotated[str | None, typer.Option(help="Numbers of the arms: FIRST:LAST, or a list with commas.")] = None,
-    cases: Annotated[int | None, typer.Option(min=1, help="Take this number of arms at most, of mixed kinds.")] = None,
+    cases: Annotated[int | None, typer.Option(min=1, help="Use at most this number of arms, of mixed kinds.")] = None,
     kinds: Annotated[
         str, typer.Option(help="Kinds of arms: clean, single, open-set, pair, shared, wrong-priors, later.")
     ] = "clean,single,open-set",
@@ -35,14 +35,14 @@ def blind(
         Literal["diagnostic", "ramp"], typer.Option(help="The diagnostic set of 55 s, or the ramp step alone, 8 s.")
     ] = "diagnostic",
     acquire: Annotated[
-        bool, typer.Option("--acquire", help="Let the diagnosis ask for further experiments, 60 s at most.")
+        bool, typer.Option("--acquire", help="Let the diagnosis request further experiments, of up to 60 s.")
     ] = False,
     registration: Annotated[
         Path | None,
         typer.Option(help="Run a registered trial: its cases and experiments, with seeds drawn from its commit."),
     ] = None,
     run: Annotated[str, typer.Option(help="Name of the run of the registered trial.")] = "diagnostic",
-    workers: Annotated[int, typer.Option(min=1, max=1000, help="Number of processes that compute.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, max=1000, help="Number of worker processes.")] = 1,
     until: Annotated[
         Literal["detect", "record", "diagnose", "score"], typer.Option(help="Last stage to carry out.")
     ] = "score",
@@ -54,13 +54,13 @@ def blind(
         bool,
         typer.Option(
             "--sharpness",
-            help="Work out which effects the records of a trial's single effects can tell apart, for answers that have "
+            help="Compute which effects the records of a trial's single effects can distinguish, for answers that have "
             "been sealed and scored.",
         ),
     ] = False,
     hashes: Annotated[
         bool,
-        typer.Option("--hashes", help="Print the hashes and versions that a registration must hold, and run nothing."),
+        typer.Option("--hashes", help="Print the hashes and versions for a registration, and run nothing."),
     ] = False,
     json: JsonOption = False,
 ) -> None:
@@ -98,7 +98,7 @@ def blind(
 
 
 def _refuse_beside_registration(context: typer.Context) -> None:
-    """Raises SpecError for options that a registered run does not take."""
+    """Raises SpecError for options that a registered run does not accept."""
     why = {
         "seeds": "name one of them; a registered trial draws its own",
         "cases": "a registered run has all cases that it registers",
@@ -111,9 +111,9 @@ def _refuse_beside_registration(context: typer.Context) -> None:
 
 
 def _after_the_answers(context: typer.Context, folder: Path) -> tuple[Campaign, list[int]]:
-    """The trial of a folder, and its cases whose answers ask for d′ of rivals.
+    """Returns the trial of a folder, and its cases whose answers need d′ of rivals.
 
-    Raises SpecError for other options, where no trial is in the folder, and where no answer has been sealed and scored.
+    Raises SpecError for other options, without a trial in the folder, and if no answer has been sealed and scored.
     """
     from trials.blind.campaign import Campaign
     from trials.blind.folder import TrialFolder

@@ -1,7 +1,7 @@
-"""`python -m trials.blind.diagnoser`: diagnoses the traces of the folder it is started in.
+"""`python -m trials.blind.diagnoser`: diagnoses the traces of its working folder.
 
-It is given trace-1.mcap, trace-2.mcap, …, perhaps held-out.mcap, and model.json, and writes answer.json. Where it is
-given asking.json besides, it may ask for an experiment that takes no longer than the budget there, s.
+It reads trace-1.mcap, trace-2.mcap, …, held-out.mcap if present, and model.json, and writes answer.json. With
+asking.json, it may request an experiment that takes no longer than the budget there, s.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def main() -> int:
 
 
 def _chooser(file: Path, machine: Machine) -> ExperimentChooser | None:
-    """The experiments that may be asked for; None where none may."""
+    """Returns the experiments that may be requested; None if none may."""
     from server.jobs.next_experiment import experiment_chooser
 
     return experiment_chooser(machine, float(json.loads(file.read_text("utf-8"))["budget"])) if file.exists() else None

@@ -13,14 +13,16 @@ from daq.contracts.machine import BoardPid, Machine
 
 
 def trial_experiment(name: str) -> ExperimentSpec:
-    """`diagnostic`: the preset of 55 s. `ramp`: the source's ramp there and back, 8 s. `held-out`: the preset."""
+    """Returns `diagnostic`: the preset of 55 s. `ramp`: the source's ramp there and back, 8 s. `held-out`: the
+    preset.
+    """
     from daq.trajectories.presets import preset
 
     return _ramp_step() if name == "ramp" else preset(name).spec
 
 
 def _ramp_step() -> ExperimentSpec:
-    """The ramp of 21.6° in 0.65 s, joints 1 to 3 together, held, and back."""
+    """Returns the ramp of 21.6° in 0.65 s, joints 1 to 3 together, held, and back."""
     segments = []
     for degrees, rest in ((21.6, 3.0), (-21.6, 3.2)):
         segments.append(Segment(move=Ramp(amplitude=math.radians(degrees), duration=0.65)))
@@ -29,7 +31,7 @@ def _ramp_step() -> ExperimentSpec:
 
 
 def write_set_points(spec: ExperimentSpec, machine: Machine, path: Path) -> Path:
-    """The experiment's set points as the mock's side reads them: a line a period, posture units."""
+    """Writes the experiment's set points for the mock's side: one line per period, posture units."""
     from daq.trajectories.planner import plan, start_angles
 
     motion = plan(spec, machine, start_angles(spec, machine))
@@ -41,8 +43,9 @@ def write_set_points(spec: ExperimentSpec, machine: Machine, path: Path) -> Path
 
 
 def write_experiment(spec: ExperimentSpec, machine: Machine, path: Path) -> Path:
-    """The experiment as the mock's side reads it, with its gains: set points (posture units, a list per period), and
-    P, I, D of the six joints."""
+    """Writes the experiment for the mock's side, with its gains: set points (posture units, a list per period), and P,
+    I, D of the six joints.
+    """
     from daq.trajectories.planner import plan, start_angles
 
     motion = plan(spec, machine, start_angles(spec, machine))
@@ -53,7 +56,7 @@ def write_experiment(spec: ExperimentSpec, machine: Machine, path: Path) -> Path
 
 
 def machine_with_load(machine: Machine, kilograms: float | None) -> Machine:
-    """The machine with the announced load; with its own for None."""
+    """Returns the machine with the announced load; with its own for None."""
     if kilograms is None or machine.load is None:
         return machine
     return carrying(machine, kilograms, "announced")

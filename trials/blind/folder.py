@@ -1,4 +1,4 @@
-"""The folder of a trial: its options, a JSON line for each case and stage, traces and answers under random names."""
+"""The folder of a trial: its options, a JSON line per case and stage, traces and answers under random names."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from firmware_protocol.invalid import first_invalid
 
 Stage = Literal["detect", "record", "diagnose", "score", "sharpness"]
 STAGES: tuple[Stage, ...] = ("detect", "record", "diagnose", "score", "sharpness")
-"""In their order. The last is carried out on request, once answers have been scored."""
+"""In order. The last runs on request, once answers have been scored."""
 _CAMPAIGN = "trial.json"
 
 
 class Asked(FrozenRecord):
-    """The options of a trial, which must be the same when it is resumed. `key` makes the names of its cases."""
+    """The options of a trial, which must be the same when it is resumed. `key` determines the names of its cases."""
 
     format: Literal[1] = 1
     experiment: Literal["diagnostic", "ramp"]
@@ -37,7 +37,7 @@ class Asked(FrozenRecord):
 
 @dataclass
 class TrialFolder:
-    """The folder of one trial. One process writes its lines; those that carry out stages only read what they need."""
+    """The folder of one trial. One process writes its lines; those that run stages only read what they need."""
 
     path: Path
     asked: Asked
@@ -51,7 +51,7 @@ class TrialFolder:
         acquire: bool,
         registration: dict[str, str] | None,
     ) -> TrialFolder:
-        """The folder, made when it is new. Raises SpecError when it holds another trial."""
+        """Opens the folder, and creates a new one. Raises SpecError if it holds another trial."""
         try:
             for part in ("traces", "answers"):
                 (path / part).mkdir(parents=True, exist_ok=True)
@@ -59,7 +59,7 @@ class TrialFolder:
             raise SpecError(f"{path}: cannot be made: {error.strerror}") from error
         asked = Asked(experiment=experiment, acquire=acquire, registration=registration, key=secrets.token_hex(16))
         file = path / _CAMPAIGN
-        # Of commands that begin at once, one writes it.
+        # Of commands that begin at once, only one writes it.
         aside = path / f".{_CAMPAIGN}.{os.getpid()}"
         aside.write_text(asked.model_dump_json(indent=1) + "\n", "utf-8")
         try:
@@ -67,7 +67,7 @@ class TrialFolder:
         except FileExistsError:
             present = _read_asked(file)
             if present.model_copy(update={"key": asked.key}) != asked:
-                raise SpecError(f"{path}: holds a trial of other options; take another folder") from None
+                raise SpecError(f"{path}: holds a trial with other options; use another folder") from None
             asked = present
         finally:
             aside.unlink()
@@ -78,14 +78,14 @@ class TrialFolder:
 
     @classmethod
     def present(cls, path: Path) -> TrialFolder:
-        """The folder of a trial that has begun, whatever its options. Raises SpecError where there is none."""
+        """Opens the folder of an existing trial, whatever its options. Raises SpecError without one."""
         folder = cls(path, _read_asked(path / _CAMPAIGN))
         folder._finish_lines()
         folder.reload()
         return folder
 
     def _finish_lines(self) -> None:
-        """Ends lines that a crash cut short, so that the next line is not appended to them."""
+        """Terminates lines that a crash cut short, so that the next line is not appended to them."""
         for stage in STAGES:
             file = self._file(stage)
             if file.exists() and not file.read_bytes().endswith(b"\n"):
@@ -96,7 +96,7 @@ class TrialFolder:
         return self.path / f"{stage}.jsonl"
 
     def reload(self) -> None:
-        """Reads the lines, those of an older version's several processes among them."""
+        """Reads the lines, including those of an older version with several processes."""
         for stage in STAGES:
             self._rows[stage] = {}
             for file in sorted(self.path.glob(f"{stage}*.jsonl")):
@@ -104,22 +104,22 @@ class TrialFolder:
                     try:
                         row = parse_json(line, str(file))
                     except SpecError:
-                        continue  # the line that a crash cut short: its case is done again
+                        continue  # a crash cut this line short: its case is done again
                     if not isinstance(row, dict) or not isinstance(row.get("seed"), int):
-                        raise SpecError(f"{file}: a line is no case of a trial: {shown(row)}")
+                        raise SpecError(f"{file}: a line is not a case of a trial: {shown(row)}")
                     self._rows[stage][row["seed"]] = row
 
     def of_case(self, seed: int) -> TrialFolder:
-        """The folder with the results of one case alone, to be sent to the process that carries out its next stage."""
+        """Returns the folder with the results of one case alone, for the process that runs its next stage."""
         rows = {stage: {seed: row} for stage in STAGES if (row := self.row(stage, seed)) is not None}
         return TrialFolder(self.path, self.asked, {**{stage: {} for stage in STAGES}, **rows})
 
     def row(self, stage: Stage, seed: int) -> dict[str, Any] | None:
-        """The result of a stage for a case."""
+        """Returns the result of a stage for a case."""
         return self._rows[stage].get(seed)
 
     def rows(self, stage: Stage) -> list[dict[str, Any]]:
-        """The results of a stage for all cases."""
+        """Returns the results of a stage for all cases."""
         return list(self._rows[stage].values())
 
     def add(self, stage: Stage, row: dict[str, Any]) -> None:
@@ -131,11 +131,11 @@ class TrialFolder:
         self._rows[stage][row["seed"]] = row
 
     def name_of(self, seed: int) -> str:
-        """The name of a case: twelve digits, which reveal nothing without the folder's key."""
+        """Returns the name of a case: twelve digits, which reveal nothing without the folder's key."""
         return hmac.new(bytes.fromhex(self.asked.key), str(seed).encode(), "sha256").hexdigest()[:12]
 
     def in_order(self, seeds: Sequence[int]) -> list[int]:
-        """Cases in the order in which they are run: that of their names, which mixes kinds."""
+        """Returns cases in the order in which they are run: that of their names, which mixes kinds."""
         return sorted(set(seeds), key=self.name_of)
 
 

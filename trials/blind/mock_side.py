@@ -1,4 +1,4 @@
-"""The mock's side of a trial, in processes of its own: how detectable an arm's effects are, and what they are."""
+"""The mock's side of a trial, in separate processes: how detectable an arm's effects are, and what they are."""
 
 from __future__ import annotations
 
@@ -19,20 +19,22 @@ class TrialStageError(DaqError):
 
 
 def detect(seed: int, set_points: Path, cache: Path) -> dict[str, Any]:
-    """Detectability d′ of the arm's effects, one by one and together. Raises TrialStageError."""
+    """Returns detectability d′ of the arm's effects, one by one and together. Raises TrialStageError."""
     return _line("mock_controller.detectability", str(seed), "--experiment", str(set_points), "--cache", str(cache))
 
 
 def reveal(seed: int) -> dict[str, Any]:
-    """The effects that the arm hides. Raises TrialStageError."""
+    """Returns the effects that the arm hides. Raises TrialStageError."""
     return _line("mock_controller.reveal", str(seed))
 
 
 def tell_apart(
     seed: int, experiments: Sequence[Path], rivals: Iterable[tuple[str, tuple[int, ...]]], cache: Path
 ) -> dict[str, Any]:
-    """d′ of effects (with the joints that were named) from the one that the arm hides, in experiments that were
-    recorded together. Raises TrialStageError."""
+    """Returns d′ of named effects (with their joints) from the hidden one, in experiments that were recorded together.
+
+    Raises TrialStageError.
+    """
     files = [word for file in experiments for word in ("--experiment", str(file))]
     named = [word for effect, joints in rivals for word in ("--rival", f"{effect}:{','.join(map(str, joints))}")]
     return _line("mock_controller.sharpness", str(seed), *files, *named, "--cache", str(cache))
@@ -41,7 +43,8 @@ def tell_apart(
 def _line(module: str, *arguments: str) -> dict[str, Any]:
     done = subprocess.run(
         [sys.executable, "-m", module, *arguments],
-        env={"OPENBLAS_NUM_THREADS": "1"} | os.environ,  # threads of thin products wait for each other
+        env={"OPENBLAS_NUM_THREADS": "1"}
+        | os.environ,  # threads would wait for each other in products of thin matrices
         capture_output=True,
         text=True,
         check=False,

@@ -29,9 +29,9 @@ class Recorded:
 
 
 def record(seed: int, run: str, spec: ExperimentSpec, machine: Machine, folder: Path) -> Recorded:
-    """Runs `spec` on the arm of a seed. `run` draws the noise: another run of the same arm has another one.
+    """Runs `spec` on the arm of a seed. `run` draws the noise: it differs between runs of the same arm.
 
-    Neither the seed nor its noise is in the trace or its name (a test looks). Raises TrialStageError.
+    Neither the seed nor its noise is in the trace or its name (a test checks that). Raises TrialStageError.
     """
     noise = int(sha256(f"noise {seed} {run}".encode()).hexdigest()[:7], 16)
     with tempfile.TemporaryDirectory(prefix="trial-") as place:
@@ -40,7 +40,7 @@ def record(seed: int, run: str, spec: ExperimentSpec, machine: Machine, folder: 
             machine=machine,
             limits=machine.limits,
             folder=Path(place),
-            robot=f"trial-{secrets.token_hex(4)}",  # its stop socket: runs go on beside each other
+            robot=f"trial-{secrets.token_hex(4)}",  # its stop socket: runs may happen at the same time
         )
         try:
             with OwnerOnDemand(opening) as owner:

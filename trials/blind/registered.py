@@ -1,4 +1,4 @@
-"""Compares a registration file with the source tree as it is, and finds the commit that registered it."""
+"""Compares a registration file with the present source tree, and finds the commit that registered it."""
 
 from __future__ import annotations
 
@@ -51,31 +51,32 @@ REGISTERED = (
     "daq_cli/models/stopping_rule.py",
     "server/jobs/next_experiment.py",
 )
-"""Parts of the source tree that decide the outcome. A test follows the imports of every stage and finds them all
-here."""
+"""Parts of the source tree that determine the outcome. A test follows the imports of every stage and finds them all
+here.
+"""
 LIBRARIES = ("numpy", "scipy", "numba", "mujoco")
-"""Libraries whose numerical results decide the outcome."""
+"""Libraries whose numerical results determine the outcome."""
 _SUFFIXES = (".py", ".toml", ".json", ".csv")
 
 
 def source_tree() -> Path:
-    """The folder that holds the packages."""
+    """Returns the folder that holds the packages."""
     return Path(daq.__file__).resolve().parents[1]
 
 
 def tree_hashes(paths: Iterable[str] = REGISTERED) -> dict[str, str]:
-    """SHA-256 of files, and of all source files in folders with their names, by path. Raises SpecError."""
+    """Returns SHA-256 of files, and of all source files in folders with their names, by path. Raises SpecError."""
     root = source_tree()
     return {path: _hash(root, root / path) for path in paths}
 
 
 def library_versions() -> dict[str, str]:
-    """Versions of the libraries, by name, as they are installed."""
+    """Returns the installed versions of the libraries, by name."""
     return {name: version(name) for name in LIBRARIES}
 
 
 def to_register() -> str:
-    """The hashes and versions of the present code, as the last tables of a registration file."""
+    """Returns the hashes and versions of the present code, as the last tables of a registration file."""
     hashes = [f'"{path}" = "{digest}"' for path, digest in tree_hashes().items()]
     versions = [f'{name} = "{found}"' for name, found in library_versions().items()]
     return "\n".join(["[hashes]", *hashes, "", "[versions]", *versions])
@@ -85,7 +86,7 @@ def _hash(root: Path, path: Path) -> str:
     if path.is_file():
         return sha256(path.read_bytes()).hexdigest()
     if not path.is_dir():
-        raise SpecError(f"{path}: a registered path that is not there")
+        raise SpecError(f"{path}: this registered path does not exist")
     found = sha256()
     files = (file for file in path.rglob("*") if file.suffix in _SUFFIXES and "__pycache__" not in file.parts)
     for file in sorted(files):
@@ -94,29 +95,31 @@ def _hash(root: Path, path: Path) -> str:
 
 
 def published_table(path: Path, run: str) -> Path:
-    """Where the table of a registration's run is kept once it has been run: beside it."""
+    """Returns the path of the table of a registration's run, beside the registration."""
     return path.with_name(f"{path.stem}-{run}.md")
 
 
 def read_registration(path: Path, run: str) -> tuple[Registration, str]:
-    """The registration and the commit that last changed it.
+    """Returns the registration and the commit that last changed it.
 
-    Raises SpecError unless it is committed as it stands, it registers all code and libraries that decide the outcome
-    as they are, and no table of this run is kept beside it yet.
+    Raises SpecError unless three conditions hold: it is committed unchanged; it registers all code and libraries that
+    determine the outcome, unchanged; and there is no table of this run beside it yet.
     """
     registration = parse_registration(read_text(path, f"registration {path}"), str(path))
     table = published_table(path, run)
     if table.exists():
-        raise SpecError(f"{table}: this run has been made; another one needs a registration of its own, with new seeds")
+        raise SpecError(
+            f"{table}: this run has already been made; another one needs its own registration, with new seeds"
+        )
     paths = dict.fromkeys((*REGISTERED, *registration.hashes))
     registration.check_code(tree_hashes(paths), library_versions(), str(path))
     return registration, registering_commit(path)
 
 
 def registering_commit(path: Path) -> str:
-    """The commit that last changed a registration. Raises SpecError unless it is committed as it stands."""
+    """Returns the commit that last changed a registration. Raises SpecError unless it is committed unchanged."""
     if _git(path, "status", "--porcelain", "--", path.name):
-        raise SpecError(f"registration {path}: is not committed as it stands; the commit's hash draws the seeds")
+        raise SpecError(f"registration {path}: has uncommitted changes; the commit's hash draws the seeds")
     commit = _git(path, "log", "-1", "--format=%H", "--", path.name)
     if not commit:
         raise SpecError(f"registration {path}: is in no commit; its hash draws the seeds")
@@ -129,5 +132,5 @@ def _git(path: Path, *arguments: str) -> str:
             ["git", *arguments], cwd=path.resolve().parent, capture_output=True, text=True, check=True
         )
     except (OSError, subprocess.CalledProcessError) as error:
-        raise SpecError(f"registration {path}: its commit cannot be asked for: {error}") from error
+        raise SpecError(f"registration {path}: its commit cannot be read: {error}") from error
     return done.stdout.strip()

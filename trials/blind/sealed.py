@@ -1,4 +1,4 @@
-"""A diagnosis in a process that is given trace files, a model, the robot time it may ask for, and nothing else."""
+"""A diagnosis in a process that gets only trace files, a model, and the robot time that it may request."""
 
 from __future__ import annotations
 
@@ -25,37 +25,37 @@ from trials.blind.mock_side import TrialStageError
 
 MODEL, ANSWER, HELD_OUT = "model.json", "answer.json", "held-out.mcap"
 ASKING = "asking.json"
-"""File that is there where experiments may be asked for: `budget` is the robot time in s that is left for them."""
+"""File that exists if experiments may be requested: `budget` is the remaining robot time for them in s."""
 TIME_LIMIT = 1800.0
-"""Time limit of a diagnosis in s: generous, because the computer may be busy with others."""
+"""Time limit of a diagnosis in s: generous, because the computer may be busy."""
 _KEPT_VARIABLES = ("PATH", "HOME", "LANG", "LC_ALL", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE", "VIRTUAL_ENV")
 _KEPT_BEGINNINGS = ("NUMBA_", "OMP_", "OPENBLAS_", "MKL_")
 DIAGNOSER = (sys.executable, "-m", "trials.blind.diagnoser")
 
 
 class DiagnosisFailedError(TrialStageError):
-    """A diagnosis that gave no answer, which is a wrong one."""
+    """A diagnosis without an answer, which counts as wrong."""
 
 
 @dataclass(frozen=True)
 class SealedAnswer:
-    """An answer as bytes, with their SHA-256, and the time that the process took in s."""
+    """An answer as bytes, with their SHA-256, and the time in s that the process took."""
 
     text: bytes
     seconds: float
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the answer as it was given."""
+        """SHA-256 of the original answer."""
         return sha256(self.text).hexdigest()
 
     def read(self) -> Diagnosis:
-        """The answer, parsed. Raises DiagnosisFailedError when it is not valid."""
+        """Returns the parsed answer. Raises DiagnosisFailedError if it is not valid."""
         try:
             return Diagnosis.model_validate_json(self.text)
         except ValidationError as error:
             first = first_invalid(error)
-            line = f"what the diagnosis gave is no answer: {first.where()}: {first.message}"
+            line = f"the output of the diagnosis is not an answer: {first.where()}: {first.message}"
             raise DiagnosisFailedError(line) from error
 
 
@@ -68,8 +68,8 @@ def diagnose_sealed(
 ) -> SealedAnswer:
     """Runs `diagnoser` in a new folder with copies of the traces and the model, and returns its answer.
 
-    Arguments are those of `diagnoser` alone; the environment is what any program needs to run. `budget`: s of robot
-    time for what it may ask for; None: it may not ask. Raises DiagnosisFailedError.
+    It gets no other arguments; the environment is what any program needs to run. `budget`: robot time in s for its
+    requests; None: it may request nothing. Raises DiagnosisFailedError.
     """
     with tempfile.TemporaryDirectory(prefix="diagnosis-") as name:
         place = Path(name)
@@ -107,4 +107,6 @@ def _environment() -> dict[str, str]:
     kept = {
         key: value for key, value in os.environ.items() if key in _KEPT_VARIABLES or key.startswith(_KEPT_BEGINNINGS)
     }
-    return {"OPENBLAS_NUM_THREADS": "1"} | kept  # as `daq` does: threads of thin products wait for each other
+    return {
+        "OPENBLAS_NUM_THREADS": "1"
+    } | kept  # as `daq` does: threads would wait for each other in products of thin matrices

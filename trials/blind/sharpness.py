@@ -1,4 +1,6 @@
-"""The last stage of a trial: what the records of an arm could tell apart, once its answer is sealed and scored."""
+"""The last stage of a trial: what the records of an arm can distinguish, computed once its answer is sealed and
+scored.
+"""
 
 from __future__ import annotations
 
@@ -21,22 +23,22 @@ from trials.blind.sealed import SealedAnswer
 
 
 def sealed_answer(folder: TrialFolder, seed: int) -> SealedAnswer:
-    """The answer of a case, as it was sealed. Raises TrialStageError where there is none, or another one."""
+    """Returns the sealed answer of a case. Raises TrialStageError if it is missing, or changed."""
     sealed = folder.row("diagnose", seed)
     if sealed is None or "answer" not in sealed:
         raise TrialStageError("no answer has been sealed")
     text = (folder.path / "answers" / sealed["answer"]).read_bytes()
     if sha256(text).hexdigest() != sealed["sha256"]:
-        raise TrialStageError(f"answer {sealed['answer']}: is not the one that was sealed")
+        raise TrialStageError(f"answer {sealed['answer']}: differs from the one that was sealed")
     return SealedAnswer(text, sealed["seconds"])
 
 
 def work_out_sharpness(
     folder: TrialFolder, seed: int, machine: Machine, experiment: Callable[[str], ExperimentSpec]
 ) -> dict[str, Any]:
-    """d′ of the rivals that a scored answer names, in all experiments that it was given together.
+    """Computes d′ of the rivals that a scored answer names, in all of its experiments together.
 
-    `machine`: with the announced load. `experiment`: the experiment of a name. Raises TrialStageError.
+    `machine`: with the announced load. `experiment`: returns the experiment of a name. Raises TrialStageError.
     """
     answer, scored = sealed_answer(folder, seed), folder.row("score", seed)
     if scored is None:
@@ -49,13 +51,13 @@ def work_out_sharpness(
 
 
 def rivals_wanted(folder: TrialFolder) -> list[int]:
-    """The cases whose answers ask for d′ of rivals."""
+    """Returns the cases whose answers need d′ of rivals."""
     scores = (Score.model_validate(row) for row in folder.rows("score"))
     return [score.seed for score in scores if asks_for_rivals(score)]
 
 
 def with_rivals(score: Score, row: dict[str, Any] | None) -> Score:
-    """The score with d′ of the rivals, where they have been worked out."""
+    """Returns the score with d′ of the rivals, if they have been computed."""
     if row is None:
         return score
     found = Sharpness.model_validate(row)
@@ -63,15 +65,15 @@ def with_rivals(score: Score, row: dict[str, Any] | None) -> Score:
 
 
 def _further(folder: TrialFolder, seed: int) -> list[ExperimentSpec]:
-    """The experiments that were asked for and used, as their traces say."""
+    """Returns the experiments that were requested and used, from their traces."""
     sealed = folder.row("diagnose", seed) or {}
     specs = []
     for name in sealed.get("traces", [])[1:]:
         try:
             spec = read_trace(folder.path / "traces" / name).record.spec
         except DaqError as error:
-            raise TrialStageError(f"an experiment that was asked for is not known: {error}") from error
+            raise TrialStageError(f"a requested experiment is not known: {error}") from error
         if spec is None:
-            raise TrialStageError(f"trace {name}: does not say what was run")
+            raise TrialStageError(f"trace {name}: does not state its experiment")
         specs.append(spec)
     return specs

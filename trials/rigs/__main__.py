@@ -19,7 +19,7 @@ from trials.rigs.world import CASES
 
 
 def main(arguments: list[str]) -> int:
-    """The exit code."""
+    """Writes the folder; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m trials.rigs", description="Writes the folder of one rig.")
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--kind", choices=tuple(KINDS))
@@ -28,7 +28,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument(
         "--effect", choices=DRAWN, metavar="NAME", help="hide this one (a name of the library), whatever the case"
     )
-    parser.add_argument("--sharpness", action="store_true", help="also which laws the records can tell apart")
+    parser.add_argument("--sharpness", action="store_true", help="also which laws the records can distinguish")
     parser.add_argument("--list", action="store_true", help="the kinds")
     asked = parser.parse_args(arguments)
     if asked.list:

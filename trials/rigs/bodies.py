@@ -1,4 +1,4 @@
-"""The rigid bodies of a true arm as text for MuJoCo, from standard Denavit–Hartenberg geometry."""
+"""Writes the rigid bodies of a true arm as text for MuJoCo, from standard Denavit–Hartenberg geometry."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 NO_INERTIA = 1e-9
-"""kg·m² where a thin rod has none: the engine wants a positive value."""
+"""kg·m² in place of a thin rod's 0: the engine requires a positive value."""
 
 
 @dataclass(frozen=True)
@@ -23,36 +23,36 @@ class Link:
 
     @staticmethod
     def rod(a: float, mass: float, alpha: float = 0.0, theta: float = 0.0, shift: float = 0.0) -> Link:
-        """A thin rod along a, its centre moved outwards by `shift`."""
+        """Returns a thin rod along a, its centre moved outwards by `shift`."""
         about = mass * a * a / 12
         return Link(a, alpha, 0.0, theta, mass, (-a / 2 + shift, 0.0, 0.0), (0.0, about, about))
 
     def heavier(self, mass: float) -> Link:
-        """The same shape with another mass."""
+        """Returns the same shape with another mass."""
         factor = mass / self.mass
         about = (self.inertia[0] * factor, self.inertia[1] * factor, self.inertia[2] * factor)
         return replace(self, mass=mass, inertia=about)
 
     def shifted(self, shift: float) -> Link:
-        """The same with its centre further along the link by `shift`."""
+        """Returns the same with its centre farther along the link by `shift`."""
         return replace(self, centre=(self.centre[0] + shift, *self.centre[1:]))
 
 
 @dataclass(frozen=True)
 class Bodies:
-    """An arm: links, a point mass at its end, gravity in the axes of the base that the file speaks of."""
+    """An arm: links, a point mass at its end, gravity in the base axes of the machine file."""
 
     links: tuple[Link, ...]
     load: float
     gravity: tuple[float, float, float]
 
     def beyond(self, joint: int) -> float:
-        """Mass beyond a joint (from 0), kg."""
+        """Returns the mass beyond a joint (from 0), kg."""
         return sum(link.mass for link in self.links[joint:]) + self.load
 
 
 def mjcf(bodies: Bodies, rotors: tuple[float, ...]) -> str:
-    """One body a joint, at the joint and turning about its own z; `rotors` turn with their joints, kg·m²."""
+    """Returns one body per joint, at the joint and turning about its own z; `rotors` turn with their joints, kg·m²."""
     text, closing = [], []
     place, turn = "0 0 0", "1 0 0 0"
     for number, (link, rotor) in enumerate(zip(bodies.links, rotors, strict=True), start=1):

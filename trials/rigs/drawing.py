@@ -1,6 +1,6 @@
-"""Draws the sound rig of a kind: an arm, motors that can move it, a controller that holds it, and what the file states.
+"""Draws the healthy rig of a kind: an arm, suitable motors, a stable controller, and the values that the file states.
 
-Every number that is stated with a deviation is off by as much as the deviation says, drawn anew for every seed.
+Every value with a stated deviation is wrong by a random amount of that size, drawn anew for every seed.
 """
 
 from __future__ import annotations
@@ -22,24 +22,25 @@ GRAVITY = 9.81
 STEP = 1e-4
 """s. Halving it moves no reading of the tests' arm by a tenth of a 16-bit count."""
 ACCELERATION = 12.0
-"""rad/s² that every motor can give its joint beside the weight."""
+"""rad/s² that every motor can give its joint in addition to its weight."""
 HEADROOM = 4.0
-"""Volts of a current loop's amplifier over those that its largest torque takes at rest: a loop that runs out of them
-gives less than is recorded, and no file of these worlds says so."""
+"""Volts of a current loop's amplifier, relative to those of its largest torque at rest. A loop without enough volts
+gives less than is recorded, and no file of these rigs states that.
+"""
 WORST = 2.2
-"""Deviations beyond so many of their size are not drawn."""
+"""Truncation of drawn deviations, in their sizes."""
 BOARD_PERIOD_DELAY = 0.3
-"""Delay of a controller over its period, at most about this."""
+"""Largest delay of a controller over its period, approximately."""
 
 
 def generator(kind_name: str, seed: int, purpose: str) -> Generator:
-    """A stream of its own for every purpose, so that a new draw in one leaves the others as they were."""
+    """Returns a separate stream for every purpose, so that a new draw in one leaves the others unchanged."""
     words = [zlib.crc32(kind_name.encode()), seed, zlib.crc32(purpose.encode())]
     return Generator(PCG64(SeedSequence(words)))
 
 
 def sound_rig(kind_name: str, kind: Kind, seed: int) -> Rig:
-    """The rig of a seed without any hidden effect."""
+    """Returns the rig of a seed without any hidden effect."""
     draw = generator(kind_name, seed, "arm")
     bodies, centre = _arm(kind, draw)
     speed = draw.uniform(1.0, 1.8)
@@ -78,7 +79,7 @@ def sound_rig(kind_name: str, kind: Kind, seed: int) -> Rig:
 
 
 def _arm(kind: Kind, draw: Generator) -> tuple[Bodies, tuple[float, ...]]:
-    """Bodies, and the posture about which the arm moves."""
+    """Returns bodies, and the posture about which the arm moves."""
     lengths = [float(draw.uniform(0.2, 0.45)) for _ in range(kind.joints)]
     density = float(draw.uniform(1.5, 4.0))
     masses = [density * a * float(draw.uniform(0.7, 1.3)) for a in lengths]
@@ -104,7 +105,7 @@ def _arm(kind: Kind, draw: Generator) -> tuple[Bodies, tuple[float, ...]]:
 
 
 def _link(kind: Kind, draw: Generator, a: float, mass: float) -> Link:
-    """A rod, or a body whose centre and inertia are its own."""
+    """Returns a rod, or a body with a centre and inertia of its own."""
     if not kind.body:
         return Link.rod(a, mass)
     about = mass * a * a * float(draw.uniform(0.06, 0.12))
@@ -113,7 +114,7 @@ def _link(kind: Kind, draw: Generator, a: float, mass: float) -> Link:
 
 
 def _resistance_to_motion(bodies: Bodies, joint: int, count: int) -> tuple[float, float]:
-    """Largest inertia (kg·m²) and weight (N·m) about a joint (from 0), stretched out."""
+    """Returns the largest inertia (kg·m²) and weight (N·m) about a joint (from 0), stretched out."""
     first = bodies.links[joint]
     inertia, weight, away = first.inertia[1], 0.0, 0.0
     for number, link in enumerate(bodies.links[joint:]):
@@ -131,7 +132,7 @@ def _resistance_to_motion(bodies: Bodies, joint: int, count: int) -> tuple[float
 def _drive(
     joint: Records, draw: Generator, kind: Kind, supply: float, strongest: float, inertia: float, speed: float
 ) -> None:
-    """A motor and gear with `strongest` to spare, and without load somewhat faster than needed."""
+    """Draws a motor and gear with `strongest` to spare, and a speed without load slightly above the needed one."""
     gear = float(np.exp(draw.uniform(math.log(20), math.log(250))))
     magnet = 0.9 * supply / (gear * speed * float(draw.uniform(1.7, 3.0)))
     stall = strongest * float(draw.uniform(2.5, 4.0))
@@ -157,7 +158,9 @@ def _friction(joint: Records, draw: Generator, kind: Kind, strongest: float, ine
 
 
 def _gains(joint: Records, draw: Generator, kind: Kind, period: float, supply: float, inertia: float) -> None:
-    """Poles of the joint alone, at its largest inertia; no gain makes too much of a count of the sensor."""
+    """Places poles of the joint alone, at its largest inertia; limits gains so that a count of the sensor has little
+    effect.
+    """
     p = joint[0]
     total = inertia + p["rotor"]
     if kind.drive == CURRENT:
@@ -186,7 +189,7 @@ def _gains(joint: Records, draw: Generator, kind: Kind, period: float, supply: f
 
 
 def _tolerances(kind: Kind, draw: Generator) -> tuple[Tolerance, ...]:
-    """What the file states with a deviation, and by which factor it is off."""
+    """Returns the values that the file states with a deviation, and the factor by which each is wrong."""
     shares: list[tuple[str, int | None, float]] = []
     for j in range(kind.joints):
         shares += [("mass", j, 0.06), ("rotor", j, 0.1), ("viscous", j, 0.3)]

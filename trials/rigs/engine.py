@@ -1,7 +1,7 @@
-"""The worlds' integrator: MuJoCo's rigid bodies, and beside them drives, friction, gears, sensors and the sampled loop.
+"""The rigs' integrator: MuJoCo's rigid bodies with separate drives, friction, gears, sensors and sampled loop.
 
 Positions at the steps and speeds between them (leapfrog). MuJoCo gives the acceleration without drives and friction,
-and solves with the mass matrix; both are called from compiled code by their names in its library.
+and solves with the mass matrix; compiled code calls both by their names in its library.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ _SOLVE = types.ExternalFunction(
 )
 
 SWEEPS = 30
-"""Sweeps of Gauss and Seidel over the joints' set-valued friction, at most."""
+"""Most Gauss–Seidel sweeps over the joints' set-valued friction."""
 AT_REST = 1e-9
 """rad/s below which a joint with set-valued friction rests."""
 WHOLE = 1e-6
-"""Share of a step within which a period is a whole number of steps."""
+"""Share of a step within which a period counts as a whole number of steps."""
 BREAKING_SPEED = 2e-3
-"""rad/s over which bristles lose what they hold at rest above sliding friction."""
+"""rad/s over which bristles lose the part of static friction above sliding friction."""
 
 
 @dataclass(frozen=True)
@@ -64,11 +64,11 @@ class Motion:
 def simulate(
     bodies: Bodies, joints: Records, loop: Records, set_points: Floats, *, noise: Floats | None = None
 ) -> Motion:
-    """The rig under its loop from rest at the first set point.
+    """Simulates the rig under its loop from rest at the first set point.
 
     With `noise` (k, n; rad) readings and drives are rounded, without it the loop is smooth.
 
-    Raises ValueError for a period that is no whole number of steps: more or less time would pass than is written down.
+    Raises ValueError for a period that is not a whole number of steps: simulated and recorded time would differ.
     """
     rotors = tuple(float(j["rotor"]) if not j["flexible"] else 0.0 for j in joints)
     model = mujoco.MjModel.from_xml_string(mjcf(bodies, rotors))
@@ -83,7 +83,7 @@ def simulate(
     addresses = (model._address, data._address)
     views = (data.qpos, data.qvel, data.qacc, data.xaxis, data.xanchor, data.xipos, np.array(model.body_mass))
     if step_within(*(float(loop[name][0]) for name in ("period", "step"))) != loop["step"][0]:
-        raise ValueError(f"a period of {loop['period'][0]} s is no whole number of steps of {loop['step'][0]} s")
+        raise ValueError(f"a period of {loop['period'][0]} s is not a whole number of steps of {loop['step'][0]} s")
     exact = noise is not None
     disturbed = np.zeros_like(set_points) if noise is None else noise
     _run(addresses, views, hinges, beyond, weight, joints, loop[0], set_points, disturbed, exact, out)
@@ -92,15 +92,14 @@ def simulate(
 
 
 def step_within(period: float, step: float) -> float:
-    """The step, s, or the one near it of which a period, s, has a whole number: time that is simulated is time that is
-    written down."""
+    """Returns the step, s, or a near one that divides a period, s, so that simulated and recorded time are equal."""
     steps = max(1, round(period / step))
     return step if abs(period / step - steps) < WHOLE else period / steps
 
 
 @compiled
 def _presses(j: int, axis: Floats, anchor: Floats, places: Floats, masses: Floats, first: int, gravity: Floats) -> Any:
-    """Gravity's torque about joint j, N·m, of the bodies from `first` on."""
+    """Returns gravity's torque about joint j, N·m, of the bodies from `first` on."""
     torque = 0.0
     for b in range(first, masses.size):
         x, y, z = places[b, 0] - anchor[j, 0], places[b, 1] - anchor[j, 1], places[b, 2] - anchor[j, 2]
@@ -113,7 +112,7 @@ def _presses(j: int, axis: Floats, anchor: Floats, places: Floats, masses: Float
 
 @compiled
 def _across(axis: Floats, j: int, gravity: Floats) -> float:
-    """Magnitude of gravity across the axis of joint j, m/s²."""
+    """Returns the magnitude of gravity across the axis of joint j, m/s²."""
     along = axis[j, 0] * gravity[0] + axis[j, 1] * gravity[1] + axis[j, 2] * gravity[2]
     square = gravity[0] ** 2 + gravity[1] ** 2 + gravity[2] ** 2 - along * along
     return math.sqrt(max(square, 0.0))
@@ -121,7 +120,9 @@ def _across(axis: Floats, j: int, gravity: Floats) -> float:
 
 @compiled
 def _within_volts(command: float, speed: float, p: Any) -> float:
-    """What of a current loop's command (N·m of the motor) its volts allow; the back-EMF helps them where it brakes."""
+    """Returns the part of a current loop's command (N·m of the motor) that its volts allow; back-EMF helps when it
+    brakes.
+    """
     back = p.back_emf * p.gear * speed
     share = p.nominal_constant / p.resistance
     return min(max(command, share * (-p.supply - back)), share * (p.supply - back))
@@ -129,7 +130,9 @@ def _within_volts(command: float, speed: float, p: Any) -> float:
 
 @compiled
 def _motor_torque(volts: float, current: float, speed: float, rise: float, p: Any, step: float) -> Any:
-    """Current (A) after a step and the torque (N·m) at the joint; `volts` is the command of a current loop in N·m."""
+    """Returns the current (A) after a step and the torque (N·m) at the joint; `volts` is the command of a current loop
+    in N·m.
+    """
     if p.current_rate > 0.0:
         wished = _within_volts(volts, speed, p) / p.nominal_constant
         current = wished + (current - wished) * math.exp(-p.current_rate * step)
@@ -143,8 +146,10 @@ def _motor_torque(volts: float, current: float, speed: float, rise: float, p: An
 
 @compiled
 def _rub(push: Floats, answer: Floats, level: Floats, switched: Any, rub: Floats, step: float) -> None:
-    """Set-valued friction: `rub` (N·m) within ±level that stops each joint if it can; `push` is the speed after the
-    step without it, `answer` M⁻¹."""
+    """Computes set-valued friction: `rub` (N·m) within ±level that stops each joint if it can.
+
+    `push` is the speed after the step without it, `answer` M⁻¹.
+    """
     n = push.size
     for _ in range(SWEEPS):
         change = 0.0

@@ -1,4 +1,4 @@
-"""The folder of a world on the disk."""
+"""Writes the folder of a rig."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from trials.rigs.world import make_world
 def write_world(
     folder: Path, kind: str, seed: int, case: str | None = None, effect: str | None = None, *, sharp: bool = False
 ) -> list[Path]:
-    """Writes one rig's folder; the paths. The truth lies beside `lab`, never in it."""
+    """Writes one rig's folder; returns the paths. The truth is beside `lab`, never in it."""
     world = make_world(kind, seed, case, effect)
     lab = folder / "lab"
     lab.mkdir(parents=True, exist_ok=True)
@@ -34,7 +34,7 @@ def write_world(
 
 
 def truth_of(rig: Rig, case: str) -> dict[str, Any]:
-    """The hidden truth: the effects, and every number of the rig."""
+    """Returns the hidden truth: the effects, and every parameter of the rig."""
     names = rig.joints.dtype.names or ()
     return {
         "kind": rig.kind_name,

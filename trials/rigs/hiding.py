@@ -1,4 +1,4 @@
-"""Hides effects in a rig: each in one of the laws that the field has for it, with a size that belongs to the arm."""
+"""Hides effects in a rig: each by one of several laws of the field, with a size that suits the joint."""
 
 from __future__ import annotations
 
@@ -16,37 +16,38 @@ from trials.rigs.parameters import BRISTLE, BY_CURRENT, JUMP, ONE_SIDED, PRESSIN
 from trials.rigs.rig import Hidden, Rig
 
 WEAKENED_MAGNET = "weakened_magnet"
-"""K_T and K_b are of one magnet, and change together."""
+"""K_T and K_b depend on the same magnet, and change together."""
 WHOLE_MACHINE = ("payload", "base_tilt")
 BEFORE_THE_DRIVE = ("wrong_gain", "lost_set_points")
-"""Effects that show only against a controller that is known."""
+"""Effects that show only with a known controller."""
 OF_VOLTS = ("motor_inductance", "dead_zone", "supply_limit", "resistance_drift", WEAKENED_MAGNET)
-"""Effects that a current loop takes away, or that there are no volts for."""
+"""Effects that a current loop compensates, or that concern volts."""
 ON_A_LENGTH = ("centre_of_mass", "link_mass")
-"""Effects of links that have a length."""
+"""Effects of links with a length."""
 ACROSS_GRAVITY = ("load_dependent_friction",)
-"""Effects of joints that do not stand upright."""
+"""Effects of joints that are not vertical."""
 OPEN = ("tight_spot", "quadratic_drag")
 """Effects that are in no library."""
 
 
 OTHER_NAMES: dict[str, dict[int, tuple[str, tuple[str, ...]]]] = {
     "load_dependent_friction": dict.fromkeys((1, 2), ("gravity_torque_friction", ())),
-    # it is larger one way and smaller the other than what the file states: a coefficient and a difference
+    # it is larger in one direction and smaller in the other than stated: a coefficient and a difference
     "viscous_friction": dict.fromkeys((1, 2), ("direction_dependent_viscous_friction", ("viscous_friction",))),
-    # a loss that differs by direction is in part a change of the torque constant: the loss is its name (decision 0053)
+    # a loss that differs by direction is partly a change of the torque constant: the loss is its name (decision 0053)
     "gear_loss": dict.fromkeys((1, 2), ("gear_loss", ("direction_dependent_gear_loss",))),
     "dead_zone": {JUMP: ("amplifier_threshold", ())},
     "resistance_drift": {2: ("resistance_rise", ())},
     "spring_torque": {ONE_SIDED: ("one_sided_spring", ())},
 }
-"""By name and law: the library's name, and what is part of it, of effects that are another one of the library."""
+"""By name and law: the library's name, and its parts, for effects that are another effect of the library."""
 
 EVENLY_PRESSED = 3
-"""The axes of the joints up to this one keep their angle to gravity in every posture: a weight presses evenly there, so
-that friction under it is Coulomb friction."""
+"""If the axes of all joints up to this one keep their angle to gravity in every posture, a weight presses evenly there,
+and friction under it is Coulomb friction.
+"""
 NAMED_BY_LAW = {"direction_dependent_gear_loss": ("gear_loss", 1)}
-"""Laws of an effect that the library has a name of its own for, beside the effect's."""
+"""Laws of an effect that have a name of their own in the library."""
 
 PRESSING_ARM = 0.3
 """m at which a pressing weight rubs, for a share of 1."""
@@ -54,7 +55,7 @@ PRESSING_ARM = 0.3
 
 @dataclass(frozen=True)
 class Size:
-    """Natural sizes of a joint: N·m, V, A, rad/s as the sound arm uses them, and its reach."""
+    """Typical sizes of a joint: N·m, V, A, rad/s in the healthy arm's motion, and its range."""
 
     torque: float
     volts: float
@@ -68,7 +69,7 @@ class Size:
 
 
 def size_of(rig: Rig, motion: Motion, joint: int) -> Size:
-    """Sizes of joint `joint` (from 0) in the motion of the sound arm."""
+    """Returns the sizes of joint `joint` (from 0) in the motion of the healthy arm."""
     p, link = rig.joints[joint], rig.bodies.links[joint]
     drive = motion.drive[:, joint]
     volts = drive if p["current_rate"] == 0 else np.zeros(1)
@@ -86,7 +87,7 @@ def size_of(rig: Rig, motion: Motion, joint: int) -> Size:
 
 
 def effects_of(rig: Rig) -> tuple[str, ...]:
-    """Names of the effects that can be hidden in a rig, in a fixed order."""
+    """Returns names of the effects that can be hidden in a rig, in a fixed order."""
     names = [*_SIZES, *WHOLE_MACHINE]
     if rig.kind.drive == CURRENT:
         names = [name for name in names if name not in OF_VOLTS]
@@ -100,7 +101,7 @@ def effects_of(rig: Rig) -> tuple[str, ...]:
 
 
 def joints_of(rig: Rig, name: str) -> tuple[int | None, ...]:
-    """Where an effect can be in a rig: joints from 1, or None for the whole machine."""
+    """Returns where an effect can be in a rig: joints from 1, or None for the whole machine."""
     if name in WHOLE_MACHINE:
         return (None,)
     places = range(1, rig.kind.joints + 1)
@@ -112,7 +113,7 @@ def joints_of(rig: Rig, name: str) -> tuple[int | None, ...]:
 
 
 def hide(rig: Rig, name: str, joint: int | None, law: int, size: dict[str, float]) -> Rig:
-    """The rig with an effect in it; sizes are fields of `parameters.JOINT`, or of the bodies."""
+    """Returns the rig with an effect; sizes are fields of `parameters.JOINT`, or of the bodies."""
     known_as, beside = known(name, law)
     if name == "load_dependent_friction" and law == PRESSING_WEIGHT and joint is not None and joint <= EVENLY_PRESSED:
         known_as = "coulomb_friction"
@@ -127,16 +128,16 @@ def hide(rig: Rig, name: str, joint: int | None, law: int, size: dict[str, float
 
 
 def known(name: str, law: int) -> tuple[str, tuple[str, ...]]:
-    """What the library calls an effect that was given a law, and which other effects of the library it is as well.
+    """Returns the library's name of an effect with a law, and the library's other effects that it includes.
 
-    An effect that was drawn by one name may be another of the library's, by its law; draws keep their own names, so
-    that a seed gives the rig that it always gave.
+    An effect that was drawn by one name may be another of the library's, by its law. Draws keep their own names, so
+    that a seed always gives the same rig.
     """
     return OTHER_NAMES.get(name, {}).get(law, (name, ()))
 
 
 def find_drawn_law(known_as: str) -> tuple[str, int]:
-    """The name by which an effect of the library is drawn, and the first law that the library calls so."""
+    """Returns the name by which an effect of the library is drawn, and its first law with that name in the library."""
     for name, others in OTHER_NAMES.items():
         for law, (other, _) in others.items():
             if other == known_as != name:
@@ -145,7 +146,7 @@ def find_drawn_law(known_as: str) -> tuple[str, int]:
 
 
 def drawn(rig: Rig, motion: Motion, name: str, joint: int | None, draw: Generator) -> tuple[int, dict[str, float]]:
-    """A law of the kind, and sizes, for an effect at a joint (from 1)."""
+    """Draws a law of the kind, and sizes, for an effect at a joint (from 1)."""
     law = int(draw.choice(rig.kind.laws))
     if name == "payload":
         return law, {"load": float(draw.uniform(0.15, 0.4)) * rig.bodies.beyond(rig.kind.joints - 1)}
@@ -219,7 +220,7 @@ _SIZES: dict[str, Callable[[Size, Generator], dict[str, float]]] = {
     },
     "quadratic_drag": lambda s, d: {"drag": s.torque / s.speed**2 * _up(0.08, 0.25, d)},
 }
-"""Sizes of the effects of joints, from the joint's own. Some are turned into fields when they are hidden."""
+"""Sizes of the effects of joints, relative to the joint's own. Some are converted to fields when they are hidden."""
 
 DRAWN = (*_SIZES, *WHOLE_MACHINE)
 """Names by which effects are drawn."""
@@ -235,11 +236,11 @@ _LAW_FIELD = {
     "periodic_disturbance": "disturbance_law",
     "potentiometer_nonlinearity": "bend_law",
 }
-"""Which field says the law of an effect; the others have one law, or friction's contact is theirs."""
+"""The field for the law of an effect; the others have one law, or friction's contact is theirs."""
 
 
 def _change(joint: Records, name: str, law: int, size: dict[str, float]) -> None:
-    """The effect in a record of one joint. What the arm has already is added to, and keeps its own law."""
+    """Adds the effect to a record of one joint. The arm's own effects are added to, and keep their law."""
     p = joint[0]
     if name in _LAW_FIELD:
         p[_LAW_FIELD[name]] = law
@@ -287,7 +288,7 @@ def _changed_bodies(bodies: Bodies, name: str, joint: int, size: dict[str, float
 
 
 def tilted(gravity: tuple[float, float, float], about_x: float, about_y: float) -> tuple[float, float, float]:
-    """Gravity in the axes of a base that was turned by `about_y` about its y, then by `about_x` about its x."""
+    """Returns gravity in the axes of a base that was turned by `about_y` about its y, then by `about_x` about its x."""
     x, y, z = gravity
     y, z = y * math.cos(about_x) + z * math.sin(about_x), -y * math.sin(about_x) + z * math.cos(about_x)
     x, z = x * math.cos(about_y) - z * math.sin(about_y), x * math.sin(about_y) + z * math.cos(about_y)

@@ -1,8 +1,8 @@
-"""The kinds of world: what an arm, its controller, its sensors and its records may be.
+"""The kinds of test rig: properties of an arm, its controller, its sensors and its records.
 
-TUNING and REPORTING are apart for good. **No reporting kind is to be looked at while the diagnosis is being tuned**:
-not its records, not its answers, not its rates. A kind that was looked at moves to REPORTED, which may be tuned with,
-and another takes its place.
+TUNING and REPORTING must never mix. **No reporting kind may be looked at during tuning of the diagnosis**: not its
+records, its answers, or its rates. A kind that was looked at moves to REPORTED, which may be used for tuning, and
+another takes its place.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ class Kind:
         joints: number of joints. controller, rate: of the loop, Hz. drive: what the controller commands.
         bits: of encoders over their range. noise: rms in counts of white noise. coloured: rms in counts of noise with
             a corner at 3 Hz. outliers: share of readings. rounding: share of the largest drive that it is rounded to.
-        limit: share of the supply that the controller may ask for, None for all of it.
+        limit: largest output of the controller as a share of the supply, None for all.
         contacts: laws of dry friction. laws: which of the three laws an effect takes, drawn from these.
-        rubs: whether sound arms have Coulomb friction, which the file then states.
-        motions: kinds of motion. duration: s of a record. recorded: columns beside the position.
-        known_loop: whether the machine file tells the controller. body: links are stated as bodies, not as rods.
+        rubs: whether healthy arms have Coulomb friction, which the file then states.
+        motions: kinds of motion. duration: s of a record. recorded: columns besides the position.
+        known_loop: whether the machine file states the controller. body: links are stated as bodies, not as rods.
         horizontal: gravity along the axes of a planar arm, as on a table.
     """
 
@@ -78,7 +78,7 @@ TUNING: dict[str, Kind] = {
         _ANTHROPOMORPHIC, rounding=0.004, limit=0.5, contacts=(TANH,), laws=(1,), noise=0.0, motions=("ramps",)
     ),
 }
-"""Kinds that the diagnosis may be tuned with."""
+"""Kinds that may be used for tuning the diagnosis."""
 
 REPORTED: dict[str, Kind] = {
     "axis-board-table": replace(
@@ -472,7 +472,7 @@ REPORTED: dict[str, Kind] = {
         _ANTHROPOMORPHIC, joints=6, rate=(400.0,), bits=(19,), contacts=(TANH,), motions=("ramps", "via points")
     ),
 }
-"""Kinds that a registered trial used and that were looked at then (docs/how-well.md): for tuning from there on."""
+"""Kinds that a registered trial used and that were then looked at (docs/how-well.md); now for tuning."""
 
 REPORTING: dict[str, Kind] = {
     "axis-cascade-random": replace(
@@ -512,6 +512,6 @@ REPORTING: dict[str, Kind] = {
         motions=("sines", "steps"),
     ),
 }
-"""Kinds that only a registered trial uses. None of them is looked at while anything is tuned."""
+"""Kinds that only a registered trial uses. None may be looked at during tuning."""
 
 KINDS = TUNING | REPORTED | REPORTING

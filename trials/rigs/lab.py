@@ -1,4 +1,6 @@
-"""What a lab would have of a rig: records as CSV, and a machine file as it would write it. No truth is in either."""
+"""Writes what a lab would have of a rig: records as CSV, and a machine file as it would write it. Neither contains the
+truth.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,7 @@ SPEED_NOISE = 0.002
 
 
 def records_text(rig: Rig, motion: Motion, name: str) -> str:
-    """The record as CSV: time, and what its kind records of every joint."""
+    """Returns the record as CSV: time, and the signals of its kind for every joint."""
     columns: list[tuple[str, np.ndarray]] = []
     for j in range(rig.kind.joints):
         columns.append((f"position_{j + 1}", motion.position[:, j]))
@@ -35,7 +37,7 @@ def records_text(rig: Rig, motion: Motion, name: str) -> str:
 
 
 def beside_text(rig: Rig) -> str:
-    """The TOML beside a record: what its columns cannot say."""
+    """Returns the TOML beside a record: data that its columns cannot hold."""
     unit = "N·m" if rig.kind.drive == CURRENT else "V"
     return (
         f'robot = "{_name(rig)}"\nperiod = {float(rig.loop["period"][0])!r}\ndrive_unit = "{unit}"\n'
@@ -44,7 +46,7 @@ def beside_text(rig: Rig) -> str:
 
 
 def machine_text(rig: Rig) -> str:
-    """The machine file: the sound rig with every stated number off by what its deviation says."""
+    """Returns the machine file: the healthy rig with every stated value wrong by its tolerance."""
     stated = {(t.name, t.joint): t for t in rig.tolerances}
     lines = [
         *("version = 1", f'name = "{_name(rig)}"', f'title = "Rig {rig.seed} of {rig.kind_name}"'),
@@ -71,7 +73,7 @@ def _exact(value: float, unit: str, source: str) -> str:
 
 
 def _off(true: float, tolerance: Tolerance | None, unit: str, source: str, low: float | None = 0.0) -> str:
-    """A number as it is stated: off by its tolerance, with the deviation of it."""
+    """Returns a value as the file states it: wrong by its tolerance, with the deviation."""
     if tolerance is None:
         return _exact(true, unit, source)
     value = float(true) * tolerance.factor

@@ -1,4 +1,4 @@
-"""The laws of the worlds, written from their formulae for scalars; `p` is a record of `parameters.JOINT`."""
+"""The laws of the rigs, as scalar formulae; `p` is a record of `parameters.JOINT`."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ DIRECTION_SHARE = 0.35
 HARDENING_ANGLE = 0.5
 """rad at which a hardening spring is twice as stiff."""
 HARDENING_GIVE = 0.01
-"""rad of give at which a hardening transmission is twice as stiff."""
+"""Deflection, rad, at which a hardening transmission is twice as stiff."""
 HUNT_DAMPING = 0.5
 """s/rad: damping of a Hunt and Crossley contact over its elastic force."""
 
 
 @compiled
 def viscous_torque(speed: float, p: Any) -> float:
-    """Linear, or of another coefficient for each direction; quadratic drag beside it."""
+    """Returns linear viscous torque, or with another coefficient for each direction; plus quadratic drag."""
     share = 1.0
     if p.viscous_law == BY_DIRECTION:
         share += DIRECTION_SHARE if speed > 0.0 else -DIRECTION_SHARE
@@ -48,7 +48,7 @@ def viscous_torque(speed: float, p: Any) -> float:
 
 @compiled
 def stribeck_share(speed: float, width: float, law: float) -> float:
-    """Share of Stribeck friction that is left at a speed."""
+    """Returns the share of Stribeck friction that remains at a speed."""
     ratio = abs(speed) / width
     if law == EXPONENTIAL:
         return math.exp(-ratio)
@@ -61,7 +61,7 @@ def stribeck_share(speed: float, width: float, law: float) -> float:
 
 @compiled
 def loss_level(transmitted: float, speed: float, p: Any) -> float:
-    """Friction of a gear under the torque that it transmits."""
+    """Returns the friction of a gear under the torque that it transmits."""
     level = p.gear_loss * abs(transmitted)
     backwards = transmitted * speed < 0.0
     if p.loss_law == DRIVING_ONLY and backwards:
@@ -73,7 +73,9 @@ def loss_level(transmitted: float, speed: float, p: Any) -> float:
 
 @compiled
 def sliding_level(angle: float, speed: float, load: float, transmitted: float, p: Any) -> float:
-    """Dry friction of a joint that slides, N·m; `load` is what load-dependent friction multiplies, times its arm."""
+    """Returns dry friction of a sliding joint, N·m; `load` is the multiplier of load-dependent friction, times its
+    arm.
+    """
     level = p.coulomb + load + loss_level(transmitted, speed, p)
     if p.direction * speed > 0.0:
         level += abs(p.direction)
@@ -87,7 +89,7 @@ def sliding_level(angle: float, speed: float, load: float, transmitted: float, p
 
 @compiled
 def bristles(z: float, speed: float, level: float, stiffness: float, step: float) -> float:
-    """Deflection of LuGre's bristles after a step: dz/dt = v − σ0 |v| z/g, solved at constant speed."""
+    """Returns the deflection of LuGre's bristles after a step: dz/dt = v − σ0 |v| z/g, solved at constant speed."""
     if level <= 0.0:
         return 0.0
     settled = math.copysign(level / stiffness, speed)
@@ -96,7 +98,7 @@ def bristles(z: float, speed: float, level: float, stiffness: float, step: float
 
 @compiled
 def wave(phase: float, law: float, square: bool) -> float:
-    """A wave of amplitude 1: sine; sine with a second harmonic, or square; triangle."""
+    """Returns a wave of amplitude 1: sine; sine with a second harmonic, or square; triangle."""
     if law == SINE:
         return math.sin(phase)
     if law == OTHER_WAVE:
@@ -106,7 +108,7 @@ def wave(phase: float, law: float, square: bool) -> float:
 
 @compiled
 def spring_torque(angle: float, p: Any) -> float:
-    """A spring at the joint: straight, hardening, or a cable that can only pull one way."""
+    """Returns the torque of a spring at the joint: straight, hardening, or a cable that only pulls one way."""
     stretch = angle - p.spring_rest
     if p.spring_law == HARDENING:
         return -p.spring * stretch * (1.0 + (stretch / HARDENING_ANGLE) ** 2)
@@ -117,7 +119,7 @@ def spring_torque(angle: float, p: Any) -> float:
 
 @compiled
 def outside_torque(time: float, angle: float, p: Any) -> float:
-    """Spring, ripple and disturbance."""
+    """Returns the torque of spring, ripple and disturbance."""
     torque = spring_torque(angle, p) if p.spring != 0.0 else 0.0
     if p.ripple != 0.0:
         torque += p.ripple * wave(p.ripple_cycles * angle + p.ripple_phase, p.ripple_law, False)
@@ -129,7 +131,9 @@ def outside_torque(time: float, angle: float, p: Any) -> float:
 
 @compiled
 def transmitted_torque(give: float, rate: float, p: Any) -> float:
-    """Torque of a gear that gives by `give` (motor less joint, rad), nothing inside its gap; contacts only press."""
+    """Returns the torque of a flexible gear with deflection `give` (motor − joint, rad); none inside its gap; contacts
+    only press.
+    """
     half = 0.5 * p.gap
     depth = give - half if give > half else (give + half if give < -half else 0.0)
     if depth == 0.0 and p.gap > 0.0:
@@ -147,7 +151,7 @@ def transmitted_torque(give: float, rate: float, p: Any) -> float:
 
 @compiled
 def amplified(command: float, p: Any) -> float:
-    """Volts at the motor: dead zone, then the supply's limit."""
+    """Returns volts at the motor: dead zone, then the supply's limit."""
     size, width = abs(command), p.dead_zone
     if width > 0.0:
         if p.dead_law == OFFSET:
@@ -161,7 +165,7 @@ def amplified(command: float, p: Any) -> float:
 
 @compiled
 def sensed(angle: float, p: Any) -> float:
-    """Angle that a sensor reports before noise and rounding: scale about the middle of its range, shift, bend."""
+    """Returns a sensor's angle before noise and rounding: scale about the middle of its range, shift, bend."""
     x = (angle - p.at_zero) / p.range - 0.5
     reported = angle + p.sensor_gain * x * p.range + p.sensor_offset
     if p.bend_law == ECCENTRIC:

@@ -1,4 +1,4 @@
-"""The sampled controllers of the worlds: one joint and one period a call. Errors and speeds in rad and rad/s."""
+"""The sampled controllers of the rigs: one joint and one period per call. Errors and speeds in rad and rad/s."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from trials.rigs.parameters import BOARD, CASCADE
 
 SUM, LAST_ERROR, INNER_SUM, LAST_READING, LAST_WANTED = range(5)
 MEMORY = 5
-"""What a controller remembers of a joint."""
+"""State of a controller for one joint."""
 
 DAC_COUNTS = 127.0
 """Largest output of the board-like controller."""
 INTEGRAL_SHIFT = 64.0
-"""Summed counts of error for one count of output at I = 1."""
+"""Summed counts of error per count of output at I = 1."""
 
 
 @compiled
 def rounded(value: float) -> float:
-    """To the nearest integer, halves upwards."""
+    """Rounds to the nearest integer, halves upwards."""
     return math.floor(value + 0.5)
 
 
 @compiled
 def control(wanted: float, read: float, p: Any, loop: Any, exact: bool, memory: Any) -> float:
-    """The output of a period, as it is recorded. Without `exact` (a smooth loop) nothing is rounded.
+    """Returns the output of a period, as it is recorded. Without `exact` (a smooth loop) nothing is rounded.
 
-    Board-like: integers, in counts; else volts or N·m. Gains are multiplied by what a wrong gain adds. In a smooth loop
-    a share of set points that gets lost shows as a set point between this one and the last; in an exact one the
-    caller has lost them already.
+    Board-like: integers, in counts; else volts or N·m. Gains include the effect of a wrong gain. In a smooth loop, a
+    share of lost set points is a set point between this one and the last; in an exact one the caller has already
+    dropped them.
     """
     taken = wanted if exact else wanted - p.lost * (wanted - memory[LAST_WANTED])
     memory[LAST_WANTED] = wanted

@@ -1,4 +1,4 @@
-"""Set points of a record: at rest first and last, within what the arm can follow."""
+"""Draws set points of a record: at rest first and last, within limits that the arm can follow."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 MOTIONS = ("ramps", "via points", "steps", "sweep", "sines", "random steps")
-"""What a record may be made of."""
+"""Kinds of motion in a record."""
 
 REST = 0.4
 """s of rest at both ends of a record."""
@@ -20,7 +20,9 @@ REST = 0.4
 def set_points(
     name: str, draw: Generator, centre: Floats, reach: Floats, speed: float, duration: float, period: float
 ) -> Floats:
-    """(k, n) rad around `centre` within ± `reach`, at most about `speed` rad/s; every joint has a motion of its own."""
+    """Returns (k, n) rad around `centre` within ± `reach`, at most about `speed` rad/s; every joint has a motion of its
+    own.
+    """
     time = np.arange(round(duration / period)) * period
     columns = []
     for middle, half in zip(centre, reach, strict=True):
@@ -51,11 +53,11 @@ def _one(name: str, draw: Generator, reach: float, speed: float, duration: float
         return _levels(draw, time, duration, 0.25 * reach, 0.9, speed)
     if name == "random steps":
         return _levels(draw, time, duration, 0.15 * reach, 0.25, speed)
-    raise ValueError(f"motion {name!r}: there are {', '.join(MOTIONS)}")
+    raise ValueError(f"motion {name!r}: not known; available: {', '.join(MOTIONS)}")
 
 
 def _levels(draw: Generator, time: Floats, duration: float, size: float, hold: float, speed: float) -> Floats:
-    """Steps between levels within ± `size`, run at `speed`: no drive is asked for a jump that it cannot follow."""
+    """Returns steps between levels within ± `size`, run at `speed`, so that no drive must follow a jump."""
     wanted, start = np.zeros_like(time), REST
     while start < duration - REST - hold:
         length = draw.uniform(0.6, 1.4) * hold
@@ -71,7 +73,7 @@ def _levels(draw: Generator, time: Floats, duration: float, size: float, hold: f
 def _between_points(
     draw: Generator, reach: float, speed: float, duration: float, time: Floats, *, smooth: bool
 ) -> Floats:
-    """From point to point, at constant speed with holds between, or by polynomials of the fifth degree."""
+    """Moves from point to point, at constant speed with holds between, or by polynomials of the fifth degree."""
     out, start, here = np.zeros_like(time), REST, 0.0
     while True:
         there = float(draw.uniform(-reach, reach))

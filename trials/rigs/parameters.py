@@ -1,4 +1,4 @@
-"""The numbers of a true rig, as records that compiled code reads by name. SI units; at the side of the joint."""
+"""Parameters of a true rig, as records that compiled code reads by name. SI units; at the joint's side."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ Records = NDArray[Any]
 """Array of records."""
 
 TANH, BRISTLE, SWITCH = 0, 1, 2
-"""How dry friction turns its sign: smoothed, as bristles that bend (LuGre), or set-valued."""
+"""How dry friction changes its sign: smoothed, as bristles that bend (LuGre), or set-valued."""
 
 EXPONENTIAL, GAUSSIAN, LORENTZIAN = 0, 1, 2
 """How Stribeck friction falls with the speed."""
 
 LINEAR, BY_DIRECTION = 0, 2
-"""Viscous friction; `drag` is quadratic in the speed beside it."""
+"""Viscous friction; `drag` is an added term, quadratic in the speed."""
 
 PRESSING_WEIGHT, GRAVITY_TORQUE = 0, 1
-"""What load-dependent friction goes with; that which goes with the transmitted torque is `gear_loss`."""
+"""Load of load-dependent friction; friction by the transmitted torque is `gear_loss`."""
 
 BOTH_WAYS, DRIVING_ONLY, WORSE_BACKWARDS = 0, 1, 2
 """Loss of a gear."""
 
 OFFSET, JUMP, ROUNDED = 0, 1, 2
-"""Dead zone: what lies outside remains; all of it passes outside; a rounded corner."""
+"""Dead zone: the excess passes; all of it passes outside; a rounded corner."""
 
 SINE, OTHER_WAVE, TRIANGLE = 0, 1, 2
 """Waves of ripple (the second with a harmonic) and of disturbances (the second square)."""
@@ -35,13 +35,13 @@ STRAIGHT, HARDENING, ONE_SIDED = 0, 1, 2
 """Springs; a one-sided one pulls like a cable."""
 
 HUNT_CROSSLEY = 2
-"""Contact whose damping grows with its depth, beside STRAIGHT and HARDENING."""
+"""Contact whose damping grows with its depth, in addition to STRAIGHT and HARDENING."""
 
 ECCENTRIC, PARABOLA, CUBE = 0, 1, 2
-"""How a bent sensor's error runs over its range."""
+"""Shape of a bent sensor's error over its range."""
 
 BY_CURRENT, BY_TIME = 0, 1
-"""What warms the winding."""
+"""Heat source of the winding."""
 
 BOARD, PID, CASCADE = 0, 1, 2
 """Controllers."""
@@ -76,16 +76,16 @@ JOINT = np.dtype(
 """One joint. A law's number is written as a float. Zero means absent, except:
 
 `current_rate` is the bandwidth of a current loop in rad/s (0: volts drive the motor), whose torque is scaled by
-`nominal_constant`, the N·m at the joint per ampere that its maker believed; `rotor` is at the joint's side;
-`count` is the sensor's in rad; `limit` and `resolution` are of the controller's output, before the amplifier.
+`nominal_constant`, its maker's assumed N·m at the joint per ampere; `rotor` is at the joint's side; `count` is the
+sensor's in rad; `limit` and `resolution` are of the controller's output, before the amplifier.
 """
 
 LOOP = np.dtype([("controller", "f8"), ("period", "f8"), ("delay", "f8"), ("step", "f8")])
-"""The sampled loop, and the step of integration in s."""
+"""The sampled loop, and the integration step in s."""
 
 
 def joints(count: int) -> Records:
-    """Joints without any effect; what divides is 1."""
+    """Returns joints without any effect; divisors are 1."""
     made = np.zeros(count, JOINT)
     for name in ("resistance", "gear", "stribeck_speed", "cooling_time", "tight_width", "counts_to_volts", "dac_scale"):
         made[name] = 1.0

@@ -1,4 +1,4 @@
-"""A rig: what is true of it, and what its lab's machine file states."""
+"""A rig: its true parameters, and those in its lab's machine file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from trials.rigs.parameters import Records
 
 @dataclass(frozen=True)
 class Stated:
-    """A number as a machine file states it; without a deviation the file claims it to be exact."""
+    """A value as a machine file states it; without a deviation the file claims it to be exact."""
 
     value: float
     unit: str
@@ -22,10 +22,10 @@ class Stated:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """A number of the rig that its file states with a deviation: the factor of its true value that is stated.
+    """A parameter that the file states with a deviation: the stated value over the true one.
 
     `joint` counts from 0, None for the whole machine; `name` is a field of the joint or loop, or `mass`, or `magnet`,
-    which is torque and back-EMF constant in one.
+    which is torque and back-EMF constant together.
     """
 
     name: str
@@ -37,10 +37,10 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Hidden:
-    """An effect that the file says nothing of. `joint` counts from 1, None for the machine.
+    """An effect that the file does not contain. `joint` counts from 1, None for the machine.
 
-    `name` is what was drawn. `known_as` is what the library calls the law that it was given; `beside` are the library's
-    other effects that are part of it.
+    `name` is the drawn name. `known_as` is the library's name for its law; `beside` are the library's other effects
+    that it includes.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Rig:
-    """The truth. `sound` are the bodies without hidden effects, which the file is about."""
+    """The truth. `sound` are the bodies without hidden effects, which the file describes."""
 
     kind_name: str
     kind: Kind
@@ -66,7 +66,7 @@ class Rig:
     sound_joints: Records
     tolerances: tuple[Tolerance, ...]
     strongest: tuple[float, ...]
-    """N·m that each joint needs to be held and moved: the size of things."""
+    """N·m that each joint needs for holding and moving: a typical size."""
     highest: float
     """V of the supply."""
     reach: tuple[float, ...]

@@ -1,25 +1,26 @@
-"""Which laws of a library the training record of a rig can tell apart, worked out from the truth on the world's side.
+"""Computes from the truth which laws of a library the training record of a rig can distinguish.
 
-A rival is the sound arm with another effect, in its plainest law. Its sizes and everything that the file states with a
-deviation are refitted by least squares to the readings of the true arm, in the worlds' own simulation without noise or
-rounding. χ² is what remains, over the variance of the noise, and what the numbers of the file cost: each is stated with
-a deviation, as a share of itself, and costs the square of how many of these it is off, by its logarithm; what those of
-the true arm are off is subtracted. No file says that a number is never further off than rigs are drawn with, so that
-the judge does not know it either (docs/decisions/0053). d′ of a rival is √(χ² of the rival − χ² of the effect's own
-plainest law), and that of `none` is √χ² of the sound arm. Below 5 record and file do not tell.
-The file counts as it is: friction of twice what is stated to 30 % is what a sound arm with an unlucky file has,
-whatever the true friction would have been without the effect.
+A rival is the healthy arm with another effect, in its plainest law. Its sizes and all parameters that the file states
+with a deviation are refitted by least squares to the readings of the true arm, in the rigs' own simulation without
+noise or rounding. χ² has two parts: the residual over the variance of the noise, and the cost of the file's parameters.
+Each is stated with a deviation, as a share of itself. It costs the square of its logarithmic distance from the stated
+value, in these deviations; the cost of the true arm's parameters is subtracted. No file states that a parameter is
+never farther off than rigs are drawn with, so the judge does not know that either (docs/decisions/0053). d′ of a rival
+is √(χ² of the rival − χ² of the effect's own plainest law), and that of `none` is √χ² of the healthy arm. Below 5
+record and file do not distinguish. The file counts as it is: friction of twice its stated value, with a
+stated deviation of 30 %, may belong to a healthy arm with an unlucky file, whatever the true friction without the
+effect.
 
-Of several effects, d′ of each is that of the arm without it, with the others as they are; rivals are computed for
-single effects only. A rival that no world can hide counts as no nearer than the sound arm.
+With several effects, d′ of each is that of the arm without it, with the others present; rivals are computed for single
+effects only. A rival that no rig can hide counts as no nearer than the healthy arm.
 
-What this version leaves out:
+This version leaves out:
 - rivals on other joints than the effect's; held-out records; recorded speeds;
-- the closed loop hides a part of what a recorded drive shows: d′ is rather too small; coloured noise counts as white
-  with its density at low frequencies, outliers do not count;
-- sizes are sought from a few starts, with tolerances that answer linearly, before tolerances are refitted, and the
-  refit ends after some steps. Whatever was tried is an upper bound of the least χ², so that d′ of `none` may be too
-  large, and d′ of a rival off either way, since what was found for the effect itself is subtracted.
+- the closed loop hides a part of the information in a recorded drive, so d′ is rather too small; coloured noise counts
+  as white with its density at low frequencies, outliers do not count;
+- sizes are searched from a few starts, with linear tolerances, before tolerances are refitted, and the refit ends after
+  some steps. Every trial is an upper bound of the least χ². So d′ of `none` may be too large, and d′ of a rival wrong
+  in either direction, since the result for the effect itself is subtracted.
 """
 
 from __future__ import annotations
@@ -42,27 +43,29 @@ from trials.rigs.world import COLOURED_CORNER, TRAINING, wanted, without_settlin
 STEP = 2e-4
 """s, about, of the simulations here."""
 DECIDES = 1e5
-"""d′ by linear tolerances above which they are not refitted: no tolerance brings it below 5. It is large, since a joint
-that sticks is anything but linear: friction that the file may state has shown 4 399 by linear tolerances."""
+"""d′ by linear tolerances above which they are not refitted: no tolerance brings it below 5. It is large, because a
+sticking joint is very nonlinear: friction that the file may state has reached 4 399 by linear tolerances.
+"""
 NOT_TOLD = 4.9
-"""d′ at which a refit of tolerances ends, since the record does not tell."""
+"""d′ at which a refit of tolerances ends, since the record does not distinguish."""
 REFITTED = 40
-"""Steps of a refit of tolerances, at most."""
+"""Most steps of a refit of tolerances."""
 DERIVATIVES = 2
-"""Times that a refit forms its derivatives anew, where those it has lead no further."""
+"""How often a refit recomputes its derivatives when it makes no more progress."""
 FARTHEST = 3.0
-"""Deviations at which a refit begins at the most."""
+"""Largest initial deviations of a refit."""
 TELLS = 5.0
-"""d′ from which record and file tell. One number that is off by as many deviations costs as much, so that none is moved
-further."""
+"""d′ at which record and file distinguish. One value that is wrong by as many deviations costs as much, so none is
+moved farther.
+"""
 DIFFERENCE = 0.05
 """Step of differences in a refit, deviations."""
 LEAST_FALL = 1e-3
-"""Share by which a step has to lower χ² for the derivatives that led to it to be kept."""
+"""Share by which a step must lower χ² for its derivatives to be kept."""
 EVALUATIONS = 6
-"""Of sizes, at most, after the starts."""
+"""Most refits of sizes, after the starts."""
 STARTS = (0.2, 0.6, 1.6)
-"""Sizes to begin with, over one that is drawn as for a hidden effect."""
+"""Initial sizes, over a drawn one of a hidden effect."""
 SIGNED = (
     "ripple",
     "disturbance",
@@ -78,37 +81,39 @@ SIGNED = (
 )
 """Sizes that may have either sign."""
 SHIFTED = ("ripple_phase", "disturbance_phase", "spring_rest", "about_x", "about_y")
-"""Sizes that are moved, not multiplied: by `MOVED` rad a unit."""
+"""Sizes that are shifted, not multiplied: by `MOVED` rad per unit."""
 MOVED = 0.5
 LARGEST = 30.0
-"""Largest size, over one that is drawn."""
+"""Largest size, over a drawn one."""
 KEPT = ("current", "duration", "cooling_time")
-"""Sizes that are not refitted: little depends on them. Nor is the stiffness of a contact behind a gap."""
+"""Sizes that are not refitted, because little depends on them, as on the stiffness of a contact behind a gap."""
 
 
 @dataclass(frozen=True)
 class Rival:
-    """`none` is the sound arm, `own` the effect itself in its plainest law."""
+    """`none` is the healthy arm, `own` the effect itself in its plainest law."""
 
     name: str
     d_prime: float
 
 
 def sharpness(rig: Rig, names: Collection[str] | None = None) -> list[Rival]:
-    """Rivals (all that can be hidden in the rig, or those that the library calls by `names`) of the one effect of
-    a rig; empty where there is not one."""
+    """Returns rivals of the one effect of a rig; empty unless there is exactly one.
+
+    names: library names of the rivals; None for all that can be hidden in the rig.
+    """
     if len(rig.hidden) != 1:
         return []
     return _Comparison(rig).rivals(effects_of(rig) if names is None else names)
 
 
 def detectability(rig: Rig) -> list[float]:
-    """d′ of each hidden effect: of the arm without it from the arm as it is."""
+    """Returns d′ of each hidden effect: between the arm without it and the arm."""
     return [_Comparison(rig, k).rivals(())[0].d_prime for k in range(len(rig.hidden))]
 
 
 def _without(rig: Rig, effect: int) -> Rig:
-    """The rig without one of its hidden effects."""
+    """Returns the rig without one of its hidden effects."""
     left = replace(rig, joints=rig.sound_joints.copy(), bodies=rig.sound, hidden=())
     for k, hidden in enumerate(rig.hidden):
         if k != effect:
@@ -117,7 +122,7 @@ def _without(rig: Rig, effect: int) -> Rig:
 
 
 class _Comparison:
-    """The true arm's readings, and what tolerances can do about a difference from them without one of its effects."""
+    """The true arm's readings, and the tolerances that can reduce a difference from them without one of its effects."""
 
     def __init__(self, rig: Rig, effect: int = 0) -> None:
         self.rig = rig
@@ -131,7 +136,7 @@ class _Comparison:
         self.own_cost = _square(self._off(np.zeros(self.shares.size)))
         self.true = self._readings(rig.bodies, rig.joints, rig.loop)
         self.motion = simulate(self.sound.bodies, self.sound.joints, _loop(rig.loop), self.asked)
-        # Tolerances answer about the true arm: the sound arm's own numbers move in it.
+        # Tolerances are linearised about the true arm: the healthy arm's own parameters vary in it.
         columns = []
         for tolerance in rig.tolerances:
             ends = [self._readings(*moved(rig, {tolerance: sign * 0.5 * tolerance.share})) for sign in (1.0, -1.0)]
@@ -163,7 +168,7 @@ class _Comparison:
         return found
 
     def _fitted(self, name: str, law: int, joint: int | None) -> float:
-        """Least χ² of the sound arm with an effect in one of its laws."""
+        """Returns the least χ² of the healthy arm with an effect in one of its laws."""
         draw = generator(self.rig.kind_name, self.rig.seed, f"rival {name} {joint}")
         _, size = drawn(self.sound, self.motion, name, joint, draw)
         if joint is not None and self.rig.hidden[0].name == name:
@@ -179,7 +184,7 @@ class _Comparison:
         return self._least(rival, len(free), free)
 
     def _least(self, rival: Callable[[Floats], Rig], count: int, free: tuple[str, ...]) -> float:
-        """Least χ² over sizes and tolerances."""
+        """Returns the least χ² over sizes and tolerances."""
 
         def left(factors: Floats) -> Floats:
             try:
@@ -208,9 +213,11 @@ class _Comparison:
         return found if math.isfinite(found) else linear
 
     def _refitted(self, rival: Callable[[Floats], Rig], sizes: Floats, low: Floats, linear: Floats) -> float:
-        """χ² with sizes and tolerances really moved, by least squares from where tolerances would answer if they were
-        linear, from where they give the true arm's own numbers, and from the stated ones; not searched further once
-        the record does not tell."""
+        """Returns χ² with sizes and tolerances refitted by least squares from three starts.
+
+        They are the linear estimate of the tolerances, the true arm's own parameters, and the stated ones. The search
+        ends once the record does not distinguish.
+        """
         best, made = math.inf, rival(sizes)
         carried = np.array([self._as_true(made, tolerance) for tolerance in self.rig.tolerances])
         bounds = (np.concatenate([low, self.least]), np.concatenate([np.full(low.size, LARGEST), self.most]))
@@ -221,7 +228,7 @@ class _Comparison:
         return best
 
     def _step(self, slopes: Floats, difference: Floats, at: Floats, bounds: tuple[Floats, Floats]) -> Floats:
-        """The step of Gauss and Newton in sizes and tolerances, within their bounds."""
+        """Returns the Gauss–Newton step in sizes and tolerances, within their bounds."""
         tolerances = at[at.size - self.shares.size :]
         off = np.zeros((tolerances.size, at.size))
         off[:, at.size - tolerances.size :] = np.diag(self._off_slopes(tolerances))
@@ -232,7 +239,9 @@ class _Comparison:
         return np.asarray(np.clip(at + step, *bounds) - at)
 
     def _as_true(self, made: Rig, tolerance: Tolerance) -> float:
-        """Deviations by which a number of the rival is moved to be that of the true arm, effect and all."""
+        """Returns the deviations by which a parameter of the rival is moved to equal that of the true arm with its
+        effect.
+        """
         field, j = ("torque_constant" if tolerance.name == "magnet" else tolerance.name), tolerance.joint
         if j is None:
             return 0.0
@@ -243,23 +252,26 @@ class _Comparison:
         return (true / own - 1.0) / tolerance.share if own else 0.0
 
     def _off(self, steps: Floats) -> Floats:
-        """By how many of its deviations each number of the file is off, where the arm's are `steps` deviations of
-        themselves from the true arm's. It goes by the ratio of both: as a distance, no friction that is stated to 30 %
-        would be more than 3.3 deviations off, however large it is."""
+        """Returns by how many deviations each value of the file is wrong, if the arm's parameters are `steps`
+        deviations from the true arm's.
+
+        It is computed from the ratio of both. As a difference, friction with a stated 30 % would never be more than 3.3
+        deviations off, however large it is.
+        """
         return np.asarray(np.log(self.factors / (1.0 + self.shares * steps)) / self.shares)
 
     def _off_slopes(self, steps: Floats) -> Floats:
-        """Derivatives of these by the steps."""
+        """Returns derivatives of these by the steps."""
         return np.asarray(-1.0 / (1.0 + self.shares * steps))
 
     def _searched(
         self, rival: Callable[[Floats], Rig], sizes: Floats, start: Floats, bounds: tuple[Floats, Floats]
     ) -> float:
-        """Least χ² that a search finds which begins at these sizes (shares of those drawn) and at `start` (deviations
-        of the tolerances).
+        """Returns the least χ² of a search from these sizes (shares of the drawn ones) and `start` (deviations of the
+        tolerances).
 
-        Steps of Gauss and Newton by the derivatives at the true arm, which are corrected by what each step shows
-        (Broyden 1965), and formed anew where they lead no further: a simulation for a step, not one for each number.
+        Gauss–Newton steps use the derivatives at the true arm, corrected by the result of each step (Broyden 1965), and
+        recomputed when they make no more progress. A step thus costs one simulation, not one per parameter.
         """
         own = sizes.size
 
@@ -267,7 +279,7 @@ class _Comparison:
             by = {t: float(s) * t.share for t, s in zip(self.rig.tolerances, x[own:], strict=True)}
             try:
                 return self._readings(*moved(rival(x[:own]), by)) - self.true
-            except (ValueError, ArithmeticError):  # no such arm
+            except (ValueError, ArithmeticError):  # the rival's arm is impossible
                 return np.full(self.true.size, 1e3)
 
         def cost(x: Floats, difference: Floats) -> float:
@@ -294,19 +306,19 @@ class _Comparison:
         return cost(at, difference)
 
     def _less_tolerances(self, difference: Floats) -> Floats:
-        """What of a difference the tolerances cannot take away, with what they cost."""
+        """Returns the part of a difference that the tolerances cannot remove, with their cost."""
         both = np.concatenate([difference, np.zeros(self.answers.shape[1])])
         return np.asarray(both - self.basis @ (self.basis.T @ both))
 
     def _readings(self, bodies: Bodies, joints: Records, loop: Records) -> Floats:
-        """All readings of the smooth loop, over their noise."""
+        """Returns all readings of the smooth loop, over their noise."""
         motion = without_settling(self.rig, simulate(bodies, joints, _loop(loop), self.asked))
         readings = np.nan_to_num(motion.position, nan=1e3, posinf=1e3, neginf=-1e3)
         return np.asarray((np.clip(readings, -1e3, 1e3) / self.sigma).ravel())
 
 
 def moved(rig: Rig, by: dict[Tolerance, float]) -> tuple[Bodies, Records, Records]:
-    """The rig with numbers of its tolerances moved by shares of themselves."""
+    """Returns the rig with values of its tolerances changed by shares of themselves."""
     bodies, joints, loop = rig.bodies, rig.joints.copy(), rig.loop.copy()
     links = list(bodies.links)
     for tolerance, share in by.items():
@@ -331,12 +343,14 @@ def moved(rig: Rig, by: dict[Tolerance, float]) -> tuple[Bodies, Records, Record
 
 
 def _of_link(link: Link, field: str) -> float:
-    """A number of a link that a tolerance moves."""
+    """Returns a parameter of a link that a tolerance changes."""
     return {"mass": link.mass, "centre": link.centre[0], "inertia": link.inertia[2]}[field]
 
 
 def _noise(rig: Rig) -> Floats:
-    """Noise of a reading (rad, by joint): white, of rounding, and coloured at its density at low frequencies."""
+    """Returns noise of a reading (rad, by joint): white, of rounding, and coloured at its density at low
+    frequencies.
+    """
     pole = math.exp(-2 * math.pi * COLOURED_CORNER * float(rig.loop["period"][0]))
     slow = rig.kind.coloured**2 * (1 + pole) / (1 - pole)
     return np.asarray(rig.joints["count"] * math.sqrt(rig.kind.noise**2 + 1 / 12 + slow))
@@ -349,7 +363,7 @@ def _loop(loop: Records) -> Records:
 
 
 def _slopes(left: Callable[[Floats], Floats], at: Floats, residual: Floats) -> Floats:
-    """Derivatives (m, n) of a residual (m,) at `at` (n,), by differences."""
+    """Returns derivatives (m, n) of a residual (m,) at `at` (n,), by differences."""
     return np.column_stack([(left(at + DIFFERENCE * one) - residual) / DIFFERENCE for one in np.eye(at.size)])
 
 

@@ -1,4 +1,4 @@
-"""A world: the rig of a kind and seed with what is hidden in it, and its records."""
+"""A test rig with records: the rig of a kind and seed with its hidden effects, and its records."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from trials.rigs.parameters import BOARD
 from trials.rigs.rig import Rig
 
 CASES = ("sound", "single", "pair", "open")
-"""What may be hidden: nothing, one effect of a library, two, or one that is in none."""
+"""Possible cases: no effect, one effect of a library, two, or one that is in none."""
 CASE_OF_SEED = ("sound", "single", "single", "pair", "single", "open", "single", "sound", "single", "single")
 """The case of a seed by its last digit."""
 SETTLING = 1.5
 """s at rest before a record begins."""
 LARGEST_ERROR = 1.0
-"""rad between set point and angle that no lab would let pass."""
+"""rad between set point and angle that no lab would accept."""
 ATTEMPTS = 12
 STIFFER = 1.25
 """Factor of a gear's own frequency between attempts."""
@@ -35,7 +35,7 @@ RECORDS = (TRAINING, HELD_OUT)
 
 @dataclass(frozen=True)
 class World:
-    """A rig, the case that was drawn, and its records by name."""
+    """A rig, its drawn case, and its records by name."""
 
     rig: Rig
     case: str
@@ -43,12 +43,12 @@ class World:
 
 
 def case_of(seed: int) -> str:
-    """The case of a seed where none is asked for."""
+    """Returns the case of a seed if none is requested."""
     return CASE_OF_SEED[seed % len(CASE_OF_SEED)]
 
 
 def make_world(kind_name: str, seed: int, case: str | None = None, effect: str | None = None) -> World:
-    """The world of a seed, the same to the bit whenever it is made. `effect` hides that one and no other."""
+    """Makes the rig of a seed with records, always exactly the same. `effect` hides only that one."""
     rig = hidden_rig(kind_name, seed, case, effect)
     return World(rig, "single" if effect else case or case_of(seed), {name: record(rig, name) for name in RECORDS})
 
@@ -60,7 +60,7 @@ def _sound_motion(kind_name: str, seed: int) -> Motion:
 
 
 def hidden_rig(kind_name: str, seed: int, case: str | None = None, effect: str | None = None) -> Rig:
-    """The rig with what is hidden in it, without its records."""
+    """Returns the rig with its hidden effects, without its records."""
     rig = sound_rig(kind_name, KINDS[kind_name], seed)
     case = case or case_of(seed)
     draw = generator(kind_name, seed, "hidden")
@@ -82,7 +82,9 @@ def hidden_rig(kind_name: str, seed: int, case: str | None = None, effect: str |
 
 
 def _hidden(rig: Rig, motion: Motion, name: str, joint: int | None, draw: Generator) -> Rig:
-    """The rig with an effect at a joint, drawn until the loop bears it; gears that give become stiffer each time."""
+    """Returns the rig with an effect at a joint, drawn until its loop is stable; flexible gears become stiffer each
+    time.
+    """
     for attempt in range(ATTEMPTS):
         law, size = drawn(rig, motion, name, joint, draw)
         if "rate" in size:
@@ -91,11 +93,11 @@ def _hidden(rig: Rig, motion: Motion, name: str, joint: int | None, draw: Genera
         runs = (simulate(made.bodies, made.joints, made.loop, wanted(rig, each)) for each in RECORDS)
         if all(np.abs(run.set_point - run.angle).max() < LARGEST_ERROR for run in runs):
             return made
-    raise ValueError(f"{rig.kind_name} {rig.seed}: its loop does not bear {name} on joint {joint}")
+    raise ValueError(f"{rig.kind_name} {rig.seed}: its loop is not stable with {name} on joint {joint}")
 
 
 def wanted(rig: Rig, name: str) -> Floats:
-    """Set points (k, n) of a record, with the rest before it; a board-like controller takes them in counts."""
+    """Returns set points (k, n) of a record, with the rest before it; in counts for a board-like controller."""
     draw = generator(rig.kind_name, rig.seed, f"motion of {name}")
     period = float(rig.loop["period"][0])
     kind_of_motion = str(draw.choice(rig.kind.motions))
@@ -110,16 +112,16 @@ def wanted(rig: Rig, name: str) -> Floats:
 
 
 def record(rig: Rig, name: str) -> Motion:
-    """A record of the rig as it is measured, from the end of its settling."""
+    """Returns a measured record of the rig, from the end of its settling."""
     asked = wanted(rig, name)
     noise = sensor_noise(rig, generator(rig.kind_name, rig.seed, f"noise of {name}"), asked.shape)
     taken = not_lost(rig, generator(rig.kind_name, rig.seed, f"losses of {name}"), asked)
     made = simulate(rig.bodies, rig.joints, rig.loop, taken, noise=noise)
-    return without_settling(rig, replace(made, set_point=asked))  # a record has what was sent
+    return without_settling(rig, replace(made, set_point=asked))  # a record has the sent set points
 
 
 def not_lost(rig: Rig, draw: Generator, asked: Floats) -> Floats:
-    """Set points (k, n) that the controller works with: for each one that is lost, the one that it had before."""
+    """Returns set points (k, n) of the controller: each lost one is replaced by the previous."""
     taken = asked.copy()
     lost = draw.random(asked.shape) < rig.joints["lost"]
     for k in range(1, len(taken)):
@@ -128,14 +130,14 @@ def not_lost(rig: Rig, draw: Generator, asked: Floats) -> Floats:
 
 
 def without_settling(rig: Rig, motion: Motion) -> Motion:
-    """The record that begins where its settling ends."""
+    """Returns the record from the end of its settling."""
     first = round(SETTLING / float(rig.loop["period"][0]))
     kept = (motion.set_point, motion.position, motion.drive, motion.angle, motion.velocity)
     return Motion(motion.time[: motion.time.size - first], *(part[first:] for part in kept))
 
 
 def sensor_noise(rig: Rig, draw: Generator, shape: tuple[int, ...]) -> Floats:
-    """Noise (rad) of every reading: white, coloured, and now and then far off."""
+    """Returns noise (rad) of every reading: white, coloured, and occasional outliers."""
     kind = rig.kind
     noise = kind.noise * draw.standard_normal(shape)
     if kind.coloured:

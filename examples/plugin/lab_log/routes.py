@@ -1,4 +1,4 @@
-"""A route below /api/v1; who may call it is said by its parameter."""
+"""A route below /api/v1; its parameter states who may call it."""
 
 from fastapi import APIRouter
 

@@ -1,11 +1,13 @@
-"""Whether the arm at the port is the one that the folder belongs to.
+"""Checks whether the controller at the port is the one that was commissioned. Controllers have no serial number.
 
-Whether the controller at a port is the one that was commissioned. Controllers have no serial number.
+It compares, only by reading:
 
-What is compared, all of it by reading: bytes of the memory that nothing changed while the memory map was found, neither
-motion nor switching off and on; that error + position is the set point at the places that were found; the control
-period, which hangs on the board's crystal; and the serial number of the adapter. Two controllers with the same program
-at the same adapter differ in the crystal alone.
+- bytes of the memory that neither motion nor power cycles changed while the memory map was found;
+- error + position, which must be the set point at the addresses that were found;
+- the control period, which depends on the board's crystal;
+- the serial number of the adapter.
+
+Two controllers with the same program at the same adapter differ only in the crystal.
 """
 
 from __future__ import annotations
@@ -26,22 +28,23 @@ from firmware_protocol.memory_map import MemoryMap
 from firmware_protocol.units import POSTURE_UNITS, posture_to_counts
 
 FEWEST_CONSTANTS = 4
-"""Least number of constant bytes that are evidence."""
+"""Least number of constant bytes that is evidence."""
 OTHERS = 0.2
-"""Share of constant bytes that may have changed on the same controller: a slow counter may not have moved while the map
-was found. At another controller the greater part differs."""
+"""Share of constant bytes that may have changed on the same controller: a slow counter may have stood still while the
+map was found. On another controller most differ.
+"""
 ALLOWED_COUNTS = 12
-"""Largest departure (ADC counts) of error + position from the set point: a joint may move between two bytes."""
+"""Largest difference (ADC counts) between error + position and the set point: a joint may move between two bytes."""
 CRYSTALS = 1e-3
 """Largest relative difference of the control period on one controller: two quartz crystals differ by a tenth of it."""
 
 
 @dataclass(frozen=True)
 class Identity:
-    """What is known of a controller; what is not known is empty, 0 or None.
+    """Known properties of a controller; unknown ones are empty, 0 or None.
 
     constants: address → byte that nothing changed
-    period_ms: control period by the host's clock, and the standard error of it
+    period_ms: control period by the host's clock, and its standard error
     adapter:   serial number of the USB adapter
     """
 
@@ -51,7 +54,7 @@ class Identity:
     adapter: str | None = None
 
     def as_data(self) -> dict[str, Any]:
-        """Plain data for TOML."""
+        """Returns plain data for TOML."""
         data: dict[str, Any] = {"constants": {f"{at:04X}": value for at, value in sorted(self.constants.items())}}
         if self.period_ms:
             data |= {"period_ms": self.period_ms, "period_error_ms": self.period_error_ms}
@@ -59,7 +62,7 @@ class Identity:
 
     @staticmethod
     def of_data(data: Mapping[str, Any]) -> Identity:
-        """The identity in plain data. Raises ValueError, TypeError, AttributeError for other data."""
+        """Returns the identity from plain data. Raises ValueError, TypeError, AttributeError for other data."""
         constants = {int(at, 16): int(value) for at, value in data.get("constants", {}).items()}
         period, error = (float(data.get(name, 0.0)) for name in ("period_ms", "period_error_ms"))
         adapter = data.get("adapter")
@@ -67,24 +70,27 @@ class Identity:
 
 
 def without_registers(constants: Mapping[int, int], memory_map: MemoryMap) -> dict[int, int]:
-    """The constant bytes that belong to no register: a host may change those."""
+    """Returns the constant bytes that belong to no register: a host may change registers."""
     taken = {address for register in memory_map.registers.values() for address in register.addresses}
     return {at: value for at, value in constants.items() if at not in taken}
 
 
 def same_bytes(kept: Identity, base: int, pages: Sequence[bytes]) -> tuple[Identity, str]:
-    """The identity without bytes that have changed after all, and why these readings of the memory are of another
-    controller; empty if they may be of the same."""
+    """Compares bytes of the memory with those that were constant.
+
+    Returns the identity without bytes that have changed after all, and why the readings are of another controller;
+    empty if they may be of the same.
+    """
     changed = [at for at, value in kept.constants.items() if all(page[at - base] != value for page in pages)]
     count = len(kept.constants)
     if count >= FEWEST_CONSTANTS and len(changed) > max(1, OTHERS * count):
-        return kept, f"{len(changed)} of {count} bytes that nothing changed are others"
+        return kept, f"{len(changed)} of {count} bytes that nothing changed are different"
     left = {at: value for at, value in kept.constants.items() if at not in changed}
     return replace(kept, constants=left), ""
 
 
 def same_registers(set_points: Mapping[int, float], positions: Mapping[int, float], errors: Mapping[int, float]) -> str:
-    """Why these values were not read where set points, positions and errors lie; empty if they agree."""
+    """Returns why these values are not set points, positions and errors; empty if they agree."""
     wrong = []
     for joint, posture in set_points.items():
         valid = 0 <= posture < POSTURE_UNITS
@@ -96,26 +102,26 @@ def same_registers(set_points: Mapping[int, float], positions: Mapping[int, floa
 
 
 def same_period(kept: Identity, period_ms: float, error_ms: float) -> str:
-    """Why this control period is another controller's; empty if it may be the same, or none is known."""
+    """Returns why this control period is another controller's; empty if it may be the same, or none is known."""
     if not kept.period_ms:
         return ""
     allowed = CRYSTALS * kept.period_ms + 4 * (kept.period_error_ms**2 + error_ms**2) ** 0.5
     if abs(period_ms - kept.period_ms) <= allowed:
         return ""
-    return f"its control period is {period_ms:.4f} ms, and was {kept.period_ms:.4f} ms"
+    return f"its control period is {period_ms:.4f} ms, but was {kept.period_ms:.4f} ms"
 
 
 def same_adapter(kept: Identity, adapter: str | None) -> str:
-    """Why this adapter is another one; empty if it is the same, or either is unknown."""
+    """Returns why this adapter is another one; empty if it is the same, or either is unknown."""
     if kept.adapter is None or adapter is None or adapter == kept.adapter:
         return ""
-    return f"its adapter has the serial number {adapter}, and it was {kept.adapter}"
+    return f"its adapter has the serial number {adapter}, but it was {kept.adapter}"
 
 
 Said = Literal["new", "same"]
 READINGS = 5
 OF_THE_ARM = (FILE, MAP, FINDINGS, MACHINE, CONFIG, "acceptance.html", "diagnosis.html", "next_experiment.json")
-"""Files of a folder that belong to one arm; its traces say themselves of which machine they are."""
+"""Files of a folder that belong to one arm; traces contain their machine."""
 
 
 class OtherArmError(SafetyError):
@@ -123,11 +129,13 @@ class OtherArmError(SafetyError):
 
 
 def identity_of(record: Record) -> Identity:
-    """What is known of the arm of a folder. Raises SpecError for a damaged record."""
+    """Returns the identity of a folder's arm. Raises SpecError for a damaged record."""
     try:
         return Identity.of_data(record.identity)
     except (ValueError, TypeError, AttributeError) as error:
-        raise SpecError(f"{record.folder / FILE}: identity is damaged ({error}): give --arm new or mend it") from error
+        raise SpecError(
+            f"{record.folder / FILE}: identity is damaged ({error}): give --arm new or repair it"
+        ) from error
 
 
 def note_memory(bench: Bench) -> None:
@@ -151,10 +159,10 @@ def note_period(bench: Bench, period_ms: float, error_ms: float) -> None:
 
 
 def require_same_arm(bench: Bench, said: Said | None) -> None:
-    """Compares the arm at the port with what is known of that of the folder; only reads.
+    """Compares the arm at the port with the folder's; only reads.
 
-    said: what the operator says of an arm that differs: that it is `same` one, of which a part was exchanged
-    Raises OtherArmError, and what connecting raises.
+    said: the operator's answer if the arm differs: it is the `same` one with an exchanged part, or `new` Raises
+    OtherArmError, and the errors of connecting.
     """
     if not bench.record.identity:
         return
@@ -164,18 +172,20 @@ def require_same_arm(bench: Bench, said: Said | None) -> None:
         exchanged = "" if misplaced else ", or --arm same if a part of it was exchanged"
         raise OtherArmError(
             f"{bench.call.port}: this is not the arm of {bench.folder}: {why}; for a new arm give --arm new, which "
-            f"begins anew{exchanged}"
+            f"starts over{exchanged}"
         )
     if why:
-        console().print(f"Taken for the same arm, as you say: {why}")
+        console().print(f"Assumed to be the same arm, as you stated: {why}")
         left = Identity({})
     if left != kept:
         bench.record.identify(left.as_data())
 
 
 def begin_anew(folder: Path) -> Record:
-    """An empty record; what belongs to the arm before is moved into a folder beside it. An emergency stop that was not
-    released safely stays noted."""
+    """Returns an empty record; moves the files of the previous arm into a folder beside it.
+
+    An emergency stop that was not released safely stays noted.
+    """
     pressed = Record.of(folder).stop_pressed
     found = [folder / name for name in OF_THE_ARM if (folder / name).exists()]
     if found:
@@ -185,8 +195,8 @@ def begin_anew(folder: Path) -> Record:
             for path in found:
                 path.rename(old / path.name)
         except OSError as error:
-            raise SpecError(f"{old}: the files of the arm before cannot be moved: {error.strerror}") from error
-        console().print(f"The results of the arm before are in {old}")
+            raise SpecError(f"{old}: the files of the previous arm cannot be moved: {error.strerror}") from error
+        console().print(f"The results of the previous arm are in {old}")
     record = Record.of(folder)
     if pressed:
         record.note_stop(True)
@@ -194,8 +204,9 @@ def begin_anew(folder: Path) -> Record:
 
 
 def _compared(bench: Bench, kept: Identity) -> tuple[Identity, str, bool]:
-    """What remains known; why the arm is another one, empty if it may be the same; and whether that is because its
-    registers lie elsewhere, so that nothing that was found may be relied on."""
+    """Returns the identity that remains; why the arm is another one, empty if it may be the same; and whether its
+    registers are elsewhere, so that no earlier result is valid.
+    """
     from extras.commissioning.memory.procedure import is_alive
     from extras.commissioning.person.memory_page import open_page
     from extras.commissioning.person.safe_release import typical
@@ -204,7 +215,7 @@ def _compared(bench: Bench, kept: Identity) -> tuple[Identity, str, bool]:
     with open_page(bench.call.port, memory_map) as page:
         pages = [page.read().data for _ in range(READINGS)]
         if not any(map(is_alive, pages)):
-            return kept, "", False  # without supply nothing can be compared; every step that needs it says so
+            return kept, "", False  # without supply nothing can be compared; every step that needs it reports that
         if (bench.folder / MAP).exists():
             registers = (typical(page, memory_map, name, READINGS) for name in ("set_point", "position", "error"))
             if why := same_registers(*registers):

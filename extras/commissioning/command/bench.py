@@ -1,4 +1,4 @@
-"""What the steps of a commissioning share: the folder, the port, the person, and how registers are read."""
+"""Shared parts of the commissioning steps: the folder, the port, the person, and reading of registers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CONFIG, MAP, FINDINGS, MACHINE = "daq.toml", "memory_map.toml", "memory_findings
 
 
 class NotCommissionedError(DaqError):
-    """A step whose result does not permit the next one."""
+    """The result of a step does not permit the next one."""
 
     exit_code = exit_codes.NOT_REACHED
 
@@ -33,19 +33,20 @@ class Commissioner(Operator, Protocol):
     """The person at the arm, who also reads a protractor."""
 
     def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
-        """Whether a step may begin; False to leave it open. Asked for every step at the arm, whatever `yes` says."""
+        """Whether a step may begin; False to leave it open. Asked for every step at the arm, whatever `yes` is."""
 
     def read_angle(
         self, joint: int, number: int, wait: Callable[[float], None]
     ) -> float | Literal["taken back"] | None:
-        """The angle (degrees) of a joint at posture `number`, after it was moved there by hand; None for no more, and
-        "taken back" where the posture before was read wrongly.
-        `wait` lets time (s) pass."""
+        """Returns the angle (degrees) of a joint at posture `number`, to which the person moved it by hand.
+
+        None for no more postures; "taken back" if the previous one was read wrongly. `wait` lets time (s) pass.
+        """
 
 
 @dataclass
 class Bench:
-    """What the steps share: the folder of the arm, the port, the person, and what has been found."""
+    """State that the steps share: the folder of the arm, the port, the person, and results."""
 
     call: Invocation
     folder: Path
@@ -57,25 +58,25 @@ class Bench:
 
     @property
     def configured(self) -> Invocation:
-        """An invocation that uses the files which the steps have written."""
+        """Returns an invocation that uses the files that the steps have written."""
         return Invocation(config_file=self.folder / CONFIG, port_option=self.call.port)
 
     def adapter(self) -> str | None:
-        """Serial number of the USB adapter at the port; None where it has none, or the port is no serial one."""
+        """Serial number of the USB adapter at the port; None without one, or for a port that is not serial."""
         from daq.transport.discovery import ports
 
         device = self.call.port.partition("?")[0]
         return next((one.serial_number for one in ports() if one.url == device), None)
 
     def memory_map(self) -> MemoryMap:
-        """The memory map that was found, or the configured one."""
+        """Returns the memory map that was found, or the configured one."""
         from daq.config.robot_files import load_memory_map
 
         path = self.folder / MAP
         return load_memory_map(path if path.exists() else self.call.settings.robot.memory_map)
 
     def machine(self) -> Machine:
-        """The machine file as it stands: this arm's, or the configured one before anything was measured."""
+        """Returns the present machine file: this arm's, or the configured one before any measurement."""
         from daq.contracts.machine import load_machine
 
         own = self.folder / MACHINE
@@ -91,7 +92,7 @@ class Bench:
         self.configure()
 
     def basis(self) -> dict[str, str]:
-        """What a result rests on: the port, and the memory map and machine file that there are."""
+        """Returns the basis of a result: the port, and the present memory map and machine file."""
         files = {"memory_map": self.folder / MAP, "machine": self.folder / MACHINE}
         return {"port": self.call.port} | {
             name: sha256(path.read_bytes()).hexdigest()[:16] if path.exists() else "none"
@@ -99,7 +100,7 @@ class Bench:
         }
 
     def configure(self) -> None:
-        """Writes daq.toml with the files that there are."""
+        """Writes daq.toml with the present files."""
         from daq.config.toml_text import settings_text
         from daq_cli.app.output_file import replacing
 

@@ -1,4 +1,4 @@
-"""Steps by command: stop, period, gains, first ramps, and what the model says of them."""
+"""Commissioning steps by command: stop, period, gains, first ramps, and their comparison with the model."""
 
 from __future__ import annotations
 
@@ -22,16 +22,17 @@ if TYPE_CHECKING:
 
 TO_GAIN = (1, 2, 3)
 FLOORS = 2.0
-"""Errors of this many times the noise floor are more than noise, and are diagnosed."""
+"""Errors above this multiple of the noise floor are more than noise, and are diagnosed."""
 DIAGNOSIS = "diagnosis.html"
 NEXT = "next_experiment.json"
 WITHIN_TOLERANCES = "yes, within its tolerances"
-"""What is said of an arm that differs from the file's numbers, but not from what the file says they may be."""
+"""Text for an arm that differs from the file's values, but within the file's deviations."""
 
 
 def end_freeze(bench: Bench) -> None:
-    """Ends a stop that is in force, with the person's word; nothing moves by that. Raises NotCommissionedError where
-    it is to stay."""
+    """Ends an active stop with the person's consent; nothing moves by that. Raises NotCommissionedError if it is to
+    stay.
+    """
     with connected(bench) as controller:
         status = controller.status()
         if StatusFlag.FROZEN not in status.flags:
@@ -45,17 +46,17 @@ def end_freeze(bench: Bench) -> None:
 
 
 def stop(bench: Bench) -> dict[str, Any]:
-    """The program's stop, from the request to the board's confirmation and the number by which it is released."""
+    """Tests the program's stop, from the request to the board's confirmation and the ID for its release."""
     with connected(bench) as controller:
         asked = replace(
-            bench.consent, what="it will be stopped where it stands, and released again", refused="it is stopped"
+            bench.consent, what="it will be stopped at its present posture, and released again", refused="it is stopped"
         )
         asked.require(bench.call.port, controller.identity)
         confirmation, number = controller.stop_numbered()
         if not confirmation.acknowledged:
             raise NotCommissionedError(f"the stop was not confirmed: {confirmation.problem}. Use the emergency stop")
         if number is None:
-            raise NotCommissionedError("the arm had been stopped already: look at it; `daq reset` ends that stop")
+            raise NotCommissionedError("the arm had already been stopped: look at it; `daq reset` ends that stop")
         controller.release(number)
     return {
         "confirmed_ms": round(1e3 * (confirmation.seconds or 0.0), 2),
@@ -64,7 +65,7 @@ def stop(bench: Bench) -> dict[str, Any]:
 
 
 def period(bench: Bench) -> dict[str, Any]:
-    """The control period by the host's clock."""
+    """Measures the control period by the host's clock."""
     with connected(bench) as controller:
         found = followed_periods(controller)
         missed = controller.status().missed
@@ -79,7 +80,9 @@ def period(bench: Bench) -> dict[str, Any]:
 
 
 def gain(bench: Bench) -> dict[str, Any]:
-    """Volts per radian of each joint, by `daq calibrate gain`; what all joints share goes into the machine file."""
+    """Measures volts per radian of each joint, by `daq calibrate gain`; writes the common part into the machine
+    file.
+    """
     from daq.calibration import gain_experiment, gains_from_trace
     from daq.calibration.gain import GainEstimate, common_gain
     from daq.contracts.quantity import Quantity
@@ -100,7 +103,7 @@ def gain(bench: Bench) -> dict[str, Any]:
         result[f"joint_{one.joint}"] = _gain_data(one) if isinstance(one, GainEstimate) else {"problem": str(one)}
     common = common_gain([one for one in estimates if isinstance(one, GainEstimate)])
     if common is None:
-        return result | {"machine_file": "not changed: the joints have no gain per unit of P in common"}
+        return result | {"machine_file": "not changed: the joints have no common gain per unit of P"}
     source = f"measured at joints {', '.join(map(str, common.joints))} by errors and powers"
     gain = Quantity(value=common.value, unit="1", source=source, deviation=common.deviation)
     values: dict[str, Any] = {"dac_counts_per_adc_count": gain}
@@ -125,12 +128,12 @@ def _gain_data(one: GainEstimate) -> dict[str, Any]:
 
 
 def first_ramp(bench: Bench) -> dict[str, Any]:
-    """A ramp of joint 1."""
+    """Runs a ramp of joint 1."""
     return _ramp(bench, (1,))
 
 
 def ramp(bench: Bench) -> dict[str, Any]:
-    """The ramp step of the source, on joints 1 to 3."""
+    """Runs the ramp step of the source, on joints 1 to 3."""
     return _ramp(bench, (1, 2, 3))
 
 
@@ -155,7 +158,7 @@ def _ramp(bench: Bench, joints: tuple[int, ...]) -> dict[str, Any]:
 
 
 def model(bench: Bench) -> dict[str, Any]:
-    """Whether the arm behaves as its machine file says; where it does not, the diagnosis of the difference."""
+    """Compares the arm with its machine file; if it differs, diagnoses the difference."""
     from daq.traces.reader import read_trace
     from model.comparison.compare import compare
     from model.machine_model.model import base_model
@@ -183,13 +186,13 @@ def model(bench: Bench) -> dict[str, Any]:
         return result
     try:
         return result | _diagnosed(bench, begin, trace)
-    except SpecError as error:  # the comparison stands without it
+    except SpecError as error:  # the comparison is valid without it
         bench.operator.show(f"no diagnosis: {error}")
         return result | {"verdict": "no diagnosis", "diagnosis": str(error)}
 
 
 def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
-    """What a diagnosis says of the ramp, and its report."""
+    """Returns the diagnosis of the ramp, and its report."""
     from daq.contracts.machine import SampledPid
     from daq_cli.app.progress import shown_progress
     from model.comparison.compare import compare
@@ -203,7 +206,7 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     bench.operator.show(
         "The ramp differs from the machine file by more than noise. A diagnosis follows; it only computes."
     )
-    simulated = isinstance(begin.machine.controller, SampledPid)  # torques, its default, propose no experiment
+    simulated = isinstance(begin.machine.controller, SampledPid)  # torques, the default, propose no experiment
     options = DiagnosisOptions(method="output-error" if simulated else None)
     with shown_progress("diagnosing") as progress:
         found = diagnose(begin, [trace], (), options, progress, chooser=experiment_chooser(begin.machine))
@@ -224,7 +227,7 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
 
 
 def _as_command(bench: Bench, spec: ExperimentSpec) -> str:
-    """Writes an experiment beside the results; the command that runs it."""
+    """Writes an experiment beside the results; returns the command that runs it."""
     from daq_cli.app.output_file import replacing
 
     path = bench.folder / NEXT

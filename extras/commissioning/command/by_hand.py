@@ -1,6 +1,6 @@
-"""Steps in which a person moves the arm by hand while the emergency stop is pressed: sensors, and the stop itself.
+"""Commissioning steps in which a person moves the arm by hand while the emergency stop is pressed.
 
-Where a joint meets its end stops, and the limits that keep clear of them.
+They measure the sensors, test the stop itself, and find each joint's end stops and limits at a distance from them.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
 
 
 MARGIN = math.radians(2.0)
-"""Angle (rad) that limits keep from an end stop: more than a protractor's error and what a joint overshoots."""
+"""Angle (rad) between limits and end stops: more than a protractor's error plus a joint's overshoot."""
 LEAST_TRAVEL = ADC_COUNTS / 4
 """Least distance (ADC counts) between both readings of one joint: less is no travel from stop to stop."""
 AT_THE_END = 2
-"""Readings this close (ADC counts) to the converter's first or last one do not say how far beyond the joint is."""
+"""Readings this close (ADC counts) to the converter's first or last one do not show how far beyond the joint is."""
 
 
 @dataclass(frozen=True)
 class EndStops:
-    """One joint's end stops: angles (rad) and readings (ADC counts) there, in the order of the angles.
+    """One joint's end stops: angles (rad) and readings (ADC counts) there, by ascending angle.
 
-    beyond: whether the converter was at its end there, so that the joint goes further than the reading tells
+    beyond: whether the converter was at its end there, so that the joint moves farther than the reading shows
     """
 
     joint: int
@@ -44,7 +44,7 @@ class EndStops:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """The widest limits (rad) that keep clear of the stops, and of where the reading ends."""
+        """The widest limits (rad) with a distance from the stops, and from the ends of the reading."""
         return self.angles[0] + MARGIN, self.angles[1] - MARGIN
 
     def __str__(self) -> str:
@@ -54,7 +54,7 @@ class EndStops:
         return f"{text}; at the {' and the '.join(ends)} one the reading ends before the joint does" if ends else text
 
     def as_data(self) -> dict[str, Any]:
-        """Plain data, angles in degrees."""
+        """Returns plain data, angles in degrees."""
         return {
             "stops_deg": [round(math.degrees(angle), 2) for angle in self.angles],
             "readings": [round(count, 1) for count in self.counts],
@@ -64,8 +64,10 @@ class EndStops:
 
 
 def end_stops_of(sensor: JointCalibration, one: float, other: float) -> EndStops:
-    """The end stops of a joint from its readings (ADC counts) at both, in any order. Raises SpecError for readings too
-    close together."""
+    """Returns the end stops of a joint from its readings (ADC counts) at both, in any order.
+
+    Raises SpecError for readings too close together.
+    """
     if abs(one - other) < LEAST_TRAVEL:
         raise SpecError(
             f"joint {sensor.joint}: readings {one:.0f} and {other:.0f} at its end stops: at least {LEAST_TRAVEL:.0f} "
@@ -80,17 +82,17 @@ def _at_the_end(counts: float) -> bool:
 
 
 AVERAGED = 12
-"""Number of readings of which the median is taken at each posture of a protractor."""
+"""Number of readings whose median is used at each posture of a protractor."""
 LEAST_MOVED = 40
-"""ADC counts by which a joint is at least moved from one posture to the next, some 3° of a major axis."""
+"""ADC counts by which a joint must move from one posture to the next, about 3° of a major axis."""
 ATTEMPTS = 3
 """How often the postures of one joint are asked for."""
 PUSHED, STAYS = 25, 5
-"""ADC counts by which a joint is to be pushed off its set point, and by which it may still move then."""
+"""ADC counts by which a joint must be pushed off its set point, and by which it may still move then."""
 
 
 def potentiometers(bench: Bench) -> dict[str, Any]:
-    """Direction, zero, range and bend of the sensors, by a protractor."""
+    """Measures direction, zero, range and bend of the sensors with a protractor."""
     from extras.commissioning.command.measured import with_sensors
     from extras.commissioning.person.memory_page import open_page
 
@@ -105,13 +107,14 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
             bench.operator.show(sensor_line(sensors[-1]))
         give_power_back(page, bench.operator, memory_map)
         stop.tell(False)
-    bench.write_machine(with_sensors(bench.machine(), sensors))  # not before: what there was stays if it fails
+    bench.write_machine(with_sensors(bench.machine(), sensors))  # not earlier: the previous results stay if it fails
     return {"machine": MACHINE, **{f"joint_{one.joint}": _sensor_data(one) for one in sensors}}
 
 
 def _sensor(bench: Bench, page: LinkPage, memory_map: MemoryMap, joint: int) -> Potentiometer:
-    """The sensor of one joint. Postures that say too little are asked for again, `ATTEMPTS` times in all. Raises
-    SpecError."""
+    """Measures the sensor of one joint. Unusable postures are asked for again, `ATTEMPTS` times in all. Raises
+    SpecError.
+    """
     from extras.commissioning.potentiometer import calibrate_potentiometer
 
     for attempt in range(1, ATTEMPTS + 1):
@@ -125,7 +128,7 @@ def _sensor(bench: Bench, page: LinkPage, memory_map: MemoryMap, joint: int) -> 
 
 
 def _postures(bench: Bench, page: LinkPage, memory_map: MemoryMap, joint: int) -> tuple[list[float], list[float]]:
-    """Readings (ADC counts) and angles (rad) of a joint at postures to which a person has moved it."""
+    """Returns readings (ADC counts) and angles (rad) of a joint at postures to which a person has moved it."""
     from extras.commissioning.potentiometer import FEWEST
 
     counts: list[float] = []
@@ -153,7 +156,7 @@ def _postures(bench: Bench, page: LinkPage, memory_map: MemoryMap, joint: int) -
 
 
 def sensor_line(found: Potentiometer) -> str:
-    """One sensor for people."""
+    """Returns one sensor as a line for people."""
     degrees = math.degrees
     return (
         f"joint {found.joint}: reading {'rises' if found.direction > 0 else 'falls'} with the angle, range "
@@ -177,7 +180,7 @@ def _sensor_data(found: Potentiometer) -> dict[str, Any]:
 
 
 def end_stops(bench: Bench) -> dict[str, Any]:
-    """Where each joint meets its end stops, led there by hand; the limits in the machine file keep clear of them."""
+    """Finds each joint's end stops, led there by hand; sets limits in the machine file at a distance from them."""
     from extras.commissioning.command.measured import with_limits
     from extras.commissioning.person.memory_page import open_page
 
@@ -199,7 +202,7 @@ def end_stops(bench: Bench) -> dict[str, Any]:
 
 
 def _reading_at(bench: Bench, page: LinkPage, memory_map: MemoryMap, task: Task) -> float:
-    """The reading (ADC counts) of the joint that a person has moved, once they say that it is there."""
+    """Returns the reading (ADC counts) of the joint that a person has moved, once they confirm it."""
     joint = task.joint or 1
     if not bench.operator.begin(task):
         raise SafetyError(f"joint {joint} was not led to its end stops")
@@ -209,16 +212,18 @@ def _reading_at(bench: Bench, page: LinkPage, memory_map: MemoryMap, task: Task)
 
 
 def emergency_stop(bench: Bench) -> dict[str, Any]:
-    """Whether the emergency stop takes the drives' power: a joint then stays off its set point, whatever its power."""
+    """Tests whether the emergency stop cuts the drives' power: a joint then stays off its set point, whatever its
+    power.
+    """
     from extras.commissioning.person.memory_page import open_page
 
     memory_map, joint = bench.memory_map(), bench.joints[0]
     with open_page(bench.call.port, memory_map) as page, _emergency_stop(bench) as stop:
         stop.tell(True)
         if not bench.operator.begin(Task("press_emergency_stop")):
-            raise SafetyError("the emergency stop was not pressed, so nothing is known about it")
+            raise SafetyError("the emergency stop was not pressed, so it was not tested")
         if not bench.operator.begin(Task("push", joint=joint)):
-            raise SafetyError("no joint was pushed, so nothing is known about the emergency stop")
+            raise SafetyError("no joint was pushed, so the emergency stop was not tested")
         while not bench.operator.finished():
             page.read()
         page.wait(0.5)
@@ -236,7 +241,7 @@ def emergency_stop(bench: Bench) -> dict[str, Any]:
 
 
 def _why_not_stopped(joint: int, error: float, moved: float) -> str:
-    """What to look at where a pushed joint was not seen to stay."""
+    """Returns advice for a pushed joint that did not stay."""
     if abs(moved) > STAYS:
         return f"joint {joint} did not stay where it was put: was the emergency stop pressed, and did you let go of it?"
     if abs(error) < PUSHED:
@@ -245,7 +250,7 @@ def _why_not_stopped(joint: int, error: float, moved: float) -> str:
 
 
 def release_if_pressed(bench: Bench) -> None:
-    """The safe release of an emergency stop that was pressed when the last call ended."""
+    """Releases safely an emergency stop that was pressed when the last call ended."""
     if bench.record.stop_pressed:
         found = (bench.folder / MAP).exists()
         release_after_interruption(bench.call.port, bench.operator, bench.memory_map(), found, bench.record.note_stop)

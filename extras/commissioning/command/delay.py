@@ -1,13 +1,10 @@
-"""The step that measures the computing delay: one joint's set point is moved to and fro, and its error is watched.
+"""Measures the controller's computing delay: from the time when it reads set points to that when it stores results.
 
-A robot whose port this process holds itself, to measure at its registers. It can be stopped like any run.
-
-The controller's computing delay: from the moment when it takes set points to the moment when it stores results.
-
-A set point is written at some moment, and the memory is read again and again until the error shows it. Only the order
-of events is known: a byte was written between a request and its reply, and a result was stored between the last
-reading without it and the first reading with it. Each such pair bounds the delay from both sides, however slow the
-computer and the line are; pairs at many phases of the period narrow the bounds.
+This process holds the port of the robot itself, to measure at its registers; it can be stopped like any run. One
+joint's set point is moved to and fro. Each is written at some time, and the memory is read repeatedly until the error
+shows it. Only the order of events is known: a byte was written between a request and its reply, and a result was stored
+between the last reading without it and the first with it. Each such pair bounds the delay from both sides, however slow
+the computer and the line are. Pairs at many phases of the period narrow the bounds.
 """
 
 from __future__ import annotations
@@ -62,10 +59,10 @@ class HeldArm:
 def held_arm(
     call: Invocation, asked: ConsentPrompt, prepare: Callable[[HeldArm], Made]
 ) -> Iterator[tuple[HeldArm, Made]]:
-    """The robot, whose port this process holds. If a real arm needs consent and a person can be asked, it asks.
+    """Yields the robot, whose port this process holds. If a real arm needs consent and a person can be asked, it asks.
 
-    `prepare` makes checks before anything moves; if it refuses, set points and gains stay as they were. Enter on the
-    main thread. Whatever ends the block early freezes the arm.
+    `prepare` makes checks before anything moves; if it fails, set points and gains stay unchanged. Enter on the main
+    thread. If the block ends early for any reason, the arm is frozen.
     """
     from daq.config.robot_files import load_memory_map
 
@@ -77,7 +74,7 @@ def held_arm(
 
         try:
             held = hold(asked.given)
-        except MissingConsentError:  # no process has the port while the operator is asked
+        except MissingConsentError:  # no process holds the port while the operator is asked
             if not asked.for_gains_of(memory_map).agreed(call.port):
                 raise
             held = hold(True)
@@ -95,8 +92,11 @@ def held_arm(
 
 @contextmanager
 def _held(robot: str, url: str, memory_map: MemoryMap, consent: Consent) -> Iterator[HeldArm]:
-    """Raises MissingConsentError for a real arm that nobody has agreed to move, SafetyError for one that has been
-    stopped, StoppedError when a stop came before it was reached, LinkError."""
+    """Yields the held robot.
+
+    Raises MissingConsentError for a real arm without consent, SafetyError for an arm that has been stopped,
+    StoppedError if a stop came before it was reached, LinkError.
+    """
     with stopped_by_ctrl_z(), port_session(Controller.connect, robot, url, memory_map) as session:
         consent.require(session.controller)
         require_not_stopped(session.controller)
@@ -110,8 +110,9 @@ def _held(robot: str, url: str, memory_map: MemoryMap, consent: Consent) -> Iter
 
 @contextmanager
 def stopped_by_ctrl_z() -> Iterator[None]:
-    """With a handler of Python's own, the guardian's wake-up pipe hears of Ctrl-Z as it does of Ctrl-C: a process that
-    the terminal has suspended could not be asked for a stop."""
+    """Handles Ctrl-Z like Ctrl-C. A Python handler lets the guardian's wake-up pipe see it; a process that the terminal
+    has suspended could not react to a stop.
+    """
     before = signal.signal(signal.SIGTSTP, lambda _number, _frame: None)
     try:
         yield
@@ -120,15 +121,16 @@ def stopped_by_ctrl_z() -> Iterator[None]:
 
 
 FEWEST = 12
-"""Least number of set points whose effect was seen: a choice."""
+"""Least number of set points with a seen effect: a choice."""
 WIDEST_S = 0.006
-"""Width (s) of an interval that is no answer: the shipped machine file says 6 ms ± 2 ms, which is no wider."""
+"""Width (s) of an interval that is useless: the shipped machine file states 6 ms ± 2 ms, which is no wider."""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One set point and its effect: bounds (s) of the moment when it was written, and of that when the first result
-    with it was stored."""
+    """One set point and its effect: bounds (s) of the time when it was written, and of that when the first result with
+    it was stored.
+    """
 
     written: tuple[float, float]
     stored: tuple[float, float]
@@ -136,7 +138,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class ComputingDelay:
-    """Bounds of the delay (s), by `used` set points."""
+    """Bounds of the delay (s), from `used` set points."""
 
     low: float
     high: float
@@ -157,8 +159,10 @@ class ComputingDelay:
 
 
 def computing_delay(effects: Sequence[Effect], period: float) -> ComputingDelay:
-    """The delay that agrees with the effect of every set point, for a controller with this period (s). Raises SpecError
-    where there is none, or where the set points say too little."""
+    """Returns the delay that agrees with the effect of every set point, for a controller with this period (s).
+
+    Raises SpecError if there is none, or for too few or uninformative set points.
+    """
     if len(effects) < FEWEST:
         raise SpecError(f"computing delay: {len(effects)} set points showed an effect, at least {FEWEST} are needed")
     first, last = _stored_within(effects, period)
@@ -170,48 +174,49 @@ def computing_delay(effects: Sequence[Effect], period: float) -> ComputingDelay:
         high = min(high, stored[1] - one.written[0])
     if low >= high:
         raise SpecError(
-            f"computing delay: the set points contradict one another (above {1e3 * low:.2f} ms, below "
-            f"{1e3 * high:.2f} ms): the controller does not take set points at one moment of its period"
+            f"computing delay: the set points contradict each other (above {1e3 * low:.2f} ms, below "
+            f"{1e3 * high:.2f} ms): the controller does not take set points at one time in its period"
         )
     if high - low > WIDEST_S:
         raise SpecError(
-            f"computing delay: between {1e3 * low:.2f} and {1e3 * high:.2f} ms: this line, or a "
-            "busy computer, is too slow to say more; close other programs, or leave the step out with --skip delay"
+            f"computing delay: between {1e3 * low:.2f} and {1e3 * high:.2f} ms: this line, or a busy computer, "
+            "is too slow for a better result; close other programs, or leave the step out with --skip delay"
         )
     return ComputingDelay(low, high, len(effects))
 
 
 def _stored_within(effects: Sequence[Effect], period: float) -> tuple[float, float]:
-    """Bounds (s) of the moment at which results are stored, in the period of the effect that is known best."""
+    """Returns bounds (s) of the time at which results are stored, within the period of the best-known effect."""
     best = min((one.stored for one in effects), key=lambda bounds: bounds[1] - bounds[0])
     middle = sum(best) / 2
     low, high = best
     for one in effects:
         turn = round((sum(one.stored) / 2 - middle) / period) * period
         low, high = max(low, one.stored[0] - turn), min(high, one.stored[1] - turn)
-    return (low, high) if low <= high else (high, low)  # crossed bounds: moments that vary by as much
+    return (low, high) if low <= high else (high, low)  # crossed bounds: times that vary by as much
 
 
 STEP = 2
 """Posture units by which the set point is moved: half a degree of a major axis, and 8 counts of its error."""
 SHOWS = 4
-"""Change of the error (ADC counts) from one reading to the next that only a new set point makes."""
+"""Change of the error (ADC counts) between readings that only a new set point causes."""
 TIMES = 36
 """Set points that are written."""
 SETTLED_PERIODS = 12
-"""Control periods from one set point to the next, in which the joint nearly comes to rest."""
+"""Control periods between set points, in which the joint nearly comes to rest."""
 GOLDEN = 0.618034
-"""Share of a period by which each set point is later in its period than the one before: they spread evenly."""
+"""Share of a period by which each set point is later in its period than the previous one: they spread evenly."""
 PATIENCE_PERIODS = 4
 """Control periods in which an effect must show."""
 READINGS_A_PERIOD = 40
-"""In lock-step, where time passes only when it is asked to."""
+"""In lock-step, time passes only on request."""
 
 
 def delay(bench: Bench) -> dict[str, Any]:
-    """The computing delay, by set points at all phases of the period; it goes into the machine file.
+    """Measures the computing delay by set points at all phases of the period, and writes it into the machine file.
 
-    A stop, Ctrl-C and every fault freeze the arm where it is; it returns to its posture only after the last set point.
+    A stop, Ctrl-C and every fault freeze the arm at its present posture; it returns to its first posture only after the
+    last set point.
     """
     from extras.commissioning.command.measured import with_controller
 
@@ -275,14 +280,14 @@ def _require_following(arm: ControllerArm, machine: Machine) -> None:
 
 
 def _quantity(found: ComputingDelay) -> Quantity:
-    source = "measured from the taking of set points to the storing of results; the drive is taken to change then"
+    source = "measured from the taking of set points to the storing of results; the drive is assumed to change then"
     value, deviation = round(found.value, 6), round(found.deviation, 6)
     return Quantity(value=value, unit="s", source=source, low=0.0, deviation=deviation)
 
 
 @dataclass
 class _Watch:
-    """The low byte of a joint's error, read again and again."""
+    """Reads the low byte of a joint's error repeatedly."""
 
     controller: Controller
     arm: ControllerArm
@@ -295,8 +300,10 @@ class _Watch:
         self._missed = self.controller.status().missed
 
     def effect(self, posture: int, phase: float) -> Effect | None:
-        """Writes a set point at a phase of the period (0 to 1 from any moment) and waits until the error shows it. None
-        where it did not, or where the controller missed set points meanwhile."""
+        """Writes a set point at a phase of the period (0 to 1 from any time) and waits until the error shows it.
+
+        None if it did not, or if the controller missed set points meanwhile.
+        """
         clock = self.controller.clock
         clock.sleep_until(self._now() + (SETTLED_PERIODS + phase) * self.period)
         error, _ = self._read()
@@ -315,14 +322,14 @@ class _Watch:
         return None
 
     def _now(self) -> float:
-        """Time (s)."""
+        """Returns the time (s)."""
         clock = self.controller.clock
         if isinstance(clock, LockStepClock):
             clock.synchronise()
         return clock.now()
 
     def _read(self) -> tuple[int, tuple[float, float]]:
-        """The byte, and bounds of the moment when it was read."""
+        """Returns the byte, and bounds of the time when it was read."""
         begun = self._now()
         data = self.controller.link.request(ReadBlock(self.address, 1), Block).data
         return data[0], (begun, self._now())

@@ -1,4 +1,4 @@
-"""Steps that find out what line, memory and bridge are like; only the memory's search asks for a hand."""
+"""Commissioning steps for line, memory and bridge; only the memory's search needs a person's hand."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ SAME_READING = 12
 GAINS, SIGNALS = ("gain_p", "gain_i", "gain_d"), ("process_inputs", "process_outputs")
 
 GIVE_IT = (
-    "Give it this one: for a board `make firmware MAP={map}`, loaded as docs/hardware.md says (for a mock: "
+    "Load this one: for a board `make firmware MAP={map}`, loaded as docs/hardware.md says (for a mock: "
     "--memory-map {map}); then run `daq commission` again"
 )
-"""What is to be done with a bridge that works by another memory map."""
+"""Advice for a bridge with another memory map."""
 
 
 def line(bench: Bench) -> dict[str, Any]:
-    """Round trips, repeats and damage of the line, and what the bridge says about itself."""
+    """Measures round trips, repeats and damage of the line, and reads the bridge's description of itself."""
     from firmware_protocol.commands import Capability
 
     with _page(bench) as page:
@@ -64,8 +64,9 @@ def line(bench: Bench) -> dict[str, Any]:
 
 
 def memory(bench: Bench) -> dict[str, Any]:
-    """The memory map, by `daq memory find`. An earlier one, its findings and its record stay if this search ends
-    early."""
+    """Finds the memory map, by `daq memory find`. An earlier one, its findings and its record stay if this search ends
+    early.
+    """
     from extras.commissioning.memory_command import (
         adopt,
         findings_text,
@@ -101,7 +102,7 @@ def memory(bench: Bench) -> dict[str, Any]:
     complete = adopt(found, {new_map: path, new_findings: findings})
     bench.configure()
     if not complete:
-        raise NotCommissionedError(f"{why_no_map(found, bench.folder / MAP)}; then go on with --skip memory")
+        raise NotCommissionedError(f"{why_no_map(found, bench.folder / MAP)}; then continue with --skip memory")
     if absent := what_is_absent(found, bench.folder / MAP):
         bench.operator.show(absent)
     note_memory(bench)
@@ -125,7 +126,7 @@ def _memory_result(found: Findings, proofs: Sequence[CommandProof]) -> dict[str,
 
 
 def bridge(bench: Bench) -> dict[str, Any]:
-    """Whether the bridge works by the memory map that was found."""
+    """Checks whether the bridge uses the memory map that was found."""
     from extras.commissioning.person.memory_page import open_page
     from firmware_protocol.commands import Gains, Process, ReadProcess, ReportGains
 
@@ -143,7 +144,7 @@ def bridge(bench: Bench) -> dict[str, Any]:
         ("gains", bool(gains), memory_map.has_gains),
         ("process signals", process is not None, memory_map.has_process),
     ):
-        if there != wanted:  # a place that the arm's map leaves out must not be written by the bridge either
+        if there != wanted:  # the bridge must not write to a place that the arm's map leaves out
             raise NotCommissionedError(f"the bridge {'has' if there else 'lacks'} {what}, unlike {MAP}. {give_it}")
     far = [
         f"{name.replace('_', ' ')} {joint}"
@@ -162,14 +163,17 @@ def bridge(bench: Bench) -> dict[str, Any]:
         far += [name.replace("_", " ") for name, value in zip(SIGNALS, signals, strict=True) if still[name][1] != value]
     if far:
         raise NotCommissionedError(
-            f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it works by another map. {give_it}"
+            f"the bridge reads {', '.join(far[:6])} elsewhere than {MAP} says: it uses another map. {give_it}"
         )
     return {"positions": [round(value) for _, value in sorted(own["position"].items())]}
 
 
 def _of_the_bridge(controller: Controller, request: Request, wanted: type[R]) -> R | None:
-    """What the bridge reads by its own memory map; None where that leaves out the registers. The controller would not
-    ask for what the arm's map leaves out, and whether the bridge has it all the same is the question here."""
+    """Returns the bridge's reading by its own memory map; None if that leaves out the registers.
+
+    The controller would not request registers that the arm's map leaves out. Whether the bridge has them all the same
+    is the question here.
+    """
     from daq.link import RequestRefusedError
     from firmware_protocol.codes import Refusal
 

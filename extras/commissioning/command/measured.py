@@ -1,4 +1,4 @@
-"""A machine with what was measured at one arm in it."""
+"""Puts measurements of an arm into its machine."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from extras.commissioning.potentiometer import Potentiometer
 
 
 def with_sensors(machine: Machine, sensors: Sequence[Potentiometer]) -> Machine:
-    """The machine with these sensors. Raises SpecError for a joint that has none."""
+    """Returns the machine with these sensors. Raises SpecError for a joint without one."""
     joints = list(machine.joints)
     for found in sensors:
         joint = machine.joint(found.joint)
@@ -32,7 +32,7 @@ def with_sensors(machine: Machine, sensors: Sequence[Potentiometer]) -> Machine:
 
 
 def with_limits(machine: Machine, limits: Mapping[int, tuple[float, float]]) -> Machine:
-    """The machine with joint limits (rad) that are nowhere wider than these."""
+    """Returns the machine with joint limits (rad) that are nowhere wider than these."""
     rows = [machine.limits.joint(number) for number in range(1, len(machine.joints) + 1)]
     for joint, (low, high) in limits.items():
         row = rows[joint - 1]
@@ -45,12 +45,12 @@ def with_limits(machine: Machine, limits: Mapping[int, tuple[float, float]]) -> 
 
 
 def with_controller(machine: Machine, values: Mapping[str, Any]) -> Machine:
-    """The machine with these values of its controller. Raises SpecError where they do not suit it."""
+    """Returns the machine with these values of its controller. Raises SpecError if they do not suit it."""
     return _checked(machine.model_copy(update={"controller": machine.controller.model_copy(update=dict(values))}))
 
 
 def _checked(machine: Machine) -> Machine:
-    """The machine, checked as one that is read."""
+    """Returns the machine, validated like one that is read."""
     try:
         return Machine.model_validate(machine.model_dump())
     except ValidationError as error:

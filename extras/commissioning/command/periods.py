@@ -1,4 +1,4 @@
-"""The control period, measured by following some periods."""
+"""Measures the control period by following several periods."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ class Periods(NamedTuple):
 
     @property
     def problem(self) -> str:
-        """Why the period is not known; empty if it is."""
+        """Returns why the period is not known; empty if it is."""
         if self.error_ms <= CERTAIN * self.period_ms:
             return ""
         return (
-            f"samples arrive with a scatter of {self.jitter_ms:.1f} ms, so that the period is known to "
-            f"± {self.error_ms:.3f} ms only: the computer or the line is too busy; end other programs, and try again"
+            f"samples arrive with a scatter of {self.jitter_ms:.1f} ms, so the period is known only to "
+            f"± {self.error_ms:.3f} ms: the computer or the line is too busy; end other programs, and try again"
         )
 
 
 def followed_periods(controller: Controller) -> Periods:
-    """Follows some control periods."""
+    """Follows several control periods."""
     ticks, times, after = [], [], None
     for _ in range(PERIODS):
         snapshot = controller.next_snapshot(after, (1,))

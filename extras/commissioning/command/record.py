@@ -1,4 +1,4 @@
-"""What a commissioning has found so far: `commissioning.toml`, written after every step."""
+"""Record of a commissioning: `commissioning.toml`, written after every step."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ FILE = "commissioning.toml"
 
 @dataclass
 class Record:
-    """The results of the steps that are done, by name, in the folder of an arm."""
+    """Results of the completed steps, by name, in the folder of an arm."""
 
     folder: Path
     steps: dict[str, dict[str, Any]] = field(default_factory=dict)
     stop_pressed: bool = False
     """Whether the emergency stop was pressed and not yet released safely."""
     operator: str = ""
-    """Who commissions the arm."""
+    """Name of the person who commissions the arm."""
     identity: dict[str, Any] = field(default_factory=dict)
-    """What identifies the arm that the results belong to (`extras.commissioning.command.arm`)."""
+    """Identity of the arm that the results belong to (`extras.commissioning.command.arm`)."""
 
     @staticmethod
     def of(folder: Path) -> Record:
-        """What the folder holds. Raises SpecError for a file that is no record."""
+        """Reads the record of a folder. Raises SpecError for an invalid file."""
         path = folder / FILE
         if not path.exists():
             return Record(folder)
@@ -45,16 +45,16 @@ class Record:
 
     @property
     def done(self) -> dict[str, dict[str, Any]]:
-        """The results of the steps that were carried out."""
+        """Returns the results of the steps that were carried out."""
         return {name: one for name, one in self.steps.items() if not one.get("skipped")}
 
     @property
     def left_out(self) -> dict[str, dict[str, Any]]:
-        """The steps that were left out on purpose, with the reason."""
+        """Returns the steps that were left out on purpose, with the reason."""
         return {name: one for name, one in self.steps.items() if one.get("skipped")}
 
     def identify(self, identity: dict[str, Any]) -> None:
-        """Keeps what identifies the arm."""
+        """Keeps the identity of the arm."""
         self.identity = identity
         self._write()
 
@@ -64,7 +64,7 @@ class Record:
         self._write()
 
     def drop(self, names: Collection[str]) -> list[str]:
-        """Forgets these steps; the names of those that there were."""
+        """Removes these steps; returns the names of those that existed."""
         gone = [name for name in self.steps if name in names]
         if gone:
             self.steps = {name: one for name, one in self.steps.items() if name not in names}

@@ -1,6 +1,6 @@
-"""The acceptance sheet of an arm: what was found on its first day, as a page with pictures.
+"""Makes the acceptance sheet of an arm: results of its first day, as a page with pictures.
 
-Where each address of an arm's memory map comes from, for its acceptance sheet.
+It also states the origin of each address of an arm's memory map.
 """
 
 from __future__ import annotations
@@ -24,14 +24,16 @@ if TYPE_CHECKING:
 
 
 FROM = ("found", "assumed", "by hand")
-"""Where an address comes from: evidence at the arm, a place that agrees with everything seen, or a person who has
-put it into the map (or changed it)."""
+"""Origin of an address: evidence at the arm, a place that agrees with all readings, or a person who has entered (or
+changed) it.
+"""
 
 
 def address_blocks(findings: dict[str, Any], path: Path) -> list[Block]:
-    """What was proved by command, and a table of the addresses by register; only the first without a memory map.
+    """Returns the results of the proof by command, and a table of the addresses by register; without a memory map only
+    the first.
 
-    findings: those of `daq memory find`. Raises what a damaged file leads to: KeyError, ValueError, TypeError.
+    findings: those of `daq memory find`. Raises for a damaged file: KeyError, ValueError, TypeError.
     """
     from daq.config.robot_files import load_memory_map
     from model.blocks import Cell, Table, Text
@@ -55,7 +57,7 @@ def address_blocks(findings: dict[str, Any], path: Path) -> list[Block]:
 
 
 def addresses_of(findings: dict[str, Any], memory_map: MemoryMap) -> dict[str, dict[str, list[str]]]:
-    """Register → where its addresses come from (`FROM`) → these addresses, joint by joint, the low byte first."""
+    """Returns register → origin of its addresses (`FROM`) → these addresses, joint by joint, the low byte first."""
     known = {(one["register"], one.get("joint") or 1): one for one in findings["findings"]}
     result: dict[str, dict[str, list[str]]] = {}
     for name, register in memory_map.registers.items():
@@ -73,7 +75,7 @@ def addresses_of(findings: dict[str, Any], memory_map: MemoryMap) -> dict[str, d
 SHEET = "acceptance.html"
 NO_REASON = "no reason was given"
 NOT_SHOWN = ("done", "basis")
-"""What the record keeps for the program alone."""
+"""Entries of the record that only the program uses."""
 INTERVALS = ("range_deg", "at_zero_deg", "bend_percent")
 """Values with half the width of their interval."""
 UNITS = {"_deg": "°", "_percent": "%", "_ms": "ms"}
@@ -86,7 +88,7 @@ LABELS = {
     "error_counts": "error (ADC counts)",
     "moved_counts": "moved by itself within a second (ADC counts)",
     "error_in_floors": "error (multiples of the noise floor)",
-    "beyond_the_reading": "the joint goes on where the reading ends (lower, upper end)",
+    "beyond_the_reading": "the joint moves on where the reading ends (lower, upper end)",
     "readings": "readings there (ADC counts)",
     "volts_per_rad": "gain (V/rad)",
     "standard_error": "its standard error (V/rad)",
@@ -101,13 +103,13 @@ LABELS = {
     "found": "registers found",
     "assumed": "registers assumed",
     "drive_signs": "signs of the drives (1: towards the set point)",
-    "to_be_run_next": "experiment that would tell most next",
+    "to_be_run_next": "most informative next experiment",
 }
-"""Names of the record that need more words, or units."""
+"""Names in the record that need more words, or units."""
 DRAWN = ("counts", "angles_deg", "residuals_deg")
-"""What a picture shows, of potentiometers."""
+"""Signals in the pictures of potentiometers."""
 MEASURED = {"potentiometers": "sensors", "end_stops": "end stops", "gain": "gain"}
-"""Steps that measure joints one by one, and what they measure."""
+"""Steps that measure joints one by one, and their measurements."""
 RAMPS = ("first_ramp", "ramp")
 """Steps that show their record."""
 COLUMNS, CELL = 16, 30
@@ -136,10 +138,10 @@ LETTERS = {
     "process_outputs": "out",
     "gripper": "g",
 }
-"""Letters of each register in the picture of the memory."""
+"""Letters for each register in the picture of the memory."""
 LEGEND = (
     "The shared memory: w set point, x position, e error, u power, P I D gains, each with its joint, + a high byte; "
-    "in and out process signals, g gripper. Filled: found; outlined: assumed; empty: nothing of these."
+    "in and out process signals, g gripper. Filled: found; outlined: assumed; empty: no register."
 )
 
 
@@ -151,7 +153,7 @@ def write_sheet(record: Record) -> Path:
 
 
 def acceptance_sheet(record: Record) -> Report:
-    """The page of everything that is done, and what is open."""
+    """Returns the page of all completed and open steps."""
     from model.blocks import Cell, Report, Section, Table
 
     sections = tuple(
@@ -165,11 +167,11 @@ def acceptance_sheet(record: Record) -> Report:
         ("not measured", _not_measured(record)),
     )
     signed = Section("Accepted", (Table(("name", "date", "signature"), ((Cell("\u2003"), Cell(""), Cell("")),)),))
-    return Report("Acceptance sheet", _answer(record), facts, (*sections, signed), errors="Intervals hold 95 %.")
+    return Report("Acceptance sheet", _answer(record), facts, (*sections, signed), errors="Intervals are 95 %.")
 
 
 def _not_measured(record: Record) -> str:
-    """The joints that no step has measured, by what was not."""
+    """Returns the joints that were not measured, by measurement."""
     parts = []
     for name, what in MEASURED.items():
         done = record.done.get(name, {})
@@ -180,7 +182,7 @@ def _not_measured(record: Record) -> str:
 
 
 def _answer(record: Record) -> str:
-    """How many steps are done, left out and open."""
+    """Returns how many steps are done, left out and open."""
     done, left_out = [[step.title for step in STEPS if step.name in some] for some in (record.done, record.left_out)]
     still_open = [step.title for step in STEPS if step.name not in record.steps]
     answer = f"{len(done)} of {len(STEPS)} steps are done, {len(left_out)} are left out, {len(still_open)} are open."
@@ -192,7 +194,7 @@ def _answer(record: Record) -> str:
 
 
 def _blocks(record: Record, name: str, does: str) -> list[Block]:
-    """What a section shows: the result of a step that is done, or why it was left out."""
+    """Returns the content of a section: the result of a completed step, or why it was left out."""
     from model.blocks import Text
 
     result = record.steps[name]
@@ -206,18 +208,18 @@ def _blocks(record: Record, name: str, does: str) -> list[Block]:
 
 
 def _beside(folder: Path, path: str) -> str:
-    """A path from the folder of the arm on, where it lies there."""
+    """Returns a path relative to the folder of the arm if it is inside, else unchanged."""
     whole = folder.absolute()
     return str(Path(path).relative_to(whole)) if Path(path).is_relative_to(whole) else path
 
 
 def _when(iso: str) -> str:
-    """A moment as 2026-11-23 08:15 UTC."""
+    """Formats a time as 2026-11-23 08:15 UTC."""
     return f"{iso[:16].replace('T', ' ')} UTC" if iso.endswith("+00:00") else iso
 
 
 def _tables(result: dict[str, Any]) -> list[Block]:
-    """What a step found: a table of its single values, and one with a row for each joint."""
+    """Returns the result of a step: a table of its single values, and one with a row for each joint."""
     from model.blocks import Cell, Table
 
     joints = {name: one for name, one in result.items() if name.startswith("joint_") and isinstance(one, dict)}
@@ -240,7 +242,7 @@ def _tables(result: dict[str, Any]) -> list[Block]:
 
 
 def _words(name: str) -> str:
-    """A name of the record as people write it."""
+    """Returns a name of the record in words."""
     name = name.strip()
     if name in LABELS:
         return LABELS[name]
@@ -251,7 +253,7 @@ def _words(name: str) -> str:
 
 
 def _shown(value: Any, interval: bool = False) -> str:
-    """A value as people write it."""
+    """Formats a value for people."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if interval and isinstance(value, list):
@@ -280,13 +282,13 @@ def _pictures(record: Record, name: str, result: dict[str, Any]) -> list[Block]:
             Picture(_sensor_picture(sensors), "Departure of the protractor's angles from each joint's straight line.")
         ]
     if name in RAMPS and (record.folder / result["trace"]).exists():
-        caption = "Set points (grey) and positions, from where each joint began."
+        caption = "Set points (grey) and positions, relative to each joint's first."
         return [Picture(_ramp_picture(record.folder / result["trace"]), caption)]
     return []
 
 
 def memory_picture(findings: dict[str, Any]) -> str:
-    """The page as a grid of bytes, each with its register and joint."""
+    """Draws the page as a grid of bytes, each with its register and joint."""
     base, size = int(findings["base"], 16), int(findings["size"])
     owner: dict[int, tuple[dict[str, Any], str]] = {}
     for one in findings["findings"]:
@@ -346,7 +348,7 @@ def _ramp_picture(path: Path) -> str:
     moved = trace.joints if trace.record.spec is None else trace.record.spec.joints
 
     def draw(figure: Any) -> None:
-        panels = figure.subplots(1, len(moved), sharey=True, squeeze=False)[0]  # one a joint: joints move alike
+        panels = figure.subplots(1, len(moved), sharey=True, squeeze=False)[0]  # one per joint: joints move alike
         for number, (axes, joint) in enumerate(zip(panels, moved, strict=True)):
             column = trace.column(joint)
             begin = trace.position[0, column]

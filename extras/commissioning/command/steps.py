@@ -1,4 +1,6 @@
-"""The steps of a commissioning, in order: what each does, what to watch, how to stop, and what has to come before."""
+"""The steps of a commissioning, in order: what each does, what to watch, how to stop, and which steps must precede
+it.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ from extras.commissioning.command.line_and_memory import bridge, line, memory
 from extras.commissioning.command.record import Record
 
 NOT_TO_BE_SKIPPED = ("bridge", "period", "ramp")
-"""Steps whose result the steps after them rely on."""
+"""Steps on whose results later steps rely."""
 RESTS_ON = {
     "bridge": ("port", "memory_map"),
     "potentiometers": ("memory_map",),
@@ -26,7 +28,7 @@ RESTS_ON = {
     "ramp": ("machine",),
     "model": ("machine",),
 }
-"""What a step's result rests on directly; it also rests on the steps that it needs."""
+"""Direct basis of a step's result; it also depends on the steps that it needs."""
 
 
 class Step(NamedTuple):
@@ -39,11 +41,11 @@ class Step(NamedTuple):
     stop: str
     run: Callable[[Bench], dict[str, Any]]
     needs: tuple[str, ...] = ()
-    """Steps that have to be done, or left out on purpose where that is safe, before this one."""
+    """Steps that must be done, or safely left out on purpose, before this one."""
     at_the_arm: bool = True
-    """Whether a person at the arm has to say that it may begin, even with --yes."""
+    """Whether a person at the arm must confirm that it may begin, even with --yes."""
     at_the_port: bool = True
-    """Whether it talks to the controller."""
+    """Whether it communicates with the controller."""
 
 
 SEE = "It only reads; nothing moves."
@@ -54,7 +56,7 @@ STEPS = (
     Step(
         "memory",
         "Memory map",
-        "Finds what lies where, while you move the arm by hand; at the end moves each joint by a degree and back.",
+        "Finds the registers while you move the arm by hand; at the end moves each joint by a degree and back.",
         "The arm, which may sink while the emergency stop is pressed.",
         "the emergency stop; q or Ctrl-C ends the search",
         memory,
@@ -147,7 +149,7 @@ STEPS = (
     Step(
         "model",
         "The model",
-        "Compares the ramp with the machine file; where they differ, a diagnosis says what may be missing.",
+        "Compares the ramp with the machine file; if they differ, a diagnosis suggests what may be missing.",
         "It only computes.",
         "Ctrl-C",
         model,
@@ -160,7 +162,7 @@ STEPS = (
 
 
 def lacking(step: Step, record: Record) -> list[str]:
-    """The steps that have to be done before this one. Some may be left out with --skip."""
+    """Returns the steps that must be done before this one. Some may be left out with --skip."""
     return [
         name
         for name in step.needs
@@ -169,7 +171,7 @@ def lacking(step: Step, record: Record) -> list[str]:
 
 
 def resting_on(names: Collection[str]) -> set[str]:
-    """The steps whose results rest on these steps, directly or not."""
+    """Returns the steps whose results depend on these steps, directly or not."""
     found: set[str] = set()
     for step in STEPS:  # in order, so that one pass is enough
         if {*names, *found} & set(step.needs):
@@ -178,8 +180,7 @@ def resting_on(names: Collection[str]) -> set[str]:
 
 
 def stale(bench: Bench) -> set[str]:
-    """The steps whose results were found at another port, or with another memory map or machine file, and those that
-    rest on them."""
+    """Returns steps whose results are from another port, memory map or machine file, and those that depend on them."""
     now = bench.basis()
     changed = {
         name

@@ -1,6 +1,5 @@
-"""What lies where in the memory that the controller shares with its host, from readings of it alone.
+"""Finds the registers in the memory that the controller shares with its host, from readings alone.
 
-`recording` keeps readings by what was done meanwhile; `bytes`, `relations` and `joint` say what a byte could be;
-`findings` gives the verdicts. `procedure` and `commands` are the way there: what a person does, and what may be
-written.
+`recording` keeps readings by the action during them; `bytes`, `relations` and `joint` find candidates for each byte;
+`findings` gives the verdicts. `procedure` and `commands` state what a person does, and what may be written.
 """

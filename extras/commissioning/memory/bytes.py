@@ -1,4 +1,4 @@
-"""What single bytes do: how far they move, and which of them follow one joint and nothing else."""
+"""Properties of single bytes: how far they change, and which of them follow only one joint."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 from extras.commissioning.memory.recording import Pages, Recording, Stage
 
 WHOLE_TURN = 150
-"""Least spread of a low byte while its joint is led: a lead of 300 counts takes it through all 256 values."""
+"""Least spread of a low byte while its joint is moved by hand: 300 counts take it through all 256 values."""
 AT_REST = 64
-"""Largest spread of a joint's bytes while another joint is led: a quarter of a low byte, 4 degrees of a major axis."""
+"""Largest spread of a joint's bytes while another joint is moved: a quarter of a low byte, 4 degrees of a major
+axis.
+"""
 
 
 def spread(pages: Pages) -> NDArray[np.int64]:
-    """Length of the shortest arc modulo 256 that holds all values of each byte; 0 for a constant one."""
+    """Returns the length of the shortest arc modulo 256 that holds all values of each byte; 0 for a constant one."""
     size = pages.shape[1]
     seen = np.zeros((size, 256), bool)
     seen[np.arange(size), pages] = True
@@ -29,7 +31,7 @@ def spread(pages: Pages) -> NDArray[np.int64]:
 
 
 def distinct(pages: Pages) -> NDArray[np.int64]:
-    """Number of different values of each byte."""
+    """Returns the number of different values of each byte."""
     size = pages.shape[1]
     seen = np.zeros((size, 256), bool)
     seen[np.arange(size), pages] = True
@@ -39,10 +41,10 @@ def distinct(pages: Pages) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class Followers:
-    """Bytes (offsets) that change while one joint is led, and rest while others are.
+    """Bytes (offsets) that change while one joint is moved by hand, and rest while others are.
 
-    low:   those that run through most of their values: low bytes
-    high:  those that change: high bytes among them
+    low:   those that take most of their values: low bytes
+    high:  those that change, high bytes among them
     byte:  those that change by more than a little: values of one byte
     """
 
@@ -52,7 +54,7 @@ class Followers:
 
 
 def followers(recording: Recording, joint: int) -> Followers:
-    """The bytes that follow a joint."""
+    """Returns the bytes that follow a joint."""
     led = recording.led(joint)
     if not led:
         return Followers((), (), ())
@@ -69,7 +71,7 @@ def followers(recording: Recording, joint: int) -> Followers:
 
 
 def constants(stages: list[Stage]) -> NDArray[np.int64]:
-    """The value of each byte that is constant throughout these stages; -1 for those that are not."""
+    """Returns the value of each byte that is constant throughout these stages; -1 for those that are not."""
     pages = np.concatenate([stage.pages for stage in stages])
     first = pages[0].astype(np.int64)
     return np.where((pages == pages[0]).all(axis=0), first, -1)

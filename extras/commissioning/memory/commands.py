@@ -1,10 +1,11 @@
-"""The proof by command: the set point of one joint, moved by the smallest steps, with the arm watched.
+"""Proves a joint's set point by command: moves it by the smallest steps while watching the arm.
 
-Only the low byte of a set point that readings have proved is written. The first value written is the one that is
-there; then one posture unit more or less, in the direction in which the high byte stays. After each write the byte
-must hold the value, the error must have moved by what a unit is, the other joints must have stayed, and every error
-must be small, but for the step itself. Otherwise the value from before is written again, and the search ends there. It
-is not written where the high byte has changed meanwhile or the low byte is none that was written: the emergency stop.
+Only the low byte of a set point that readings have proved is written. The first value written is the present one; the
+next is one posture unit more or less, in the direction that keeps the high byte. After each write four things must
+hold: the byte holds the value, the error has changed by that unit, the other joints have not moved, and every error
+except that of the step is small. Otherwise the previous value is written again, and the search ends there. The byte is
+not restored if the high byte has changed meanwhile or the low byte is not a written one; the person then presses the
+emergency stop.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from firmware_protocol.units import POSTURE_UNITS, posture_to_counts
 LONGEST_STEP = 4
 """Largest step (posture units): about a degree of a major axis."""
 SETTLING_S = 0.3
-"""Time (s) after a step until the arm is looked at."""
+"""Time (s) from a step until the arm is checked."""
 MOVED = 2.5
-"""Least movement (ADC counts) that counts as one."""
+"""Least movement (ADC counts) that counts as a movement."""
 OTHERS = 16
 """Largest movement (ADC counts) of the other joints."""
 READINGS = 8
@@ -33,10 +34,10 @@ READINGS = 8
 
 @dataclass(frozen=True)
 class CommandProof:
-    """What a joint did when its set point was moved.
+    """Result of moving a joint's set point.
 
     proved:   whether the error followed the set point that was written
-    step:     the largest step that was written (posture units, signed); 0 if none was
+    step:     the largest step that was written (posture units, signed); 0 if none
     moved:    ADC counts by which the joint moved with that step
     sign:     1 if the joint moved towards the set point, -1 if away from it, 0 if it did not move
     problem:  why the proof was not completed; empty otherwise
@@ -57,18 +58,18 @@ class _Seen:
 
 
 def prove_by_command(page: Page, joints: Sequence[JointEvidence], joint: int) -> CommandProof:
-    """Moves one joint by a unit, and more only while it does not move; brings the set point back."""
+    """Moves one joint by a unit, by more only while it does not move, and restores the set point."""
     own = next(one for one in joints if one.joint == joint)
     place = None if own.set_point is None else own.set_point.place
     if own.pair is None or place is None or place.high is None:
-        return CommandProof(joint, False, 0, 0.0, 0, "where its set point lies is not proved")
+        return CommandProof(joint, False, 0, 0.0, 0, "the address of its set point is not proved")
     before = _look(page, joints)
     low, high = page.base + place.low, page.base + place.high
     there = page.read_byte(low) | page.read_byte(high) << 8
     expected = before.positions[joint] + before.errors[joint]
     if not 0 <= there < POSTURE_UNITS or abs(posture_to_counts(there) - expected) > MOVED:
         return CommandProof(
-            joint, False, 0, 0.0, 0, f"its set point reads {there}, and error + position is {expected:.0f}"
+            joint, False, 0, 0.0, 0, f"its set point reads {there}, but error + position is {expected:.0f}"
         )
     result = CommandProof(joint, False, 0, 0.0, 0)
     direction = 1 if (there & 0xFF) + LONGEST_STEP <= 0xFF and there + LONGEST_STEP < POSTURE_UNITS else -1
@@ -94,16 +95,18 @@ def prove_by_command(page: Page, joints: Sequence[JointEvidence], joint: int) ->
 
 
 def _restored(page: Page, low: int, high: int, there: int, wrote: Collection[int]) -> str:
-    """Writes the old low byte again, but only under the high byte that was there, and over a byte that was written
-    here: another one would be another posture, far away. Why it was not written; empty if it was."""
+    """Writes the old low byte again, if the high byte is unchanged and the present low byte was written here.
+
+    Otherwise it would be another posture, far away. Returns why it was not written; empty if it was.
+    """
     try:
         high_now, low_now = page.read_byte(high), page.read_byte(low)
         if high_now == there >> 8 and low_now in wrote:
             page.write_byte(low, there & 0xFF)
             return ""
     except DaqError as error:
-        return f"the set point from before could not be written again, press the emergency stop: {error}"
-    return f"the set point now reads {low_now | high_now << 8}, and nothing more is written: press the emergency stop"
+        return f"the previous set point could not be written again, press the emergency stop: {error}"
+    return f"the set point now reads {low_now | high_now << 8}, so nothing more is written: press the emergency stop"
 
 
 def _judge(
@@ -114,7 +117,7 @@ def _judge(
     now = _look(page, joints)
     moved = now.positions[joint] - before.positions[joint]
     if held != wanted:
-        return CommandProof(joint, False, step, moved, 0, f"wrote {wanted}, and {held} stands there")
+        return CommandProof(joint, False, step, moved, 0, f"wrote {wanted}, but {held} was read back")
     others = [j for j in now.positions if j != joint and abs(now.positions[j] - before.positions[j]) > OTHERS]
     if others:
         return CommandProof(joint, False, step, moved, 0, f"joint {others[0]} moved with it")

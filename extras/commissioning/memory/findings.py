@@ -1,8 +1,7 @@
-"""The verdicts on every register, with the evidence for each, and the memory map that follows from them.
+"""Judges every register, with evidence, and makes a memory map from the verdicts.
 
-Where gains could be: patterns of bytes that hold those which errors and powers show.
-
-The memory map of an arm whose bytes were found in part: a file that a person completes.
+It also finds where gains may be (patterns of bytes that hold the gains that errors and powers show), and writes an
+incomplete map for a person to complete.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from extras.commissioning.memory.bytes import constants, spread
-from extras.commissioning.memory.joint import LEAST_EPOCHS, JointEvidence, joint_evidence
+from extras.commissioning.memory.joint import LEAST_SET_POINTS, JointEvidence, joint_evidence
 from extras.commissioning.memory.recording import Recording
 from extras.commissioning.memory.relations import Place
 from firmware_protocol.memory_map import (
@@ -34,11 +33,12 @@ Columns = tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
 
 
 def gain_columns(held: NDArray[np.int64], measured: Sequence[int | None]) -> list[Columns]:
-    """Every regular pattern whose P bytes hold the `measured` gains and whose I and D bytes hold 0.
+    """Returns every regular pattern whose P bytes hold the `measured` gains and whose I and D bytes hold 0.
+
+    A pattern is three rows, equally far apart, or a record of P, I and D for each joint. If I or D is not 0, a power is
+    not proportional to its error, and there is no measured gain.
 
     held: the constant value of each byte, -1 where it cannot be a gain
-    A pattern is three rows, equally far apart, or a record of P, I and D for each joint. With I or D other than 0 a
-    power is not in proportion to its error, and there would be no measured gain.
     """
     if any(gain is None or not 1 <= gain <= GAIN_MAX for gain in measured):
         return []
@@ -56,12 +56,12 @@ def gain_columns(held: NDArray[np.int64], measured: Sequence[int | None]) -> lis
 
 
 COMPLETED = "found at this arm, completed by hand"
-"""Name of a map of which a person has filled in a part."""
+"""Name of a map that a person has completed."""
 
 
 def begun_map_text(found: Findings) -> str:
-    """A map in which what was not found is a question mark: it can be loaded once each is replaced by an address."""
-    lines = ["# Put an address in place of each question mark, as 0xFC40.", "version = 1", f'name = "{COMPLETED}"']
+    """Returns a map with a question mark for each missing address; it can be loaded once all are replaced."""
+    lines = ["# Replace each question mark with an address, such as 0xFC40.", "version = 1", f'name = "{COMPLETED}"']
     lines += [f"base = 0x{found.base:04X}", f"size = 0x{found.size:02X}"]
     for name, shipped in default_memory_map().registers.items():
         own = [one for one in found.all if one.register == name]
@@ -79,9 +79,10 @@ def begun_map_text(found: Findings) -> str:
 
 Verdict = Literal["found", "contradicts", "assumed", "unknown"]
 """found:       the evidence leaves no other byte
-contradicts: found, and not where the source documents it
-assumed:     a place that agrees with everything seen, which others do too
-unknown:     no place, or several"""
+contradicts: found, but not where the source documents it
+assumed:     a place that agrees with all readings, as others do
+unknown:     no place, or several
+"""
 
 
 @dataclass(frozen=True)
@@ -102,14 +103,14 @@ class Finding:
         return self.verdict in ("found", "contradicts")
 
     def as_data(self) -> dict[str, Any]:
-        """Plain data for JSON and TOML."""
+        """Returns plain data for JSON and TOML."""
         data = {name: value for name, value in asdict(self).items() if value is not None and value != ""}
         return data | {name: f"{data[name]:04X}" for name in ("low", "high") if name in data}
 
 
 @dataclass(frozen=True)
 class Findings:
-    """Everything that was found, and `joints`, the evidence behind it."""
+    """All findings, and `joints`, the evidence for them."""
 
     base: int
     size: int
@@ -118,10 +119,10 @@ class Findings:
     free_running: tuple[int, ...] = ()
     """Addresses that change while nothing moves."""
     unchanged: tuple[tuple[int, int], ...] = ()
-    """(address, byte) of what neither motion nor switching off and on has changed."""
+    """(address, byte) of bytes that changed neither with motion nor with power cycles."""
 
     def of(self, register: str, joint: int | None = None) -> Finding:
-        """The finding on a register."""
+        """Returns the finding on a register."""
         return next(one for one in self.all if (one.register, one.joint) == (register, joint))
 
     def missing(self) -> list[Finding]:
@@ -129,24 +130,28 @@ class Findings:
         return [one for one in self.all if one.low is None]
 
     def without_place(self) -> tuple[str, ...]:
-        """Names of the registers of which some joint's has no place, each once, in the order of the map."""
+        """Names of the registers without a place on some joint, each once, in the order of the map."""
         return tuple(dict.fromkeys(one.register for one in self.missing()))
 
     def absent(self) -> tuple[str, ...]:
-        """Names of the registers that the memory map leaves out, because they have no place: nothing reads or writes
-        them. Gains are left out together."""
+        """Names of the registers that the memory map leaves out, because they have no place.
+
+        Nothing reads or writes them. Gains are left out together.
+        """
         names = {name for name in self.without_place() if name in MAY_BE_ABSENT}
         names |= set(GAIN_REGISTERS) if names & set(GAIN_REGISTERS) else set()
         return tuple(name for name in MAY_BE_ABSENT if name in names)
 
     def essential(self) -> tuple[str, ...]:
-        """Names of the registers without a place that no memory map can be without."""
+        """Names of the registers without a place that every memory map needs."""
         return tuple(name for name in self.without_place() if name not in MAY_BE_ABSENT)
 
     def memory_map(self, name: str) -> MemoryMap | None:
-        """The memory map, with "found" and "assumed" for each address, without what is `absent`; None while a set
-        point, position, error or power has no place, and where the errors of some joints have two bytes and of others
-        one."""
+        """Returns the memory map, with "found" and "assumed" for each address, without the `absent` registers.
+
+        None while a set point, position, error or power has no place, or if the errors of some joints have two bytes
+        and of others one.
+        """
         widths = {one.high is None for one in self.all if one.register == "error"}
         if self.essential() or len(widths) > 1:
             return None
@@ -168,7 +173,7 @@ class Findings:
 
 
 def judge(recording: Recording) -> Findings:
-    """The verdicts that a recording allows. Pure: the same recording gives the same verdicts."""
+    """Returns the verdicts on a recording. Pure: the same recording gives the same verdicts."""
     joints = tuple(joint_evidence(recording, joint) for joint in range(1, JOINTS + 1))
     joints = _without_shared_bytes(joints)
     found = [one for joint in joints for one in _of_joint(recording, joint)]
@@ -201,7 +206,7 @@ def _places(joint: JointEvidence) -> dict[str, Place]:
 
 
 def _without_shared_bytes(joints: tuple[JointEvidence, ...]) -> tuple[JointEvidence, ...]:
-    """Takes back what was found for two joints at once: one byte cannot belong to both."""
+    """Withdraws places that two joints share: one byte cannot belong to both."""
     users: dict[int, set[int]] = {}
     for joint in joints:
         for place in _places(joint).values():
@@ -210,7 +215,7 @@ def _without_shared_bytes(joints: tuple[JointEvidence, ...]) -> tuple[JointEvide
                     users.setdefault(offset, set()).add(joint.joint)
     shared = {number for numbers in users.values() if len(numbers) > 1 for number in numbers}
     return tuple(
-        JointEvidence(joint.joint, None, None, None, "its bytes are those of another joint, too")
+        JointEvidence(joint.joint, None, None, None, "another joint has the same bytes")
         if joint.joint in shared
         else joint
         for joint in joints
@@ -222,13 +227,15 @@ def _of_joint(recording: Recording, joint: JointEvidence) -> list[Finding]:
     why = {"position": joint.lacks, "error": joint.lacks, "power": joint.lacks, "set_point": joint.lacks}
     if joint.pair is not None:
         share = f"{joint.pair.share:.1%} of readings"
-        why["position"] = f"12 bits without a jump while led; with the error it gives one set point in {share}"
+        why["position"] = (
+            f"12 bits without a jump while moved by hand; with the error it gives one set point in {share}"
+        )
         why["error"] = f"set point minus position in {share}, {joint.pair.delay * 1e3:+.1f} ms from it"
         why["set_point"] = _set_point_evidence(joint, base)
     if joint.power is not None:
         why["power"] = (
             f"{joint.power.gain:.2f} times the error up to its limit in {joint.power.share:.1%} of readings, "
-            f"by {joint.power.inside} different errors"
+            f"with {joint.power.inside} different errors"
         )
     found = []
     for name in ("position", "error", "power", "set_point"):
@@ -248,15 +255,15 @@ def _set_point_evidence(joint: JointEvidence, base: int) -> str:
         return "error + position is no set point in posture units"
     shown = ", ".join(map(str, found.postures))
     if found.place is not None:
-        return f"the only bytes that hold error + position in posture units after each switching-on: {shown}"
-    if len(set(found.postures)) < LEAST_EPOCHS:
+        return f"the only bytes that hold error + position in posture units after each power-up: {shown}"
+    if len(set(found.postures)) < LEAST_SET_POINTS:
         return f"only {len(set(found.postures))} different set points were seen ({shown})"
     low, high = (", ".join(f"{base + offset:04X}" for offset in column) or "none" for column in (found.low, found.high))
     return f"for {shown}: low byte {low}, high byte {high}"
 
 
 def _documented(name: str, joint: int, low: int, high: int | None) -> Verdict:
-    """Whether something found contradicts the source."""
+    """Whether a finding contradicts the source."""
     register = default_memory_map()[name]
     if register.provenance[joint - 1] != "documented" or register.high is None:
         return "found"
@@ -264,8 +271,10 @@ def _documented(name: str, joint: int, low: int, high: int | None) -> Verdict:
 
 
 def _gains(recording: Recording, joints: tuple[JointEvidence, ...], found: list[Finding]) -> list[Finding]:
-    """Gains are never changed by the controller, so a reading alone proves none: the best is a pattern of bytes that
-    holds the gains which errors and powers show."""
+    """Finds gains. The controller never changes them, so a reading alone proves none.
+
+    The best evidence is a pattern of bytes that holds the gains that errors and powers show.
+    """
     taken = {offset for one in found for offset in (one.low, one.high) if offset is not None}
     free = np.ones(recording.size, bool)
     free[[address - recording.base for address in taken]] = False
@@ -291,13 +300,13 @@ def _gains(recording: Recording, joints: tuple[JointEvidence, ...], found: list[
 
 
 def _shipped_gains(recording: Recording) -> Columns:
-    """Where the shipped map assumes the gains."""
+    """Returns the addresses of the gains in the shipped map."""
     p, i, d = (tuple(address - recording.base for address in default_memory_map()[f"gain_{g}"].low) for g in "pid")
     return p, i, d
 
 
 def _signals(recording: Recording, found: list[Finding]) -> list[Finding]:
-    """Process inputs by switching them; outputs and gripper only the host would change."""
+    """Finds process inputs by switching them. Only the host would change outputs and gripper."""
     result = []
     inputs = [stage for stage in recording.stages if stage.kind == "inputs"]
     at_rest = constants([stage for stage in recording.stages if stage.kind != "inputs"])
@@ -311,14 +320,21 @@ def _signals(recording: Recording, found: list[Finding]) -> list[Finding]:
     if place is not None:
         result.append(Finding("process_inputs", None, "found", recording.base + place, None, why))
     else:
-        result.append(Finding("process_inputs", None, "unknown", evidence=why if not inputs else "no byte, or several"))
+        result.append(
+            Finding(
+                "process_inputs",
+                None,
+                "unknown",
+                evidence=why if not inputs else "no byte followed them, or several did",
+            )
+        )
     taken = {address for one in [*found, *result] for address in (one.low, one.high)}
     for name in ("process_outputs", "gripper"):
         address = default_memory_map()[name].low[0]
-        why = "only the host changes it, so that no reading shows it"
+        why = "only the host changes it, so readings do not show it"
         if address not in taken and at_rest[address - recording.base] == 0:
-            why += "; what the shipped map assumes agrees with everything seen"
+            why += "; the shipped map's address agrees with all readings"
             result.append(Finding(name, None, "assumed", address, None, why))
         else:
-            result.append(Finding(name, None, "unknown", evidence=f"{why}; what the shipped map assumes is wrong"))
+            result.append(Finding(name, None, "unknown", evidence=f"{why}; the shipped map's address is wrong"))
     return result

@@ -1,4 +1,8 @@
-"""The registers of one joint, from everything that was recorded."""
+"""Finds the registers of one joint from a recording.
+
+A stage is a series of readings during one action. A power cycle is the time between two power-ups. A pair is the
+position and error registers of a joint. A joint is led when a person moves it by hand.
+"""
 
 from __future__ import annotations
 
@@ -22,15 +26,17 @@ from extras.commissioning.memory.relations import (
     stage_set_point,
 )
 
-LEAST_EPOCHS = 3
-"""Least number of different set points by which the bytes of a set point are told from others."""
+LEAST_SET_POINTS = 3
+"""Least number of different set points that identify the set-point bytes."""
 _SETTLED_STAGES: tuple[StageKind, ...] = ("power_up", "rest", "lead")
 
 
 @dataclass(frozen=True)
 class SetPointBytes:
-    """What could be a joint's set point: offsets of low and of high bytes, by `postures` (posture units) in as many
-    epochs."""
+    """Candidates for a joint's set point.
+
+    low, high: offsets of possible low and high bytes. postures: the set point (posture units) of each power cycle.
+    """
 
     low: tuple[int, ...]
     high: tuple[int, ...]
@@ -38,15 +44,16 @@ class SetPointBytes:
 
     @property
     def place(self) -> Place | None:
-        """The only possible place; None where there are several, or none, or too few postures to tell."""
-        if len(self.low) != 1 or len(self.high) != 1 or len(set(self.postures)) < LEAST_EPOCHS:
+        """The only possible place; None if there are several, or none, or too few postures to distinguish."""
+        if len(self.low) != 1 or len(self.high) != 1 or len(set(self.postures)) < LEAST_SET_POINTS:
             return None
+        # the high byte must have taken two values, or any byte that is constantly zero would match
         return None if len({posture >> 8 for posture in self.postures}) < 2 else Place(self.low[0], self.high[0])
 
 
 @dataclass(frozen=True)
 class JointEvidence:
-    """What the recording says about one joint. Each part is None where it is not clear; `lacks` says what to do."""
+    """Findings on one joint. Each part is None if it is not clear; `lacks` says what is missing."""
 
     joint: int
     pair: Pair | None
@@ -56,7 +63,7 @@ class JointEvidence:
 
 
 def joint_evidence(recording: Recording, joint: int) -> JointEvidence:
-    """Position, error, power and set point of a joint."""
+    """Returns position, error, power and set point of a joint."""
     if not recording.led(joint):
         return JointEvidence(joint, None, None, None, "it was not moved")
     stages = JointStages(recording, joint)
@@ -70,16 +77,16 @@ def joint_evidence(recording: Recording, joint: int) -> JointEvidence:
     limit = SAME_PERIOD * recording.period_s
     fits = [fit for fit in powers(stages, follow, pair, rate) if abs(fit.delay) <= limit]
     power = fits[0] if len(fits) == 1 else None
-    lacks = "" if power else f"{len(fits)} powers are possible" if fits else "no byte is in proportion to its error"
+    lacks = "" if power else f"{len(fits)} powers are possible" if fits else "no byte is proportional to its error"
     return JointEvidence(joint, pair, power, set_point_bytes(recording, joint, pair), lacks)
 
 
 def set_point_bytes(recording: Recording, joint: int, pair: Pair) -> SetPointBytes | None:
-    """Bytes that hold the set point in every epoch, and do not change within one."""
+    """Returns the bytes that hold the set point in every power cycle, and do not change within one."""
     low, high = np.ones(recording.size, bool), np.ones(recording.size, bool)
     postures = []
-    for epoch in recording.epochs:
-        stages = [stage for stage in recording.of_epoch(epoch) if stage.kind in _SETTLED_STAGES]
+    for power_cycle in recording.power_cycles:
+        stages = [stage for stage in recording.of_power_cycle(power_cycle) if stage.kind in _SETTLED_STAGES]
         own = [stage for stage in stages if stage.joint in (joint, None)]
         posture = posture_of(stage_set_point(own, pair))
         if posture is None:

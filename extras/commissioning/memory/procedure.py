@@ -1,8 +1,8 @@
-"""The way to a memory map: what a person does with the arm, what is read meanwhile, and what may be written.
+"""Procedure for finding a memory map: actions of a person, readings during them, and what may be written.
 
 Nothing is written before `prove_by_command`, and there only the low byte of a set point that the readings have proved.
-The emergency stop is pressed while the arm is moved by hand, and is released only when every error has been read to be
-small: a controller whose set points are elsewhere would move the arm there.
+The emergency stop is pressed while the arm is moved by hand. It is released only when every error reads as small: a
+controller with its set points elsewhere would move the arm there.
 """
 
 from __future__ import annotations
@@ -23,24 +23,25 @@ from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.units import ADC_COUNTS, POSTURE_UNITS
 
 AT_REST = 150
-"""Number of readings of a memory that rests: long enough for a counter of every period to run on by more than a joint
-at rest may."""
+"""Number of readings of a memory at rest. In that time a counter of every period runs on by more than a joint at rest
+may move.
+"""
 AFTER_POWER_UP = 30
 """Number of readings after switching on."""
 ALIVE_VALUES = 5
-"""Least number of different bytes in a memory that is alive: without supply it reads the same everywhere."""
+"""Least number of different bytes in a live memory: without supply it reads the same everywhere."""
 POWER_UP_S = 20.0
-"""Time (s) that a controller may take until its memory is alive after the person says that it is switched on."""
+"""Time (s) that a controller may need until its memory is live, after the person says that it is switched on."""
 ATTEMPTS = 3
-"""How often a joint is led before it is given up."""
-MOST_EPOCHS = 8
-"""How often the controller is switched on again before set points are given up."""
+"""How often a joint is led by hand before it is given up."""
+MOST_POWER_CYCLES = 8
+"""How often the controller is power-cycled before set points are given up."""
 QUARTERS = (128, 384, 640, 880)
-"""Postures (posture units) of which each has another high byte of the set point."""
+"""Postures (posture units) with different high bytes of the set point."""
 _WAYS = ((0, 1, 2, 3, 1, 2), (1, 2, 3, 0, 3, 0), (3, 0, 1, 2, 0, 1))
-"""The quarters of joints 1 to 6 at the first three switchings-on; then everybody moves on by one."""
+"""The quarters of joints 1 to 6 at the first three power-ups; later each moves on by one."""
 SAFE_ERROR = 12
-"""Largest error (ADC counts) with which the drives may have their power back: the arm will move by that much."""
+"""Largest error (ADC counts) with which the drives may get power: the arm will move by that much."""
 
 TaskKind = Literal[
     "rest",
@@ -65,12 +66,12 @@ TaskKind = Literal[
 
 @dataclass(frozen=True)
 class Task:
-    """Something that a person is asked to do.
+    """An action that a person is asked for.
 
-    joint:   the joint to be led
-    targets: postures (posture units) to which joints are to be brought, about
+    joint:   the joint to be led by hand
+    targets: approximate postures (posture units) for joints
     inputs:  bits of the process inputs that are to be on
-    again:   why it is asked for once more; empty the first time
+    again:   reason for asking again; empty the first time
     """
 
     kind: TaskKind
@@ -81,20 +82,21 @@ class Task:
 
 
 class Operator(Protocol):
-    """The person at the arm, or what stands in for one."""
+    """The person at the arm, or a stand-in."""
 
     def begin(self, task: Task) -> bool:
-        """Asks for something; returns when the person begins, or has done what needs no time. False: it cannot be
-        done."""
+        """Asks for an action; returns when the person begins, or has done one that takes no time. False: it cannot be
+        done.
+        """
 
     def finished(self) -> bool:
-        """Whether the person has finished what has begun."""
+        """Whether the person has finished the action."""
 
     def show(self, text: str) -> None:
-        """Tells something."""
+        """Shows a text."""
 
     def watch(self, postures: Mapping[int, int]) -> None:
-        """Shows where the joints are (posture units), as often as it is known."""
+        """Shows the present postures of the joints (posture units), whenever they are known."""
 
 
 class Page(Protocol):
@@ -105,19 +107,19 @@ class Page(Protocol):
     period_s: float
 
     def read(self) -> PageReading:
-        """All bytes. Raises LinkError."""
+        """Returns all bytes. Raises LinkError."""
 
     def read_byte(self, address: int) -> int:
-        """One byte."""
+        """Returns one byte."""
 
     def write_byte(self, address: int, value: int) -> None:
-        """Writes one byte. Only for addresses of which it is proved what they are."""
+        """Writes one byte. Only for addresses with a proved meaning."""
 
     def reconnect(self) -> bool:
-        """Takes the control again after the controller was switched on again; whether it says that it restarted."""
+        """Reconnects after a power cycle; returns whether the controller reports a restart."""
 
     def wait(self, seconds: float) -> None:
-        """Lets time pass."""
+        """Waits."""
 
 
 @dataclass
@@ -130,15 +132,15 @@ class Finder:
     keep: Callable[[Recording], None] = lambda _recording: None
     """Called after every stage, so that nothing is lost."""
     pressed: Callable[[bool], None] = lambda _pressed: None
-    """Told that the emergency stop is about to be pressed, or was not."""
+    """Called when the emergency stop is about to be pressed (True), or was not (False)."""
     recording: Recording = field(init=False)
-    epoch: int = 0
+    power_cycle: int = 0
 
     def __post_init__(self) -> None:
         self.recording = Recording(self.page.base, self.page.size, self.page.period_s)
 
     def find(self) -> Findings:
-        """Everything that can be found without writing."""
+        """Finds all that can be found without writing."""
         if not self._do(Task("rest")):
             return judge(self.recording)
         self._read("rest", None, AT_REST)
@@ -154,7 +156,7 @@ class Finder:
     # --- stages
 
     def _lead_all(self) -> list[JointEvidence]:
-        """Leads every joint once, which also shows what does not follow the others; then again those still unclear."""
+        """Has every joint led once by hand, to see which bytes follow each; then again those still unclear."""
         wanted = dict.fromkeys(range(1, JOINTS + 1), "")
         for _ in range(ATTEMPTS):
             for joint, lacks in wanted.items():
@@ -173,20 +175,20 @@ class Finder:
             self._read("inputs", bits, 8)
 
     def _switch_on(self, joints: Sequence[JointEvidence]) -> None:
-        """Set points by switching the controller off and on again at other postures, until their bytes are clear."""
+        """Finds set points by power cycles at other postures, until their bytes are clear."""
         known = {joint.joint: joint for joint in joints if joint.pair is not None}
         again = ""
-        while known and self.epoch < MOST_EPOCHS:
-            targets = {joint: _quarter(joint, self.epoch) for joint in known}
+        while known and self.power_cycle < MOST_POWER_CYCLES:
+            targets = {joint: _quarter(joint, self.power_cycle) for joint in known}
             if not self._do(Task("place", targets=targets, again=again)):
                 return
             self._watch_until_finished(known)
             if not switched_off_and_on(self.page, self.operator):
                 return
-            self.epoch += 1
+            self.power_cycle += 1
             self._read("power_up", None, AFTER_POWER_UP)
             open_joints = [joint for joint, one in known.items() if not self._has_set_point(one)]
-            if self.epoch >= 3 and not open_joints:
+            if self.power_cycle >= 3 and not open_joints:
                 return
             again = f"set points of joints {', '.join(map(str, open_joints))} are not clear yet" if open_joints else ""
 
@@ -200,7 +202,7 @@ class Finder:
             self.operator.watch(self.postures(known))
 
     def postures(self, known: Mapping[int, JointEvidence]) -> dict[int, int]:
-        """Where the joints are (posture units)."""
+        """Returns the present postures of the joints (posture units)."""
         pages = np.frombuffer(self.page.read().data, np.uint8)[None, :]
         return {
             joint: int(position_of(pages, one.pair.position)[0] * POSTURE_UNITS / ADC_COUNTS)
@@ -216,26 +218,26 @@ class Finder:
         readings = [self.page.read()]
         while len(readings) < count if count else not self.operator.finished():
             readings.append(self.page.read())
-        self.recording.stages.append(Stage.of(kind, joint, self.epoch, readings))
+        self.recording.stages.append(Stage.of(kind, joint, self.power_cycle, readings))
         self.keep(self.recording)
 
 
-def _quarter(joint: int, epoch: int) -> int:
-    """About where (posture units) a joint is to be at a switching-on: no two joints go the same way."""
-    return QUARTERS[(_WAYS[epoch % len(_WAYS)][joint - 1] + epoch // len(_WAYS)) % len(QUARTERS)]
+def _quarter(joint: int, power_cycle: int) -> int:
+    """Returns an approximate posture (posture units) for a joint at a power-up: no two joints change alike."""
+    return QUARTERS[(_WAYS[power_cycle % len(_WAYS)][joint - 1] + power_cycle // len(_WAYS)) % len(QUARTERS)]
 
 
 def errors_now(page: Page, joints: Sequence[JointEvidence]) -> dict[int, int]:
-    """The errors (ADC counts) of the joints whose error is known: the median of a few readings."""
+    """Returns the errors (ADC counts) of the joints whose error is known: the median of a few readings."""
     pages = np.frombuffer(b"".join(page.read().data for _ in range(5)), np.uint8).reshape(5, -1)
     return {one.joint: int(np.median(signed_of(pages, one.pair.error))) for one in joints if one.pair is not None}
 
 
 def may_have_power(errors: Mapping[int, int]) -> str:
-    """Why the drives may not have their power back yet; empty if they may."""
+    """Returns why the drives may not get power yet; empty if they may."""
     if len(errors) < JOINTS:
         known = ", ".join(map(str, errors)) or "none"
-        return f"the error of every joint must be known before the drives may have power; known: {known}"
+        return f"the error of every joint must be known before the drives may get power; known: {known}"
     far = [f"joint {joint}: {error}" for joint, error in errors.items() if abs(error) > SAFE_ERROR]
     if far:
         return f"errors above {SAFE_ERROR} ADC counts, the arm would jump: {'; '.join(far)}"
@@ -248,8 +250,10 @@ def is_alive(data: bytes) -> bool:
 
 
 def switched_off_and_on(page: Page, operator: Operator, kind: TaskKind = "switch_off_and_on") -> bool:
-    """Has the controller switched off and on, and reads meanwhile. It is asked for again until the memory was seen
-    without supply, or the controller says that it restarted, and the memory is alive. False: the person cannot."""
+    """Has the controller power-cycled, and reads meanwhile; False if the person cannot do it.
+
+    It asks again until the memory was seen without supply, or the controller reports a restart, and the memory is live.
+    """
     again = ""
     while operator.begin(Task(kind, again=again)):
         was_off = not _reads_alive(page)
@@ -269,12 +273,12 @@ def switched_off_and_on(page: Page, operator: Operator, kind: TaskKind = "switch
             restarted = alive = False
         if alive and (was_off or restarted):
             return True
-        again = "the memory is not alive" if not alive else "no interruption of the supply was seen"
+        again = "the memory is not live" if not alive else "no interruption of the supply was seen"
     return False
 
 
 def _reads_alive(page: Page) -> bool:
-    """Whether the memory can be read, and is alive. A bridge that hangs on the same supply does not answer."""
+    """Whether the memory can be read, and is live. A bridge with the same supply does not answer."""
     try:
         return is_alive(page.read().data)
     except DaqError:
@@ -285,8 +289,10 @@ def _reads_alive(page: Page) -> bool:
 
 
 def release(page: Page, operator: Operator, against: Callable[[], str]) -> str:
-    """Has the emergency stop released while `against`, asked again and again, has nothing against it. Why it may still
-    be pressed, or has to be pressed again; empty after a release that went well."""
+    """Has the emergency stop released once `against` returns no objection; `against` is called repeatedly.
+
+    Returns why it stays pressed, or must be pressed again; empty after a safe release.
+    """
     if why := against():
         return f"the emergency stop stays pressed: {why}"
     if not operator.begin(Task("hold_for_release")):

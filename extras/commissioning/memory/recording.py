@@ -1,4 +1,4 @@
-"""Readings of the whole shared memory, kept by what was done to the arm meanwhile."""
+"""Readings of the whole shared memory, kept by the action during them."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ class PageReading:
 
 @dataclass(frozen=True)
 class Stage:
-    """Readings during which one thing was done.
+    """Readings during one action.
 
-    kind:  rest, or a joint led by hand, or the rest after the controller was switched on again, or inputs switched
+    kind:  rest, or a joint led by hand, or the rest after a power-up, or inputs switched
     joint: the joint that was led, or the number of the inputs that were on; None for all else
-    epoch: how often the controller had been switched on again before
+    power_cycle: number of power-ups before
     pages: (n, size)
     times: (n,) in s
     """
 
     kind: StageKind
     joint: int | None
-    epoch: int
+    power_cycle: int
     pages: Pages
     times: NDArray[np.float64]
 
     @staticmethod
-    def of(kind: StageKind, joint: int | None, epoch: int, readings: list[PageReading]) -> Stage:
-        """The readings as arrays."""
+    def of(kind: StageKind, joint: int | None, power_cycle: int, readings: list[PageReading]) -> Stage:
+        """Returns a stage with the readings as arrays."""
         pages = np.frombuffer(b"".join(r.data for r in readings), np.uint8).reshape(len(readings), -1)
-        return Stage(kind, joint, epoch, pages, np.array([r.time_s for r in readings]))
+        return Stage(kind, joint, power_cycle, pages, np.array([r.time_s for r in readings]))
 
 
 @dataclass
@@ -54,18 +54,18 @@ class Recording:
     stages: list[Stage] = field(default_factory=list)
 
     def led(self, joint: int) -> list[Stage]:
-        """The stages in which a joint was led."""
+        """Returns the stages in which a joint was led by hand."""
         return [stage for stage in self.stages if stage.kind == "lead" and stage.joint == joint]
 
     def undisturbed(self, joint: int) -> list[Stage]:
-        """The stages in which a joint rested."""
+        """Returns the stages in which a joint rested."""
         return [stage for stage in self.stages if stage.joint != joint and stage.kind != "inputs"]
 
     @property
-    def epochs(self) -> list[int]:
-        """The epochs, ascending."""
-        return sorted({stage.epoch for stage in self.stages})
+    def power_cycles(self) -> list[int]:
+        """The power cycles, ascending."""
+        return sorted({stage.power_cycle for stage in self.stages})
 
-    def of_epoch(self, epoch: int) -> list[Stage]:
-        """The stages of an epoch."""
-        return [stage for stage in self.stages if stage.epoch == epoch]
+    def of_power_cycle(self, power_cycle: int) -> list[Stage]:
+        """Returns the stages of a power cycle."""
+        return [stage for stage in self.stages if stage.power_cycle == power_cycle]

@@ -1,10 +1,13 @@
-"""How the quantities of one joint give themselves away.
+"""Finds the quantities of one joint by relations between them.
 
-A position is a number of 12 bits that runs without jumps while its joint is led; error + position stays the set point,
-from one switching-on to the next, and right after that the error is next to nothing; a power is the error times P up
-to the limits of 8 bits. Each reading may be torn, and its bytes are up to a few periods apart: so a relation has to
-hold in nearly all readings, with an allowance for what the joint moves meanwhile. What holds with a delay of a period
-is a copy of the period before, and not the quantity itself.
+- A position has 12 bits and changes without jumps while its joint is led by hand.
+- Error + position is the set point. It is constant from one power-up to the next, and right after a power-up the error
+  is almost 0.
+- A power is the error times P, up to the limits of 8 bits.
+
+Each reading may be torn, and its bytes may be a few periods apart. So a relation must hold in nearly all readings, with
+a tolerance for the joint's motion meanwhile. A relation that holds with a delay of one period belongs to a copy of the
+last period, not to the quantity itself.
 """
 
 from __future__ import annotations
@@ -22,37 +25,41 @@ from firmware_protocol.units import ADC_COUNTS, counts_to_posture, posture_to_co
 Numbers = NDArray[np.float64]
 
 SIXTEEN_BITS = 0x10000
-"""After which a value of two bytes begins anew."""
+"""Modulus of a value of two bytes."""
 HOLDS = 0.95
 """Least share of readings in which a relation must hold; the others may be torn."""
 WIDEST = 80.0
-"""Largest allowance (ADC counts): less than a third of what a wrong high byte would be off by."""
+"""Largest tolerance (ADC counts): less than a third of the error of a wrong high byte."""
 MOSTLY = 0.75
-"""Least share of readings that are not torn; a fast movement reads many a position with its high byte of the period
-before or after. Between two readings a joint may move by half a turn of its low byte, 128 counts: at 50 readings a
-second by 6000 counts/s, its whole range in 0.7 s."""
+"""Least share of readings that are not torn: during a fast movement many positions have their high byte from the period
+before or after. Between two readings a joint may move by half a turn of its low byte, 128 counts: at 50 readings per
+second by 6000 counts/s, its whole range in 0.7 s.
+"""
 GAP = 3.5
 """Longest time between two readings, in control periods, over which a movement is followed: half a turn of a low byte
 at 1800 counts/s."""
 LEAST_TRAVEL = 400
-"""Least travel (ADC counts) of a led joint from which its bytes are told apart; 256 are one turn of a low byte."""
+"""Least travel (ADC counts) of a led joint at which its bytes can be distinguished; 256 are one turn of a low byte."""
 NOISE = 2.5
 """Largest difference (ADC counts) between two readings of a joint at rest, from noise and rounding."""
 SAME_PERIOD = 0.4
-"""Largest delay, in control periods, of what belongs to the same period; a copy of the last one has a delay of 1."""
+"""Largest delay, in control periods, of values that belong to the same period; a copy of the last one has a delay
+of 1.
+"""
 SETTLED = 60
-"""Largest error (ADC counts) of an arm that its drives hold, or whose set points are the posture at switching on: 4
-degrees of a major axis, by which its load may pull it down."""
+"""Largest error (ADC counts) of an arm that its drives hold, or whose set points are the posture at power-up: 4 degrees
+of a major axis, by which its load may pull it down.
+"""
 LEAST_INSIDE = 12
-"""Least number of different errors, inside the limits of a register, by which it is judged."""
+"""Least number of different errors, inside the limits of a register, for a judgement."""
 STILL = 20.0
-"""Rate (ADC counts/s) below which a joint counts as still: less than half a count a period."""
+"""Rate (ADC counts/s) below which a joint counts as still: less than half a count per period."""
 LEAST_GAIN = 0.3
-"""Least ratio of power to error; the adjustable P is a whole number from 1 on."""
+"""Least ratio of power to error; the adjustable P is a whole number of at least 1."""
 
 
 _APART = 3
-"""Number of readings before and after one by which its rate is measured."""
+"""Number of readings before and after one that give its rate."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +72,10 @@ class Place:
 
 @dataclass(frozen=True)
 class Pair:
-    """Position and error of one joint, as one hypothesis. `share` is that of readings in which both agree with one set
-    point, `delay` (s) how far the error lags behind."""
+    """Position and error of one joint, as one hypothesis.
+
+    `share`: of readings in which both agree with one set point. `delay` (s): of the error.
+    """
 
     position: Place
     error: Place
@@ -76,8 +85,10 @@ class Pair:
 
 @dataclass(frozen=True)
 class PowerFit:
-    """A power of one joint, as a hypothesis: `gain` is DAC counts per ADC count of error, `inside` the number of
-    different errors below the limit."""
+    """A power of one joint, as a hypothesis.
+
+    `gain`: DAC counts per ADC count of error. `inside`: number of different errors below the limit.
+    """
 
     place: Place
     gain: float
@@ -87,20 +98,20 @@ class PowerFit:
 
 
 def position_of(pages: Pages, place: Place) -> Numbers:
-    """Position (ADC counts): 12 bits; the four bits above may be anything."""
+    """Returns the position (ADC counts): 12 bits; the four bits above may have any value."""
     assert place.high is not None
     return (pages[:, place.low] + 256.0 * (pages[:, place.high] & 0x0F)).astype(np.float64)
 
 
 def signed_of(pages: Pages, place: Place) -> Numbers:
-    """A signed value of one byte or two."""
+    """Returns a signed value of one byte or two."""
     if place.high is None:
         return pages[:, place.low].astype(np.int8).astype(np.float64)
     return (pages[:, place.low] + 256 * pages[:, place.high].astype(np.int16)).astype(np.int16).astype(np.float64)
 
 
 class JointStages:
-    """What one joint did while it was led, in the form that the relations need."""
+    """Readings of one joint while it was led by hand, in the form that the relations need."""
 
     def __init__(self, recording: Recording, joint: int) -> None:
         self.led = recording.led(joint)
@@ -110,13 +121,13 @@ class JointStages:
         gaps = np.diff(self.times) > GAP * recording.period_s
         within = np.cumsum([len(stage.times) for stage in self.led])[:-1]
         self.ends = np.union1d(np.flatnonzero(gaps) + 1, within)
-        """Where readings do not follow one another: a new stage, or a pause of the computer."""
+        """Where readings are not consecutive: a new stage, or a pause of the computer."""
         self._continuous: dict[int, Numbers] = {}
 
     def rate(self, values: Numbers) -> Numbers:
-        """Counts per s at each reading, from readings before and after it; 0 at the ends of a stage.
+        """Returns counts per s at each reading, from readings before and after it; 0 at the ends of a stage.
 
-        The readings are far enough apart that it matters little how many periods lie between them.
+        These readings are far enough apart that the number of periods between them matters little.
         """
         rates, wide = np.zeros_like(values), 2 * _APART
         for part in np.split(np.arange(len(values)), self.ends):
@@ -126,12 +137,14 @@ class JointStages:
         return rates
 
     def pace(self, rate: Numbers) -> Numbers:
-        """The fastest rate (counts/s) around each reading, without its sign: what readings may differ by follows it."""
+        """Returns the largest absolute rate (counts/s) near each reading; it determines by how much readings may
+        differ.
+        """
         padded = np.pad(np.abs(rate), 2 * _APART, mode="edge")
         return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4 * _APART + 1).max(axis=1))
 
     def continuous(self, low: int) -> Numbers:
-        """A low byte without its turns: a number that runs on, from 0 in each stage."""
+        """Returns a low byte without its wraps: a number that runs on, from 0 in each stage."""
         if low not in self._continuous:
             parts = np.split(self.pages[:, low].astype(np.int64), self.ends)
             steps = [(np.diff(part, prepend=part[:1]) + 128) % 256 - 128 for part in parts]
@@ -139,21 +152,23 @@ class JointStages:
         return self._continuous[low]
 
     def off_track(self, low: int, values: Numbers, turn: int) -> Numbers:
-        """By how much values, which begin anew after `turn`, are off what their low byte alone says: a multiple of 256
-        where the high byte is wrong, or of another period."""
+        """Returns by how much values modulo `turn` differ from those that their low byte alone gives.
+
+        The difference is a multiple of 256 if the high byte is wrong, or of another period.
+        """
         off = values - self.continuous(low)
         parts = [part - np.median(part) for part in np.split(off, self.ends)]
         return np.asarray((np.concatenate(parts) + turn / 2) % turn - turn / 2)
 
     def is_whole(self, place: Place, values: Numbers, turn: int) -> bool:
-        """Whether low and high byte belong together: the high byte changes when the low byte turns."""
+        """Whether low and high byte belong together: the high byte changes when the low byte wraps."""
         if np.ptp(self.continuous(place.low)) < LEAST_TRAVEL:
             return False
         return float(np.mean(np.abs(self.off_track(place.low, values, turn)) < 128)) >= MOSTLY
 
 
 def positions(stages: JointStages, follow: Followers) -> list[Place]:
-    """Every pair of bytes that could be a position."""
+    """Returns every pair of bytes that may be a position."""
     places = (Place(low, high) for low in follow.low for high in follow.high if low != high)
     return [place for place in places if stages.is_whole(place, position_of(stages.pages, place), ADC_COUNTS)]
 
@@ -169,20 +184,20 @@ def _errors(stages: JointStages, follow: Followers) -> Iterator[Place]:
 
 
 def _inside(values: Numbers) -> tuple[NDArray[np.bool_], float, float]:
-    """Which values are not at a limit of their register, and the limits that they reach."""
+    """Returns which values are not at a limit of their register, and the limits that they reach."""
     lowest, highest = float(values.min()), float(values.max())
     return (values > lowest + 2) & (values < highest - 2), lowest, highest
 
 
 def _near_turn(values: Numbers, tolerance: Numbers) -> NDArray[np.bool_]:
-    """Where a value is so close to a multiple of 256 that its high byte may be of another period than its low byte."""
+    """Returns where a value is so close to a multiple of 256 that its bytes may be of different periods."""
     over = values % 256
     result: NDArray[np.bool_] = np.minimum(over, 256 - over) <= tolerance
     return result
 
 
 def _delay(difference: Numbers, rate: Numbers) -> float:
-    """How far (s) something lags behind, if it differs by `difference` while its quantity changes at `rate`."""
+    """Returns the delay (s) of a copy that differs by `difference` while its quantity changes at `rate`."""
     moving = np.abs(rate) > STILL
     if moving.sum() < 8:
         return float("inf")
@@ -192,7 +207,7 @@ def _delay(difference: Numbers, rate: Numbers) -> float:
 
 
 def set_point_counts(stage_pages: Pages, position: Place, error: Place) -> float:
-    """The set point (ADC counts) by error + position, where the error is inside its limits."""
+    """Returns the set point (ADC counts) by error + position, where the error is inside its limits."""
     e = signed_of(stage_pages, error)
     total = position_of(stage_pages, position) + e
     inside = np.abs(e) < 120
@@ -200,7 +215,7 @@ def set_point_counts(stage_pages: Pages, position: Place, error: Place) -> float
 
 
 def pairs(stages: JointStages, follow: Followers) -> list[Pair]:
-    """Every position and error that belong together."""
+    """Returns every position and error that belong together."""
     found = []
     allowance = 2.0 * stages.recording.period_s
     errors = [(place, signed_of(stages.pages, place)) for place in _errors(stages, follow)]
@@ -228,24 +243,24 @@ def pairs(stages: JointStages, follow: Followers) -> list[Pair]:
 
 
 def _settles(recording: Recording, error: Place) -> bool:
-    """Whether the error is small while the drives hold the arm, and right after each switching-on at other postures.
+    """Whether the error is small while the drives hold the arm, and right after each power-up at other postures.
 
-    Without it position and error could be taken for one another.
+    Without this, position and error could be exchanged.
     """
     starts = [stage for stage in recording.stages if stage.kind in ("rest", "power_up")]
     return all(abs(float(np.median(signed_of(stage.pages, error)))) <= SETTLED for stage in starts)
 
 
 def _low_delay(stages: JointStages, one: int, other: int) -> float:
-    """How far (s) the low byte `other` lags behind `one`."""
+    """Returns the delay (s) of the low byte `other` behind `one`."""
     difference = (stages.pages[:, one].astype(np.float64) - stages.pages[:, other] + 128) % 256 - 128
     return _delay(difference, stages.rate(stages.continuous(one)))
 
 
 def _high_delay(stages: JointStages, place: Place, values: Numbers, turn: int) -> float:
-    """How far (s) the high byte of values, which begin anew after `turn`, lags behind the low byte.
+    """Returns the delay (s) of the high byte of values modulo `turn` behind the low byte.
 
-    A high byte that is late is wrong by 256 for as long as it is late, after each turn of the low byte.
+    A late high byte is wrong by 256 for that time, after each wrap of the low byte.
     """
     rate = stages.rate(stages.continuous(place.low))
     squares = float((rate**2).sum())
@@ -255,10 +270,10 @@ def _high_delay(stages: JointStages, place: Place, values: Numbers, turn: int) -
 
 
 def newest_pair(stages: JointStages, candidates: list[Pair], period_s: float) -> Pair | None:
-    """The pair whose bytes are all of the present period; None unless all others are clearly older, or torn.
+    """Returns the pair whose bytes are all of the present period; None unless all others are clearly older, or torn.
 
-    The low byte of the position is the one that is ahead of all others by most of a period; its high byte and the
-    error are those that are neither ahead nor behind.
+    The low byte of the position is the one that is ahead of all others by most of a period; its high byte and the error
+    are neither ahead nor behind.
     """
     limit = SAME_PERIOD * period_s
     lows = sorted({pair.position.low for pair in candidates})
@@ -279,7 +294,7 @@ def newest_pair(stages: JointStages, candidates: list[Pair], period_s: float) ->
 
 
 def powers(stages: JointStages, follow: Followers, pair: Pair, position_rate: Numbers) -> list[PowerFit]:
-    """Every byte that could be the power of the joint whose position and error are known."""
+    """Returns every byte that may be the power of the joint whose position and error are known."""
     error = signed_of(stages.pages, pair.error)
     period = stages.recording.period_s
     pace = stages.pace(position_rate)
@@ -306,7 +321,7 @@ def powers(stages: JointStages, follow: Followers, pair: Pair, position_rate: Nu
 
 
 def _ratio(power: Numbers, error: Numbers) -> float:
-    """The ratio of power to error that most readings agree on."""
+    """Returns the ratio of power to error on which most readings agree."""
     clear = np.abs(error) >= 4
     if clear.sum() < 6:
         return 0.0
@@ -314,7 +329,7 @@ def _ratio(power: Numbers, error: Numbers) -> float:
 
 
 def posture_of(counts: float) -> int | None:
-    """The set point (posture units) whose counts these are; None where no posture has these counts."""
+    """Returns the set point (posture units) with these counts; None if no posture has them."""
     whole = round(counts)
     if not 0 <= whole < ADC_COUNTS:
         return None
@@ -323,5 +338,5 @@ def posture_of(counts: float) -> int | None:
 
 
 def stage_set_point(stages: list[Stage], pair: Pair) -> float:
-    """The set point (ADC counts) in stages of one epoch."""
+    """Returns the set point (ADC counts) in stages of one power cycle."""
     return set_point_counts(np.concatenate([stage.pages for stage in stages]), pair.position, pair.error)

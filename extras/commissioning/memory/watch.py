@@ -1,4 +1,4 @@
-"""What changes in the memory, how fast, and what changes together."""
+"""Reports which bytes of the memory change, how fast, and together with which others."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import numpy as np
 from extras.commissioning.memory.recording import PageReading
 
 TOGETHER = 0.8
-"""Least share of changes in common with which two bytes count as changing together."""
+"""Least share of common changes of two bytes that count as changing together."""
 LEAST_CHANGES = 4
-"""Least number of changes by which that is judged."""
+"""Least number of changes for that judgement."""
 
 
 @dataclass(frozen=True)
 class WatchedByte:
-    """One byte of the memory over the readings that are looked at.
+    """One byte of the memory over a series of readings.
 
-    rate:     changes a second
-    together: addresses of other bytes that change at the same moments
+    rate:     changes per second
+    together: addresses of other bytes that change at the same times
     """
 
     address: int
@@ -33,7 +33,7 @@ class WatchedByte:
     together: tuple[int, ...]
 
     def as_data(self) -> dict[str, Any]:
-        """Plain data for JSON; addresses in hexadecimal."""
+        """Returns plain data for JSON; addresses in hexadecimal."""
         return {
             "address": f"{self.address:04X}",
             "value": self.value,
@@ -46,7 +46,7 @@ class WatchedByte:
 
 
 def watched(base: int, readings: Sequence[PageReading]) -> list[WatchedByte]:
-    """Every byte, in order, from readings that follow one another."""
+    """Returns every byte, in order, from consecutive readings."""
     pages = np.frombuffer(b"".join(r.data for r in readings), np.uint8).reshape(len(readings), -1)
     changed = np.diff(pages.astype(np.int16), axis=0) != 0
     counts = changed.sum(axis=0)

@@ -1,1 +1,1 @@
-"""What the steps do with an arm, and with the person beside it."""
+"""Access to the arm, and communication with the person beside it."""

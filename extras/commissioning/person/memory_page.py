@@ -1,7 +1,7 @@
-"""The shared memory of a controller at a port, read and written by peek and poke alone.
+"""Reads and writes a controller's shared memory at a port, by peek and poke alone.
 
-The bridge carries out other requests by its own memory map, which is what is to be found out. Of these only the
-release of a stop is used, which touches no memory.
+The bridge carries out other requests by its own memory map, which is still to be found. Of these only the release of a
+stop is used, which touches no memory.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ if TYPE_CHECKING:
     from firmware_protocol.memory_map import MemoryMap
 
 APART = 0.8
-"""Least time from one reading of the memory to the next, in control periods: nothing new comes more often."""
+"""Least time between two readings of the memory, in control periods: values do not change more often."""
 
 
 class UnprovedWriteError(SafetyError):
-    """A write to an address of which it is not proved what it is."""
+    """A write to an address whose meaning is not proved."""
 
 
 @dataclass
@@ -61,11 +61,11 @@ class LinkPage:
 
     @property
     def simulated(self) -> bool:
-        """Whether no arm is behind it."""
+        """Whether it is a mock."""
         return Capability.SIMULATED in Capability(self.hello.capabilities)
 
     def read(self) -> PageReading:
-        """All bytes, in as few requests as possible. Raises LinkError, RequestRefusedError."""
+        """Reads all bytes, in as few requests as possible. Raises LinkError, RequestRefusedError."""
         self.clock.sleep_until(self._next_s)
         end = self.base + self.size
         requests = [ReadBlock(start, min(MAX_PAYLOAD, end - start)) for start in range(self.base, end, MAX_PAYLOAD)]
@@ -81,7 +81,7 @@ class LinkPage:
         return PageReading((begun + self.clock.now()) / 2, bytes(data))
 
     def read_byte(self, address: int) -> int:
-        """One byte."""
+        """Returns one byte."""
         return self.link.request(ReadBlock(address, 1), Block).data[0]
 
     def prove(self, addresses: Iterable[int]) -> None:
@@ -91,11 +91,13 @@ class LinkPage:
     def write_byte(self, address: int, value: int) -> None:
         """Writes one byte. Raises UnprovedWriteError."""
         if address not in self.proved:
-            raise UnprovedWriteError(f"{address:04X}: it is not proved what this byte is; nothing was written")
+            raise UnprovedWriteError(f"{address:04X}: the meaning of this byte is not proved; nothing was written")
         self.link.request(WriteBlock(address, bytes((value,))), BlockWritten)
 
     def release_freeze(self, may: Callable[[], bool]) -> bool:
-        """Releases a stop that is in force, if it `may` be; whether none is. Writes nothing to the memory."""
+        """Releases an active stop, if `may()` allows it; returns whether none is active. Writes nothing to the
+        memory.
+        """
         status = self.link.request(ReadStatus(), Status)
         if not status.status & StatusFlag.FROZEN:
             return True
@@ -105,7 +107,7 @@ class LinkPage:
         return True
 
     def reconnect(self) -> bool:
-        """Greets the controller again; whether it has been reset since."""
+        """Greets the controller again; returns whether it has been reset since."""
         before = self.hello.boots
         self.hello = self._greet()
         if isinstance(self.clock, LockStepClock):
@@ -113,7 +115,7 @@ class LinkPage:
         return self.hello.boots != before
 
     def wait(self, seconds: float) -> None:
-        """Sleeps, or lets the mock's time pass."""
+        """Sleeps, or advances the mock's time."""
         self.clock.sleep_until(self.clock.now() + seconds)
 
     def _greet(self) -> HelloReply:
@@ -122,6 +124,6 @@ class LinkPage:
 
 @contextmanager
 def open_page(url: str, memory_map: MemoryMap) -> Iterator[LinkPage]:
-    """The memory at a port, as large as a memory map says. Raises TransportError, LinkError."""
+    """Opens the memory at a port, of the size in a memory map. Raises TransportError, LinkError."""
     with Link.open(url) as link:
         yield LinkPage(link, memory_map.base, memory_map.size)

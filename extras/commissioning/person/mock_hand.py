@@ -1,4 +1,4 @@
-"""A stand-in for the person at the arm: does with a mock what the procedure asks a person to do with a real arm."""
+"""Acts as the person at the arm: does with a mock what the procedure asks of a person."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from daq.contracts.machine import Machine
 from extras.commissioning.memory.procedure import Task
 
 WIGGLE = ((35, 0.4), (-35, 0.7), (20, 0.5), (-12, 0.4), (0, 0.2))
-"""Posture units from where the joint is, and seconds to get there: slow, about the set point, for the power."""
+"""Posture units from the present posture, and seconds to get there: slow, about the set point, for the power."""
 SWEEP = ((60, 1.2), (940, 2.0))
 """Posture units, and seconds to get there: most of the range."""
 
@@ -24,7 +24,7 @@ SWEEP = ((60, 1.2), (940, 2.0))
 IN_REAL_TIME = 2.5
 """Factor by which a mock's arm is led more slowly through its control port, where this computer may pause."""
 PLACES = (0, 10, 5, 2, 8, 4, 6, 1, 9, 3, 7)
-"""Postures of a protractor, in tenths of the range that is led through: the first of them span it."""
+"""Postures for a protractor, in tenths of the range: the first of them span it."""
 
 
 End = Literal["low", "high"]
@@ -32,16 +32,16 @@ End = Literal["low", "high"]
 
 
 class MockArm(Protocol):
-    """What a mock offers to somebody who stands beside it."""
+    """Actions of a person beside a mock."""
 
     def now(self) -> float:
-        """Time in s, that of the mock."""
+        """Returns the mock's time in s."""
 
     def emergency_stop(self, *, pressed: bool) -> Mapping[int, float]:
-        """Presses or releases it; where the joints are (degrees), as somebody beside the arm sees."""
+        """Presses or releases the emergency stop; returns the joints' angles (degrees)."""
 
     def lead(self, to: Mapping[int, float | End], seconds: float) -> Mapping[int, float]:
-        """Moves joints by hand to angles (degrees) or to an end stop; the angles."""
+        """Moves joints by hand to angles (degrees) or to an end stop; returns the angles."""
 
     def switch_off_and_on(self) -> None:
         """Interrupts the controller's supply."""
@@ -52,27 +52,29 @@ class MockArm(Protocol):
 
 @dataclass
 class MockOperator:
-    """Carries out the tasks of a search on a mock. Postures are true angles in the stated calibration's units, since a
-    person sees where the arm is, whatever its sensors say."""
+    """Carries out the tasks of a search on a mock.
+
+    Postures are true angles in the stated calibration's units, since a person sees the arm, whatever its sensors read.
+    """
 
     arm: MockArm
     machine: Machine
     slow: float = 1.0
     """Factor on all times of a movement."""
     tell: Callable[[str], None] = lambda _text: None
-    """Told what is done, and everything that a person would be shown."""
+    """Receives the actions, and all texts for a person."""
     postures: dict[int, float] = field(default_factory=dict)
     _path: list[tuple[dict[int, float | End], float]] = field(default_factory=list)
     _until: float = 0.0
     _before: dict[int, float] = field(default_factory=dict)
 
     def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
-        """It always may."""
+        """Always returns True."""
         del at_the_arm, yes
         return True
 
     def begin(self, task: Task) -> bool:
-        """Begins a task; everything can be done."""
+        """Begins a task; every task can be done."""
         self._path, self._until = [], self.arm.now()
         self.tell(f"    the mock's hand: {task.kind.replace('_', ' ')}{'' if task.joint is None else f' {task.joint}'}")
         if task.kind == "press_emergency_stop":
@@ -94,7 +96,7 @@ class MockOperator:
         return True
 
     def _led(self, task: Task, joint: int) -> list[tuple[dict[int, float | End], float]]:
-        """Where a joint is led, and within what time (s)."""
+        """Returns the angles to which a joint is led, and times (s)."""
         here = self.postures[joint]
         if task.kind == "lead":
             centre = min(max(here, 60.0), 940.0)
@@ -110,7 +112,7 @@ class MockOperator:
         return [({joint: self._before[joint]}, 2.0)] if task.kind == "bring_back" else []
 
     def finished(self) -> bool:
-        """Goes on to the next part of a movement when one is done."""
+        """Continues with the next part of a movement when one is done."""
         if self.arm.now() < self._until:
             return False
         if not self._path:
@@ -124,7 +126,7 @@ class MockOperator:
         return False
 
     def read_angle(self, joint: int, number: int, wait: Callable[[float], None]) -> float | None:
-        """Moves a joint by hand to posture `number` (from 1) of its range; the angle, read to half a degree."""
+        """Moves a joint by hand to posture `number` (from 1) of its range; returns the angle, read to half a degree."""
         to = 100.0 + 80.0 * PLACES[(number - 1) % len(PLACES)]
         self._path, self._until = [({joint: to}, 1.0)], self.arm.now()
         while not self.finished():
@@ -133,11 +135,11 @@ class MockOperator:
         return round(2 * self._degrees(joint, to)) / 2
 
     def show(self, text: str) -> None:
-        """Passes it on."""
+        """Passes the text on."""
         self.tell(text)
 
     def watch(self, postures: Mapping[int, int]) -> None:
-        """Nobody looks."""
+        """Does nothing."""
 
     def _degrees(self, joint: int, posture: float) -> float:
         return math.degrees(self.machine.calibration(joint).posture_to_rad(posture))
@@ -148,15 +150,17 @@ class MockOperator:
 
 
 class MockRefusedError(DaqError):
-    """The mock did not do what it was asked to."""
+    """The mock did not carry out a command."""
 
 
 @contextmanager
 def mock_operator(
     control: str, machine: Machine, tell: Callable[[str], None], *, lock_step: bool
 ) -> Iterator[MockOperator]:
-    """The stand-in at a mock's control port; unhurried where the mock follows the clock. `tell` is told what it does.
-    Raises SpecError."""
+    """Yields the stand-in at a mock's control port; it takes its time if the mock follows the clock. Raises SpecError.
+
+    `tell` receives its actions.
+    """
     arm = ControlPortArm(control)
     try:
         yield MockOperator(arm, machine, 1.0 if lock_step else IN_REAL_TIME, tell)
@@ -178,20 +182,20 @@ class ControlPortArm:
         self._lines = self._socket.makefile("rb")
 
     def ask(self, command: str, **values: object) -> dict[str, Any]:
-        """The answer to one command. Raises MockRefusedError."""
+        """Returns the answer to one command. Raises MockRefusedError."""
         self._socket.sendall(json.dumps({"do": command, **values}).encode() + b"\n")
         line = self._lines.readline()
-        answer: dict[str, Any] = json.loads(line) if line else {"ok": False, "error": "it has ended"}
+        answer: dict[str, Any] = json.loads(line) if line else {"ok": False, "error": "the mock has ended"}
         if not answer["ok"]:
             raise MockRefusedError(f"the mock refused {command}: {answer['error']}")
         return answer
 
     def now(self) -> float:
-        """The board's time in s."""
+        """Returns the board's time in s."""
         return float(self.ask("state")["time_us"]) * 1e-6
 
     def emergency_stop(self, *, pressed: bool) -> Mapping[int, float]:
-        """Presses or releases it."""
+        """Presses or releases the emergency stop."""
         degrees = self.ask("emergency_stop", pressed=pressed)["degrees"]
         return {int(joint): float(angle) for joint, angle in degrees.items()}
 
@@ -209,6 +213,6 @@ class ControlPortArm:
         self.ask("inputs", bits=bits)
 
     def close(self) -> None:
-        """Ends the connection."""
+        """Closes the connection."""
         self._lines.close()
         self._socket.close()

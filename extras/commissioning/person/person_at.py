@@ -1,4 +1,4 @@
-"""The person at the arm: at the terminal, or a mock's stand-in."""
+"""Chooses the person at the arm: at the terminal, or a mock's stand-in."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def person_at(call: Invocation, mock_control: str | None) -> Iterator[TerminalOperator | MockOperator]:
-    """Whoever carries out the tasks. `mock_control`: the control port of a mock, whose hand then does. Raises
-    SpecError."""
+    """Yields the one who carries out the tasks. `mock_control`: the control port of a mock. Raises SpecError."""
     if mock_control is None:
         from extras.commissioning.person.terminal_operator import TerminalOperator
 

@@ -1,4 +1,4 @@
-"""While the emergency stop is pressed: whatever ends the work says that it has to stay pressed."""
+"""Reminds the person to keep the emergency stop pressed, however the work ends."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ KEEP_PRESSED = "Keep the emergency stop pressed: switch the controller off and o
 
 @dataclass
 class EmergencyStop:
-    """Whether the emergency stop is pressed, as far as the program knows. A block that is left while it is, by its end
-    or by anything raised, tells the person.
+    """Whether the emergency stop is pressed, as far as the program knows.
 
-    note: told of every change
+    If a `with` block ends while it is, normally or by an exception, the person is told. note: called with every change
     """
 
     operator: Operator
@@ -25,7 +24,7 @@ class EmergencyStop:
     pressed: bool = False
 
     def tell(self, pressed: bool) -> None:
-        """That it is about to be pressed, or was released safely."""
+        """Notes that it is about to be pressed, or was released safely."""
         self.pressed = pressed
         self.note(pressed)
 

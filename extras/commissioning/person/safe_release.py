@@ -1,4 +1,4 @@
-"""The safe release of the emergency stop: the drives have their power back only where the arm stays where it is."""
+"""Releases the emergency stop safely: the drives get power only if the arm does not move."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FIRST = "The emergency stop was pressed and not released safely. Keep it pressed
 
 
 def typical(page: Page, memory_map: MemoryMap, name: str, count: int) -> dict[int, float]:
-    """A register of each joint: the median of its readings, of which some may be torn."""
+    """Returns a register of each joint: the median of its readings, some of which may be torn."""
     register = memory_map[name]
     values: dict[int, list[int]] = {joint: [] for joint in range(1, len(register.low) + 1)}
     for _ in range(count):
@@ -42,11 +42,11 @@ def typical(page: Page, memory_map: MemoryMap, name: str, count: int) -> dict[in
 def release_after_interruption(
     port: str, operator: Operator, memory_map: MemoryMap, found: bool, note: Callable[[bool], None]
 ) -> None:
-    """The safe release of an emergency stop that was pressed when the last call ended. Raises SafetyError.
+    """Releases an emergency stop that was pressed when the last call ended. Raises SafetyError.
 
-    found: whether the memory map was found at this arm. Otherwise no error can be read: then it is released while the
-        controller is off.
-    note:  told when it was released
+    found: whether the memory map was found at this arm. If not, no error can be read, and the stop is released while
+    the controller is off.
+    note: called after the release
     """
     from extras.commissioning.person.memory_page import open_page
 
@@ -63,19 +63,23 @@ def release_after_interruption(
 
 
 def give_power_back(page: LinkPage, operator: Operator, memory_map: MemoryMap) -> None:
-    """Makes the posture the set points by switching off and on, and has the emergency stop released. Raises SafetyError
-    where the arm would jump."""
+    """Makes the posture the set points by a power cycle, and has the emergency stop released.
+
+    Raises SafetyError if the arm would jump.
+    """
     if not switched_off_and_on(page, operator):
-        raise SafetyError("the controller was not switched off and on: its set points are not where the arm is")
+        raise SafetyError("the controller was not switched off and on, so its set points are not the arm's posture")
     if why := release(page, operator, lambda: _against_power(page, memory_map)):
         raise SafetyError(why)
 
 
 def _against_power(page: LinkPage, memory_map: MemoryMap) -> str:
-    """Why the drives may not have power; empty if the memory is alive, error + position is each joint's set point by
-    this map, and every error is small."""
+    """Returns why the drives may not get power; empty if they may.
+
+    They may if the memory is live, error + position is each joint's set point by this map, and every error is small.
+    """
     if not is_alive(page.read().data):
-        return "the memory is not alive"
+        return "the memory is not live"
     told = {name: typical(page, memory_map, name, 5) for name in ("set_point", "position", "error")}
     for joint, error in told["error"].items():
         if abs(error) > SAFE_ERROR:

@@ -1,4 +1,4 @@
-"""The person at the arm, asked at the terminal, or by lines of a script on standard input."""
+"""Asks the person at the arm, at the terminal or by lines of a script on standard input."""
 
 from __future__ import annotations
 
@@ -26,28 +26,28 @@ NO_PAUSE = (
     "unplug",
     "plug_in",
 )
-"""Tasks that are over when the person says that they are done."""
+"""Tasks that end when the person says that they are done."""
 LARGEST_ANGLE = 360
-"""Largest angle (degrees) of a joint, to either side, that can be typed."""
+"""Largest joint angle (degrees), to either side, that can be typed."""
 AT_ONCE = ("release_emergency_stop",)
-"""Tasks that begin without a question, for one has just been answered."""
+"""Tasks that begin without a question, because one has just been answered."""
 
 
 def words(task: Task) -> str:
-    """What a person is asked to do, what to watch, and how to stop."""
+    """Says what a person is asked to do, what to watch, and how to stop."""
     text = {
-        "rest": "Leave the arm as it is, switched on and at rest. Nothing is written, nothing moves.",
-        "press_emergency_stop": "Hold the arm, for it may sink, and press the emergency stop. The controller itself "
-        "must stay switched on. It stays pressed until you are told otherwise.",
-        "lead": f"Move joint {task.joint} by hand, and no other: first a few degrees to and fro around where it is, "
-        "slowly (some 10 s), then evenly to one end of its range, to the other end, and back to where it was.",
+        "rest": "Leave the arm as it is, switched on and at rest. Nothing is written, and nothing moves.",
+        "press_emergency_stop": "Hold the arm, because it may sink, and press the emergency stop. The controller "
+        "itself must stay switched on. Keep it pressed until you are told otherwise.",
+        "lead": f"Move joint {task.joint} by hand, and no other: first a few degrees to and fro around its posture, "
+        "slowly (about 10 s), then evenly to one end of its range, to the other end, and back.",
         "push": f"Move joint {task.joint} by hand by about 3 degrees, leave it there, and let go of it.",
         "end_stop": f"Move joint {task.joint} by hand, gently, until it meets an end stop, and hold it there.",
         "other_end_stop": f"Now move joint {task.joint} the other way until it meets its other end stop, and hold it.",
-        "bring_back": f"Bring joint {task.joint} back to about where it was, well clear of its end stops.",
+        "bring_back": f"Move joint {task.joint} back to about its first posture, well clear of its end stops.",
         "unplug": "Unplug the cable between this computer and the bridge.",
         "plug_in": "Plug it in again, and wait a moment.",
-        "place": "Bring the joints to about these postures (0 to 999 over a joint's range), and hold them there: "
+        "place": "Move the joints to about these postures (0 to 999 over a joint's range), and hold them there: "
         + ", ".join(f"joint {joint}: {posture}" for joint, posture in task.targets.items()),
         "switch_off_and_on": "With the emergency stop still pressed, switch the controller off and on again. The arm "
         "must stay where it is.",
@@ -58,8 +58,8 @@ def words(task: Task) -> str:
         "the emergency stop. The arm should stay where it is. If it moves, press at once.",
         "set_inputs": f"Switch the process inputs so that their number is {task.inputs} (input 1 counts 1, input 2 "
         "counts 2). Without switches at the inputs, skip this.",
-        "end_freeze": "The bridge holds the set points: it begins so after its program was loaded, or somebody has "
-        "stopped the arm. If that is over, the stop is released now; nothing moves by that.",
+        "end_freeze": "The bridge holds the set points: it does so after its program was loaded, or after somebody has "
+        "stopped the arm. Continue to release the stop; this moves nothing.",
         "command": f"Joint {task.joint} will move by at most 4 posture units (a degree of a major axis) and back. "
         "Watch it; the emergency stop ends it.",
     }[task.kind]
@@ -68,7 +68,9 @@ def words(task: Task) -> str:
 
 
 class Lines:
-    """Lines of standard input, read without Python's buffer: `select` then tells truly whether one has come."""
+    """Reads lines of standard input without Python's buffer, so that `select` reports correctly whether one has
+    arrived.
+    """
 
     def __init__(self, descriptor: int | None = None) -> None:
         self._descriptor = descriptor
@@ -76,7 +78,7 @@ class Lines:
         self._ended = False
 
     def forget(self) -> None:
-        """Forgets what was typed ahead at a terminal; the lines of a script stay."""
+        """Discards lines that were typed ahead at a terminal; the lines of a script stay."""
         descriptor = self._open()
         if os.isatty(descriptor):
             with contextlib.suppress(ImportError):  # Windows has none
@@ -86,13 +88,13 @@ class Lines:
             self._held = b""
 
     def ready(self) -> bool:
-        """Whether a line, or the end, has come."""
+        """Whether a line, or the end, has arrived."""
         while b"\n" not in self._held and not self._ended and select.select([self._open()], [], [], 0)[0]:
             self._read()
         return b"\n" in self._held or self._ended
 
     def read(self) -> str:
-        """The next line; empty at the end."""
+        """Returns the next line; empty at the end."""
         while b"\n" not in self._held and not self._ended:
             self._read()
         line, newline, self._held = self._held.partition(b"\n")
@@ -102,7 +104,7 @@ class Lines:
         if self._descriptor is None:
             try:
                 self._descriptor = sys.stdin.fileno()
-            except (AttributeError, OSError, ValueError):  # there is no standard input
+            except (AttributeError, OSError, ValueError):  # without standard input
                 self._descriptor = os.open(os.devnull, os.O_RDONLY)
         return self._descriptor
 
@@ -123,14 +125,16 @@ class TerminalOperator:
     _shown: str = field(default="", repr=False)
 
     def may_begin(self, *, at_the_arm: bool, yes: bool) -> bool:
-        """Asks before a step. One at the arm is always asked for, be it of a script that answers; another one only of
-        a person. Raises Abort for `q` and where the input has ended."""
+        """Asks before a step. Raises Abort for `q` and at the end of the input.
+
+        A step at the arm always needs an answer, even from a script; other steps only from a person.
+        """
         if not at_the_arm and (yes or not can_be_asked()):
             return True
         return self._choice("    Enter to begin, s to leave it open, q to end: ") != "s"
 
     def begin(self, task: Task) -> bool:
-        """Asks. Raises Abort for `q` and where the input has ended."""
+        """Asks for a task. Raises Abort for `q` and at the end of the input."""
         self.step += 1
         console().print(f"\n[{self.step}] {words(task)}")
         self._waits = task.kind not in NO_PAUSE
@@ -162,12 +166,12 @@ class TerminalOperator:
         self, joint: int, number: int, wait: Callable[[float], None]
     ) -> float | Literal["taken back"] | None:
         """Asks for the angle of a joint that was moved by hand."""
-        del wait  # a person takes the time that it takes
+        del wait  # a person may take any time
         while True:
             self.lines.forget()
             console().print(
                 f"    joint {joint}, posture {number}: move and hold it, type its angle in degrees "
-                "(Enter: no more, b: take the last one back): ",
+                "(Enter: no more, b: remove the last one): ",
                 end="",
             )
             answer = self._answer()
@@ -178,7 +182,7 @@ class TerminalOperator:
             try:
                 angle = float(answer)
             except ValueError:
-                console().print(f"    {answer!r} is no number")
+                console().print(f"    {answer!r} is not a number")
                 continue
             if abs(angle) <= LARGEST_ANGLE:
                 return angle
@@ -189,14 +193,14 @@ class TerminalOperator:
         console().print(text)
 
     def watch(self, postures: Mapping[int, int]) -> None:
-        """Shows the postures in one line that is written over."""
+        """Shows the postures in one line that is overwritten."""
         shown = "  ".join(f"{joint}: {posture:3d}" for joint, posture in postures.items())
         if console().is_terminal and shown != self._shown:
             console().print(f"\r    {shown}", end="")
         self._shown = shown
 
     def _choice(self, question: str) -> str:
-        """Asks until the answer is Enter or `s`, and returns it. Raises Abort for `q` and where the input ends."""
+        """Asks until the answer is Enter or `s`, and returns it. Raises Abort for `q` and at the end of the input."""
         while True:
             self.lines.forget()
             console().print(question, end="")

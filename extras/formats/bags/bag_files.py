@@ -1,4 +1,4 @@
-"""Which file is a bag, and the files of one, checked against the limits of traces."""
+"""Recognises bags, and checks their files against the limits of traces."""
 
 from __future__ import annotations
 
@@ -16,31 +16,33 @@ from extras.formats.bags.bag_storage import METADATA, ROS_1_MAGIC, SQLITE_MAGIC,
 STORAGES = (".mcap", ".db3", ".bag")
 COMPRESSED = ".zstd"
 _FRAMES = (0xFD2FB528, *range(0x184D2A50, 0x184D2A60))
-"""First four bytes, little-endian, of what zstd uncompresses: a frame of data, or one that it skips (RFC 8878)."""
+"""First four bytes, little-endian, of zstd data: a frame of data, or one to be skipped (RFC 8878)."""
 _PIECE = 1 << 20
 
 
 def is_bag(path: Path, first: bytes) -> bool:
-    """Whether a file is a bag by its first bytes, or by its name. A folder is one, or what is left of one, unless it
-    is a data set of lerobot."""
+    """Whether a file is a bag by its first bytes, or by its name.
+
+    A folder is a bag, possibly incomplete, unless it is a data set of lerobot.
+    """
     begins = first.startswith((MCAP0_MAGIC, ROS_1_MAGIC)) or first == SQLITE_MAGIC
     folder = path.is_dir() and not (path / "meta" / "info.json").is_file()
     return folder or begins or path.suffix.lower() in STORAGES
 
 
 def check_files(path: Path, limits: TraceLimits) -> None:
-    """Raises TraceError where a bag is none, is a trace already, or exceeds a limit, also once it is uncompressed."""
+    """Raises TraceError if the path is no bag, is already a trace, or exceeds a limit, also when uncompressed."""
     if path.is_dir() and not (path / METADATA).exists():
         inside = sorted(one.name for one in path.iterdir() if one.suffix in STORAGES)
         rather = f"; name the file in it, {path / inside[0]}" if inside else ""
-        raise TraceError(f"{path}: is a folder without {METADATA}, as a recording leaves that was cut off{rather}")
+        raise TraceError(f"{path}: is a folder without {METADATA}, as an interrupted recording leaves it{rather}")
     if not is_bag(path, first_bytes(path)):
         wanted = f"a folder with {METADATA}, or a file {', '.join(STORAGES)}"
         raise TraceError(f"{path}: {f'is no bag: that is {wanted}' if path.exists() else 'there is no such bag'}")
     try:
         files = sorted(path.iterdir()) if path.is_dir() else [path, *journals_of(path)]
         total = 0
-        for file in files:  # of any name: metadata.yaml chooses which are read
+        for file in files:  # with any name: metadata.yaml selects the files
             if not file.is_dir():
                 total += _check_file(file, limits)
                 if total > limits.file_bytes:
@@ -50,7 +52,7 @@ def check_files(path: Path, limits: TraceLimits) -> None:
 
 
 def _check_file(file: Path, limits: TraceLimits) -> int:
-    """Size (bytes) of a file, uncompressed where the whole of it is compressed. Raises TraceError, OSError."""
+    """Returns the uncompressed size (bytes) of a file. Raises TraceError, OSError."""
     with disk.open_regular(file) as stream:
         size = disk.size_of(stream)
         if file.name == METADATA and size > limits.metadata_bytes:
@@ -63,7 +65,7 @@ def _check_file(file: Path, limits: TraceLimits) -> int:
         if file.suffix == COMPRESSED or first in _FRAMES:
             return _size_uncompressed(file, limits)
         if is_trace(file, limits):
-            raise TraceError(f"{file}: is a trace already; copy it into the folder of traces")
+            raise TraceError(f"{file}: is already a trace; copy it into the folder of traces")
     return size
 
 

@@ -1,4 +1,4 @@
-"""Imports a bag in a process of its own with limited memory, because rosbags uncompresses whatever a bag asks it to."""
+"""Imports a bag in a separate process with limited memory, because rosbags uncompresses whatever a bag contains."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from extras.formats.bags.ros_bag import NO_MEMORY, import_bag
 
 SPARE = 64 << 20
-"""Memory (bytes) beside that for files and messages: rosbags takes it for its definitions of types."""
+"""Memory (bytes) in addition to that for files and messages: rosbags needs it for its type definitions."""
 REFUSED = 2
-"""Exit code of a process that answers with an error instead of a trace."""
+"""Exit code of a process that returns an error instead of a trace."""
 _SIGNALS = ("time", "position", "velocity", "drive", "set_point")
 _UNLIMITED = 1 << 62
 
 
 def import_bag_apart(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: Choice | None = None) -> Trace:
-    """What `import_bag` returns, made in another process, which may use no more memory than `memory_of` says.
+    """Returns the result of `import_bag`, computed in another process with the memory of `memory_of`.
 
-    Each file that it writes is limited too, and lies in a folder of its own that is removed in any case.
-    Raises TraceError, also where the memory does not suffice, and MissingExtraError.
+    Each file that it writes is limited too, and is in a folder that is always removed. Raises TraceError, also if the
+    memory does not suffice, and MissingExtraError.
     """
     require_extra("ros", f"{path}: reading a bag", "rosbags")
     order = {"path": str(path), "limits": limits.model_dump(), "choice": vars(choice or Choice())}
@@ -55,7 +55,9 @@ def import_bag_apart(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, cho
 
 
 def memory_of(limits: TraceLimits) -> int:
-    """Memory (bytes) for a bag: a file as a whole, and as much for what it holds as all chunks of a file may have."""
+    """Returns the memory (bytes) for a bag: one whole file, and as much for its content as all chunks of a file may
+    have.
+    """
     return SPARE + limits.file_bytes + limits.total_bytes
 
 
@@ -90,7 +92,7 @@ def _limit(kind: int, most: int) -> None:
 
 
 def _own_memory() -> int:
-    """The bytes of this process that RLIMIT_DATA counts; 0 where the system does not say."""
+    """Returns the bytes of this process that RLIMIT_DATA counts; 0 if the system does not report them."""
     with suppress(OSError, ValueError, IndexError):
         return int(Path("/proc/self/statm").read_text("ascii").split()[5]) * resource.getpagesize()
     return 0

@@ -1,6 +1,6 @@
-"""What a bag of ROS holds, and what of it is not there: each storage is held against what it says of itself.
+"""Reads the storages of a ROS bag, and reports missing content by comparing each with its own index.
 
-A channel of another program is never decoded, so whatever its definitions are, it keeps nothing from being read.
+A channel of another program is never decoded, so its definitions cannot prevent reading the rest.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ from extras.formats.bags.joint_messages import STATES
 
 METADATA = "metadata.yaml"
 LARGEST_MESSAGE = 1 << 20
-"""Largest message (bytes) of joint states: that of some ten thousand joints."""
+"""Largest message (bytes) of joint states: for about ten thousand joints."""
 ENCODINGS = "json", "protobuf"
-"""Encodings of messages, beside ROS's, that are read by the names of their fields."""
-NEVER_ENDED = "its recording was never ended, and what it had not yet written is missing"
+"""Encodings of messages, other than ROS's, that are read by the names of their fields."""
+NEVER_ENDED = "its recording was never ended, so unwritten data is missing"
 JOURNALS = "-wal", "-journal"
 SQLITE_MAGIC = b"SQLite format 3\0"
 ROS_1_MAGIC = b"#ROSBAG V"
 
 _JOURNAL = bytes.fromhex("d9d505f920a163d7")
-"""First bytes of a rollback journal of SQLite; zeros stand there when its change has ended."""
+"""First bytes of a rollback journal of SQLite; they are zero when its change has ended."""
 _WAL_HEAD, _FRAME_HEAD = 32, 24
 """Bytes before the frames of SQLite's write-ahead log, and before the page of each (https://sqlite.org/fileformat2.html#walformat)."""
 _MESSAGE = struct.Struct("<HIQQ")
@@ -53,11 +53,11 @@ class Contents:
     """Topics, and the messages of those with joint states.
 
     types:    type of the messages on each topic
-    messages: moment of reception (ns since 1970) and bytes of each message, by topic
+    messages: time of reception (ns since 1970) and bytes of each message, by topic
     schemas:  definition of the messages on each topic of another encoding
-    missing:  one line for everything that the bag promises, or once held, and that is not here
-    ended:    whether metadata.yaml, which a recorder writes when it ends, says how many messages there are
-    ros_1:    whether messages are laid out as those of ROS 1
+    missing:  one line for each part that the bag announces, or once held, but lacks
+    ended:    whether metadata.yaml, which a recorder writes at the end, states how many messages there are
+    ros_1:    whether messages have the layout of ROS 1
     """
 
     types: dict[str, str] = field(default_factory=dict)
@@ -68,37 +68,37 @@ class Contents:
     ros_1: bool = False
 
     def topic(self, name: str, kind: str) -> bool:
-        """Adds a topic; True where its messages are read."""
+        """Adds a topic; returns whether its messages are read."""
         self.types.setdefault(name, kind)
         if self.is_read(name):
             self.messages.setdefault(name, [])
         return self.is_read(name)
 
     def is_read(self, topic: str) -> bool:
-        """Whether the messages on a topic tell of joints, or of anything by names of its own."""
+        """Whether the messages on a topic contain joints, or fields in another encoding."""
         return self.types.get(topic, "").partition(" in ")[0] in STATES or self.encoding(topic) in ENCODINGS
 
     def encoding(self, topic: str) -> str:
-        """The encoding of the messages on a topic, where it is not ROS's."""
+        """Returns the encoding of the messages on a topic if it is not ROS's."""
         return self.types.get(topic, "").partition(" in ")[2]
 
     def hold(self, before: Mapping[str, int], promised: Mapping[str, int], who: str) -> None:
-        """Notes the messages that `who` promises on each topic and that have not come since `before`."""
+        """Notes the messages that `who` announces on each topic and that have not come since `before`."""
         for topic, count in promised.items():
             there = len(self.messages.get(topic, ())) - before.get(topic, 0)
             if self.is_read(topic) and there < count:
-                self.missing.append(f"{who} promises {count} messages on {_text(topic)}, {there} are there")
+                self.missing.append(f"{who} announces {count} messages on {_text(topic)}, but there are {there}")
 
     def counts(self) -> dict[str, int]:
-        """Number of messages on each topic so far."""
+        """Returns the number of messages on each topic so far."""
         return {topic: len(messages) for topic, messages in self.messages.items()}
 
 
 def contents(path: Path, limits: TraceLimits) -> Contents:
-    """What is in a bag, messages by their moments of reception.
+    """Returns the content of a bag, with times of reception.
 
-    Raises TraceError where a storage is damaged so that nothing tells what is left of it, where a limit is exceeded, or
-    a bag is being written; OSError; and for a bag of ROS 1 whatever rosbags does.
+    Raises TraceError if a storage is too damaged to know what remains, a limit is exceeded, or a bag is being written;
+    OSError; and for a bag of ROS 1 any exception of rosbags.
     """
     found = Contents()
     if path.is_dir():
@@ -123,7 +123,7 @@ def _folder(path: Path, found: Contents, limits: TraceLimits) -> None:
     for name in names:
         file = path / PurePath(name).name
         if not file.is_file():
-            found.missing.append(f"{METADATA} names {_text(file.name)}, which is not there")
+            found.missing.append(f"{METADATA} names {_text(file.name)}, which does not exist")
             continue
         with _plain(file, mode == "file") as plain:
             _file(plain, found, limits)
@@ -134,7 +134,7 @@ def _folder(path: Path, found: Contents, limits: TraceLimits) -> None:
 
 
 def _about(data: bytes, origin: str) -> dict[str, Any]:
-    """What rosbag2 says of a bag, in YAML. Raises TraceError."""
+    """Returns rosbag2's description of a bag, from YAML. Raises TraceError."""
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
 
@@ -144,12 +144,12 @@ def _about(data: bytes, origin: str) -> dict[str, Any]:
         raise TraceError(f"{origin}: is not YAML: {shown(str(error))}") from error
     about = read.get("rosbag2_bagfile_information", read) if isinstance(read, dict) else None
     if not isinstance(about, dict):
-        raise TraceError(f"{origin}: says nothing of a bag (rosbag2_bagfile_information)")
+        raise TraceError(f"{origin}: does not describe a bag (rosbag2_bagfile_information)")
     return about
 
 
 def _topics(about: dict[str, Any]) -> dict[int, tuple[str, str, int]]:
-    """Name, type and promised number of messages of each topic; entries that are none are left out."""
+    """Returns name, type and announced number of messages of each topic; invalid entries are left out."""
     topics = {}
     entries = about.get("topics_with_message_count")
     for number, entry in enumerate(entries if isinstance(entries, list) else ()):
@@ -161,7 +161,7 @@ def _topics(about: dict[str, Any]) -> dict[int, tuple[str, str, int]]:
 
 @contextmanager
 def _plain(file: Path, compressed: bool) -> Iterator[Path]:
-    """The file as it is, or uncompressed in a folder that is removed."""
+    """Yields the file as it is, or uncompressed in a folder that is removed."""
     if not compressed:
         yield file
         return
@@ -176,7 +176,9 @@ def _inflated(data: bytes, path: Path) -> bytes:
     with zstandard.ZstdDecompressor().stream_reader(data) as plain:
         found = plain.read(LARGEST_MESSAGE + 1)
     if len(found) > LARGEST_MESSAGE:
-        raise TraceError(f"{path}: a message has more than {LARGEST_MESSAGE} bytes uncompressed; joint states have not")
+        raise TraceError(
+            f"{path}: a message has more than {LARGEST_MESSAGE} bytes uncompressed, too many for joint states"
+        )
     return found
 
 
@@ -196,7 +198,7 @@ def _file(file: Path, found: Contents, limits: TraceLimits) -> None:
 
 
 def _text(text: str) -> str:
-    """A name from a file, short and in one line."""
+    """Returns a name from a file, short and in one line."""
     return " ".join(text.split())[:60]
 
 
@@ -204,7 +206,7 @@ def _text(text: str) -> str:
 
 
 class _Mcap:
-    """One MCAP file, read from its begin to its end or to where it is cut off; damaged chunks are left out."""
+    """One MCAP file, read to its end or to where it is cut off; damaged chunks are left out."""
 
     def __init__(self, file: Path, data: bytes, found: Contents, limits: TraceLimits) -> None:
         self._file, self._view, self._found, self._limits = file, memoryview(data), found, limits
@@ -217,7 +219,7 @@ class _Mcap:
         self._loose = False
 
     def read(self) -> None:
-        """Adds what the file holds; first the definitions at its end, which outlast a damaged chunk."""
+        """Adds the file's content; first the definitions at its end, which survive a damaged chunk."""
         for opcode, _, body in self._records():
             if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self._record(opcode, body)
@@ -232,16 +234,16 @@ class _Mcap:
             position = begin + len(body)
         if opcode != Opcode.FOOTER or bytes(self._view[position:]) != MCAP0_MAGIC:
             line = f"{_text(self._file.name)} ends or is damaged after byte {position} of {len(self._view)}"
-            self._found.missing.append(f"{line}, as a recorder that was killed leaves it; nothing after that was read")
+            self._found.missing.append(f"{line}, as a killed recorder leaves it; nothing after that was read")
         if self._damaged:
             self._found.missing.append(f"{_text(self._file.name)}: {self._damaged} damaged parts were left out")
         for number, count in self._promised.items():
             if number in self._topics and self._counts[number] < count:
-                line = f"the statistics promise {count} messages on {_text(self._topics[number])}"
-                self._found.missing.append(f"{_text(self._file.name)}: {line}, {self._counts[number]} are there")
+                line = f"the statistics announce {count} messages on {_text(self._topics[number])}"
+                self._found.missing.append(f"{_text(self._file.name)}: {line}, but there are {self._counts[number]}")
 
     def _records(self) -> Iterator[tuple[int, int, memoryview]]:
-        """Opcode, begin and content of each record, up to the footer or where the file is cut off."""
+        """Yields opcode, begin and content of each record, up to the footer or the end of a truncated file."""
         begin, end = len(MCAP0_MAGIC), len(self._view)
         opcode = 0
         while opcode != Opcode.FOOTER and begin + HEAD.size <= end:
@@ -302,14 +304,16 @@ class _Mcap:
                     self._found.schemas.setdefault(topic, self._schemas.get(schema, (kind, b"")))
             elif opcode == Opcode.STATISTICS:
                 fields = Fields(body)
-                fields.raw(8 + 2 + 4 * 4 + 8 + 8)  # sums over all channels, and the moments of the first and the last
+                fields.raw(
+                    8 + 2 + 4 * 4 + 8 + 8
+                )  # sums over all channels, and the times of the first and the last message
                 counts = fields.raw(fields.u32())
                 self._promised = dict(struct.iter_unpack("<HQ", counts))
         except (ValueError, struct.error):
             self._damaged += 1
 
     def _data_end(self, body: memoryview, position: int) -> None:
-        """Raises TraceError where numbers may be wrong that no checksum of a chunk protects."""
+        """Raises TraceError if the data section's checksum differs: no chunk checksum protects its content."""
         with suppress(ValueError):
             crc = data_end_of(body).data_section_crc
             if crc not in (0, zlib.crc32(self._view[:position])) and (self._loose or not self._inflated):
@@ -351,7 +355,7 @@ def _rows(file: Path, database: sqlite3.Connection, found: Contents, limits: Tra
         query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY timestamp LIMIT ?"
         for received, data in database.execute(query, (number, limits.records + 1)):
             if not isinstance(received, int) or not isinstance(data, bytes):
-                raise TraceError(f"{file}: a message on {_text(str(name))} is no message: it is of another type")
+                raise TraceError(f"{file}: a message on {_text(str(name))} is invalid: it is of another type")
             found.messages[str(name)].append((received, data[: LARGEST_MESSAGE + 1]))
     (lost,) = database.execute("SELECT count(*) FROM messages WHERE topic_id NOT IN (SELECT id FROM topics)").fetchone()
     if lost:
@@ -363,7 +367,9 @@ def _rows(file: Path, database: sqlite3.Connection, found: Contents, limits: Tra
 def _hold_to_its_own_metadata(
     file: Path, database: sqlite3.Connection, found: Contents, before: Mapping[str, int]
 ) -> None:
-    """Notes what a database's own metadata promise and it lacks. Some releases of ROS leave that table empty."""
+    """Notes content that a database's own metadata announce and it lacks. Some releases of ROS leave that table
+    empty.
+    """
     row = database.execute("SELECT metadata FROM metadata ORDER BY id DESC LIMIT 1").fetchone()
     if row is None or found.ended:
         return
@@ -371,7 +377,7 @@ def _hold_to_its_own_metadata(
         about = _about(str(row[0]).encode(), file.name)
         paths = about.get("relative_file_paths")
         if isinstance(paths, list) and len(paths) > 1:
-            return  # of all files of the bag together; metadata.yaml says the same
+            return  # for all files of the bag together; metadata.yaml states the same
         topics = {name: count for name, _, count in _topics(about).values()}
         if not about.get("message_count") and found.counts() != before:
             found.missing.append(f"{_text(file.name)}: {NEVER_ENDED}")
@@ -379,8 +385,10 @@ def _hold_to_its_own_metadata(
 
 
 def _is_plain(journal: Path) -> bool:
-    """Whether a journal begins as one does, and names no other file: SQLite deletes the file that a journal of several
-    databases ends with."""
+    """Whether a journal has a valid beginning and names no other file.
+
+    SQLite would delete the file that is named at the end of a journal of several databases.
+    """
     with journal.open("rb") as stream:
         begin = stream.read(8)
         stream.seek(-min(8, stream.seek(0, os.SEEK_END)), os.SEEK_END)
@@ -388,15 +396,15 @@ def _is_plain(journal: Path) -> bool:
 
 
 def journals_of(file: Path) -> list[Path]:
-    """The journals of SQLite beside a file that have content."""
+    """Returns the non-empty SQLite journals beside a file."""
     beside = (Path(f"{file}{end}") for end in JOURNALS)
     return [one for one in beside if one.is_file() and one.stat().st_size]
 
 
 def _recovered(file: Path, folder: Path, found: Contents) -> Path:
-    """The database with what its journals hold: itself, or a copy to which SQLite has applied them.
+    """Returns the database with its journals applied: itself, or a copy that SQLite has recovered.
 
-    Raises TraceError where the database is being written or a journal cannot be applied, OSError.
+    Raises TraceError if the database is being written or a journal cannot be applied, OSError.
     """
     wal, journal = (Path(f"{file}{end}") for end in JOURNALS)
     if not (beside := journals_of(file)):
@@ -405,9 +413,7 @@ def _recovered(file: Path, folder: Path, found: Contents) -> Path:
     copies = {file: copy} | {one: Path(f"{copy}{one.name.removeprefix(file.name)}") for one in beside}
     states = [(one.stat().st_size, one.stat().st_mtime_ns) for one in copies]
     if journal in beside and not _is_plain(journal):
-        raise TraceError(
-            f"{file}: was left in the middle of a change, and the damaged {journal.name} cannot take it back"
-        )
+        raise TraceError(f"{file}: was left in the middle of a change, and the damaged {journal.name} cannot undo it")
     for one, target in copies.items():
         shutil.copyfile(one, target)
     if states != [(one.stat().st_size, one.stat().st_mtime_ns) for one in copies]:
@@ -415,7 +421,7 @@ def _recovered(file: Path, folder: Path, found: Contents) -> Path:
     whole = _frames(wal) if wal in beside else 0
     with closing(sqlite3.connect(copy)) as database:
         database.execute("SELECT count(*) FROM sqlite_master").fetchone()
-        _, applied, _ = database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()  # the others count 0 pages
+        _, applied, _ = database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()  # the others report 0 pages
         if whole > max(applied, 0):
             line = f"{whole - max(applied, 0)} of {whole} pages of {beside[0].name} are damaged or were never committed"
             found.missing.append(f"{line}; rows in them are missing")
@@ -423,7 +429,7 @@ def _recovered(file: Path, folder: Path, found: Contents) -> Path:
 
 
 def _frames(wal: Path) -> int:
-    """Number of pages that the present generation of a write-ahead log has, whether they are sound or not."""
+    """Returns the number of pages in the present generation of a write-ahead log, valid or not."""
     data = memoryview(wal.read_bytes())
     if len(data) < _WAL_HEAD:
         return 0

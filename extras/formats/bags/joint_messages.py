@@ -1,4 +1,4 @@
-"""Messages of ROS that tell of joints, by ROS's own definitions: what a bag says of its types is never run."""
+"""Decodes ROS messages about joints by ROS's own definitions; type definitions in a bag are never executed."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ JOINT_STATE = "sensor_msgs/msg/JointState"
 CONTROLLER_STATE = "control_msgs/msg/JointTrajectoryControllerState"
 DYNAMIC_STATE = "control_msgs/msg/DynamicJointState"
 STATES = (JOINT_STATE, CONTROLLER_STATE, DYNAMIC_STATE)
-"""Types of the messages that are read, the first of them before the others."""
+"""Message types that are read, the first in preference to the others."""
 
 _POINTS = "std_msgs/Header header\nstring[] joint_names\n"
 _BY_RELEASE = {
-    "ros2": ("reference", "feedback", "error", "output"),  # from Iron on
+    "ros2": ("reference", "feedback", "error", "output"),  # since Iron
     "humble": ("reference", "feedback", "error", "output", "desired", "actual"),
     "old": ("desired", "actual", "error"),  # ROS 1, and ROS 2 up to Galactic
 }
-"""Points of a controller's state: what control_msgs of a release has (https://github.com/ros-controls/control_msgs)."""
+"""Fields of a controller's state, by release of control_msgs (https://github.com/ros-controls/control_msgs)."""
 _DYNAMIC = (
     "std_msgs/Header header\nstring[] joint_names\ncontrol_msgs/InterfaceValue[] interface_values\n"
     f"{'=' * 80}\nMSG: control_msgs/InterfaceValue\nstring[] interface_names\nfloat64[] values\n"
@@ -32,7 +32,7 @@ _DYNAMIC = (
 
 @dataclass(frozen=True)
 class JointValues:
-    """What one message says of joints, (j,) each; empty where it does not say. stamp: ns since 1970."""
+    """Joint values in one message, (j,) each; empty where it has none. stamp: ns since 1970."""
 
     stamp: int
     names: tuple[str, ...]
@@ -43,7 +43,7 @@ class JointValues:
 
 
 def decoder(kind: str, ros_1: bool) -> Callable[[bytes], JointValues]:
-    """What decodes the messages of one type."""
+    """Returns the decoder for messages of one type."""
 
     def decode(raw: bytes) -> JointValues:
         message, release = _decoded(kind, ros_1, raw)
@@ -72,7 +72,7 @@ def _floats(values: Sequence[float]) -> Floats:
 
 
 def _dynamic(stamp: int, message: Any) -> JointValues:
-    """The joints that have a position; what one of them lacks is NaN."""
+    """Returns the joints that have a position; other missing values are NaN."""
     by_joint = [dict(zip(one.interface_names, one.values, strict=False)) for one in message.interface_values]
     named = [(n, values) for n, values in zip(message.joint_names, by_joint, strict=False) if "position" in values]
     signals = [[values.get(name, np.nan) for _, values in named] for name in ("position", "velocity", "effort")]
@@ -80,7 +80,7 @@ def _dynamic(stamp: int, message: Any) -> JointValues:
 
 
 def _decoded(kind: str, ros_1: bool, raw: bytes) -> tuple[Any, str]:
-    """The message, and the release whose definition fits it. Raises what rosbags raises where none does."""
+    """Returns the message, and the release whose definition fits it. Raises as rosbags does if none fits."""
     releases = tuple(_BY_RELEASE) if kind == CONTROLLER_STATE else ("",)
     for release in releases:
         store = _store(ros_1, kind, release)

@@ -1,4 +1,4 @@
-"""Messages of an MCAP file in JSON or protobuf, as a table: a row each, a column for every number in them."""
+"""Reads JSON or protobuf messages of an MCAP file as a table: one row per message, one column per number."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from extras.formats.tables.flat import columns_of
 
 
 def message_columns(origin: str, found: Contents, topic: str) -> Columns:
-    """The columns of a topic's messages, and `log_time`, in s since 1970. Raises TraceError, MissingExtraError."""
+    """Returns the columns of a topic's messages, and `log_time`, in s since 1970. Raises TraceError,
+    MissingExtraError.
+    """
     messages = found.messages[topic]
     decode: Callable[[bytes], Any] = json.loads
     if found.encoding(topic) == "protobuf":
@@ -25,13 +27,13 @@ def message_columns(origin: str, found: Contents, topic: str) -> Columns:
     for number, (_, raw) in enumerate(messages, start=1):
         try:
             rows.append(decode(raw[:LARGEST_MESSAGE]))
-        except Exception as error:  # whatever a damaged message makes a decoder raise
+        except Exception as error:  # a damaged message makes a decoder raise any exception
             raise TraceError(f"{origin}: message {number}: {' '.join(str(error).split())[:200]}") from error
     return {"log_time": np.array([received for received, _ in messages]) / 1e9} | columns_of(rows)
 
 
 def _protobuf(origin: str, name: str, schema: bytes) -> Callable[[bytes], Any]:
-    """What decodes messages by the descriptors that the file holds. Raises TraceError, MissingExtraError."""
+    """Returns a decoder by the descriptors in the file. Raises TraceError, MissingExtraError."""
     require_extra("ros", f"{origin}: messages of protobuf", "google")
     from google.protobuf import descriptor_pb2, descriptor_pool, json_format, message_factory
 
@@ -41,7 +43,7 @@ def _protobuf(origin: str, name: str, schema: bytes) -> Callable[[bytes], Any]:
         for file in files.file:
             pool.Add(file)
         kind = message_factory.GetMessageClass(pool.FindMessageTypeByName(name))
-    except Exception as error:  # whatever a damaged schema makes protobuf raise
+    except Exception as error:  # a damaged schema makes protobuf raise any exception
         raise TraceError(f"{origin}: its schema cannot be read: {' '.join(str(error).split())[:200]}") from error
 
     def decode(raw: bytes) -> Any:

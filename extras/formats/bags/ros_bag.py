@@ -1,7 +1,6 @@
-"""Joint states in bags of ROS 2 (MCAP and SQLite) and ROS 1, decoded as a trace by the library rosbags.
+"""Imports joint states from bags of ROS 2 (MCAP and SQLite) and ROS 1 as a trace, using the library rosbags.
 
-Messages are decoded only by the definitions that ROS has of them. Those in JSON and protobuf are tables, whose columns
-the user names.
+Messages are decoded only by ROS's own definitions. Those in JSON and protobuf are tables, whose columns the user names.
 """
 
 from __future__ import annotations
@@ -55,14 +54,13 @@ class _State:
 
 
 def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: Choice | None = None) -> Trace:
-    """The joint states in a bag as a trace: a folder with metadata.yaml, or a file of MCAP, SQLite or ROS 1.
+    """Returns the joint states in a bag as a trace: a folder with metadata.yaml, or a file of MCAP, SQLite or ROS 1.
 
-    A TOML file of the same name beside it holds what messages cannot. What the bag promises and does not hold is told
-    in the notes, and the outcome is then `interrupted`.
+    A TOML file of the same name beside it adds what messages cannot hold. Content that the bag announces but lacks is
+    listed in the notes, and the outcome is then `interrupted`.
 
-    Nothing here limits the memory that a bag takes: `bag_process` does, for the bags of strangers.
-    Raises TraceError with one line for anything that is no bag, holds no joint states, or contradicts itself, and
-    MissingExtraError where rosbags is not installed.
+    This function does not limit memory; `bag_process` does, for untrusted bags. Raises TraceError with one line for a
+    path that is no bag, has no joint states, or is inconsistent, and MissingExtraError without rosbags.
     """
     path, choice = Path(path), choice or Choice()
     require_extra("ros", f"{path}: reading a bag", "rosbags")
@@ -103,7 +101,7 @@ def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
 
 
 def _other_topics(found: Contents, topic: str) -> str:
-    """Where set points are that were not taken."""
+    """Returns a hint on set points in other topics."""
     others = [name for name in found.messages if found.types[name] == CONTROLLER_STATE and found.messages[name]]
     return (
         f" Its set points are on {listed(others)}: --set-points takes them." if others and topic not in others else ""
@@ -111,7 +109,7 @@ def _other_topics(found: Contents, topic: str) -> str:
 
 
 def _contents(path: Path, limits: TraceLimits) -> Contents:
-    """What is in a bag. Raises TraceError."""
+    """Returns the content of a bag. Raises TraceError."""
     with _one_error(path):
         return contents(path, limits)
 
@@ -125,7 +123,7 @@ def _read(path: Path, found: Contents, topic: str) -> list[_State]:
 
 @contextmanager
 def _one_error(path: Path) -> Iterator[None]:
-    """Turns whatever a damaged bag makes rosbags raise into TraceError."""
+    """Turns any exception of rosbags on a damaged bag into TraceError."""
     try:
         yield
     except TraceError:
@@ -140,13 +138,13 @@ def _one_error(path: Path) -> Iterator[None]:
 
 
 def _topic(path: Path, found: Contents, wanted: str | None) -> str:
-    """The topic that is wanted, else the only one with messages of the first type that has some. Raises TraceError."""
+    """Returns the requested topic, else the only one with messages of the first available type. Raises TraceError."""
     there = sorted(found.messages)
     if not there:
         others = sorted(f"{name} ({kind})" for name, kind in found.types.items())
         raise TraceError(f"{path}: has no topic of {JOINT_STATE}; it has {listed(others) or 'no topic'}")
     if wanted is not None and wanted not in there:
-        raise TraceError(f"{path}: topic {listed([wanted])}: has no joint states; there are some on {listed(there)}")
+        raise TraceError(f"{path}: topic {listed([wanted])}: has no joint states; topics with some: {listed(there)}")
     if wanted is not None:
         return wanted
     told = [name for name in there if found.messages[name]] or there
@@ -165,13 +163,13 @@ def _decoded(
     for number, (received, raw) in enumerate(messages, start=1):
         place = f"{origin}: message {number}"
         if len(raw) > LARGEST_MESSAGE:
-            raise TraceError(f"{place}: has more than {LARGEST_MESSAGE} bytes; joint states have not")
+            raise TraceError(f"{place}: has more than {LARGEST_MESSAGE} bytes, too many for joint states")
         try:
             state = _State(number, received, decode(raw))
         except MemoryError:
             raise
         except Exception as error:
-            raise TraceError(f"{place}: is no message of its type") from error
+            raise TraceError(f"{place}: is not a valid message of its type") from error
         _check_lengths(place, state)
         yield state
 
@@ -189,7 +187,7 @@ def _check_lengths(origin: str, state: _State) -> None:
 
 
 def _names(origin: str, states: list[_State], wanted: tuple[str, ...] | None, limits: TraceLimits) -> tuple[str, ...]:
-    """The joints to take: those that are wanted, else those of all messages. Raises TraceError."""
+    """Returns the requested joints, else those of all messages. Raises TraceError."""
     sets = Counter(frozenset(state.names) for state in states)
     sets.pop(frozenset(), None)
     if not sets:
@@ -220,7 +218,7 @@ class _Table:
         self._said = [f"{INCOMPLETE}{line}." for line in missing]
         self._states = self._keep("Messages without all of these joints", states, lambda s: set(names) <= set(s.names))
         self._states = self._keep(
-            "Messages with a position that is no number",
+            "Messages with a position that is not a number",
             self._states,
             lambda s: bool(np.isfinite(s.values.position[self._columns(s)]).all()),
         )
@@ -229,7 +227,7 @@ class _Table:
         return [state.names.index(name) for name in self._names]
 
     def _keep(self, what: str, states: list[_State], good: Callable[[_State], bool]) -> list[_State]:
-        """The states that are good; the others are counted. Raises TraceError where none is."""
+        """Returns the good states and counts the others. Raises TraceError if none is good."""
         kept = [state for state in states if good(state)]
         if len(kept) < len(states):
             first = next(state.number for state in states if not good(state))
@@ -240,7 +238,7 @@ class _Table:
         return kept
 
     def trace(self, record: TraceRecord, choice: Choice, asked: list[_State] | None) -> Trace:
-        """The trace with joints numbered from 1, and notes on what was left out. asked: messages of set points.
+        """Returns the trace with joints numbered from 1, and notes on omissions. asked: messages of set points.
 
         Raises TraceError.
         """
@@ -249,14 +247,14 @@ class _Table:
         set_point = self._optional("set_point") if asked is None else self._asked(asked, moments, choice.received)
         created, time = _since_start(moments[len(moments) - len(self._states) :])
         if not EARLIEST <= created < LATEST:
-            raise TraceError(f"{self._origin}: its times are not of the years 1970 to 2261; --received takes others")
+            raise TraceError(f"{self._origin}: its times are outside the years 1970 to 2261; --received uses others")
         velocity, drive = self._optional("velocity"), self._optional("effort")
         unit = None if choice.drive_unit is None else drive_of(choice.drive_unit, self._origin)
         if unit == NONE:
             drive = None
         elif drive is not None and unit is None:
             line = "its effort may be in N·m, as ROS defines it, or in amperes, as many drivers send it"
-            raise TraceError(f"{self._origin}: {line}; say --drive-unit N·m, N, A or V, or none to leave it out")
+            raise TraceError(f"{self._origin}: {line}; give --drive-unit N·m, N, A or V, or none to leave it out")
         update: dict[str, Any] = {"notes": " ".join([record.notes, *self._said]).strip(), "created": created}
         update |= {"drive_unit": unit if drive is not None else None} | ({"outcome": "interrupted"} if lost else {})
         numbers = tuple(range(1, len(self._names) + 1))
@@ -266,9 +264,9 @@ class _Table:
         )
 
     def _asked(self, asked: list[_State], moments: list[int], received: bool) -> Floats:
-        """The set points of another topic, each held until the next comes; states before the first are left out.
+        """Returns the set points of another topic, each held until the next; states before the first are left out.
 
-        Raises TraceError where that topic lacks a joint or nothing is left.
+        Raises TraceError if that topic lacks a joint or nothing remains.
         """
         known = [s for s in asked if set(self._names) <= set(s.names)]
         if not known:
@@ -283,9 +281,9 @@ class _Table:
         return np.array([values[row][self._columns(known[row])] for row in rows if row >= 0])
 
     def _moments(self, received: bool) -> list[int]:
-        """Time (ns since 1970) of each sample; a message with the time of the one before is left out.
+        """Returns the time (ns since 1970) of each sample; a message with the time of the previous one is left out.
 
-        Raises TraceError where a time goes back.
+        Raises TraceError if times decrease.
         """
         stamped = all(state.stamp for state in self._states)
         received = received or not stamped
@@ -296,7 +294,7 @@ class _Table:
             if moments[state.number] < moments[before.number]:
                 now, then = moments[state.number] / 1e9, moments[before.number] / 1e9
                 line = f"its time {now:.9f} s does not come after {then:.9f} s"
-                hint = "; --received takes the times at which messages were received"
+                hint = "; --received uses the times at which messages were received"
                 raise TraceError(f"{self._origin}: message {state.number}: {line}{hint}")
         again = {
             state.number
@@ -304,12 +302,12 @@ class _Table:
             if moments[state.number] == moments[before.number]
         }
         self._states = self._keep(
-            "Messages with the time of the one before", self._states, lambda state: state.number not in again
+            "Messages with the time of the previous one", self._states, lambda state: state.number not in again
         )
         return [moments[state.number] for state in self._states]
 
     def _optional(self, name: Optional) -> Floats | None:
-        """A signal that messages may lack, or fill with NaN; None where one of them does."""
+        """Returns a signal that messages may lack, or fill with NaN; None if any of them lacks it."""
         lacking = sum(len(getattr(state.values, name)) == 0 for state in self._states)
         if lacking == 0:
             found = self._stacked(name)
@@ -326,7 +324,7 @@ class _Table:
 
 
 def _since_start(moments: list[int]) -> tuple[datetime, Floats]:
-    """Moment of the first sample, to the microsecond, and the time (s) of each since then."""
+    """Returns the time of the first sample, to the microsecond, and the time (s) of each since then."""
     start = moments[0] // 1000 * 1000
     try:
         created = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=start // 1000)

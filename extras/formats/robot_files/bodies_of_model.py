@@ -19,21 +19,21 @@ from model.machine_model.model import Model
 from model.machine_model.nominal import NO_LIMIT
 
 IN_BODIES = frozenset((at.MASS_ADDED, at.PAYLOAD, at.TILT_X, at.TILT_Y, at.SHIFT))
-"""Numbers of effects that are part of masses, centres and gravity."""
+"""Effect parameters that are part of masses, centres and gravity."""
 
 
 @dataclass(frozen=True, eq=False)
 class OutgoingLink:
     """One link with its joint.
 
-    name, joint: of link and joint, each of a file once
+    name, joint: names of link and joint, unique in a file
     slides:   whether the joint is prismatic
-    place:    (4, 4) frame of the link in that of the link before, with the joint at 0; the joint's axis is its z
-    angles:   roll, pitch and yaw (rad) of `place`: α and θ of the link before
+    place:    (4, 4) frame of the link in that of the previous link, with the joint at 0; the joint's axis is its z
+    angles:   roll, pitch and yaw (rad) of `place`: α and θ of the previous link
     mass, centre (3,), inertia (3, 3) about the centre, in the link's frame
-    low, high, speed: limits; None where there is none
+    low, high, speed: limits; None for no limit
     rotor:    inertia of the drive at the joint, kg·m² or kg
-    gain, back: torque (N·m, N) at the joint for a unit of drive, and lost for a unit of speed through the drive itself
+    gain, back: torque (N·m, N) at the joint per unit of drive, and lost per unit of speed through the drive itself
     viscous, coulomb: friction at the joint
     stiffness, slack: of a spring at the joint, and where it is slack
     drive_limit: largest drive; None where there is none
@@ -140,7 +140,9 @@ def motor_numbers(link: OutgoingLink) -> tuple[float, float, float]:
 
 
 def left_out(model: Model, held: frozenset[int]) -> list[str]:
-    """What of a model a format cannot hold, `held` being the columns that it can: effects, sensors, the controller."""
+    """Returns the parts of a model that a format cannot hold: effects, sensors, the controller. held: columns that it
+    can.
+    """
     found = []
     for use in model.effects:
         columns = {parameter.column for parameter in effect(use.name).parameters}
@@ -189,7 +191,7 @@ def _gravity(shared: Floats) -> tuple[float, float, float]:
 
 
 def _unlike(name: str, taken: set[str]) -> str:
-    """The name, or one with a number behind it, that no joint has yet."""
+    """Returns the name, or with an appended number a name that no joint has yet."""
     plain = "_".join("".join(sign if sign.isprintable() else " " for sign in name).split()) or "joint"
     found, number = plain, 2
     while found in taken:

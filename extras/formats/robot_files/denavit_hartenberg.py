@@ -1,6 +1,6 @@
-"""Standard Denavit–Hartenberg parameters of an arm whose axes lie anywhere.
+"""Computes standard Denavit–Hartenberg parameters of an arm whose axes may lie anywhere.
 
-Every joint keeps its own zero and its own direction: a machine's positions are those of the file that it came from.
+Every joint keeps its own zero and direction: a machine's positions are those of its original file.
 """
 
 from __future__ import annotations
@@ -15,17 +15,21 @@ from daq.contracts.errors import SpecError
 from model.arrays import Floats
 
 PARALLEL = 1e-10
-"""Angle (rad) below which two axes are parallel: what is rounded away is smaller than an engine's own error."""
+"""Angle (rad) below which two axes count as parallel: rounding it away matters less than a physics engine's own
+error.
+"""
 FARTHEST = 100.0
-"""Longest offset (m) along a joint's axis. Axes that are nearly parallel have their common normal far away, and moments
-about so distant an origin lose digits: at 100 m, four of sixteen."""
+"""Longest offset (m) along a joint's axis. Nearly parallel axes have a distant common normal, and moments about so
+distant an origin lose digits: at 100 m, four of sixteen.
+"""
 ROUNDED = 1e-4
-"""Angle (rad) up to which axes with so distant a normal count as parallel: π written with four decimals or more is as
-near as that."""
+"""Angle (rad) up to which axes with so distant a normal count as parallel: about the error of π written with four
+decimals.
+"""
 _NOTHING = 1e-11
-"""Lengths (m) below this come of π's last digits in a file, and are written as 0: no length, no parameter."""
+"""Lengths (m) below this result from π's last digits in a file, and are written as 0."""
 _NO_ANGLE = 1e-14
-"""Angles (rad) below this are rounding of our own, and written as 0."""
+"""Angles (rad) below this are our own rounding, and are written as 0."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,8 @@ class Frames:
     """The D–H frames of an arm at 0.
 
     origins, axes: (n + 1, 3) origins and (n + 1, 3, 3) axes as columns, in the root's frame; 0 is the base's
-    parameters: one a joint
-    notes: a line for each axis that was turned, to be parallel to the one before it
+    parameters: one per joint
+    notes: a line for each axis that was turned, to be parallel to the previous one
     """
 
     origins: Floats
@@ -54,7 +58,7 @@ class Frames:
 
 
 def transform(theta: float, d: float, a: float, alpha: float) -> Floats:
-    """A of one joint (thesis 3.7): coordinates in its frame become those in the frame before. rad and m."""
+    """Returns A of one joint (thesis 3.7), which maps coordinates in its frame to the previous frame. rad and m."""
     ct, st, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
     return np.array(
         [
@@ -67,7 +71,7 @@ def transform(theta: float, d: float, a: float, alpha: float) -> Floats:
 
 
 def frames_of(points: Sequence[Floats], directions: Sequence[Floats], tip: Floats, names: Sequence[str]) -> Frames:
-    """D–H frames of an arm.
+    """Returns the D–H frames of an arm.
 
     Args:
         points: (3,) a point of each joint's axis.
@@ -75,7 +79,7 @@ def frames_of(points: Sequence[Floats], directions: Sequence[Floats], tip: Float
         tip: (3,) end of the last link; the last frame's origin.
         names: of the joints, for errors and notes.
 
-    Raises SpecError when two axes are so nearly parallel that no frame between them keeps enough digits.
+    Raises SpecError for two axes so nearly parallel that no frame between them keeps enough digits.
     """
     z = [np.asarray(d) / np.linalg.norm(d) for d in directions]
     notes = []
@@ -114,7 +118,7 @@ def frames_of(points: Sequence[Floats], directions: Sequence[Floats], tip: Float
 def _normal(
     point: Floats, z: Floats, following: Floats, z_next: Floats, x_before: Floats
 ) -> tuple[Floats, Floats, Floats, float]:
-    """Foot of the common normal on an axis and on the next one, its direction, and the twist α about it."""
+    """Returns the foot of the common normal on an axis and on the next one, its direction, and the twist α about it."""
     cross = np.cross(z, z_next)
     sine = float(np.linalg.norm(cross))
     apart = following - point
@@ -133,18 +137,18 @@ def _normal(
 
 
 def _angle(start: Floats, end: Floats, axis: Floats) -> float:
-    """Angle (rad) from one unit vector to another about an axis that both are perpendicular to."""
+    """Returns the angle (rad) from one unit vector to another about an axis perpendicular to both."""
     return math.atan2(float(np.cross(start, end) @ axis), float(start @ end))
 
 
 def _perpendicular(vector: Floats, axis: Floats) -> Floats:
-    """The unit vector nearest to `vector` that is perpendicular to an axis."""
+    """Returns the unit vector nearest to `vector` that is perpendicular to an axis."""
     across = vector - axis * float(axis @ vector)
     return across / np.linalg.norm(across)
 
 
 def _across(axis: Floats, candidates: Floats) -> Floats:
-    """The part of the first of several vectors that is far enough from an axis, perpendicular to it."""
+    """Returns the perpendicular part of the first vector that is far enough from an axis."""
     return _perpendicular(next(c for c in candidates if abs(float(c @ axis)) < 0.9), axis)
 
 

@@ -1,4 +1,4 @@
-"""A robot as its file describes it: links in a tree, each with its mass and the joint that it hangs on."""
+"""Description of a robot, as in its file: a tree of links, each with its mass and the joint to its parent."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from model.arrays import Floats
 
 @dataclass(frozen=True)
 class Follower:
-    """What a mimic joint does: its position is `offset + ratio ·` that of the joint `leader`."""
+    """Rule of a mimic joint: its position is `offset + ratio ·` that of the joint `leader`."""
 
     leader: str
     ratio: float
@@ -21,7 +21,7 @@ class Follower:
 
 @dataclass(frozen=True, eq=False)
 class DescribedJoint:
-    """A joint that moves. A number that its file does not state is None.
+    """A joint that moves. Values that its file does not state are None.
 
     axis:     (3,) unit vector in the axes of the joint's link
     low, high, speed, effort: limits, in rad, m, s, N·m, N
@@ -43,9 +43,9 @@ class DescribedJoint:
 
 @dataclass(frozen=True, eq=False)
 class DescribedLink:
-    """A link, whose frame is where its joint is; it is fixed to its parent where it has none.
+    """A link, whose frame is at its joint; without a joint it is fixed to its parent.
 
-    parent:   index of the link that it hangs on; None for the root
+    parent:   index of its parent link; None for the root
     position: (3,) of its frame in the parent's, with the joint at 0, m
     rotation: (3, 3) from its axes to the parent's, with the joint at 0
     centre:   (3,) centre of mass in its own frame, m
@@ -71,19 +71,19 @@ class Description:
     links: tuple[DescribedLink, ...]
     gravity: Floats
     doubts: tuple[str, ...] = ()
-    """One line for everything that looks like another unit."""
+    """One line for each value that seems to be in another unit."""
 
     @property
     def joints(self) -> dict[str, int]:
-        """Index of the link of each joint that moves, by the joint's name."""
+        """Returns the index of the link of each joint that moves, by the joint's name."""
         return {link.joint.name: i for i, link in enumerate(self.links) if link.joint is not None}
 
     def children(self, link: int) -> list[int]:
-        """Links that hang on a link."""
+        """Returns the child links of a link."""
         return [i for i, other in enumerate(self.links) if other.parent == link]
 
     def path(self, link: int) -> list[int]:
-        """Links from the root to a link, both included."""
+        """Returns the links from the root to a link, both included."""
         found = [link]
         while (parent := self.links[found[-1]].parent) is not None:
             found.append(parent)
@@ -91,7 +91,7 @@ class Description:
 
 
 def turned(axis: Floats, angle: float) -> Floats:
-    """Rotation (3, 3) by an angle (rad) about a unit vector (Rodrigues)."""
+    """Returns the rotation (3, 3) by an angle (rad) about a unit vector (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)

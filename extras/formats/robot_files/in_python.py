@@ -1,4 +1,4 @@
-"""Writing models in the formats of others, for programs and notebooks."""
+"""Writes models in the formats of others, for programs and notebooks."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from model.machine_model.model import Model
 
 
 def write_urdf(model: Model, path: Path | str) -> list[str]:
-    """Writes a model, with its own numbers, as URDF. Returns what of it a URDF cannot hold.
+    """Writes a model, with its own values, as URDF. Returns the parts that a URDF cannot hold.
 
-    Raises SpecError when the file cannot be written.
+    Raises SpecError if the file cannot be written.
     """
     text, left_out = urdf_text(model)
     written(text, Path(path))
@@ -21,9 +21,9 @@ def write_urdf(model: Model, path: Path | str) -> list[str]:
 
 
 def write_mjcf(model: Model, path: Path | str) -> list[str]:
-    """Writes a model, with its own numbers, as MJCF for MuJoCo. Returns what of it MJCF cannot hold.
+    """Writes a model, with its own values, as MJCF for MuJoCo. Returns the parts that MJCF cannot hold.
 
-    Raises SpecError for a link that no real body can be, and when the file cannot be written.
+    Raises SpecError for a physically inconsistent link, and if the file cannot be written.
     """
     text, left_out = mjcf_text(model)
     written(text, Path(path))

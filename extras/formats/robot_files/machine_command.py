@@ -38,11 +38,13 @@ def new(
     drives: Annotated[
         str | None,
         typer.Option(
-            help="Drives, one for all joints or one a joint: names of `daq machine drives`, or torques for a unit of "
-            "what is recorded (0.5 N·m/A). Or a machine file whose drives, friction and sensors are taken, by joint."
+            help="Drives, one for all joints or one per joint: names of `daq machine drives`, or torques per unit "
+            "of the record (0.5 N·m/A). Or a machine file with drives, friction and sensors, matched by joint name."
         ),
     ] = None,
-    record: Annotated[str | None, typer.Option(help="A record of it: joints, unit of the drive, a check.")] = None,
+    record: Annotated[
+        str | None, typer.Option(help="A record of the robot: gives joints and unit of the drive, and is checked.")
+    ] = None,
     joints: Annotated[
         str | None, typer.Option(help="Joints that move, such as shoulder,elbow (default: all, if they are one chain).")
     ] = None,
@@ -60,7 +62,7 @@ def new(
 ) -> None:
     """Write a machine file, from a URDF, from names of servos, or from answers to a few questions.
 
-    What is not known is an assumption, which the file marks. At the end stands which three numbers would sharpen
+    Unknown values are assumptions, marked in the file. The command ends with the three values that would improve
     answers most.
     """
     from daq.contracts.machine import load_machine, parse_machine
@@ -85,7 +87,7 @@ def new(
 
 
 def _described(name: str, drives: str | None, joints: str | None, trace: Trace | None) -> str:
-    """The text of a machine that is described by names of drives, or by answers."""
+    """Returns the text of a machine that is described by names of drives, or by answers."""
     from extras.formats.robot_files.new_machine import Described, check_drive, text_of
 
     unit = "V" if trace is None else trace.record.drive_unit or "V"
@@ -98,11 +100,11 @@ def _described(name: str, drives: str | None, joints: str | None, trace: Trace |
         count = len(given) or int(_asked("How many joints?", "1", str.isdecimal, "a whole number"))
         names = [f"joint_{k + 1}" for k in range(count)]
     if len(given) not in (0, 1, len(names)):
-        raise SpecError(f"--drives names {len(given)}, and there are {len(names)} joints")
+        raise SpecError(f"--drives names {len(given)}, but there are {len(names)} joints")
     if given:
         each = given * len(names) if len(given) == 1 else given
         return text_of(name, [Described(one, drive) for one, drive in zip(names, each, strict=True)], unit)
-    console().print("Enter takes what stands in brackets, or leaves a number unknown.")
+    console().print("Enter accepts the value in brackets, or leaves a value unknown.")
     return text_of(name, [_joint_told(one, last=one == names[-1]) for one in names], unit)
 
 
@@ -133,7 +135,7 @@ def _drive_told(name: str, slides: bool = False) -> str:
         check_drive(text, slides)
         return True
 
-    return _asked(f"{name}: its servo or motor, or torque for a unit of drive (0.5 N·m/A) []", "", is_drive, "a drive")
+    return _asked(f"{name}: its servo or motor, or torque per unit of drive (0.5 N·m/A) []", "", is_drive, "a drive")
 
 
 def _is_of(unit: str) -> Callable[[str], bool]:
@@ -167,7 +169,7 @@ def _of_urdf(
     name: str | None,
     trace: Trace | None,
 ) -> str:
-    """The text of the machine that a URDF describes, with drives from elsewhere."""
+    """Returns the text of the machine that a URDF describes, with drives from elsewhere."""
     from daq.config.machine_text import machine_text
     from daq.contracts.drive_library import library_drives
     from daq.contracts.machine import load_machine
@@ -189,7 +191,7 @@ def _of_urdf(
     told: dict[str, str] = {}
     if given and other is None:
         if len(given) not in (1, len(names)):
-            raise SpecError(f"--drives names {len(given)}, and there are {len(names)} joints")
+            raise SpecError(f"--drives names {len(given)}, but there are {len(names)} joints")
         each = given * len(names) if len(given) == 1 else given
         told = {one: check_drive(drive, slides[one]) for one, drive in zip(names, each, strict=True)}
     machine = machine_of_arm(arm, pull, other, parts_of(told, slides), name)
@@ -207,7 +209,7 @@ def _is_drive(text: str) -> bool:
 
 
 def _tell(machine: Machine, path: Path, trace: Trace | None, json: bool) -> None:
-    """What is assumed in a new file, what a record says of it, and which numbers matter most."""
+    """Prints the assumptions in a new file, the check of a record, and the most important values."""
     from daq.contracts.machine_form import defaults_of
     from daq_cli.models.record_doubts import end_if_doubted, print_record
     from extras.formats.robot_files.uncertain_numbers import most_uncertain
@@ -240,7 +242,7 @@ def _tell(machine: Machine, path: Path, trace: Trace | None, json: bool) -> None
     if found:
         print_record(found)
     if sharpest:
-        console().print("Measure first, for their deviations move the torques most:")
+        console().print("Measure first, because their deviations change the torques most:")
         for number, share in sharpest:
             stated = f"{number.value:.3g} ± {number.deviation:.2g} {number.unit}"
             console().print(f"  {number.name} = {stated}: {100 * share:.0f} %")
@@ -255,7 +257,7 @@ def tidy(
         Path | None, typer.Option("--output", "-o", help="File to write (default: the file itself).")
     ] = None,
 ) -> None:
-    """Write a machine file in the short form: numbers as texts, sources as comments, defaults left out."""
+    """Write a machine file in the short form: quantities as texts, sources as comments, defaults left out."""
     from daq.config.machine_text import tidied
     from daq.contracts.documents import read_text
 
@@ -293,7 +295,7 @@ def drives(
 def to_urdf(
     model: Annotated[str, typer.Argument(help=MODEL_HELP)], output: OutputFile = None, json: JsonOption = False
 ) -> None:
-    """Write a machine, or a fitted model with its numbers, as URDF. What a URDF cannot hold is named."""
+    """Write a machine, or a fitted model with its values, as URDF. Prints the parts that a URDF cannot hold."""
     from extras.formats.robot_files.urdf_writer import urdf_text
 
     _write(read_model(model), urdf_text, output, "urdf", json)
@@ -303,7 +305,9 @@ def to_urdf(
 def to_mjcf(
     model: Annotated[str, typer.Argument(help=MODEL_HELP)], output: OutputFile = None, json: JsonOption = False
 ) -> None:
-    """Write a machine, or a fitted model with its numbers, as MJCF for MuJoCo. What MJCF cannot hold is named."""
+    """Write a machine, or a fitted model with its values, as MJCF for MuJoCo. Prints the parts that MJCF cannot
+    hold.
+    """
     from extras.formats.robot_files.mjcf_writer import mjcf_text
 
     _write(read_model(model), mjcf_text, output, "mjcf", json)
@@ -385,7 +389,7 @@ def _write(
 def _check_new(path: Path) -> None:
     check_folder(path, "--output")
     if path.exists():
-        raise SpecError(f"{path}: is there already; name another file with -o")
+        raise SpecError(f"{path}: already exists; name another file with -o")
 
 
 def _names(text: str) -> list[str]:
@@ -396,7 +400,7 @@ def _names(text: str) -> list[str]:
 
 
 def _held(text: str | None) -> dict[str, float]:
-    """Positions by joint from `wrist=0.5,finger=0.02`."""
+    """Returns positions by joint from `wrist=0.5,finger=0.02`."""
     found: dict[str, float] = {}
     for pair in [] if text is None else text.split(","):
         match = re.fullmatch(r"\s*(\S.*?)\s*=\s*(\S+)\s*", pair)

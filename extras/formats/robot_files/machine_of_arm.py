@@ -1,5 +1,4 @@
-"""The machine that an arm of a URDF is. What the URDF does not say is taken from another machine, or left as an
-assumption that is marked as one."""
+"""Converts an arm of a URDF to a machine. What the URDF lacks comes from another machine, or is a marked assumption."""
 
 from __future__ import annotations
 
@@ -35,11 +34,12 @@ from model.arrays import Floats
 
 EXPECTED_FRICTION = 0.1
 """Expected size of friction that the URDF does not state, as a share of the joint's largest torque: typical of geared
-arms, and wide enough for a fit to find another."""
+arms, and wide enough for a fit to find another.
+"""
 
 
 class JointParts(NamedTuple):
-    """What a URDF does not say of a joint, or says as a placeholder; None for what is not known either."""
+    """Data of a joint that a URDF lacks, or states as a placeholder; None if unknown."""
 
     drive: DcMotor | CurrentDrive | PlainGain | None = None
     friction: Friction | None = None
@@ -56,20 +56,20 @@ def machine_from_urdf(
     drives: Machine | None = None,
     name: str | None = None,
 ) -> Machine:
-    """The machine that some joints of a URDF make: its kinematics, masses, inertias and limits.
+    """Returns the machine that some joints of a URDF form: its kinematics, masses, inertias and limits.
 
     Drives, friction, sensors and the controller are not in a URDF. They come from the joints of the same names in
     `drives`, or are assumptions: a drive that is a torque (a force), friction as the URDF states it or 0. The machine's
-    `notes` say which joints are held, and what is assumed.
+    `notes` list held joints and assumptions.
 
     Args:
         path: the URDF; its meshes are not read.
-        joints: names of the joints that move; None for all, if they follow one another. The others are held.
-        hold: positions of joints that are held, rad or m; 0 where none is given.
-        tip: link whose frame is the end of the arm, where a load hangs; None for the last joint's own link.
-        gravity: in the axes of the URDF's root, m/s²; None for what the file says (MuJoCo's extension), or 9.81 down.
-        drives: a machine whose joints' drives, friction and sensors are taken over by name, and its controller if all
-            its joints are.
+        joints: names of the joints that move; None for all, if they form a chain. The others are held.
+        hold: positions of held joints, rad or m; 0 by default.
+        tip: link whose frame is the end of the arm, where a load is attached; None for the last joint's own link.
+        gravity: in the axes of the URDF's root, m/s²; None for the file's (MuJoCo's extension), or 9.81 down.
+        drives: a machine whose drives, friction and sensors are used by joint name, and its controller if all its
+            joints match.
         name: of the machine; None for that of the robot.
 
     Raises SpecError with one line.
@@ -85,7 +85,7 @@ def machine_of_arm(
     parts: Mapping[str, JointParts],
     name: str | None,
 ) -> Machine:
-    """The machine of an arm; see `machine_from_urdf`. What `parts` says of a joint comes before `drives`."""
+    """Returns the machine of an arm; see `machine_from_urdf`. `parts` of a joint take precedence over `drives`."""
     names = [joint.joint.name for joint in arm.joints]
     source = Path(arm.description.origin).name
     try:
@@ -136,7 +136,7 @@ def _known(names: Sequence[str], drives: Machine | None, parts: Mapping[str, Joi
 
 
 def _controller(names: Sequence[str], drives: Machine | None) -> object:
-    """The other machine's controller, if it has the same joints: its gains have a row for each."""
+    """Returns the other machine's controller, if it has the same joints: its gains have a row for each."""
     if drives is not None and [joint.name for joint in drives.joints] == list(names):
         return drives.controller
     return NoController(kind="none")
@@ -167,14 +167,14 @@ def _joint(
 
 
 def torque_drive(slides: bool) -> PlainGain:
-    """The assumption for a drive that nothing is known of: what is recorded is its torque (force)."""
+    """Returns the assumption for an unknown drive: the recorded signal is its torque (force)."""
     unit, word = ("N/N", "force") if slides else ("N·m/(N·m)", "torque")
     gain = Quantity(value=1.0, unit=unit, source=f"the recorded drive is the {word} at the joint", assumed=True)
     return PlainGain(kind="gain", gain=gain)
 
 
 def _friction(joint: DescribedJoint, torque: float, source: str) -> Friction:
-    """What the URDF states, or else 0; a fit may find another value."""
+    """Returns friction as the URDF states it, or else 0; a fit may find another value."""
     slides = joint.kind == "prismatic"
     speed = joint.speed or 1.0
 
@@ -192,7 +192,9 @@ def _friction(joint: DescribedJoint, torque: float, source: str) -> Friction:
 
 
 def _torque(arm: SerialArm, index: int, gravity: Floats) -> float:
-    """A joint's largest torque (force): its limit, or what holds everything beyond it against gravity; 1 without."""
+    """Returns a joint's largest torque (force): its limit, or what holds the rest of the arm against gravity; else
+    1.
+    """
     own = arm.joints[index]
     if own.joint.effort is not None:
         return own.joint.effort
@@ -203,7 +205,7 @@ def _torque(arm: SerialArm, index: int, gravity: Floats) -> float:
 
 
 def _body(joint: ArmJoint, frames: Frames, number: int, source: str, notes: list[str]) -> Body:
-    """The link in the axes of its own frame; adds a note where no real body has such moments."""
+    """Returns the link in the axes of its own frame; adds a note if its moments are physically inconsistent."""
     axes = frames.axes[number]
     centre = axes.T @ (joint.body.centre - frames.origins[number])
     inertia = axes.T @ joint.body.inertia @ axes
@@ -239,7 +241,7 @@ def _held(arm: SerialArm) -> list[str]:
 
 
 def _assumed(joints: Sequence[Joint], arm: SerialArm) -> list[str]:
-    """What the machine assumes, in a line each."""
+    """Returns the machine's assumptions, one per line."""
     lines = []
     for what, names in (
         (

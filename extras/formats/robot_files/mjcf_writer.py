@@ -1,4 +1,4 @@
-"""A model as MJCF, MuJoCo's own format. MuJoCo's writer is not used: it keeps six digits."""
+"""Writes a model as MJCF, MuJoCo's own format. MuJoCo's writer is not used, because it keeps only six digits."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ NEARLY = {
 COPPER = 0.0039
 """Relative rise of a copper winding's resistance, 1/K."""
 LEAST_MOMENT = 1e-10
-"""Least principal moment of a body, as a share of its largest: MuJoCo refuses the 0 of a thin rod about itself."""
+"""Least principal moment of a body, as a share of its largest: MuJoCo rejects the 0 of a thin rod about itself."""
 SMALLEST_MOMENT = 1e-14
-"""Least principal moment of a body, kg·m²: MuJoCo takes smaller ones for 0."""
+"""Least principal moment of a body, kg·m²: MuJoCo treats smaller ones as 0."""
 LEAST_MASS = 1e-9
-"""Least mass (kg) of a body: MuJoCo refuses a massless one that moves."""
+"""Least mass (kg) of a body: MuJoCo rejects a massless one that moves."""
 
 
 def mjcf_text(model: Model) -> tuple[str, list[str]]:
-    """The model's MJCF, and what of the model it leaves out.
+    """Returns the model's MJCF, and the parts of the model that it leaves out.
 
     Every drive is an actuator whose control is the recorded drive: a `dcmotor` with the file's constants where back-EMF
     is known, which MuJoCo has from 3.7 on. Raises SpecError for a link that no real body can be.
@@ -94,7 +94,7 @@ def _body(parent: Xml.Element, link: OutgoingLink, end: Floats) -> Xml.Element:
         if value:
             joint.set(name, text_of(value))
     length = float(np.linalg.norm(end[:3, 3]))
-    if length > 1e-3:  # something to look at; it has no mass and touches nothing
+    if length > 1e-3:  # only for display; it has no mass and touches nothing
         Xml.SubElement(
             body,
             "geom",
@@ -162,7 +162,9 @@ def _preload(actuators: Xml.Element, link: OutgoingLink) -> None:
 
 
 def _heavy_enough(link: OutgoingLink) -> tuple[float, Floats]:
-    """Mass and inertia that MuJoCo accepts: a thin rod's are made larger by 1e-10 of themselves. Raises SpecError."""
+    """Returns mass and inertia that MuJoCo accepts: a thin rod's are increased by 1e-10 of themselves. Raises
+    SpecError.
+    """
     inertia = 0.5 * (link.inertia + link.inertia.T)
     least, middle, most = np.linalg.eigvalsh(inertia)
     floor = max(LEAST_MOMENT * float(most), SMALLEST_MOMENT)
@@ -170,14 +172,14 @@ def _heavy_enough(link: OutgoingLink) -> tuple[float, Floats]:
     if missing > 11.0 * floor or link.mass < 0.0:
         shown = ", ".join(f"{moment:.4g}" for moment in (least, middle, most))
         raise SpecError(
-            f"link of joint {link.joint}: {link.mass:.4g} kg with the principal moments {shown} kg·m²: no real body "
-            "has them, and MuJoCo takes none but real ones; a URDF can be written (daq machine to-urdf)"
+            f"link of joint {link.joint}: {link.mass:.4g} kg with the principal moments {shown} kg·m² is not "
+            "physically consistent, as MuJoCo requires; a URDF can be written (daq machine to-urdf)"
         )
     return max(link.mass, LEAST_MASS), inertia + missing * np.eye(3)
 
 
 def _turn(angles: tuple[float, float, float]) -> str:
-    """Quaternion of roll, pitch and yaw, as text."""
+    """Returns the quaternion of roll, pitch and yaw, as text."""
     roll, pitch, yaw = angles
     return text_of(*_product(_about("z", yaw), _product(_about("y", pitch), _about("x", roll))))
 
@@ -188,7 +190,7 @@ def _about(axis: str, angle: float) -> tuple[float, ...]:
 
 
 def _product(one: Sequence[float], other: Sequence[float]) -> tuple[float, ...]:
-    """Product of two quaternions (w, x, y, z)."""
+    """Returns the product of two quaternions (w, x, y, z)."""
     a, b = np.array(one[1:]), np.array(other[1:])
     w = one[0] * other[0] - float(a @ b)
     x, y, z = one[0] * b + other[0] * a + np.cross(a, b)

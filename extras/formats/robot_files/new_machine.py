@@ -1,4 +1,4 @@
-"""A new machine file from what is at hand: a URDF, names of servos, a record, or answers at the terminal."""
+"""Makes a new machine file from available data: a URDF, names of servos, a record, or answers at the terminal."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 TOLD = "as told when the file was made"
 GUESSED = {"mass": "0.2 kg ± 50 %, guess", "length": "100 mm ± 20 %, guess"}
 ALIKE_IN_A_ROW = 5.0
-"""Factor of the standard error of a gain, because samples in a row are left with alike errors."""
+"""Factor on the standard error of a gain, because errors of consecutive samples are correlated."""
 MOST_ERROR = 0.3
-"""Most relative standard error of a gain that is taken over."""
+"""Largest relative standard error of a gain that is used."""
 LIKELY = 0.5
-"""Least share of the variance of a joint's needed torque that its recorded drive must explain to tell its gain."""
+"""Least share of the variance of a joint's needed torque that its recorded drive must explain to estimate its gain."""
 
 
 @dataclass(frozen=True)
 class Described:
-    """A joint as it is described in a few words.
+    """A short description of a joint.
 
-    drive: a name of the library, a torque for a unit of the recorded drive such as `0.5 N·m/A`, or empty: not known.
-    mass: of its link. length: to the next joint's axis. axis: how that lies to this one's.
+    drive: a name of the library, a torque per unit of the recorded drive such as `0.5 N·m/A`, or empty: not known.
+    mass: of its link. length: to the next joint's axis. axis: direction of that axis relative to this one's.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Described:
 
 
 def text_of(name: str, joints: Sequence[Described], unit: str) -> str:
-    """The machine file of described joints. unit: of the recorded drive. Raises SpecError."""
+    """Returns the machine file of described joints. unit: of the recorded drive. Raises SpecError."""
     lines = [f'name = "{name}"']
     for joint in joints:
         lines += ["", "[[joints]]", f'name = "{joint.name}"']
@@ -65,7 +65,7 @@ def text_of(name: str, joints: Sequence[Described], unit: str) -> str:
 
 
 def check_drive(text: str, slides: bool = False) -> str:
-    """What was typed for a drive, if it is one. Raises SpecError."""
+    """Returns the typed text if it is a drive. Raises SpecError."""
     if text and text not in library_drives():
         if not is_number(text):
             from daq.contracts.drive_library import library_drive
@@ -76,7 +76,7 @@ def check_drive(text: str, slides: bool = False) -> str:
 
 
 def parts_of(drives: Mapping[str, str], slides: Mapping[str, bool]) -> dict[str, JointParts]:
-    """The parts of joints, by name, whose drives are described; see `Described`. Raises SpecError."""
+    """Returns the parts of joints, by name, whose drives are described; see `Described`. Raises SpecError."""
     found = {}
     for name, drive in drives.items():
         if drive in library_drives():
@@ -88,7 +88,7 @@ def parts_of(drives: Mapping[str, str], slides: Mapping[str, bool]) -> dict[str,
 
 
 def library_joint(name: str) -> Joint:
-    """A joint with a drive of the library. Raises SpecError."""
+    """Returns a joint with a drive of the library. Raises SpecError."""
     return parse_machine(f'name = "one"\n[[joints]]\nname = "one"\nlink = {{ mass = 1 }}\ndrive = "{name}"\n').joint(1)
 
 
@@ -106,9 +106,9 @@ def _gain_unit(unit: str, slides: bool = False) -> str:
 
 
 def with_gains_of_record(machine: Machine, trace: Trace) -> Machine:
-    """The machine whose unknown drives have the gain that a record shows, by the torque that its motion needs.
+    """Returns the machine with unknown drive gains estimated from a record, by the torque that its motion needs.
 
-    A joint that shows none has 1, with a wide deviation.
+    A joint whose gain cannot be estimated gets 1, with a wide deviation.
     """
     unit = trace.record.drive_unit or "V"
     unknown = [
@@ -125,8 +125,9 @@ def with_gains_of_record(machine: Machine, trace: Trace) -> Machine:
 
 
 def _shown_gains(machine: Machine, trace: Trace) -> Iterator[tuple[int, tuple[float, float | None]]]:
-    """By joint, the torque for a unit of drive that a record shows, beside friction that it shows too; and how alike
-    both sides are."""
+    """Yields by joint the estimated torque per unit of drive, with friction fitted too, and the explained share of the
+    variance.
+    """
     from extras.formats.robot_files.uncertain_numbers import CUTOFF
     from model.inverse_dynamics.recorded_motion import recorded_motion
     from model.inverse_dynamics.torque_balance import TorqueBalance
@@ -146,8 +147,11 @@ def _shown_gains(machine: Machine, trace: Trace) -> Iterator[tuple[int, tuple[fl
 
 
 def _ratio(needed: Floats, driven: Floats, others: Sequence[Floats]) -> tuple[float, float] | None:
-    """The torque for a unit of drive, beside others that take part, and the share of the torque that all explain; None
-    where the record does not tell it."""
+    """Returns the torque per unit of drive, with other contributions fitted, and the share of the torque that all
+    explain.
+
+    None if the record does not determine it.
+    """
     columns = np.stack([driven, *others], axis=1)
     size = np.linalg.norm(columns, axis=0)
     if not size[0]:

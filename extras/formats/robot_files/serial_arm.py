@@ -1,4 +1,4 @@
-"""The serial arm that is made of some joints of a robot; the others are held, and what they carry becomes one body."""
+"""Extracts a serial arm from some joints of a robot; the others are held, and what they carry becomes one body."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class RigidBody:
 class ArmJoint:
     """A joint of the arm, with the arm at 0: a point (3,) of its axis and its direction (3,), in the root's frame.
 
-    body: everything that moves with it and with no joint beyond it
+    body: everything that moves with it but with no later joint
     """
 
     joint: DescribedJoint
@@ -53,14 +53,14 @@ def serial_arm(
     hold: Mapping[str, float] | None = None,
     tip: str | None = None,
 ) -> SerialArm:
-    """The arm that some joints of a robot make; the others are held.
+    """Returns the arm that some joints of a robot form; the others are held.
 
     Args:
-        names: joints that move, base first; None for all, if they follow one another.
-        hold: positions of joints that are held, rad or m; 0 where none is given.
-        tip: link whose frame is the end of the arm; None for the link that hangs on the last joint.
+        names: joints that move, base first; None for all, if they form a chain.
+        hold: positions of held joints, rad or m; 0 by default.
+        tip: link whose frame is the end of the arm; None for the link of the last joint.
 
-    Raises SpecError with one line for joints that are not there, do not follow one another, or follow another joint.
+    Raises SpecError with one line for joints that do not exist, do not form a chain, or mimic another joint.
     """
     chain = _chain(robot, names)
     moving = {_joint(robot, link).name for link in chain}
@@ -83,7 +83,7 @@ def _joint(robot: Description, link: int) -> DescribedJoint:
 
 
 def _chain(robot: Description, names: Sequence[str] | None) -> list[int]:
-    """Links of the joints that move, base first."""
+    """Returns the links of the joints that move, base first."""
     known = robot.joints
     if not known:
         raise SpecError(f"{robot.origin}: has no joint that moves")
@@ -92,8 +92,8 @@ def _chain(robot: Description, names: Sequence[str] | None) -> list[int]:
         if len(links) != len(known):
             follower = next(n for n, link in known.items() if _joint(robot, link).follows is not None)
             raise SpecError(
-                f"{robot.origin}: joint {shown(follower)} mimics another; name the arm's joints (--joints), which are "
-                f"independent: it has {_some(known)}"
+                f"{robot.origin}: joint {shown(follower)} mimics another; name the arm's independent joints "
+                f"(--joints): it has {_some(known)}"
             )
     else:
         if unknown := [name for name in names if name not in known]:
@@ -114,7 +114,7 @@ def _chain(robot: Description, names: Sequence[str] | None) -> list[int]:
         if joint.follows is not None:
             raise SpecError(
                 f"{robot.origin}: joint {shown(joint.name)} mimics {shown(joint.follows.leader)}; "
-                "a model's joints are independent, leave it out and it is held"
+                "a model's joints are independent; leave it out, so that it is held"
             )
     return links
 
@@ -125,7 +125,7 @@ def _some(names: Mapping[str, int]) -> str:
 
 
 def _held(robot: Description, moving: set[str], hold: Mapping[str, float]) -> dict[str, float]:
-    """Position of every joint that does not move."""
+    """Returns the position of every joint that does not move."""
     known = robot.joints
     for name, value in hold.items():
         if name not in known or name in moving:
@@ -148,7 +148,7 @@ def _held(robot: Description, moving: set[str], hold: Mapping[str, float]) -> di
 
 
 def _placed(robot: Description, held: Mapping[str, float]) -> tuple[list[Floats], list[Floats]]:
-    """Rotation and position of every link's frame in the root's, joints that move at 0."""
+    """Returns rotation and position of every link's frame in the root's, with moving joints at 0."""
     rotations: list[Floats] = []
     positions: list[Floats] = []
     for link in robot.links:
@@ -169,7 +169,7 @@ def _placed(robot: Description, held: Mapping[str, float]) -> tuple[list[Floats]
 
 
 def _owners(robot: Description, chain: Sequence[int]) -> list[int | None]:
-    """For every link the link of the chain that it moves with; None for those that move with the base."""
+    """Returns for every link the link of the chain with which it moves; None if it moves with the base."""
     owners: list[int | None] = []
     for i, link in enumerate(robot.links):
         above = None if link.parent is None else owners[link.parent]
@@ -178,7 +178,7 @@ def _owners(robot: Description, chain: Sequence[int]) -> list[int | None]:
 
 
 def _merged(robot: Description, members: Sequence[int], rotations: list[Floats], positions: list[Floats]) -> RigidBody:
-    """Several links that move together, as one body."""
+    """Merges several links that move together into one body."""
     links = [robot.links[i] for i in members]
     centres = [positions[i] + rotations[i] @ robot.links[i].centre for i in members]
     mass = sum(link.mass for link in links)
@@ -198,5 +198,5 @@ def _tip(robot: Description, name: str | None, owner: Sequence[int | None], last
     found = [i for i, link in enumerate(robot.links) if link.name == name]
     if not found or owner[found[0]] != last:
         own = [robot.links[i].name for i, moves_with in enumerate(owner) if moves_with == last]
-        raise SpecError(f"--tip {name}: is no link that the last joint carries; it carries {', '.join(own[:40])}")
+        raise SpecError(f"--tip {name}: the last joint carries no such link; it carries {', '.join(own[:40])}")
     return found[0]

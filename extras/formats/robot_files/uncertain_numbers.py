@@ -1,4 +1,6 @@
-"""Which numbers of a machine file matter most: how far the deviation of each moves the torques of a motion."""
+"""Finds the most important values of a machine file: how much does the deviation of each change the torques of a
+motion?
+"""
 
 from __future__ import annotations
 
@@ -16,28 +18,28 @@ from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
 DURATION, PERIOD = 20.0, 0.01
-"""Of the imagined motion, s."""
+"""Duration of the imagined motion, s."""
 SHARE = 0.35
 """Amplitude of a joint, as a share of its range."""
 SWING = 0.5
 """Amplitude of a joint whose file states no range, rad or m."""
 SLOWEST = 0.2
-"""Frequency of the first joint, Hz; the others are a little faster, so that no two move alike."""
+"""Frequency of the first joint, Hz; the others are slightly faster, so that no two move alike."""
 CUTOFF = 8.0
-"""Of the torques' low-pass, Hz."""
+"""Cutoff of the torques' low-pass, Hz."""
 
 
 class Uncertain(NamedTuple):
-    """A number, and the share of the torque's size (root mean squares) by which its deviation moves that of a joint."""
+    """A parameter, and the share of a joint's torque (root mean squares) by which its deviation changes it."""
 
     parameter: Parameter
     share: float
 
 
 def most_uncertain(model: Model, trace: Trace | None = None) -> list[Uncertain]:
-    """The numbers whose deviations move the torques of a motion, the largest share first.
+    """Returns the parameters whose deviations change the torques of a motion, the largest share first.
 
-    trace: the motion; None for slow waves of all joints within their limits. Raises TraceError where it holds none.
+    trace: the motion; None for slow waves of all joints within their limits. Raises TraceError if it has no motion.
     """
     motion = recorded_motion(_imagined(model.machine) if trace is None else trace, model.machine, CUTOFF)
     balance = TorqueBalance(model, (motion,))
@@ -56,7 +58,7 @@ def most_uncertain(model: Model, trace: Trace | None = None) -> list[Uncertain]:
 
 
 def _imagined(machine: Machine) -> Trace:
-    """A motion of all modelled joints within their limits, and no drive."""
+    """Returns a motion of all modelled joints within their limits, without drive."""
     time = np.arange(0.0, DURATION, PERIOD)
     joints = machine.modelled_joints
     columns = []

@@ -1,5 +1,6 @@
-"""Reads a URDF. MuJoCo's reader turns its frames and inertias into numbers; its compiler, which merges, balances and
-rounds them, is not run."""
+"""Reads a URDF. MuJoCo's reader parses frames and inertias; its compiler, which merges, balances and rounds them, is
+not run.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +18,12 @@ from model.arrays import Floats
 
 
 def read_urdf(path: Path) -> Description:
-    """The robot in a URDF file; meshes are not read. Raises SpecError with one line."""
+    """Returns the robot in a URDF file; meshes are not read. Raises SpecError with one line."""
     return parse_urdf(read_text(path, f"URDF {path}", xml=True), str(path))
 
 
 def parse_urdf(text: str, origin: str) -> Description:
-    """The robot in a URDF's text; `origin` names the file in errors. Raises SpecError with one line."""
+    """Returns the robot in a URDF's text; `origin` names the file in errors. Raises SpecError with one line."""
     checked = checked_urdf(text, origin)
     spec = _spec(text, origin)
     links: list[DescribedLink] = []
@@ -39,8 +40,10 @@ def parse_urdf(text: str, origin: str) -> Description:
 
 
 def _spec(text: str, origin: str) -> Any:
-    """What MuJoCo reads, not compiled. Its warnings, which would go to a file in the working folder, are about what is
-    not used here."""
+    """Returns the result of MuJoCo's reader, not compiled.
+
+    Its warnings, which would be written to a file in the working folder, concern only unused parts.
+    """
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
@@ -90,7 +93,7 @@ def _joint(body: Any, link: str, checked: CheckedUrdf) -> DescribedJoint | None:
 
 
 def _rotation(quaternion: Any) -> Floats:
-    """Rotation matrix of a quaternion (w, x, y, z)."""
+    """Returns the rotation matrix of a quaternion (w, x, y, z)."""
     matrix = np.zeros(9)
     unit = np.array(quaternion, dtype=float)
     mujoco.mju_quat2Mat(matrix, unit / np.linalg.norm(unit))

@@ -1,6 +1,6 @@
-"""Checks the text of a URDF before a reader of C++ sees it, and takes from it what that reader leaves out.
+"""Checks the text of a URDF before a C++ reader parses it, and extracts data that this reader ignores.
 
-Every fault is one line that names the link or joint.
+Every fault is reported in one line that names the link or joint.
 """
 
 from __future__ import annotations
@@ -16,32 +16,33 @@ from daq.contracts.errors import SpecError
 from extras.formats.robot_files.description import Follower
 
 LARGEST = 8 << 20
-"""Size (characters) of the largest URDF that is read; a humanoid's has a tenth of it."""
+"""Size (characters) of the largest accepted URDF; a humanoid's has a tenth of it."""
 MOST_LINKS = 1000
-"""Most links of a URDF that is read; reading takes time in proportion to the square of their number."""
+"""Most links of an accepted URDF; reading time is proportional to the square of their number."""
 MOST_ELEMENTS = 200_000
-"""Most XML elements of a URDF that is read."""
+"""Most XML elements of an accepted URDF."""
 
 LONGEST = 20.0
 """Length (m) beyond any arm's; Canadarm2, the longest, has 17.6 m."""
 FULL_TURN = math.tau + 1e-2
 """Largest angle (rad) of an origin's turn, with its rounding."""
 MOST_TURNS = 4
-"""Turns of a joint with limits beyond which they are doubted: cables that run through a joint allow two or three."""
+"""Turns of a joint with limits beyond which they are doubted: cables through a joint allow two or three."""
 DENSEST = 9 * 22_600.0
-"""Largest mass (kg) by the cube of half the sum of its moments' radius (m³): a ball of osmium, the densest matter
-(22 600 kg/m³), has m/r³ = 4π/3 ρ and a radius of 0.775 r; every other shape has less."""
+"""Largest mass (kg) by the cube of half the sum of its moments' radius (m³): a ball of osmium, the densest matter (22
+600 kg/m³), has m/r³ = 4π/3 ρ and a radius of 0.775 r; every other shape has less.
+"""
 XACRO = "is xacro that was not expanded; make a URDF of it first: `xacro FILE > robot.urdf`"
 
 NO_LIMIT = 1e9
-"""Number from which a limit counts as none: of a joint that slides, a URDF must state limits, even if it has none."""
+"""Value from which a limit counts as none: a URDF must state limits for a prismatic joint, even if it has none."""
 
 MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
-"""Types of joint that a machine can have, and what they are called there."""
+"""Joint types that a machine can have, and their names there."""
 _REFUSED = {"planar": "moves in a plane", "floating": "moves freely", "spherical": "turns about a point"}
 
 _OF_BODIES = ("origin", "mass", "inertia", "axis")
-"""Elements whose numbers are computed with; NO_LIMIT bounds them. Those of limits may be as large as there are."""
+"""Elements whose values are used in computations; NO_LIMIT bounds them. Limits may have any size."""
 _NUMBERS: dict[str, dict[str, int]] = {
     "origin": {"xyz": 3, "rpy": 3},
     "mass": {"value": 1},
@@ -52,12 +53,12 @@ _NUMBERS: dict[str, dict[str, int]] = {
     "mimic": {"multiplier": 1, "offset": 1},
     "safety_controller": {"soft_lower_limit": 1, "soft_upper_limit": 1},
 }
-"""How many numbers the attributes of an element hold."""
+"""Number of values in the attributes of an element."""
 
 
 @dataclass(frozen=True)
 class JointText:
-    """What the URDF says of a joint beside its place and axis; None where it says nothing."""
+    """Data of a joint in the URDF, besides its place and axis; None if the file states none."""
 
     kind: str
     low: float | None
@@ -71,10 +72,10 @@ class JointText:
 
 @dataclass(frozen=True)
 class CheckedUrdf:
-    """A URDF whose links form one tree and whose numbers are finite.
+    """A URDF whose links form one tree and whose values are finite.
 
     parents: parent's name of every link but the root
-    joint_of: name of the joint that each of these links hangs on
+    joint_of: name of the joint between each of these links and its parent
     """
 
     name: str
@@ -83,11 +84,11 @@ class CheckedUrdf:
     joint_of: dict[str, str]
     joints: dict[str, JointText]
     doubts: tuple[str, ...] = ()
-    """One line for everything that looks like another unit than URDF's m, kg, kg·m² and rad."""
+    """One line for each value that seems to be in a unit other than URDF's m, kg, kg·m² and rad."""
 
 
 def checked_urdf(text: str, origin: str) -> CheckedUrdf:
-    """The names, limits and tree of a URDF. Raises SpecError with one line, which `origin` begins."""
+    """Returns the names, limits and tree of a URDF. Raises SpecError with one line, which begins with `origin`."""
     robot = _robot(text, origin)
     links = [_name(link, origin) for link in robot.findall("link")]
     joints = robot.findall("joint")
@@ -105,7 +106,7 @@ def _robot(text: str, origin: str) -> Xml.Element:
     if len(text) > LARGEST:
         raise SpecError(f"{origin}: has {len(text)} characters; at most {LARGEST} are read")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise SpecError(f"{origin}: has a document type or entities, which no URDF needs; they are not read")
+        raise SpecError(f"{origin}: has an XML DOCTYPE or entities, which no URDF needs; they are not read")
     for start, most, what in (("<link", MOST_LINKS, "links"), ("<", 2 * MOST_ELEMENTS, "XML elements")):
         if text.count(start) > most:
             raise SpecError(f"{origin}: has more than {most} {what}; name the arm's own file")
@@ -118,7 +119,7 @@ def _robot(text: str, origin: str) -> Xml.Element:
     if any("xacro" in element.tag.rpartition("}")[0] for element in root.iter()):
         raise SpecError(f"{origin}: {XACRO}")
     space, brace, _ = root.tag.rpartition("}")
-    if brace:  # a default namespace, of which no other reader of URDF knows
+    if brace:  # a default namespace, which no other URDF reader supports
         for element in root.iter():
             element.tag = element.tag.removeprefix(space + brace)
     if root.tag != "robot":
@@ -134,7 +135,7 @@ def _name(element: Xml.Element, origin: str) -> str:
 
 
 def _numbers(element: Xml.Element | None, attribute: str, where: str) -> list[float] | None:
-    """The numbers of an attribute; None when it is not there. Raises SpecError with one line."""
+    """Returns the values of an attribute; None if it is missing. Raises SpecError with one line."""
     text = None if element is None else element.get(attribute)
     if element is None or text is None:
         return None
@@ -146,7 +147,7 @@ def _numbers(element: Xml.Element | None, attribute: str, where: str) -> list[fl
     most = NO_LIMIT if element.tag in _OF_BODIES else math.nextafter(math.inf, 0.0)
     if len(values) != count or not all(abs(value) <= most for value in values):
         needed = "a finite number is needed" if count == 1 else f"{count} finite numbers are needed"
-        needed += f", ±{most:g} at most" if any(most < abs(value) < math.inf for value in values) else ""
+        needed += f", at most ±{most:g}" if any(most < abs(value) < math.inf for value in values) else ""
         raise SpecError(f"{where}: {element.tag} {attribute} is {shown(text)}; {needed}")
     return values
 
@@ -176,9 +177,11 @@ def _joint(joint: Xml.Element, origin: str) -> JointText:
     where = f"{origin}: joint {shown(joint.get('name'))}"
     kind = joint.get("type", "")
     if kind in _REFUSED:
-        raise SpecError(f"{where}: is {kind}, it {_REFUSED[kind]}; an arm's joints are {', '.join(MOVING)} or fixed")
+        raise SpecError(
+            f"{where}: is {kind}, it {_REFUSED[kind]}; an arm's joints must be {', '.join(MOVING)} or fixed"
+        )
     if kind not in MOVING and kind != "fixed":
-        raise SpecError(f"{where}: type is {shown(kind)}; an arm's joints are {', '.join(MOVING)} or fixed")
+        raise SpecError(f"{where}: type is {shown(kind)}; an arm's joints must be {', '.join(MOVING)} or fixed")
     _numbers(joint.find("origin"), "xyz", where)
     _numbers(joint.find("origin"), "rpy", where)
     axis = _numbers(joint.find("axis"), "xyz", where)
@@ -206,7 +209,7 @@ def _joint(joint: Xml.Element, origin: str) -> JointText:
 
 
 def _doubts(robot: Xml.Element) -> Iterator[str]:
-    """What no arm has in URDF's own units; numbers have been checked before."""
+    """Yields values that no arm has in URDF's units; their format has already been checked."""
     origins = [origin for joint in robot.findall("joint") if (origin := joint.find("origin")) is not None]
     reach = sum(math.hypot(*(_numbers(origin, "xyz", "") or (0.0,))) for origin in origins)
     if reach > LONGEST:
@@ -220,9 +223,9 @@ def _doubts(robot: Xml.Element) -> Iterator[str]:
     ]
     soft = [shown(joint.get("name")) for joint in robot.findall("joint") if _is_softer(joint)]
     if soft:
-        yield f"joint {', '.join(soft)}: the soft limits of its safety_controller are narrower, and are not taken over"
+        yield f"joint {', '.join(soft)}: the soft limits of its safety_controller are narrower, and are not imported"
     if any((ratio.text or "").strip() not in ("", "1", "1.0") for ratio in robot.iter("mechanicalReduction")):
-        yield "a mechanicalReduction of its transmissions is not taken over: state gear_ratio in the machine file"
+        yield "a mechanicalReduction of its transmissions is not imported: state gear_ratio in the machine file"
     if max(turns, default=0.0) > FULL_TURN:
         yield f"an origin is turned by rpy {max(turns):.4g} rad, more than once round: are angles in degrees?"
     if NO_LIMIT > max(limits, default=0.0) > MOST_TURNS * FULL_TURN:
@@ -240,7 +243,7 @@ def _doubts(robot: Xml.Element) -> Iterator[str]:
 
 
 def _is_softer(joint: Xml.Element) -> bool:
-    """Whether a joint has soft limits within its limits; both 0 are none."""
+    """Whether a joint has soft limits within its limits; both 0 means none."""
     ends = ("lower", "upper")
     low, high = (_number(joint.find("limit"), end, "") or 0.0 for end in ends)
     softer, stricter = (_number(joint.find("safety_controller"), f"soft_{end}_limit", "") or 0.0 for end in ends)
@@ -248,12 +251,12 @@ def _is_softer(joint: Xml.Element) -> bool:
 
 
 def _largest(limit: float | None) -> float | None:
-    """A limit of speed or effort; None where it is 0, which files write that state none."""
+    """Returns a limit of speed or effort; None if it is 0, which files use for no limit."""
     return limit if limit is not None and 0.0 < limit < NO_LIMIT else None
 
 
 def _tree(links: list[str], joints: list[Xml.Element], origin: str) -> tuple[str, dict[str, str], dict[str, str]]:
-    """The root, and parent and joint of every other link. Raises SpecError unless that is one tree."""
+    """Returns the root, and parent and joint of every other link. Raises SpecError unless they form one tree."""
     known, parents, joint_of = set(links), dict[str, str](), dict[str, str]()
     for joint in joints:
         where = f"{origin}: joint {shown(joint.get('name'))}"
@@ -262,10 +265,12 @@ def _tree(links: list[str], joints: list[Xml.Element], origin: str) -> tuple[str
             element = joint.find(end)
             ends[end] = "" if element is None else element.get("link", "")
             if ends[end] not in known:
-                raise SpecError(f"{where}: its {end} is {shown(ends[end])}, which is no link of the file")
+                raise SpecError(f"{where}: its {end} is {shown(ends[end])}, but the file has no such link")
         if ends["child"] in parents:
             before = joint_of[ends["child"]]
-            raise SpecError(f"{where}: its child {shown(ends['child'])} hangs on joint {shown(before)} too: a loop")
+            raise SpecError(
+                f"{where}: its child {shown(ends['child'])} is also the child of joint {shown(before)}: a loop"
+            )
         parents[ends["child"]], joint_of[ends["child"]] = ends["parent"], joint.get("name", "")
     roots = [name for name in links if name not in parents]
     if len(roots) > 1:

@@ -1,4 +1,4 @@
-"""A model as URDF. What a URDF has no place for is named in a comment, and to the caller."""
+"""Writes a model as URDF. Parts that a URDF cannot hold are listed in a comment, and returned."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from model import layout as at
 from model.machine_model.model import Model
 
 HELD = frozenset((at.VISCOUS, at.COULOMB))
-"""Numbers of effects that a URDF has a place for, beside those of the bodies."""
+"""Effect parameters that a URDF can hold, besides those of the bodies."""
 
 
 def urdf_text(model: Model) -> tuple[str, list[str]]:
-    """The model's URDF, and what of the model it leaves out.
+    """Returns the model's URDF, and the parts of the model that it leaves out.
 
-    Each link's frame is at its joint, whose axis is z. Gravity points down: a tilted base hangs on a link `world`. Its
-    magnitude is in MuJoCo's extension, which other readers ignore. The end of the arm is the link `tool`.
+    Each link's frame is at its joint, whose axis is z. Gravity points down: a tilted base is fixed to a link `world`.
+    Its magnitude is in MuJoCo's extension, which other readers ignore. The end of the arm is the link `tool`.
     """
     arm = outgoing_arm(model)
     lost = left_out(model, HELD)

@@ -1,4 +1,4 @@
-"""Nested data of any format as columns: `a.b` for what lies in another, `a[2]` or `a[elbow]` for one of many."""
+"""Flattens nested data of any format to columns: `a.b` for a nested field, `a[2]` or `a[elbow]` for an element."""
 
 from __future__ import annotations
 
@@ -11,20 +11,22 @@ from daq.contracts.trace import Floats
 from daq.traces.mapping.expression import Columns
 
 NAMES = ("name", "names", "joint_names", "joint_name")
-"""Fields of a message that name the values of the others."""
+"""Fields of a message that name the elements of the others."""
 MOST = 10_000
-"""Number of columns that are told apart; a picture has more."""
+"""Largest number of columns for one array; a picture has more."""
 
 
 def columns_of(found: Any) -> Columns:
-    """The columns of a tree of mappings, objects with fields, lists and arrays. What holds no numbers is left out."""
+    """Returns the columns of a tree of mappings, objects with fields, lists and arrays. Parts without numbers are left
+    out.
+    """
     columns: Columns = {}
     _add(columns, "", _plain(found))
     return columns
 
 
 def _plain(found: Any) -> Any:
-    """A structure of MATLAB, or a record of NumPy, as a mapping; anything else as it is."""
+    """Converts a structure of MATLAB, or a record of NumPy, to a mapping; returns anything else unchanged."""
     fields = getattr(found, "_fieldnames", None)
     if fields is not None:
         return {name: getattr(found, name) for name in fields}
@@ -69,7 +71,7 @@ def _add_list(columns: Columns, place: str, found: Sequence[Any]) -> None:
 
 
 def _add_field(columns: Columns, place: str, values: list[Any], labels: Sequence[str]) -> None:
-    """One field of many messages. labels: what a message calls the values of its lists."""
+    """Adds one field of many messages. labels: names of the elements of its lists."""
     if not labels or not _is_list(values[0]) or _is_list_of_text(values[0]):
         _add(columns, place, values)
         return
@@ -84,7 +86,7 @@ def _labels(message: Mapping[str, Any]) -> Sequence[str]:
 
 
 def _add_array(columns: Columns, place: str, found: np.ndarray[Any, Any]) -> None:
-    """A vector as it is; of a table the columns along its shorter side."""
+    """Adds a vector as it is; of a table the columns along its shorter side."""
     if found.dtype.kind not in "fiub":
         return
     values = np.squeeze(found)
@@ -97,13 +99,13 @@ def _add_array(columns: Columns, place: str, found: np.ndarray[Any, Any]) -> Non
 
 
 def _holds_series(found: Mapping[str, Any]) -> bool:
-    """Whether one entry of a list is a record by itself: it has lists of many numbers, and of different lengths."""
+    """Whether one entry of a list is itself a record: it has long lists of numbers, of different lengths."""
     lengths = {len(value) for value in found.values() if _is_list(value) and not _is_list_of_text(value)}
     return bool(lengths) and max(lengths) > SERIES
 
 
 SERIES = 64
-"""Length from which a list in one of many entries is a record of its own, and not one value a joint."""
+"""Length from which a list in an entry counts as a record, not as one value per joint."""
 
 
 def _is_list(value: Any) -> bool:

@@ -1,4 +1,4 @@
-"""Reads MATLAB's .mat in a process of its own: a damaged file makes scipy's reader crash, and all of its process."""
+"""Reads MATLAB's .mat in a separate process, because a damaged file can crash the process of scipy's reader."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from daq.contracts.errors import TraceError
 from daq.traces.mapping.expression import Columns
 
 REFUSED = 2
-"""Exit code of a process that answers with an error."""
+"""Exit code of a process that returns an error."""
 NEW = "-v7.3"
 
 
 def read_mat(path: Path) -> Columns:
-    """The columns of a file of MATLAB. Raises TraceError."""
+    """Returns the columns of a MATLAB file. Raises TraceError."""
     module = [sys.executable, "-P", "-m", "extras.formats.tables.mat_process", str(path)]
     done = subprocess.run(module, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=False)
     if done.returncode == REFUSED and done.stdout.decode("utf-8", "replace") == NEW:
@@ -31,7 +31,7 @@ def read_mat(path: Path) -> Columns:
 
 
 def main() -> int:
-    """Writes the columns of the file that the first argument names, or one line of error."""
+    """Writes the columns of the file in the first argument, or one line of error."""
     from scipy.io import loadmat
 
     from extras.formats.tables.flat import columns_of

@@ -1,4 +1,4 @@
-"""Parquet, data sets of lerobot, MATLAB's .mat, NumPy's .npz and JSON, as traces by the mapping of their columns."""
+"""Imports Parquet, data sets of lerobot, MATLAB's .mat, NumPy's .npz and JSON as traces, by a mapping of columns."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from extras.formats.tables.mat_process import read_mat
 PARQUET_MAGIC = b"PAR1"
 SUFFIXES = (".parquet", ".mat", ".npz", ".json")
 INFO = Path("meta") / "info.json"
-"""What a data set of lerobot says of itself."""
+"""Description of a data set of lerobot."""
 
 
 def is_table(path: Path, first: bytes) -> bool:
@@ -31,8 +31,10 @@ def is_table(path: Path, first: bytes) -> bool:
 
 
 def import_table(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: Choice | None = None) -> Trace:
-    """The trace in a table, whose columns the choice or the TOML beside it names. Raises TraceError with one line,
-    MissingExtraError."""
+    """Returns the trace in a table, whose columns the choice or the TOML beside it names.
+
+    Raises TraceError with one line, MissingExtraError.
+    """
     path = Path(path)
     description, _ = Description.read(path if path.name else path.resolve(), limits)
 
@@ -44,7 +46,7 @@ def import_table(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice:
 
 
 def _columns(path: Path, limits: TraceLimits) -> Columns:
-    """The columns of a file or of a data set. Raises TraceError, MissingExtraError."""
+    """Returns the columns of a file or of a data set. Raises TraceError, MissingExtraError."""
     try:
         if path.is_dir():
             return _data_set(path, limits)
@@ -61,12 +63,12 @@ def _columns(path: Path, limits: TraceLimits) -> Columns:
         return _parquet([path], _features(info[0], limits) if info else {}, limits)
     except (DaqError, MemoryError):
         raise
-    except Exception as error:  # a damaged file makes the libraries that read it raise anything
+    except Exception as error:  # a damaged file makes its libraries raise any exception
         raise TraceError(f"{path}: cannot be read: {' '.join(str(error).split())[:200]}") from error
 
 
 def _data_set(path: Path, limits: TraceLimits) -> Columns:
-    """The rows of all episodes of a data set of lerobot, of version 2 or 3."""
+    """Returns the rows of all episodes of a data set of lerobot, version 2 or 3."""
     names = _features(path / INFO, limits)
     files = sorted((path / "data").glob("**/*.parquet"))
     if not files:
@@ -75,14 +77,14 @@ def _data_set(path: Path, limits: TraceLimits) -> Columns:
 
 
 def _features(info: Path, limits: TraceLimits) -> dict[str, tuple[str, ...]]:
-    """What a data set of lerobot calls the values of each feature."""
+    """Returns the names of the elements of each feature in a data set of lerobot."""
     said = json.loads(read_file(info, limits.metadata_bytes, "metadata_bytes"))
     features: dict[str, Any] = said.get("features", {})
     return {name: _names(feature.get("names")) for name, feature in features.items()}
 
 
 def _names(found: Any) -> tuple[str, ...]:
-    """What a data set calls the values of a feature, whichever way it is written."""
+    """Returns the names of a feature's elements, in either notation."""
     if isinstance(found, dict):
         found = next(iter(found.values()), ())
     while isinstance(found, list) and len(found) == 1 and isinstance(found[0], list):
@@ -91,7 +93,7 @@ def _names(found: Any) -> tuple[str, ...]:
 
 
 def _parquet(files: list[Path], names: dict[str, tuple[str, ...]], limits: TraceLimits) -> Columns:
-    """names: of the values of a column that holds several."""
+    """names: of the elements of a column that holds several."""
     require_extra("tables", f"{files[0]}: Parquet", "pyarrow")
     import pyarrow
     import pyarrow.parquet

@@ -1,4 +1,4 @@
-"""The archive: traces in storage that speaks S3, behind the folder of traces."""
+"""The archive: long-term storage of traces by S3, in addition to the folder of traces."""
 
 from daq.plugins import Plugin
 

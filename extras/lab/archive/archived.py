@@ -1,4 +1,4 @@
-"""Which traces the archive has, and which local copies may go."""
+"""Keeps in the database which traces the archive has, and which local copies may be dropped."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ArchivedStore:
         self._store = store
 
     def get(self, trace: str) -> Archived | None:
-        """Returns what the archive has of a trace; None if it has nothing, or is about to delete it."""
+        """Returns the archive's entry of a trace; None if there is none, or it is about to be deleted."""
         with self._store.reading() as session:
             row = session.get(ArchivedRow, trace)
             return None if row is None or row.deleting else _archived(row)
@@ -59,23 +59,24 @@ class ArchivedStore:
         return set(session.scalars(query))
 
     def delete_later(self, session: Session, trace: str) -> None:
-        """Notes that a trace is deleted: its object goes when the archive can be reached."""
+        """Queues the archived object of a deleted trace for deletion, which is done once the archive can be reached."""
         session.execute(update(ArchivedRow).filter_by(trace=trace).values(deleting=True))
 
     def add(self, made: Archived) -> None:
-        """Records a trace that the archive has now. If the trace has been deleted meanwhile, its object is to be
-        deleted as well."""
+        """Records a trace that the archive now has. If the trace was deleted meanwhile, its object is queued for
+        deletion.
+        """
         with self._store.writing() as session:
             is_gone = session.get(TraceRow, made.trace) is None
             session.merge(ArchivedRow(**made.__dict__, deleting=is_gone))
 
     def forget(self, trace: str) -> None:
-        """Deletes a row: the archive no longer has the trace."""
+        """Deletes a row, because the archive no longer has the trace."""
         with self._store.writing() as session:
             session.execute(delete(ArchivedRow).filter_by(trace=trace))
 
     def note(self, trace: str, *, checked: datetime | None = None, fetched: datetime | None = None) -> None:
-        """Records when an object was read back, or its trace was fetched."""
+        """Records the time at which an object was read back, or its trace was fetched."""
         values = {name: at for name, at in (("checked", checked), ("fetched", fetched)) if at is not None}
         with self._store.writing() as session:
             session.execute(update(ArchivedRow).filter_by(trace=trace).values(**values))
@@ -87,7 +88,7 @@ class ArchivedStore:
             return [_archived(row) for row in session.scalars(query)]
 
     def to_send(self, robot: str) -> list[str]:
-        """Returns the traces that the folder has and the archive does not, the oldest first. Reads the whole table."""
+        """Returns the traces that only the folder has, the oldest first. Reads the whole table."""
         query = (
             select(TraceRow.id)
             .where(TraceRow.robot == robot, TraceRow.missing.is_(False))

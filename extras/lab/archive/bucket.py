@@ -1,8 +1,7 @@
-"""One bucket of a store that speaks S3, through `obstore`. Every error is one line without a secret in it.
+"""Accesses one bucket of an S3 store, through `obstore`. Every error is one line without secrets.
 
-Who the service is at the store: from a file, or from the environment. Never from a request.
-
-Names of objects: people find a trace by them, and no other content ever has the same name.
+Credentials come from a file or the environment, never from a request. Names of objects let people find a trace, and
+different contents never have the same name.
 """
 
 from __future__ import annotations
@@ -31,11 +30,11 @@ if TYPE_CHECKING:
 
 
 ACCESS_KEY, SECRET_KEY, SESSION_TOKEN = "AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN"
-"""Environment variables that every client of S3 knows."""
+"""Environment variables that every S3 client reads."""
 
 
 class Credentials(FrozenRecord):
-    """The two halves of a key, and the token of one that lasts for a session. Their `repr` shows none of them."""
+    """The two halves of a key, and the token of a temporary one. Their `repr` shows none of them."""
 
     access_key: SecretStr
     secret_key: SecretStr
@@ -43,7 +42,7 @@ class Credentials(FrozenRecord):
 
 
 def load_credentials(settings: ArchiveSettings, environment: Mapping[str, str] | None = None) -> Credentials:
-    """Reads the credentials. Raises SpecError in one line, which repeats none of them."""
+    """Reads the credentials. Raises SpecError in one line, without repeating any of them."""
     if settings.credentials is not None:
         return _of_file(settings)
     environment = os.environ if environment is None else environment
@@ -64,8 +63,8 @@ def _of_file(settings: ArchiveSettings) -> Credentials:
     try:
         data = parse_toml(text, what)
     except SpecError:
-        # The words of a parser may repeat what it could not read.
-        raise SpecError(f'{what}: is not TOML; write access_key = "…" and secret_key = "…", one a line') from None
+        # A parser's message may repeat text that it could not read.
+        raise SpecError(f'{what}: is not TOML; write access_key = "…" and secret_key = "…", one per line') from None
     try:
         found = Credentials.model_validate(data)
     except ValidationError as error:
@@ -78,43 +77,45 @@ def _of_file(settings: ArchiveSettings) -> Credentials:
 
 PLAIN = re.compile(r"[^A-Za-z0-9._-]+")
 DIGITS = 16
-"""Number of digits of the SHA-256 in a name: 64 bits, so that two contents do not meet."""
+"""Number of digits of the SHA-256 in a name: 64 bits, so that names of different contents never collide."""
 LONGEST = 120
 """Number of characters of the file's name that are kept."""
 
 
 def object_name(prefix: str, robot: str, file: str, created: datetime, sha256: str) -> str:
-    """Returns `PREFIX/ROBOT/YEAR/FILE-SHA256.mcap`, in characters that need no escape in an address."""
+    """Returns `PREFIX/ROBOT/YEAR/FILE-SHA256.mcap`, in characters that need no escape in a URL."""
     stem = PLAIN.sub("_", file.removesuffix(".mcap")).strip("._")[:LONGEST] or "trace"
     parts = (prefix, robot, f"{created.astimezone(UTC).year:04d}", f"{stem}-{sha256[:DIGITS]}.mcap")
     return "/".join(part for part in parts if part)
 
 
 PIECE = 8 << 20
-"""Number of bytes that one request sends or fetches, so that a time limit on a request suits traces of every size."""
+"""Bytes that one request sends or fetches, so that a time limit on a request suits traces of every size."""
 AT_ONCE = 2
-"""Number of pieces that are sent at once, so that little memory and little of the line is taken."""
+"""Pieces that are sent at once; few, to limit memory and network load."""
 RETRIES, RETRY_WITHIN = 2, timedelta(seconds=10)
-"""How often `obstore` repeats a request, and for how long; after that the service waits longer and tries again."""
+"""How often, and for how long, `obstore` repeats a request; after that the service waits longer and tries again."""
 STATUS = re.compile(r"\b(?:status(?: code)?:?|error code|server error[^0-9]{0,20})\s*\(?([1-5]\d\d)\b", re.IGNORECASE)
-"""The status of an answer, in the words of `obstore`."""
+"""Finds the status of an answer in a message of `obstore`."""
 REACHING = ("connect", "dns", "tcp", "closed before", "reset by peer", "refused", "error sending request")
 Progress = Callable[[int], None]
 """Called with the number of bytes that have been moved so far."""
 
 
 class ArchiveError(DaqError):
-    """The store did not do what it was asked. Another attempt may succeed: it is away, slow, or answers errors."""
+    """The store did not carry out a request. Another attempt may succeed: it is unreachable, slow, or answers
+    errors.
+    """
 
     exit_code = exit_codes.NOT_REACHED
 
 
 class RefusedError(ArchiveError):
-    """The store refuses this service, or its bucket is not there: a person must look."""
+    """The store refuses this service, or its bucket does not exist: a person must look."""
 
 
 class DamagedError(ArchiveError):
-    """What the store has is not what was sent: it is gone, shorter, or different."""
+    """The store's object is not the one that was sent: it is missing, shorter, or different."""
 
 
 @dataclass(frozen=True)
@@ -126,14 +127,16 @@ class Content:
 
 
 class Bucket:
-    """Objects by their names. Safe to use from any thread; each call waits for the store, for `timeout` s a piece."""
+    """Accesses objects by their names. Safe to use from any thread; each call waits for the store, up to `timeout` s
+    per piece.
+    """
 
     def __init__(self, settings: ArchiveSettings, credentials: Credentials) -> None:
         from obstore.store import S3Store
 
         self.place = settings.place
-        # Every key is given: one that is not would be looked for in the environment, and credentials at the address
-        # where a virtual machine of Amazon's finds its own.
+        # Every option is given. obstore would look for others in the environment, and for credentials at the address
+        # that Amazon's virtual machines use.
         config: S3Config = {
             "region": settings.region,
             "access_key_id": credentials.access_key.get_secret_value(),
@@ -156,7 +159,7 @@ class Bucket:
         )
 
     def send(self, key: str, file: Path, progress: Progress = lambda _done: None) -> Content:
-        """Sends a file, and returns what was sent. Raises OSError if the file cannot be read, ArchiveError."""
+        """Sends a file, and returns its size and digest. Raises OSError if the file cannot be read, ArchiveError."""
         import obstore
 
         digest, size = hashlib.sha256(), 0
@@ -187,13 +190,15 @@ class Bucket:
     def read(
         self, key: str, size: int, take: Callable[[bytes], object], progress: Progress = lambda _: None
     ) -> Content:
-        """Reads an object of `size` bytes piece by piece, each given to `take`. Raises what `take` raises;
-        DamagedError if the object is gone or has another size; ArchiveError."""
+        """Reads an object of `size` bytes in pieces, and calls `take` with each.
+
+        Raises as `take` does; DamagedError if the object is missing or has another size; ArchiveError.
+        """
         import obstore
 
         digest, done = hashlib.sha256(), 0
         if self.size_of(key) != size:
-            raise DamagedError(f"archive {self.place}: {key} has another size than what was sent")
+            raise DamagedError(f"archive {self.place}: {key} has another size than the file that was sent")
         while done < size:
             try:
                 piece = bytes(obstore.get_range(self._store, key, start=done, end=min(size, done + PIECE)))
@@ -217,7 +222,7 @@ class Bucket:
             raise self._error("reading a trace", error) from error
 
     def remove(self, key: str) -> None:
-        """Deletes an object; one that is gone already is no error. Raises ArchiveError."""
+        """Deletes an object; a missing one is no error. Raises ArchiveError."""
         import obstore
 
         try:
@@ -228,17 +233,17 @@ class Bucket:
             raise self._error("deleting a trace", error) from error
 
     def _error(self, doing: str, error: Exception) -> ArchiveError:
-        """What went wrong, in our own words: those of a store may repeat names, keys and signatures."""
+        """Describes an error in words of this program: a store's message may contain names, keys and signatures."""
         kind, why = _reason(error)
         return kind(f"archive {self.place}: {doing}: {why}")
 
 
 def open_bucket(settings: ArchiveSettings) -> Bucket | None:
-    """Opens the archive; None if none is configured. Nothing is asked of the store yet. Raises SpecError."""
+    """Opens the archive; None if none is configured. Sends no request yet. Raises SpecError."""
     if settings.bucket is None:
         return None
     if find_spec("obstore") is None:
-        install = "`pip install 'ma2000-daq[archive]'` where daq is installed"
+        install = "`pip install 'ma2000-daq[archive]'` in daq's environment"
         raise SpecError(f"archive.bucket {settings.bucket}: obstore is not installed: {install}")
     try:
         return Bucket(settings, load_credentials(settings))
@@ -249,7 +254,7 @@ def open_bucket(settings: ArchiveSettings) -> Bucket | None:
 
 
 def check(settings: Settings) -> None:
-    """Raises SpecError where the configured archive cannot be used."""
+    """Raises SpecError if the configured archive cannot be used."""
     open_bucket(settings.section(ArchiveSettings))
 
 
@@ -266,7 +271,7 @@ def _reason(error: Exception) -> tuple[type[ArchiveError], str]:
         (
             isinstance(error, exceptions.PermissionDeniedError | exceptions.UnauthenticatedError),
             RefusedError,
-            "the store refuses these credentials, or what they may do",
+            "the store refuses these credentials, or lacks their permission",
         ),
         ("timed out" in low or "timeout" in low, ArchiveError, "no answer in time"),
         (status is not None, ArchiveError, f"the store answers {status[1] if status else ''}"),

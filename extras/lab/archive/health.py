@@ -1,6 +1,6 @@
-"""Whether the store can be reached, and when it is asked again: at once, then after pauses that double.
+"""Tracks whether the store can be reached, and when to try again: at once, then after pauses that double.
 
-Tells an object that fails by itself from a store that does not answer.
+It distinguishes an object that fails by itself from a store that does not answer.
 """
 
 from __future__ import annotations
@@ -14,17 +14,20 @@ from extras.lab.archive.bucket import ArchiveError, RefusedError
 from server.clock import Clock
 
 IN_A_ROW = 2
-"""Number of failures in a row after which a step of a round ends: one object may be at fault, but a store that is away
-would cost its time limit for every one of hundreds."""
+"""Consecutive failures after which a step of a round ends: one object may be at fault, but an unreachable store would
+cost a time limit for each of hundreds.
+"""
 
 
 class Attempts:
-    """The failures of one round, and those that the rounds before have left. One thread uses it; others may read
-    `failing`, and say that the store has answered."""
+    """Failures of one round, and those that remain from earlier rounds.
+
+    One thread uses it; others may read `failing`, and report that the store has answered.
+    """
 
     def __init__(self) -> None:
         self.failing: dict[str, str] = {}
-        """Traces that fail while the store answers for others, and why."""
+        """Traces that fail although the store answers for others, and why."""
         self._failed: dict[str, ArchiveError] = {}
         self._before: set[str] = set()
         self._in_a_row = 0
@@ -37,21 +40,21 @@ class Attempts:
         self._has_answered = False
 
     def begin_step(self) -> None:
-        """Begins a step of the round, which tries whatever failed in the steps before."""
+        """Begins a step of the round, which also tries traces that failed in earlier steps."""
         self._in_a_row = 0
 
     def answered(self) -> None:
-        """Notes that the store did what it was asked."""
+        """Notes that the store carried out a request."""
         self._has_answered, self._in_a_row = True, 0
 
     def forget(self, trace: str) -> None:
-        """Forgets what failed: it has been done, or is no longer wanted."""
+        """Removes a failure: the request has been carried out, or is no longer needed."""
         self.failing.pop(trace, None)
 
     def failed(self, trace: str, error: ArchiveError) -> None:
         """Notes a failure."""
         self._failed[trace] = error
-        if trace not in self.failing:  # else it says nothing about the store
+        if trace not in self.failing:  # else it is no information on the store
             self._in_a_row += 1
 
     @property
@@ -61,7 +64,7 @@ class Attempts:
 
     @property
     def is_enough(self) -> bool:
-        """Whether so many have failed in a row that the step is to end."""
+        """Whether the step must end after so many consecutive failures."""
         return self._in_a_row >= IN_A_ROW
 
     def has_failed(self, trace: str) -> bool:
@@ -73,8 +76,10 @@ class Attempts:
         return trace in self.failing or trace in self._before
 
     def end(self) -> None:
-        """Ends a round. Raises the first failure if the store has answered nothing at all; otherwise the traces are at
-        fault, and the store is asked for the others without a pause."""
+        """Ends a round. Raises the first failure if the store has answered nothing at all.
+
+        Otherwise the traces are at fault, and the next round begins without a pause.
+        """
         if self._has_answered:
             self.failing = self.failing | {trace: f"{error} (trace {trace})" for trace, error in self._failed.items()}
             return
@@ -90,7 +95,7 @@ HealthState = Literal["ok", "away", "refused"]
 
 @dataclass(frozen=True)
 class Trouble:
-    """Failures in a row: the last one's line, how many, since when, and the moment (s, monotonic) of the next try."""
+    """Consecutive failures: the last one's line, their number, begin, and the time (s, monotonic) of the next try."""
 
     state: HealthState
     line: str
@@ -100,12 +105,12 @@ class Trouble:
 
 
 def pause_after(failures: int, first: float = FIRST_PAUSE, longest: float = LONGEST_PAUSE) -> float:
-    """Returns the pause (s) after so many failures in a row."""
+    """Returns the pause (s) after so many consecutive failures."""
     return float(min(longest, first * 2.0 ** min(failures - 1, 30)))
 
 
 class Health:
-    """Shared by those who ask the store. Safe to use from any thread."""
+    """State of the store, shared by all its users. Safe to use from any thread."""
 
     def __init__(self, clock: Clock, pauses: tuple[float, float] = (FIRST_PAUSE, LONGEST_PAUSE)) -> None:
         self._clock = clock
@@ -125,7 +130,7 @@ class Health:
         return was is not None
 
     def failed(self, error: ArchiveError) -> bool:
-        """Notes a failure. Returns whether it is the first in a row, or another one than before."""
+        """Notes a failure. Returns whether it is the first of a series, or a different one."""
         state: HealthState = "refused" if isinstance(error, RefusedError) else "away"
         with self._lock:
             before = self._trouble
@@ -136,6 +141,6 @@ class Health:
         return before is None or before.state != state
 
     def wait(self) -> float:
-        """Returns the time (s) until the store may be asked again; 0 if it may be asked now."""
+        """Returns the time (s) until the next request to the store; 0 if it may be sent now."""
         trouble = self._trouble
         return 0.0 if trouble is None else max(0.0, trouble.next_try - self._clock.monotonic())

@@ -1,4 +1,4 @@
-"""The archives of a running service: one behind the folder of each robot."""
+"""The archives of a running service: one for the folder of each robot."""
 
 from __future__ import annotations
 
@@ -21,53 +21,53 @@ from server.services import Services
 
 
 class Archives(Part, Collector):
-    """All archives; none where the configuration has no bucket."""
+    """All archives; none if the configuration has no bucket."""
 
     def __init__(self, services: Services) -> None:
-        """Raises SpecError and MissingExtraError where the archive cannot be used."""
+        """Raises SpecError and MissingExtraError if the archive cannot be used."""
         self._services = services
         self._settings = services.settings.section(ArchiveSettings)
         self._bucket = open_bucket(self._settings)
         self._archived = ArchivedStore(services.store)
-        services.traces.archive_index = self._archived  # also where there is no bucket any more: what it has is known
+        services.traces.archive_index = self._archived  # also without a bucket: traces of an earlier one are known
         self._of: dict[str, ArchiveService] = {}
         moved = "Traces sent to the archive or fetched from it, and attempts that failed."
         self._moved = Counter("daq_archive_transfers", moved, ("robot", "direction", "result"), registry=None)
         self._size = Counter("daq_archive_bytes", "Sizes of these traces.", ("robot", "direction"), registry=None)
 
     def of(self, robot: str) -> ArchiveService:
-        """Returns the archive of a robot. Raises a 409 where there is none."""
+        """Returns the archive of a robot. Raises a 409 without one."""
         if robot not in self._of:
             advice = "set [archive] in its daq.toml (docs/archive.md)"
             raise conflict("no-archive", "this service has no archive", advice)
         return self._of[robot]
 
     def robots_made(self, robots: Sequence[RobotServices]) -> None:
-        """Puts an archive behind the folder of each robot."""
+        """Adds an archive to the folder of each robot."""
         if self._bucket is not None:
             for rig in robots:
                 rig.catalogue.archive = self._of[rig.robot.name] = self._made(rig, self._bucket)
 
     def start(self) -> None:
-        """Begins to send what waits."""
+        """Begins to send waiting traces."""
         for archive in self._of.values():
             archive.start()
 
     def close(self, seconds: float) -> None:
-        """Ends; what is on its way is begun again."""
+        """Ends; interrupted transfers are repeated after the next start."""
         for archive in self._of.values():
             archive.close(seconds / len(self._of))
 
     def warnings(self) -> list[str]:
-        """Returns what is wrong with each archive."""
+        """Returns the problems of each archive."""
         return [of_robots([name], line, among=len(self._of)) for name in self._of for line in self._lines(name)]
 
     def checks(self) -> dict[str, str]:
-        """Returns the same for the readiness."""
+        """Returns the same for the readiness check."""
         return {f"archive of {name}": "; ".join(self._lines(name)) for name in self._of}
 
     def attention(self) -> dict[str, Attention]:
-        """Returns the archives that are away."""
+        """Returns the archives that cannot be reached."""
         problems = {name: archive.status().problem for name, archive in self._of.items()}
         return {
             f"archive {name}": Attention("archive.away", f"{name}: {problem}", name)
@@ -76,7 +76,7 @@ class Archives(Part, Collector):
         }
 
     def describe(self) -> Iterable[Metric]:
-        """Returns nothing: what is collected is asked for when Prometheus asks."""
+        """Returns nothing: values are computed when Prometheus requests them."""
         return ()
 
     def collect(self) -> Iterable[Metric]:

@@ -1,4 +1,4 @@
-"""Routes of the archive: its state, and traces on their way to it and back."""
+"""Routes of the archive: its state, and transfers of traces to it and back."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ ArchivesDep = Annotated[Archives, part(Archives)]
 
 @router.get("/archive")
 def get_archive(rig: RobotDep, archives: ArchivesDep, _: Viewer) -> ArchiveStatus:
-    """Returns whether the archive answers, and what waits for it."""
+    """Returns whether the archive answers, and the traces that wait for it."""
     return archives.of(rig.robot.name).status()
 
 
 @router.get("/traces/{trace}/archive")
 def get_trace_archive(trace: Identity, rig: RobotDep, archives: ArchivesDep, _: Viewer) -> TraceArchive:
-    """Returns where a trace is, and how far it is on its way."""
+    """Returns where a trace is, and the progress of its transfer."""
     return archives.of(rig.robot.name).of(trace)
 
 
@@ -38,19 +38,19 @@ def archive_trace(
     traces: Traces,
     caller: Operator,
 ) -> TraceArchive:
-    """Sends a trace to the archive now; with `drop`, its local copy goes when it is there."""
-    traces.file_of(rig.robot.name, trace)  # raises a 404 for a trace that there is not
+    """Sends a trace to the archive now; with `drop`, its local copy is deleted afterwards."""
+    traces.file_of(rig.robot.name, trace)  # raises a 404 for a missing trace
     archive = archives.of(rig.robot.name)
     archive.send_and_drop(trace, drop=order.drop)
     if order.drop:
-        line = f"trace {trace}: its local copy goes when the archive has it"
+        line = f"trace {trace}: its local copy is deleted once the archive has it"
         rig.record_event("archive", line, actor=caller.name)
     return archive.of(trace)
 
 
 @router.post("/traces/{trace}/fetch", status_code=202)
 def fetch_trace(trace: Identity, rig: RobotDep, archives: ArchivesDep, _: Viewer) -> TraceArchive:
-    """Fetches a trace that only the archive has, as opening it does; returns how far this is."""
+    """Fetches a trace that only the archive has, as opening it does; returns the progress."""
     archive = archives.of(rig.robot.name)
     if not archive.of(trace).local:
         archive.fetch_now(trace)

@@ -1,7 +1,7 @@
-"""Sends traces to the archive, fetches them on demand, and drops local copies: on two threads of its own.
+"""Sends traces to the archive, fetches them on demand, and drops local copies, on two threads of its own.
 
-Nothing else waits for the store. What is on its way is in memory; what the archive has is in the database, written only
-after it was read back and compared.
+Nothing else waits for the store. Transfers in progress are in memory. Archived traces are in the database, and are
+entered only after they were read back and compared.
 """
 
 from __future__ import annotations
@@ -34,17 +34,19 @@ from server.clock import Clock
 from server.problems import ProblemError
 
 ROUND = 600.0
-"""Time (s) between two looks for traces to send and copies to drop, beside those that are told of."""
+"""Time (s) between two looks for traces to send and copies to drop, in addition to those that are reported."""
 SENT_A_ROUND = 200
-"""Largest number of traces that are sent before copies are dropped: at first use years of traces may wait, and the disk
-may be full."""
+"""Most traces that are sent before copies are dropped: at first use years of traces may wait, and the disk may be
+full.
+"""
 CHECKED_LATELY = timedelta(hours=1)
-"""Time for which an object that was read back need not be read back again before the local copy goes."""
+"""Time for which an object that was read back is not read again before the local copy is deleted."""
 RETRY_AFTER = 2
-"""Time (s) after which a client asks again for a trace that is being fetched."""
+"""Time (s) after which a client may ask again for a trace that is being fetched."""
 HEARD_WITHIN = 60.0
-"""Time (s) for which a failed fetch answers the next request: who waits for it asks every RETRY_AFTER, and whoever
-comes later has it tried again."""
+"""Time (s) for which a failed fetch answers the next request. A waiting client asks every RETRY_AFTER; a later request
+starts a new attempt.
+"""
 MB = 1_000_000
 log = logging.getLogger("server.archive")
 
@@ -82,7 +84,7 @@ class ArchiveService:
         self._sending, self._fetching = Transfers("send", now), Transfers("fetch", now)
         self._attempts = Attempts()
         self._drops: set[str] = set()
-        """Traces whose local copies somebody wants to be dropped, whatever the policy says."""
+        """Traces whose local copies a user wants to drop, whatever the policy."""
         self._closing = threading.Event()
         self._work, self._asked = threading.Event(), threading.Event()
         self._local_bytes = self._archived = 0
@@ -100,12 +102,12 @@ class ArchiveService:
         ]
 
     def start(self) -> None:
-        """Starts to send what waits."""
+        """Starts to send waiting traces."""
         for thread in self._threads:
             thread.start()
 
     def close(self, patience: float) -> None:
-        """Ends the threads. What was on its way is begun again after the next start."""
+        """Ends the threads. Interrupted transfers are repeated after the next start."""
         self._closing.set()
         self._work.set()
         self._asked.set()
@@ -113,7 +115,7 @@ class ArchiveService:
             if thread.is_alive():
                 thread.join(patience / len(self._threads))
 
-    # ---- what others ask
+    # ---- called by others
 
     def send(self, trace: str) -> None:
         """Sends a trace of the folder as soon as possible."""
@@ -121,8 +123,9 @@ class ArchiveService:
             self._work.set()
 
     def send_and_drop(self, trace: str, *, drop: bool) -> None:
-        """Does the same on a person's order; with `drop`, the local copy goes afterwards. Raises a 404 if the trace is
-        nowhere."""
+        """Sends a trace on a user's request; with `drop`, the local copy is deleted afterwards. Raises a 404 for a
+        missing trace.
+        """
         self._context.catalogue.place_of(trace)
         if self._context.archived.get(trace) is None:
             self._sending.add(trace)
@@ -131,18 +134,18 @@ class ArchiveService:
         self._work.set()
 
     def deleted(self) -> None:
-        """A trace has been deleted: its object goes, too."""
+        """Deletes the object of a deleted trace, too."""
         self._work.set()
 
     def fetch(self, trace: str) -> ProblemError:
-        """Fetches a trace; returns the problem with which a request for it is answered meanwhile."""
+        """Fetches a trace; returns the problem that answers requests for it meanwhile."""
         before = self._fetching.failed_since(trace, self._context.clock.monotonic() - HEARD_WITHIN)
         if before is not None:
-            self._fetching.ended(trace)  # whoever asks again has it tried again
+            self._fetching.ended(trace)  # a client that asks again starts a new attempt
             return ProblemError(503, "archive", before.problem, "try again, or look into the archive")
         self.fetch_now(trace)
         said = words_of(self._fetching.of(trace))
-        advice = "ask again in a moment; GET …/archive says how far it is"
+        advice = "ask again in a moment; GET …/archive shows its progress"
         line = f"the archive has this trace, and it is being fetched: {said}"
         return ProblemError(503, "trace-in-archive", line, advice, headers={"Retry-After": str(RETRY_AFTER)})
 
@@ -153,12 +156,14 @@ class ArchiveService:
             self._asked.set()
 
     def bring(self, traces: Iterable[str], since: float) -> Transfer:
-        """Fetches traces. Returns how far this is altogether, or the first that has failed since that moment (s,
-        monotonic). What failed before, perhaps since a disk was full, is tried again."""
+        """Fetches traces. Returns their total progress, or the first failure since that time (s, monotonic).
+
+        Earlier failures, perhaps from a full disk, are tried again.
+        """
         traces = list(traces)
         for trace in traces:
             if (failed := self._fetching.failed_since(trace, since)) is not None:
-                self._fetching.ended(trace)  # whoever asks again has it tried again
+                self._fetching.ended(trace)  # a client that asks again starts a new attempt
                 return failed
             before = self._fetching.of(trace)
             if before is None or before.state == "failed":
@@ -174,7 +179,7 @@ class ArchiveService:
         )
 
     def of(self, trace: str) -> TraceArchive:
-        """Returns where a trace is. Raises a 404 if it is nowhere."""
+        """Returns where a trace is. Raises a 404 for a missing trace."""
         path = self._context.catalogue.place_of(trace)
         found = self._context.archived.get(trace)
         return TraceArchive(
@@ -188,7 +193,7 @@ class ArchiveService:
         )
 
     def status(self) -> ArchiveStatus:
-        """Returns the state, as the last round found it."""
+        """Returns the state that the last round found."""
         trouble, limit = self.health.trouble, self._context.settings.keep_size
         return ArchiveStatus(
             place=self._context.bucket.place,
@@ -204,11 +209,11 @@ class ArchiveService:
         )
 
     def warnings(self, warn_at: float) -> list[str]:
-        """Returns what will need somebody soon, one line each."""
+        """Returns problems that will need a person soon, one line each."""
         status, found = self.status(), []
         if status.problem:
             found.append(f"{status.problem}; {status.waiting} traces wait to be sent, and stay here until then")
-        # Of either, one line for all: those of hundreds would hide the others.
+        # One line for all of a kind: hundreds would hide the others.
         for failing in (self._attempts.failing, self._unreadable):
             lines = list(failing.copy().values())
             found += [f"{lines[0]}; and {len(lines) - 1} other traces fail"] if len(lines) > 1 else lines
@@ -216,13 +221,17 @@ class ArchiveService:
             found.append(self._over)
         elif status.local_limit is not None and status.local_bytes >= warn_at * status.local_limit:
             size = f"{status.local_bytes / MB:.0f} of {status.local_limit / MB:.0f} MB"
-            found.append(f"local traces take {size} (archive.keep_size): beyond that the oldest archived ones go")
+            found.append(
+                f"local traces take {size} (archive.keep_size): beyond that the oldest archived ones are dropped"
+            )
         return found
 
     # ---- the threads
 
     def _loop(self, step: Callable[[], bool], wake: threading.Event) -> None:
-        """Calls `step` until it has nothing to do, then waits for `wake`; after a failure, waits as `health` says."""
+        """Calls `step` until it has nothing to do, then waits for `wake`; after a failure, pauses as `health`
+        states.
+        """
         while not self._closing.is_set():
             wake.clear()
             pause = ROUND
@@ -250,11 +259,11 @@ class ArchiveService:
             self._tell(line)
 
     def _tell(self, line: str) -> None:
-        with contextlib.suppress(Exception):  # the archive goes on without its events
+        with contextlib.suppress(Exception):  # the archive continues without its events
             self._context.tell(line)
 
     def _round(self) -> bool:
-        """Deletes and sends what waits, and drops what may go. Returns whether more waits to be sent."""
+        """Deletes and sends waiting objects, and drops local copies. Returns whether more traces wait to be sent."""
         context = self._context
         if (wait := self.health.wait()) > 0 and self._closing.wait(wait):
             return False
@@ -279,7 +288,7 @@ class ArchiveService:
         return self._sending.has_others(self._attempts.failing)
 
     def _delete_gone(self) -> None:
-        """Deletes the objects of deleted traces. One that the store does not delete keeps no other trace waiting."""
+        """Deletes the objects of deleted traces. A failed deletion delays no other trace."""
         context = self._context
         self._attempts.begin_step()
         gone = context.archived.to_delete(context.robot)
@@ -297,7 +306,7 @@ class ArchiveService:
             self._succeeded()
 
     def _send_waiting(self) -> None:
-        """Sends what waits. A trace that cannot be sent waits behind the others."""
+        """Sends waiting traces. A trace that cannot be sent goes to the end of the queue."""
         self._attempts.begin_step()
         for _ in range(SENT_A_ROUND):
             waiting = self._sending.first()
@@ -345,13 +354,15 @@ class ArchiveService:
         self._succeeded()
 
     def _require_same(self, name: str, wanted: Content) -> None:
-        """Reads an object back. Raises DamagedError if it is not what was sent."""
+        """Reads an object back. Raises DamagedError if it differs from the file that was sent."""
         if self._context.bucket.read(name, wanted.size, lambda _piece: None) != wanted:
-            line = f"archive {self._context.bucket.place}: {name}: what comes back is not what was sent (SHA-256)"
+            line = f"archive {self._context.bucket.place}: {name}: differs from the file that was sent (SHA-256)"
             raise DamagedError(line)
 
     def _require_still_there(self, found: Archived, now: datetime) -> None:
-        """Raises DamagedError unless the archive has the same as before: read back, if that was long ago."""
+        """Raises DamagedError unless the archive still has the same object; reads it back if the last time was long
+        ago.
+        """
         if now - found.checked > CHECKED_LATELY:
             self._require_same(found.object, Content(found.size, found.sha256))
             self._context.archived.note(found.trace, checked=now)
@@ -395,7 +406,9 @@ class ArchiveService:
         self._context.fetched()
 
     def _fetch_one(self, wanted: Archived) -> None:
-        """Fetches a trace into the folder, compared with what was sent. Raises ArchiveError, ProblemError, OSError."""
+        """Fetches a trace into the folder, compared with the file that was sent. Raises ArchiveError, ProblemError,
+        OSError.
+        """
         context = self._context
         folder = context.catalogue.folder
         free = shutil.disk_usage(folder).free
@@ -405,16 +418,18 @@ class ArchiveService:
             raise ProblemError(507, "no-room", line, "free some space on the disk of the traces")
         with tempfile.TemporaryDirectory(prefix=UPLOAD, dir=folder) as beside:
             part = Path(beside) / "fetched.mcap"
-            # What differs may have been damaged on its way: a second attempt tells.
+            # A difference may be due to the transfer: a second attempt shows.
             if not any(self._read_into(part, wanted) for _attempt in range(2)):
-                line = f"archive {context.bucket.place}: {wanted.object} is not what was sent (SHA-256)"
+                line = f"archive {context.bucket.place}: {wanted.object} differs from the file that was sent (SHA-256)"
                 raise DamagedError(line)
             context.catalogue.take_back(wanted.trace, part)
         context.archived.note(wanted.trace, fetched=context.clock.utc())
         self._local_bytes += wanted.size
 
     def _read_into(self, part: Path, wanted: Archived) -> bool:
-        """Fetches an object into a file, and returns whether it is what was sent. Raises ArchiveError, OSError."""
+        """Fetches an object into a file, and returns whether it is the one that was sent. Raises ArchiveError,
+        OSError.
+        """
         with part.open("wb") as stream:
 
             def take(piece: bytes) -> None:
@@ -440,7 +455,7 @@ class ArchiveService:
                 return
 
     def _drop_by_policy(self) -> None:
-        """Drops local copies that are too old, then the oldest while all of them take too much room."""
+        """Drops local copies that are too old, then the oldest while all of them take too much space."""
         context, settings = self._context, self._context.settings
         self._over = ""
         if settings.keep_days is not None:
@@ -450,13 +465,13 @@ class ArchiveService:
         if settings.keep_size is not None and self._local_bytes > (limit := settings.keep_size * MB):
             self._drop_some(lambda size: size > limit)
             self._local_bytes = context.archived.local_size(context.robot)
-            if self._local_bytes > limit and not self._attempts.has_failures:  # else the store is the reason
+            if self._local_bytes > limit and not self._attempts.has_failures:  # otherwise the store is the reason
                 size = f"{self._local_bytes / MB:.0f} of {limit / MB:.0f} MB"
                 why = "models and jobs refer to the others" if settings.keep_used else "the others are in use"
                 self._over = f"local traces take {size} (archive.keep_size), and no more can be dropped: {why}"
 
     def _drop_some(self, is_wanted: Callable[[int], bool], before: datetime | None = None) -> None:
-        """Drops the oldest copies while `is_wanted` says so of the total size that is left."""
+        """Drops the oldest copies while `is_wanted` of the remaining total size is true."""
         context, size = self._context, self._local_bytes
         last: Local | None = None
         while is_wanted(size) and not self._closing.is_set():
@@ -471,8 +486,9 @@ class ArchiveService:
                 last = local
 
     def _drop(self, local: Local) -> bool:
-        """Deletes a local copy, after the archive has shown that it has the same. Returns False if the copy stays,
-        whatever the reason is: others may go."""
+        """Deletes a local copy, after the archive has proved that it has the same. Returns False if the copy stays for
+        any reason.
+        """
         path = self._context.catalogue.folder / local.file
         try:
             is_dropped = self._dropped(local)
@@ -490,7 +506,7 @@ class ArchiveService:
         return is_dropped
 
     def _dropped(self, local: Local) -> bool:
-        """Does this, and raises what goes wrong: ArchiveError, OSError."""
+        """Does this, and raises ArchiveError, OSError."""
         context = self._context
         found = context.archived.get(local.trace)
         path = context.catalogue.folder / local.file
@@ -519,7 +535,7 @@ class ArchiveService:
 
 
 def words_of(transfer: Transfer | None) -> str:
-    """How far a transfer is, for people."""
+    """Returns the progress of a transfer, in words."""
     if transfer is None:
         return "waiting"
     if transfer.problem:

@@ -1,4 +1,4 @@
-"""The configuration of the archive: where traces are kept for long, and which copies stay on this computer."""
+"""The configuration of the archive: where traces are stored, and which copies stay on this computer."""
 
 from __future__ import annotations
 
@@ -23,8 +23,7 @@ class ArchiveSettings(Section):
     bucket: Annotated[str, Field(pattern=BUCKET)] | None = None
     """Name of the bucket, which must exist."""
     endpoint: Annotated[str, Field(max_length=500)] | None = None
-    """Address of a server that speaks S3; None for Amazon's of the `region`. Only the configuration names it: no
-    request can."""
+    """URL of an S3 server; None for Amazon's of the `region`. Only the configuration names it: no request can."""
     region: Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{1,64}$")] = "us-east-1"
     """Region of the bucket. Most other servers than Amazon's ignore it."""
     prefix: Annotated[
@@ -45,26 +44,26 @@ class ArchiveSettings(Section):
     @field_validator("bucket", mode="before")
     @classmethod
     def _is_name(cls, bucket: object) -> object:
-        """Raises ValueError for a text that names no bucket: in words, where the pattern alone would be shown."""
+        """Raises ValueError for an invalid bucket name, in words: the pattern alone would not be clear."""
         if isinstance(bucket, str) and not re.fullmatch(BUCKET, bucket):
-            raise ValueError("names no bucket; write 3 to 63 lower-case letters, digits, dots and hyphens")
+            raise ValueError("is not the name of a bucket; write 3 to 63 lower-case letters, digits, dots and hyphens")
         return bucket
 
     @field_validator("endpoint")
     @classmethod
     def _is_address(cls, endpoint: str | None) -> str | None:
-        """Raises ValueError for what is no address, and for one with a password: an address is shown."""
+        """Raises ValueError for an invalid URL, and for one with a password: URLs are shown."""
         if endpoint is None:
             return None
         try:
             parts = urlsplit(endpoint)
             _ = parts.port
         except ValueError:
-            raise ValueError("is no address; write https://host:port") from None
+            raise ValueError("is not a URL; write https://host:port") from None
         if parts.username is not None or parts.password is not None:
             raise ValueError("has a password in it; put it into the file `credentials`, or the environment")
         if parts.scheme not in ("http", "https") or not parts.hostname or parts.query or parts.fragment:
-            raise ValueError("is no address; write https://host:port")
+            raise ValueError("is not a URL; write https://host:port")
         return endpoint.rstrip("/")
 
     @field_validator("credentials")
@@ -74,5 +73,5 @@ class ArchiveSettings(Section):
 
     @property
     def place(self) -> str:
-        """Where the archive is, in messages."""
+        """Returns the location of the archive, for messages."""
         return f"{self.bucket} at {self.endpoint or f'Amazon S3, {self.region}'}"

@@ -17,8 +17,9 @@ class ArchiveTable(DeclarativeBase):
 
 
 class ArchivedRow(ArchiveTable):
-    """A trace that the archive has, whole, as it was read back. The row stays until the object is deleted, also if the
-    trace is deleted before that."""
+    """A trace that the archive has, verified by reading it back. The row stays until the object is deleted, also if the
+    trace is deleted before that.
+    """
 
     __tablename__ = "archived_traces"
     __table_args__ = (Index("archived_traces_by_robot", "robot", "deleting"),)
@@ -31,6 +32,6 @@ class ArchivedRow(ArchiveTable):
     sha256: Mapped[str] = mapped_column(String(64))
     archived: Mapped[datetime]
     checked: Mapped[datetime]
-    """When the object was last read back and was what had been sent."""
+    """When the object was last read back and was equal to the file that had been sent."""
     fetched: Mapped[datetime | None]
     deleting: Mapped[bool] = mapped_column(default=False)

@@ -1,4 +1,4 @@
-"""Traces on their way between this computer and the archive, and those that wait."""
+"""Queues of transfers between this computer and the archive."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Transfers:
         """Failed transfers, and when they failed."""
 
     def add(self, trace: str, total: int = 0) -> bool:
-        """Adds a trace at the end. Returns False if it waits already. One that failed is tried again."""
+        """Adds a trace at the end. Returns False if it already waits. A failed one is tried again."""
         with self._lock:
             self._failed.pop(trace, None)
             if trace in self._waiting:
@@ -33,18 +33,18 @@ class Transfers:
             return True
 
     def first(self) -> str | None:
-        """Returns the trace that is next, which stays in the queue."""
+        """Returns the next trace, which stays in the queue."""
         with self._lock:
             return next(iter(self._waiting), None)
 
     def moved(self, trace: str, done: int, total: int) -> None:
-        """Notes how much has been moved."""
+        """Notes the progress in bytes."""
         with self._lock:
             if trace in self._waiting:
                 self._waiting[trace] = self._transfer("moving", done, total)
 
     def held_up(self, trace: str, problem: str) -> None:
-        """Notes that a trace waits for another attempt, behind all others: one that always fails holds up none."""
+        """Moves a trace to the end for another attempt, so that one that always fails delays no other."""
         with self._lock:
             if trace in self._waiting:
                 total = self._waiting[trace].total
@@ -52,8 +52,10 @@ class Transfers:
                 self._waiting.move_to_end(trace)
 
     def ended(self, trace: str, problem: str = "") -> None:
-        """Takes a trace out of the queue; with a problem, it has failed and is not tried again by itself;
-        without one, an earlier failure is forgotten."""
+        """Removes a trace from the queue.
+
+        With a problem, it has failed and is not repeated automatically; without one, an earlier failure is removed.
+        """
         with self._lock:
             was = self._waiting.pop(trace, None)
             self._failed.pop(trace, None)
@@ -64,7 +66,7 @@ class Transfers:
                     self._failed.popitem(last=False)
 
     def of(self, trace: str) -> Transfer | None:
-        """Returns how far a trace is; None if it neither waits nor has failed."""
+        """Returns the progress of a trace; None if it neither waits nor has failed."""
         with self._lock:
             _at, failed = self._failed.get(trace, (0.0, None))
             return self._waiting.get(trace) or failed

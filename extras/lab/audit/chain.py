@@ -1,4 +1,4 @@
-"""The chain of digests, by which a change of the log is noticed."""
+"""The chain of digests, which reveals changes of the log."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from datetime import UTC
 from daq.contracts.service.audit import AuditEntry, AuditNote
 
 FIRST = "0" * 64
-"""What the first row has in place of the digest of a row before it."""
+"""Value in the first row in place of a previous digest."""
 
 
 @dataclass(frozen=True)
@@ -27,15 +27,16 @@ class Head:
 
 @dataclass(frozen=True)
 class Misfit:
-    """The first row that is not as it was written."""
+    """The first row that differs from the one that was written."""
 
     number: int
     why: str
 
 
 def digest_of(number: int, previous: str, note: AuditNote) -> str:
-    """Returns the digest of a row: SHA-256 of the canonical JSON (sorted keys, no spaces, ASCII, UTC) of all that it
-    says, its number and the digest of the row before."""
+    """Returns the digest of a row: SHA-256 of the canonical JSON (sorted keys, no spaces, ASCII, UTC) of its content,
+    its number and the previous row's digest.
+    """
     said = note.model_dump(include=set(AuditNote.model_fields))
     said["at"] = note.at.astimezone(UTC).isoformat(timespec="microseconds")
     text = json.dumps(said | {"number": number, "previous": previous}, sort_keys=True, separators=(",", ":"))
@@ -51,11 +52,11 @@ def chained(head: Head, notes: Iterable[AuditNote]) -> Iterator[AuditEntry]:
 
 
 def first_misfit(entries: Iterable[AuditEntry], known: Head | None = None) -> tuple[Head, Misfit | None]:
-    """Reads a whole log, in order. Returns its last row that fits, and the first that does not; None if all do.
+    """Reads a whole log, in order. Returns its last valid row, and the first invalid one; None if all are valid.
 
     Args:
-        known: a row that was written down earlier, elsewhere. It shows what the rows by themselves cannot: that the end
-            of the log was cut off, or that all of it was written anew.
+        known: a row that was written down earlier, elsewhere. It reveals what the rows alone cannot: that the end of
+            the log was cut off, or that all of it was rewritten.
     """
     head = Head()
     for entry in entries:
@@ -77,5 +78,5 @@ def _misfit(head: Head, entry: AuditEntry) -> str:
     if entry.previous != head.digest:
         return "the row before it is not the one after which it was written"
     if entry.digest != digest_of(entry.number, entry.previous, entry):
-        return "it does not say what was written"
+        return "its content is not what was written"
     return ""

@@ -1,4 +1,4 @@
-"""`daq audit`: shows who asked the service for what, and checks that nobody has changed the log of it."""
+"""`daq audit`: shows who requested what from the service, and checks that nobody has changed the log of it."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ if TYPE_CHECKING:
     from daq.contracts.service.audit import AuditEntry
     from extras.lab.audit.chain import Head
 
-app = typer.Typer(add_completion=False, help="Show who asked the service for what; check the log of it.")
+app = typer.Typer(add_completion=False, help="Show who requested what from the service; check the log of it.")
 
 
 @app.callback(invoke_without_command=True)
 def audit(
     context: typer.Context,
     number: Annotated[int, typer.Option("-n", "--number", min=1, max=1_000_000, help="Number of rows.")] = 50,
-    actor: Annotated[str | None, typer.Option(help="Only what this token's owner asked for.")] = None,
+    actor: Annotated[str | None, typer.Option(help="Only requests of this token's owner.")] = None,
     robot: Annotated[str | None, typer.Option("--of", help="Only what concerns this robot.")] = None,
     action: Annotated[str | None, typer.Option(help="Only this action, such as submit_experiment.")] = None,
     outcome: Annotated[
-        Literal["done", "refused", "failed"] | None, typer.Option(help="Only what became of it this way.")
+        Literal["done", "refused", "failed"] | None, typer.Option(help="Only rows with this outcome.")
     ] = None,
     since: Annotated[datetime | None, typer.Option(help="Only rows from this time on (of this computer).")] = None,
     json: JsonOption = False,
@@ -63,12 +63,14 @@ def verify(
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Check every row of the audit log. Names the first row that is not as it was written; exit code 5, then."""
+    """Check every row of the audit log. Names the first row that differs from the one that was written; exit code 5,
+    then.
+    """
     from extras.lab.audit.log import AuditLog
 
     known = None if head is None else _parse_head(head)
     store = service_database(invocation(context))
-    store.require_sound()  # a log can fit and yet be a view, or have lost the triggers that keep it
+    store.require_sound()  # a log can be valid and yet be a view, or have lost its protecting triggers
     last, misfit = AuditLog(store).first_misfit(known)
     if json:
         wrong = None if misfit is None else {"number": misfit.number, "why": misfit.why}

@@ -1,4 +1,4 @@
-"""The rows of the audit log in the database: they are added and read, and nothing else."""
+"""The rows of the audit log in the database: rows are only added and read."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from server.store.engine import Store
 from server.store.pages import newest_first
 
 AT_ONCE = 1000
-"""Number of rows that are read at a time when the whole log is read."""
+"""Rows that are read at a time when the whole log is read."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class AuditLog:
         return found[0] if found else None
 
     def first_misfit(self, known: Head | None = None) -> tuple[Head, Misfit | None]:
-        """Reads the whole log. Returns its last row that fits and the first that does not, as `chain.first_misfit`."""
+        """Reads the whole log. Returns its last valid row and the first invalid one, as `chain.first_misfit`."""
         read = Head()
 
         def noted() -> Iterator[AuditEntry]:
@@ -85,8 +85,10 @@ class AuditLog:
             return read, Misfit(read.number + 1, "it cannot be read")
 
     def all(self) -> Iterator[AuditEntry]:
-        """Yields every row, the oldest first, with few of them in memory. Raises DamagedError at a row that cannot be
-        read, after all rows before it."""
+        """Yields every row, the oldest first, with few of them in memory.
+
+        Raises DamagedError at an unreadable row, after all rows before it.
+        """
         last: int | None = None
         at_once = AT_ONCE
         while True:
@@ -111,7 +113,7 @@ class AuditLog:
 
 
 def append_in(session: Session, notes: Iterable[AuditNote]) -> Head:
-    """Adds rows within a transaction that writes, so that they are there if all that it writes is, and only then."""
+    """Adds rows within a writing transaction, so that they exist exactly if its other changes do."""
     if session.get_bind().dialect.name == "postgresql":
         # Two transactions must not both follow the same row. On SQLite only one of them writes at a time anyway.
         session.execute(text("LOCK TABLE audit IN SHARE ROW EXCLUSIVE MODE"))
@@ -136,6 +138,8 @@ def _head(session: Session) -> Head:
 
 
 def _entry(row: AuditRow) -> AuditEntry:
-    """Returns a row as it is told. Raises ValueError (a DamagedError within `reading`) for what nobody has written."""
+    """Returns a row for users. Raises ValueError (a DamagedError within `reading`) for content that this program does
+    not write.
+    """
     said = {name: getattr(row, name) for name in AuditEntry.model_fields if name != "number"}
     return AuditEntry(number=row.sequence, **said)

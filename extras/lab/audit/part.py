@@ -1,8 +1,7 @@
-"""The audit log of a running service: what it hears of becomes rows.
+"""The audit log of a running service: turns events into rows, and lists them.
 
-Notes the start of the service, and which sections of its configuration have changed since the last one.
-
-The audit log, to be read. No route changes or deletes a row.
+It notes the start of the service, and which sections of its configuration have changed since the last start. No route
+changes or deletes a row.
 """
 
 from __future__ import annotations
@@ -39,8 +38,10 @@ STARTED = "start_service"
 
 
 def begun(settings: Settings, audit: AuditLog, now: datetime) -> AuditNote:
-    """Returns a note of the start, with a digest of each section of the configuration. A digest tells whether two are
-    the same, and no word of either."""
+    """Returns a note of the start, with a digest of each section of the configuration.
+
+    A digest shows whether two are equal, but nothing of their content.
+    """
     sections = _digests(settings)
     before = audit.newest(STARTED)
     known = json.loads(before.content or "{}").get("configuration", {}) if before is not None else sections
@@ -65,7 +66,7 @@ def _digests(settings: Settings) -> dict[str, str]:
         else:
             said = value.model_dump(mode="json") if isinstance(value, BaseModel) else value
         if name == "server":
-            # Without its password, which somebody could guess and try against the digest.
+            # Without its password, which somebody could guess and verify by the digest.
             said |= {"database": masked(address_of(settings.server))}
         text = json.dumps(said, sort_keys=True, default=_plain)
         found[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -79,11 +80,11 @@ def _plain(value: object) -> object:
 KEPT = "audit-waiting.jsonl"
 """File of the rows that could not be written before the service ended."""
 KEEPING = 0.6
-"""Share of the time for the end in which rows that could not be written are kept in that file."""
+"""Share of the time for shutdown that is reserved for saving unwritten rows to that file."""
 
 
 class AuditPart(Part, Collector):
-    """Writes rows, and tells Prometheus how many wait."""
+    """Writes rows, and reports the number of waiting ones to Prometheus."""
 
     def __init__(self, services: Services) -> None:
         self._services = services
@@ -91,7 +92,7 @@ class AuditPart(Part, Collector):
         self.writer = AuditWriter(self.log, services.folder / KEPT)
 
     def robots_made(self, robots: Sequence[Any]) -> None:
-        """Notes the start, and what has changed in the configuration."""
+        """Notes the start, and changes of the configuration."""
         del robots
         self.writer.note(begun(self._services.settings, self.log, self._services.clock.utc()))
 
@@ -100,7 +101,7 @@ class AuditPart(Part, Collector):
         return asked_request(self.writer, self._services.clock.utc, scope, with_content=with_content)
 
     def acted(self, note: AuditNote, *, again: bool = False) -> None:
-        """Writes what happened otherwise than by a request."""
+        """Writes events other than requests."""
         (self.writer.count if again else self.writer.note)(cleaned(note))
 
     def checks(self) -> dict[str, str]:
@@ -112,11 +113,11 @@ class AuditPart(Part, Collector):
         self.writer.close(seconds * (1 - KEEPING))
 
     def describe(self) -> Iterable[Metric]:
-        """Returns nothing: what is collected is asked for when Prometheus asks."""
+        """Returns nothing: values are computed when Prometheus requests them."""
         return ()
 
     def collect(self) -> Iterable[Metric]:
-        """Returns how many rows were written, and how many wait."""
+        """Returns the numbers of written and of waiting rows."""
         written = CounterMetricFamily("daq_audit_rows", "Rows of the audit log written since the service started.")
         written.add_metric((), self.writer.written)
         yield written
@@ -125,7 +126,7 @@ class AuditPart(Part, Collector):
 
 router = Router(tags=["system"], responses=PROBLEMS)
 FLUSHED_WITHIN = 1.0
-"""Time (s) to write the rows that wait, so that a list has what was asked before it."""
+"""Time (s) to write waiting rows, so that a list includes the requests before it."""
 
 
 def _equals(what: str, longest: int = 200) -> object:
@@ -141,12 +142,12 @@ def list_audit(
     action: Annotated[str | None, _equals("action", 64)] = None,
     subject: Annotated[str | None, _equals("subject")] = None,
     outcome: Annotated[Outcome | None, Query(description="Only rows with this outcome.")] = None,
-    since: Annotated[Moment | None, Query(description="Only rows from this moment on.")] = None,
-    until: Annotated[Moment | None, Query(description="Only rows before this moment.")] = None,
+    since: Annotated[Moment | None, Query(description="Only rows from this time on.")] = None,
+    until: Annotated[Moment | None, Query(description="Only rows before this time.")] = None,
     limit: Limit = 50,
     cursor: CursorOf = None,
 ) -> Page[AuditEntry]:
-    """Lists who asked for which change, from where, and what became of it, the newest first. Needs the role operator.
+    """Lists who requested which change, from where, and its outcome, the newest first. Needs the role operator.
 
     Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
     """

@@ -1,4 +1,4 @@
-"""Notes what a request asks, and what it is answered, while both pass."""
+"""Notes a request and its answer, while both pass."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from extras.lab.audit.writer import AuditWriter
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 CHANGE_NOTHING = frozenset(["preview_experiment"])
-"""Operations that change nothing although they are asked by POST."""
+"""POST operations that change nothing."""
 COUNTED = frozenset(["renew_control", "attend_queue", "jog_robot", "create_ticket"])
-"""Operations that a client repeats all the time: the first has a row, the others are counted."""
+"""Operations that clients repeat all the time: the first has a row, the others are counted."""
 COUNTED_REFUSALS = (401, 403, 404, 405, 429)
-"""Refusals that anybody can cause without end: they are counted, too."""
+"""Refusals that anybody can cause without limit: they are counted, too."""
 STOPS = frozenset(["stop_robot", "stop_fleet"])
 LONGEST_CONTENT = 4096
-"""Number of bytes of a body that are kept as they are; of a longer one, its size and digest."""
+"""Bytes of a body up to which it is kept unchanged; of a longer one, size and digest are kept."""
 LONGEST_ANSWER = 65536
 ROW_WITHIN = 1.0
-"""Time (s) for which the answer to a change waits for its row. The row of a stop is never waited for."""
+"""Time (s) for which the answer to a change waits for its row. A stop never waits for its row."""
 _ROBOT = re.compile(r"/api/v1/robots/([a-z0-9][a-z0-9_-]{0,31})(/|$)")
 
 
 class Asker(Protocol):
-    """Who sent a request, as the gate has admitted them."""
+    """Sender of a request, as admitted by the gate."""
 
     @property
     def name(self) -> str:
@@ -50,13 +50,15 @@ class Asker(Protocol):
 def asked_request(
     writer: AuditWriter, utc: Callable[[], datetime], scope: Scope, *, with_content: bool
 ) -> AskedRequest | None:
-    """Returns a watch over a request; None for one that only asks. `with_content`: whether its body is kept; a file
-    has its digest alone."""
+    """Returns a watch over a request; None for a read-only one.
+
+    `with_content`: whether its body is kept; of a file only the digest is.
+    """
     return None if scope["method"] in SAFE_METHODS else AskedRequest(writer, utc(), scope, with_content=with_content)
 
 
 class AskedRequest:
-    """One request. Wrap what it receives and what it is sent; the row is noted with the end of the answer."""
+    """One request. Wrap its `receive` and `send`; the row is noted at the end of the answer."""
 
     def __init__(self, writer: AuditWriter, at: datetime, scope: Scope, *, with_content: bool) -> None:
         self._writer = writer
@@ -67,7 +69,7 @@ class AskedRequest:
         self._answer, self._status, self._noted = b"", 500, False
 
     def receive(self, receive: Receive) -> Receive:
-        """Returns `receive`, while the body is read beside it."""
+        """Returns `receive`, which also copies the body."""
 
         async def heard() -> Message:
             message = await receive()
@@ -82,7 +84,7 @@ class AskedRequest:
         return heard
 
     def send(self, send: Send) -> Send:
-        """Returns `send`, which notes the request before the answer's last piece goes out."""
+        """Returns `send`, which notes the request before the answer's last piece is sent."""
 
         async def told(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -92,18 +94,19 @@ class AskedRequest:
                 if not message.get("more_body", False):
                     written = self._note()
                     if written is not None and self._action() not in STOPS:
-                        # Past this time the row comes later: the change has been made, and its asker is told so.
+                        # After this time the row comes later: the change has been made, and the client must learn of
+                        # it.
                         await asyncio.wait([asyncio.wrap_future(written)], timeout=ROW_WITHIN)
             await send(message)
 
         return told
 
     def end(self) -> None:
-        """Notes a request that got no whole answer: its client was gone, or the service failed."""
+        """Notes a request without a whole answer: its client was gone, or the service failed."""
         self._note()
 
     def _note(self) -> Future[None] | None:
-        """Notes the request, once. Returns a future of its row; None if it has none of its own."""
+        """Notes the request, once. Returns a future of its row; None without a row of its own."""
         action = self._action()
         if self._noted or action in CHANGE_NOTHING:
             return None
@@ -158,12 +161,12 @@ class AskedRequest:
 
 
 def outcome_of(status: int) -> Outcome:
-    """Returns what became of a request that was answered so."""
+    """Returns the outcome of a request with this answer."""
     return "done" if status < 400 else "refused" if status < 500 else "failed"
 
 
 def _subject(scope: Scope, answer: dict[str, Any]) -> str | None:
-    """Returns the number or name of what was made or changed: from the address, or else from the answer."""
+    """Returns the ID or name of the object that was made or changed: from the URL, or else from the answer."""
     named = [value for name, value in scope.get("path_params", {}).items() if name != "robot"]
     made = [one.get("id") for one in answer.get("experiments", []) if isinstance(one, dict)] or [answer.get("id")]
     found = ", ".join(str(one) for one in named or made if one is not None)
@@ -171,8 +174,11 @@ def _subject(scope: Scope, answer: dict[str, Any]) -> str | None:
 
 
 def _detail(answer: dict[str, Any]) -> str:
-    """Returns why a request was refused, or what an arm answered. Of fields that are not valid only the names: the
-    problem repeats their values, and `content` has those that are no secrets."""
+    """Returns why a request was refused, or an arm's answer.
+
+    Of invalid fields it contains only the names: the problem repeats their values, and `content` has those that are no
+    secrets.
+    """
     if isinstance(answer.get("type"), str) and "detail" in answer:
         fields = [str(one.get("field")) for one in answer.get("fields") or () if isinstance(one, dict)]
         return line_of(f"{answer['type'].rpartition('#')[2]}: {', '.join(fields) or answer['detail']}")

@@ -17,7 +17,7 @@ class AuditTable(DeclarativeBase):
 
 
 class AuditRow(AuditTable):
-    """One row of the audit log. Triggers refuse to change or delete it, and to insert one anywhere but at the end."""
+    """One row of the audit log. Triggers forbid changing or deleting it, and inserting one anywhere but at the end."""
 
     __tablename__ = "audit"
     __table_args__ = (

@@ -1,4 +1,4 @@
-"""What of a request may stand in the log: no secret, nothing endless, and only what every database can hold."""
+"""Prepares content of a request for the log: without secrets, limited in size, and valid in every database."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Any
 from daq.contracts.service.audit import AuditNote
 
 LONGEST_LINE = 600
-"""Length of an address or a reason in the log."""
+"""Length of a URL or a reason in the log."""
 HIDDEN = "(not in the log)"
 _SECRET_NAME = re.compile(
     r"token|secret|password|lease|ticket|credential|assertion|verifier|^code$|api_?key", re.IGNORECASE
 )
 _SECRET = re.compile(r"daq_[\w-]{16,}|whsec_[\w+/=-]+|eyJ[\w-]+\.[\w-]+\.[\w-]*|(?i:bearer|basic)\s+[\w.~+/=-]{8,}")
-"""Tokens of this service, secrets of webhooks, JSON Web Tokens and headers with either, wherever somebody puts one."""
+"""Tokens of this service, secrets of webhooks, JSON Web Tokens and headers with them, anywhere in a text."""
 
 
 def line_of(text: object) -> str:
-    """Returns a text in one line without secrets, of LONGEST_LINE characters at most."""
+    """Returns a text in one line without secrets, of at most LONGEST_LINE characters."""
     whole = _SECRET.sub(HIDDEN, str(text))
     shown = "".join(
         sign if sign.isprintable() else sign.encode("unicode_escape", "backslashreplace").decode() for sign in whole
@@ -28,13 +28,13 @@ def line_of(text: object) -> str:
 
 
 def cleaned(note: AuditNote) -> AuditNote:
-    """Returns a note whose texts may stand in the log."""
+    """Returns a note with texts that may be in the log."""
     short = {name: line_of(said)[:200] for name in ("actor", "origin", "subject") if (said := getattr(note, name))}
     return note.model_copy(update={**short, "request": line_of(note.request), "detail": line_of(note.detail)})
 
 
 def content_of(body: bytes) -> str | None:
-    """Returns what a JSON body says, as JSON without secrets; None if it is not JSON."""
+    """Returns the content of a JSON body, as JSON without secrets; None if it is not JSON."""
     try:
         return json.dumps(_without_secrets(json.loads(body)), sort_keys=True, separators=(",", ":"))
     except (ValueError, RecursionError):

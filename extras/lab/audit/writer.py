@@ -1,6 +1,7 @@
-"""Writes the audit log on a thread of its own, so that nobody waits for a disk who must not.
+"""Writes the audit log on a thread of its own, so that time-critical code never waits for a disk.
 
-Counts what is asked again and again, so that it fills no disk: heartbeats, jogging, refused requests.
+It counts repeated requests instead of writing each, so that they do not fill the disk: heartbeats, jogging, refused
+requests.
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ from extras.lab.audit.log import AuditLog
 from server.database_errors import is_value, one_line
 
 COUNTED_FOR = 60.0
-"""Time (s) for which repeated requests are counted before a row says how many there were."""
+"""Time (s) for which repeated requests are counted before a row states their number."""
 MOST_KEYS = 1000
-"""Number of different repeated requests that are told apart; further ones are counted together."""
+"""Most different repeated requests that are distinguished; further ones are counted together."""
 Key = tuple[object, ...]
 
 
 @dataclass
 class _Counted:
-    """Requests of one key since the last row about them, the last one's note, and when counting began (s)."""
+    """Requests of one key since the last row about them, the last one's note, and the begin of counting (s)."""
 
     count: int
     note: AuditNote
@@ -40,13 +41,13 @@ class _Counted:
 
 
 class Repeats:
-    """The requests that are counted now. For one thread."""
+    """Counts repeated requests. For one thread."""
 
     def __init__(self) -> None:
         self._counted: dict[Key, _Counted] = {}
 
     def take(self, note: AuditNote, now: float) -> AuditNote | None:
-        """Returns the note if it is the first of its kind; otherwise None, and it is counted."""
+        """Returns the note if it is the first of its kind; otherwise counts it and returns None."""
         key = _key(note)
         known = self._counted.get(key)
         if known is None and len(self._counted) >= MOST_KEYS:
@@ -59,7 +60,7 @@ class Repeats:
         return None
 
     def due(self, now: float) -> list[AuditNote]:
-        """Returns a note for each kind that was counted for COUNTED_FOR s. Kinds that have ended are forgotten."""
+        """Returns a note for each kind that was counted for COUNTED_FOR s. Kinds that have ended are removed."""
         found = []
         for key, counted in list(self._counted.items()):
             if now - counted.since < COUNTED_FOR:
@@ -72,7 +73,7 @@ class Repeats:
         return found
 
     def rest(self) -> list[AuditNote]:
-        """Returns what is counted now, and forgets it, because the service ends."""
+        """Returns and removes all present counts, because the service ends."""
         counted, self._counted = self._counted, {}
         return [one.note.model_copy(update={"count": one.count}) for one in counted.values() if one.count]
 
@@ -84,8 +85,9 @@ def _key(note: AuditNote) -> Key:
 AT_ONCE = 200
 """Number of rows in one transaction."""
 MOST_WAITING = 50_000
-"""Number of notes (about 1 kB each) that wait in memory while the database cannot be written; further ones are only in
-the service's log, and a row says how many."""
+"""Most notes (about 1 kB each) that wait in memory while the database cannot be written. Further ones are only in the
+service's log, and a row states their number.
+"""
 AGAIN_AFTER = 1.0
 """Time (s) after which a failed write is tried again."""
 LOOK_EVERY = 5.0
@@ -94,17 +96,17 @@ log = logging.getLogger("server.audit")
 
 
 class AuditWriter:
-    """Takes notes from any thread, and never lets it wait, except for those that come after its end.
+    """Accepts notes from any thread, without making it wait, except after the writer's end.
 
-    Notes that cannot be written wait in memory. If they still wait when the service ends, they are kept in the file
-    `kept`, and written when it starts again.
+    Notes that cannot be written wait in memory. If they still wait when the service ends, they are saved in the file
+    `kept`, and written after the next start.
     """
 
     def __init__(
         self, audit: AuditLog, kept: Path, clock: Callable[[], float] = time.monotonic, again_after: float = AGAIN_AFTER
     ) -> None:
         self.waiting = 0
-        """Number of notes that are not in the database yet, without those that are counted."""
+        """Number of notes that are not yet in the database, without those that are counted."""
         self.written = 0
         """Number of rows written since the service started."""
         self.trouble = ""
@@ -120,7 +122,7 @@ class AuditWriter:
         self._closing = self._closed = False
         self._take_in()
         self._thread: threading.Thread | None = None
-        """Started with the first note, so that a service that cannot start leaves none."""
+        """Started with the first note, so that a service that fails to start leaves no thread."""
 
     def note(self, note: AuditNote) -> Future[None]:
         """Adds a note. The future ends when its row is on the disk."""
@@ -134,7 +136,7 @@ class AuditWriter:
         return written
 
     def count(self, note: AuditNote) -> None:
-        """Adds a note of what is asked again and again: the first has a row at once, the others are counted."""
+        """Adds a note of a repeated request: the first has a row at once, the others are counted."""
         with self._changed:
             first = self._repeats.take(note, self._clock())
             if first is not None:
@@ -147,7 +149,7 @@ class AuditWriter:
             return self._changed.wait_for(lambda: not self.waiting, within)
 
     def close(self, within: float) -> None:
-        """Writes what is left, within this time (s), and keeps the rest in a file."""
+        """Writes the remaining notes, within this time (s), and saves the rest in a file."""
         with self._changed:
             self._closing = True
             for note in self._repeats.rest():
@@ -196,7 +198,7 @@ class AuditWriter:
                     written.set_result(None)
 
     def _write(self, notes: Sequence[AuditNote]) -> bool:
-        """Writes rows. Returns whether they are written: errors are told once, and the rows wait."""
+        """Writes rows. Returns whether they are written: errors are logged once, and the rows wait."""
         left_out, many = self._left_out, list(notes)
         if left_out:
             line = f"{left_out} rows are only in the service's log: too many waited for the database"
@@ -218,7 +220,7 @@ class AuditWriter:
         except DatabaseError as error:
             if not is_value(error):
                 raise
-            # One of them has what this database cannot hold. It shall not keep the others out.
+            # One of them has content that this database cannot hold. It must not block the others.
             for note in notes:
                 log.warning("audit: a row without its words: %s", note.model_dump_json(exclude_none=True))
             head = self._audit.append([note.model_copy(update=_WITHOUT_WORDS) for note in notes])
@@ -226,7 +228,7 @@ class AuditWriter:
         log.debug("audit: %s", head)
 
     def _take_in(self) -> None:
-        """Takes in what the service could not write before it ended."""
+        """Reads the notes that the service could not write before it ended."""
         with suppress(FileNotFoundError):
             for line in self._kept.read_text("utf-8").splitlines():
                 try:
@@ -240,7 +242,7 @@ class AuditWriter:
         self.waiting = len(self._notes)
 
     def _forget_kept(self) -> None:
-        """Removes the file, since what it had has rows now. If that fails, the next start writes them again."""
+        """Removes the file, since its notes have rows now. If that fails, the next start writes them again."""
         self._taken_in = False
         with suppress(OSError):
             self._kept.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Backup and restore of everything that a service keeps, as one file: database, traces, models, results of jobs."""
+"""Backup and restore of all data of a service, as one file: database, traces, models, results of jobs."""
 
 from daq.plugins import Command, Plugin
 
@@ -6,7 +6,7 @@ PLUGIN = Plugin(
     commands=(
         Command(
             "backup",
-            "Save everything that a service keeps in one file.",
+            "Save all data of a service in one file.",
             "extras.lab.backup.backup_command",
             about="service",
             needs="server",

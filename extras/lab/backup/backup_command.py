@@ -1,4 +1,4 @@
-"""`daq backup`: writes everything that a service keeps into one file."""
+"""`daq backup`: writes all data of a service into one file."""
 
 from __future__ import annotations
 

@@ -30,8 +30,7 @@ from server.store.schema import (
 
 
 def copy_database(source: Path, target: Path) -> None:
-    """Copies the database as it is at one moment, whatever is written meanwhile (SQLite's online backup).
-    Raises BackupError."""
+    """Copies a consistent state of the database during writes (SQLite's online backup). Raises BackupError."""
     if not source.is_file():
         raise BackupError(f"database {source}: does not exist: no service has run with this configuration yet")
     try:
@@ -46,7 +45,7 @@ def copy_database(source: Path, target: Path) -> None:
 
 
 def revision_of(database: Path) -> str | None:
-    """Returns the revision of a database's tables; None if it has none. Raises BackupError when it is damaged."""
+    """Returns the revision of a database's tables; None if it has none. Raises BackupError for a damaged one."""
     try:
         with closing(open_to_read(database)) as connection:
             found = connection.execute("PRAGMA integrity_check").fetchone()[0]
@@ -60,8 +59,11 @@ def revision_of(database: Path) -> str | None:
 
 
 def keep_own_objects(database: Path, revision: str | None) -> tuple[str, ...]:
-    """Removes what the migrations to this revision do not make, such as triggers, which would act with the service's
-    rights. Returns its names. Raises BackupError if something that they make is missing, or of another form."""
+    """Removes objects that the migrations to this revision do not make, such as triggers, which would act with the
+    service's rights.
+
+    Returns their names. Raises BackupError if an object of the migrations is missing or different.
+    """
     try:
         with closing(sqlite3.connect(database)) as connection, connection:
             found = schema_of(connection.execute)
@@ -80,8 +82,10 @@ def keep_own_objects(database: Path, revision: str | None) -> tuple[str, ...]:
 
 
 def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
-    """Pauses the queue of `robot` in this database, for the service that will use it. A queue that is paused already
-    keeps its reason. Raises BackupError."""
+    """Pauses the queue of `robot` in this database, for the service that will use it.
+
+    A queue that is already paused keeps its reason. Raises BackupError.
+    """
     since = now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")  # as SQLAlchemy writes it
     line = "INSERT INTO queues (robot, paused, reason, since) VALUES (?, 1, ?, ?) ON CONFLICT (robot) DO UPDATE"
     changes = "SET paused = 1, reason = excluded.reason, since = excluded.since WHERE NOT paused"
@@ -100,12 +104,13 @@ _FORGOTTEN = (
 )
 _GIVEN_UP = "state = 'given-up', ended = :now, problem = 'a backup was restored'"
 _NOT_SENT = f"UPDATE notifications SET {_GIVEN_UP} WHERE state = 'waiting'"
-"""What a restore ends."""
+"""Tables and rows that a restore ends."""
 
 
 def forget_what_may_have_ended(database: Path, now: datetime) -> None:
-    """Ends what may have been ended after the backup was made: sessions, approvals of what has not begun, and
-    notifications that wait. Raises BackupError."""
+    """Ends sessions, approvals of waiting experiments, and waiting notifications: they may have been ended after the
+    backup. Raises BackupError.
+    """
     words = {"now": now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")}
     try:
         with closing(sqlite3.connect(database)) as connection, connection:
@@ -116,8 +121,9 @@ def forget_what_may_have_ended(database: Path, now: datetime) -> None:
 
 
 def note_dropped(source: Path, target: Path, packed: Container[str]) -> None:
-    """Notes in the copy `target` which local traces without a file in `packed` the archive has by now, as `source`
-    says. Raises BackupError."""
+    """Notes in the copy `target` which local traces without a file in `packed` the archive has by now, according to
+    `source`. Raises BackupError.
+    """
     try:
         with closing(sqlite3.connect(target, timeout=BUSY_TIMEOUT_MS / 1e3)) as connection:
             if not _has_table(connection, "archived_traces"):
@@ -154,7 +160,9 @@ def head_of_audit(database: Path) -> str:
 
 
 def note_restored(database: Path, at: datetime, command: str, archive: str, detail: str) -> None:
-    """Notes the restore in a database's audit log; one without tables stays as it is. Raises BackupError."""
+    """Notes the restore in a database's audit log; a database without its tables stays unchanged. Raises
+    BackupError.
+    """
     with closing(sqlite3.connect(database)) as connection:
         if not _has_table(connection, "audit"):
             return

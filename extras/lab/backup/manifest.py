@@ -1,4 +1,4 @@
-"""The manifest of a backup, which lists its files with their digests, and the checks of the files against it."""
+"""The manifest of a backup, which lists its files with digests, and checks against it."""
 
 from __future__ import annotations
 
@@ -36,8 +36,9 @@ class Entry(FrozenRecord):
 
 
 class Manifest(BaseModel):
-    """The list of a backup's files. `revision` is that of the database's tables; the files `left_out` were deleted,
-    or dropped after they had been archived, while the backup was made."""
+    """The list of a backup's files. `revision` is that of the database's tables; the files `left_out` were deleted, or
+    dropped after they had been archived, while the backup was made.
+    """
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
@@ -70,7 +71,7 @@ def opened(archive: Path) -> Iterator[tuple[zipfile.ZipFile, Manifest]]:
 
 
 def verify(archive: Path, progress: Progress = lambda _fraction, _text: None) -> Manifest:
-    """Reads every byte of a backup. Raises BackupError if a file is missing or differs from what was written."""
+    """Reads every byte of a backup. Raises BackupError if a file is missing or different from the one written."""
     try:
         with opened(archive) as (pack, manifest):
             done = 0
@@ -85,7 +86,7 @@ def verify(archive: Path, progress: Progress = lambda _fraction, _text: None) ->
 
 
 def check(entry: Entry, found: str, archive: Path) -> None:
-    """Raises BackupError if the digest `found` differs from that of the file that was written."""
+    """Raises BackupError if the digest `found` differs from that of the written file."""
     if found != entry.sha256:
         raise BackupError(f"{archive}: {entry.name} is not as it was written: the backup is damaged")
 
@@ -114,7 +115,9 @@ def _manifest(pack: zipfile.ZipFile, archive: Path) -> Manifest:
         line = f"{archive}: {MANIFEST}: {first.where()}: {first.message}; nothing was changed"
         raise BackupError(line) from error
     if manifest.format > FORMAT:
-        line = f"{archive}: is a backup of format {manifest.format}, this version knows {FORMAT}; nothing was changed"
+        line = (
+            f"{archive}: is a backup of format {manifest.format}, this version supports {FORMAT}; nothing was changed"
+        )
         raise BackupError(line)
     listed = {entry.name: entry for entry in manifest.files}
     strange = next((name for name in listed if not NAMES.fullmatch(name)), None)

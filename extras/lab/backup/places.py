@@ -1,4 +1,4 @@
-"""Where a service keeps its files, and the names of these files in a backup."""
+"""Paths of a service's files, and their names in a backup."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ NAMES = re.compile(
 
 
 def is_trace(name: str) -> bool:
-    """Whether the file that has this name in a backup is a trace."""
+    """Whether the file with this name in a backup is a trace."""
     return name.startswith("traces/")
 
 
@@ -37,8 +37,9 @@ class BackupError(DaqError):
 
 @dataclass(frozen=True)
 class Places:
-    """Places of one configuration's files. `database` is the database's file; `traces` are the folders by the name of
-    each robot."""
+    """Paths of one configuration's files. `database` is the database's file; `traces` are the folders by the name of
+    each robot.
+    """
 
     database: Path
     traces: dict[str, Path]
@@ -46,21 +47,21 @@ class Places:
 
     @property
     def url(self) -> URL:
-        """The database's address."""
+        """The database's URL."""
         return file_address(self.database)
 
     @property
     def robot(self) -> str:
-        """The name of the robot; of several, all of their names."""
+        """The name of the robot; of several, all names."""
         return ", ".join(sorted(self.traces))
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """All folders, without those in them."""
+        """All top folders."""
         return (self.database.parent, *self.traces.values(), self.service)
 
     def home(self, name: str) -> Path:
-        """Returns which of the folders the file that has this name in a backup goes to. Raises BackupError."""
+        """Returns the folder for the file with this name in a backup. Raises BackupError."""
         if name == DATABASE:
             return self.database.parent
         kind, *rest = name.split("/")
@@ -68,11 +69,13 @@ class Places:
             return self.service
         robot = rest[0] if len(rest) > 1 else self.robot
         if robot not in self.traces or (len(rest) > 1) != (len(self.traces) > 1):
-            raise BackupError(f"{name!r}: the backup has a trace of no robot of {self.robot}; nothing was changed")
+            raise BackupError(
+                f"{name!r}: the backup has a trace of another robot than {self.robot}; nothing was changed"
+            )
         return self.traces[robot]
 
     def target(self, name: str) -> Path:
-        """Returns the place of the file that has this name in a backup."""
+        """Returns the path for the file with this name in a backup."""
         if name == DATABASE:
             return self.database
         home = self.home(name)
@@ -93,7 +96,7 @@ class Places:
 
 
 def places_of(settings: Settings) -> Places:
-    """Returns the places of a configuration. Raises BackupError if its database is not a file."""
+    """Returns the paths of a configuration. Raises BackupError if its database is not a file."""
     address = address_of(settings.server)
     database = sqlite_file(address)
     if database is None:

@@ -41,8 +41,9 @@ CHECK_SHARE, WRITE_SHARE = 0.4, 0.98
 
 @dataclass(frozen=True)
 class Restored:
-    """What was restored, and the folders into which the files that existed before were moved. `removed`: objects of the
-    backup's database that this program does not make, such as triggers."""
+    """Result of a restore: the folders into which existing files were moved, and `removed`: objects of the backup's
+    database that this program does not make, such as triggers.
+    """
 
     manifest: Manifest
     put_aside: tuple[Path, ...]
@@ -67,10 +68,10 @@ def restore(
     overwrite: bool = False,
     reserve: int = RESERVE,
 ) -> Restored:
-    """Writes all files of a backup to the places of this configuration.
+    """Writes all files of a backup to the paths of this configuration.
 
     Raises BackupError if the backup is damaged or another robot's, or if files exist there and `overwrite` is False;
-    raises InUseError while a service runs. Nothing has been changed then.
+    raises InUseError while a service runs. In these cases nothing has been changed.
     """
     manifest = verify(archive, lambda fraction, text: progress(CHECK_SHARE * fraction, text))
     if manifest.robot != places.robot:
@@ -81,7 +82,7 @@ def restore(
         there = occupied(places)
         if there and not overwrite:
             names = ", ".join(str(path) for path in there[:3]) + (", …" if len(there) > 3 else "")
-            line = f"{len(there)} files or folders exist already ({names})"
+            line = f"{len(there)} files or folders already exist ({names})"
             raise BackupError(f"{line}: with --overwrite they are moved aside; nothing was changed")
         staged = _Staged(archive, places, now, reserve)
         try:
@@ -106,7 +107,7 @@ def occupied(places: Places) -> list[Path]:
 
 
 class _Staged:
-    """Files extracted beside their places, on the same disk, so that moving each into place is a rename."""
+    """Files extracted beside their final paths, on the same disk, so that a rename moves each into place."""
 
     def __init__(self, archive: Path, places: Places, now: datetime, reserve: int) -> None:
         self._archive = archive
@@ -116,13 +117,13 @@ class _Staged:
         self._moves: list[tuple[Path, Path]] = []
         self._folders = {folder / STAGING for folder in places.folders}
         self._traces: dict[str, Path] = {}
-        """Place of each trace, by the name of its file, which no two robots have in common."""
+        """Path of each trace, by the name of its file, which is unique over all robots."""
         self._robots: dict[str, str] = {}
-        """Robot of each trace, by its number, also of those that only the archive has."""
+        """Robot of each trace, by its ID, including those that only the archive has."""
         self.removed: tuple[str, ...] = ()
 
     def write(self, manifest: Manifest, progress: Progress) -> None:
-        """Extracts all files, and checks the digest of each once more. Raises BackupError, OSError."""
+        """Extracts all files, and checks the digest of each again. Raises BackupError, OSError."""
         self.clear()
         for folder in self._folders:
             folder.mkdir(parents=True)
@@ -131,7 +132,7 @@ class _Staged:
         self._traces = {Path(name).name: self._places.target(name) for name in names}
         done = 0
         with opened(self._archive) as (pack, _):
-            # The database first: it says into which folders the requests of jobs lead.
+            # The database first: it determines the folders in the requests of jobs.
             for entry in sorted(manifest.files, key=lambda one: one.name != DATABASE):
                 progress(done / max(1, manifest.size), entry.name)
                 self._extract(pack, entry)
@@ -148,15 +149,16 @@ class _Staged:
             forget_what_may_have_ended(self._staged(DATABASE), self._now)
 
     def note_in_audit_log(self, manifest: Manifest) -> None:
-        """Notes in the restored audit log which log it takes the place of: rows that the backup does not have are in
-        the database that is put aside."""
+        """Notes in the restored audit log which log it replaces: rows that the backup lacks are in the database that
+        was moved aside.
+        """
         ended = head_of_audit(self._places.database)
         detail = f"a backup of {manifest.created:%Y-%m-%d %H:%M:%S %Z} takes the place of a log that ended with {ended}"
         command = f"daq restore {self._archive.name}"
         note_restored(self._staged(DATABASE), self._now, command, self._archive.name, detail)
 
     def move_in(self) -> None:
-        """Moves every file into its place, and writes the folders to the disk."""
+        """Moves every file into place, and syncs the folders to the disk."""
         for staged, target in self._moves:
             target.parent.mkdir(parents=True, exist_ok=True)
             staged.replace(target)
@@ -187,8 +189,10 @@ class _Staged:
         self._moves.append((path, self._places.target(entry.name)))
 
     def _lead_to_places(self, request: Path) -> None:
-        """Changes the paths of traces, models and another job in a job's request to this configuration's folders. A
-        request that is none stays as it is: no worker accepts it."""
+        """Changes the paths of traces, models and another job in a job's request to this configuration's folders.
+
+        An invalid request stays unchanged: no worker accepts it.
+        """
         try:
             task = _Led.model_validate_json(request.read_bytes())
         except ValidationError:
@@ -202,7 +206,7 @@ class _Staged:
             os.fsync(stream.fileno())
 
     def _place_of(self, number: str, name: str) -> Path:
-        """Returns the place of a trace; of one that the backup does not have, where it is fetched to."""
+        """Returns the path of a trace; if the backup lacks it, the path to which it is fetched."""
         folders = self._places.traces
         folder = folders.get(self._robots.get(number, ""), next(iter(folders.values())))
         return self._traces.get(name, folder / name)

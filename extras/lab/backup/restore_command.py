@@ -1,4 +1,4 @@
-"""`daq restore`: writes a backup to the configured places."""
+"""`daq restore`: writes a backup to the configured paths."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def restore(
         with shown_progress("restore") as progress:
             done = bring_back(file, places, SystemClock().utc(), progress, overwrite=overwrite)
         put_aside, removed = [str(folder) for folder in done.put_aside], done.removed
-        found, what = done.manifest, "was brought back"
+        found, what = done.manifest, "was restored"
     if json:
         counted = {"bytes": found.size, "traces": found.count("traces"), "models": found.count("models")}
         manifest = found.model_dump(mode="json", exclude={"files"})
@@ -54,6 +54,6 @@ def restore(
     for folder in put_aside:
         console().print(f"existing data were moved to {folder}", markup=False)
     for name in removed:
-        console().print(f"not brought back, since this program does not make it: {name} of the database", markup=False)
+        console().print(f"not restored, since this program does not make it: {name} of the database", markup=False)
     counts = f"{found.count('traces')} traces, {found.count('models')} models, {found.size / 1e6:.1f} MB"
     print(f"{file} of {found.created:%Y-%m-%d %H:%M:%S %Z} {what}: {counts}")

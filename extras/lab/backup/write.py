@@ -21,14 +21,14 @@ RESERVE = 20_000_000
 
 
 def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, reserve: int = RESERVE) -> Manifest:
-    """Writes a backup to `target`, completely or not at all. Other users cannot read it: it holds hashes of tokens.
+    """Writes a backup to `target`, completely or not at all. Other users cannot read it: it contains hashes of tokens.
 
-    The database is copied first, as it is at one moment: every file that it names exists by then, and is copied after
-    it. Files deleted meanwhile are left out, and the manifest lists them; those that the archive took over are noted as
-    archived. Raises BackupError.
+    The database is copied first, in a consistent state: every file that it names exists by then, and is copied
+    afterwards. Files deleted meanwhile are left out, and the manifest lists them; those that the archive took over are
+    noted as archived. Raises BackupError.
     """
     if target.exists():
-        raise BackupError(f"{target}: exists already; a backup is never overwritten")
+        raise BackupError(f"{target}: already exists; a backup is never overwritten")
     try:
         with tempfile.TemporaryDirectory(prefix=".backup-", dir=target.absolute().parent) as folder:
             database = Path(folder) / "service.sqlite"
@@ -38,8 +38,8 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
             _require_room(target.absolute().parent, [(DATABASE, database), *files], reserve)
             part = Path(folder) / "backup.zip"
             entries, left_out = _pack(part, files, progress)
-            # The archive may have taken traces over since the copy. Its rows say where they are, and every trace is
-            # either packed or has its row by now: a service that runs need not be told to wait with its disk full.
+            # The archive may have taken over traces since the copy. Its rows state where they are, and by now every
+            # trace is either packed or has its row. So a running service need not pause while its disk is full.
             note_dropped(places.database, database, {Path(one.name).name for one in entries if is_trace(one.name)})
             with zipfile.ZipFile(part, "a") as pack:
                 entries.insert(0, _put(pack, DATABASE, database))
@@ -57,7 +57,7 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
             with part.open("rb") as stream:
                 os.fsync(stream.fileno())
             if target.exists():
-                raise BackupError(f"{target}: was made by somebody else meanwhile; it was not overwritten")
+                raise BackupError(f"{target}: was made by another program meanwhile; it was not overwritten")
             part.replace(target)
             sync_folder(target.absolute().parent)
     except OSError as error:
@@ -66,7 +66,7 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
 
 
 def _pack(part: Path, files: list[tuple[str, Path]], progress: Progress) -> tuple[list[Entry], list[str]]:
-    """Writes the files into the archive. Returns the entries written, and the names of files that were gone."""
+    """Writes the files into the archive. Returns the written entries, and the names of missing files."""
     entries, left_out = [], []
     descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o600)
     with os.fdopen(descriptor, "w+b") as stream, zipfile.ZipFile(stream, "w") as pack:

@@ -1,6 +1,6 @@
 """Batches: the same study of many traces, with a table as its result, on many cores or computers.
 
-Another program can go on where one ended.
+Another program can continue an interrupted batch.
 """
 
 from daq.plugins import Command, Name, Plugin

@@ -1,4 +1,4 @@
-"""The answer about one trace as columns of a table. Pure."""
+"""Converts the answer about one trace to columns of a table. Pure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ Columns = dict[str, Cell]
 
 
 def of_fit(found: FitResult) -> Columns:
-    """The error of each joint and, of each parameter, the value with its 95 % interval, where the trace determines it.
+    """Returns the error of each joint and, for each parameter, its value with 95 % interval, if the trace determines
+    it.
 
     Columns of a parameter begin with its name; `NAME` itself is the value.
     """
@@ -34,7 +35,7 @@ def of_fit(found: FitResult) -> Columns:
 
 
 def of_validation(found: Fidelity) -> Columns:
-    """Σλ², the mean squared error of each joint, and each parameter's λ²."""
+    """Returns Σλ², the mean squared error of each joint, and each parameter's λ²."""
     columns: Columns = {"sum_of_contributions": found.sum_of_contributions, "explains": found.explains}
     for joint, error in zip(found.outputs, found.error_by_joint, strict=True):
         columns |= _joint(joint, mean_squared_error=error)
@@ -43,7 +44,7 @@ def of_validation(found: Fidelity) -> Columns:
 
 
 def of_simulation(found: TraceAgreement) -> Columns:
-    """How far each joint's measurement is from its simulation."""
+    """Returns the difference of each joint's measurement from its simulation."""
     columns: Columns = {"samples": found.samples}
     for j in found.joints:
         columns |= _joint(j.joint, unit=j.unit, error=j.rmse, largest=j.largest, noise=j.floor, share=j.share)
@@ -51,7 +52,7 @@ def of_simulation(found: TraceAgreement) -> Columns:
 
 
 def of_diagnosis(found: Diagnosis, headline: str) -> Columns:
-    """The verdict, the effects that were added, and the error of each joint before and after."""
+    """Returns the verdict, the effects that were added, and the error of each joint before and after."""
     added = [step for step in found.steps if step.adopted and step.effect is not None]
     columns: Columns = {
         "verdict": found.verdict,
@@ -72,7 +73,7 @@ def _joint(number: int, **columns: Cell) -> Columns:
 
 
 def _finite(columns: Columns) -> Columns:
-    """Leaves cells empty whose numbers are not finite, which JSON cannot write."""
+    """Leaves cells with infinite or missing values empty, because JSON cannot write them."""
     return {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
         for name, value in columns.items()

@@ -1,6 +1,6 @@
 """`daq batch`: the same fit, validation, simulation or diagnosis of many traces, with a table as result.
 
-Runs a batch on this computer or on the workers of a URL, and shows how it goes.
+It runs a batch on this computer or on the workers of a URL, and shows its progress.
 """
 
 from __future__ import annotations
@@ -51,12 +51,12 @@ if TYPE_CHECKING:
 
 
 TELL_EVERY = 10.0
-"""Time (s) between two lines of progress where standard error is no terminal."""
+"""Time (s) between two lines of progress if standard error is no terminal."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """A batch as the command line asks for it. `traces`: a folder, or a query for the configured one."""
+    """A batch as the command line requests it. `traces`: a folder, or a query for the configured one."""
 
     traces: str
     out: Path
@@ -67,7 +67,7 @@ class Asked:
 
 
 def run(robot: RobotAccess, asked: Asked, study: Study) -> bool:
-    """Runs a batch and prints what came out. Returns whether every trace is done."""
+    """Runs a batch and prints its results. Returns whether every trace is done."""
     from daq.executors.workers import ending
     from extras.lab.batches.executors import LOCAL, open_workers, parse_address
     from extras.lab.batches.folder import asked_of, opened
@@ -114,7 +114,7 @@ def _chosen(robot: RobotAccess, text: str) -> list[Chosen]:
 
 
 def place_and_query(text: str) -> tuple[Path | None, TraceQuery]:
-    """The folder that a text names, or None and the query that it is instead. Raises SpecError."""
+    """Returns the folder that a text names, or None and a query. Raises SpecError."""
     from daq.contracts.errors import SpecError
     from daq.traces.query import TraceQuery, parse_query
 
@@ -127,8 +127,10 @@ def place_and_query(text: str) -> tuple[Path | None, TraceQuery]:
 
 @contextmanager
 def shown(what: str) -> Iterator[Told]:
-    """Shows a batch's progress: a bar with rate and time left at a terminal, elsewhere a line now and then. Failures
-    are told one by one, in a line each."""
+    """Shows a batch's progress: at a terminal a bar with rate and remaining time, elsewhere occasional lines.
+
+    Each failure is reported in one line.
+    """
     with _bar(what) if console().is_terminal else _lines() as progress:
 
         def tell(standing: Standing, row: Row | None) -> None:
@@ -180,14 +182,14 @@ def _print_end(asked: Asked, done: int, failed: int, seconds: float) -> None:
         return
     print(f"{done} of {done + failed} traces done, in {seconds:.1f} s: {' and '.join(map(str, written))}")
     if len(written) < len(tables):
-        console().print("no Parquet: `pip install 'ma2000-daq[tables]'` where daq is installed")
+        console().print("no Parquet: needs `pip install 'ma2000-daq[tables]'` in daq's environment")
     if failed:
         console().print(f"{failed} failed; the same command tries them again")
 
 
 app = typer.Typer(
     add_completion=False,
-    help="Study many traces, each by itself: a table is the result. The same command goes on after an interruption.",
+    help="Study many traces, each separately, with a table as result. The same command continues an interrupted batch.",
     no_args_is_help=True,
 )
 
@@ -195,15 +197,17 @@ TracesOf = Annotated[
     str,
     typer.Argument(
         metavar="FOLDER|QUERY",
-        help="A folder of traces; or which of the configured folder: words, and kind:, source:, outcome:, robot:, "
+        help="A folder of traces; or a query for the configured folder: words, and kind:, source:, outcome:, robot:, "
         "since:, until:.",
     ),
 ]
 ExecutorOption = Annotated[
     str,
-    typer.Option("--executor", help="Who computes: local://4 (processes), or dask://host:8786."),
+    typer.Option("--executor", help="Where to compute: local://4 (processes), or dask://host:8786."),
 ]
-OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder of the result; a batch in it goes on.")]
+OutOption = Annotated[
+    Path, typer.Option("--out", "-o", help="Folder of the result; an unfinished batch in it is continued.")
+]
 ModelOption = Annotated[
     str | None, typer.Option(help=f"The model of all traces (default: the machine of each). {MODEL_HELP}")
 ]
@@ -235,7 +239,7 @@ def fit(
     consistent_inertias: ConsistentOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Fit a model to every trace by itself: a row of parameters and errors for each."""
+    """Fit a model to every trace separately: one row of parameters and errors per trace."""
     from daq.contracts.service.jobs import FitStudy
     from daq_cli.models.effect_choice import bounds, effect_choices, patterns
 
@@ -273,7 +277,7 @@ def validate(
     ] = 0.5,
     json: JsonOption = False,
 ) -> None:
-    """Validate a model against every trace by itself (Σλ²): a row for each."""
+    """Validate a model against every trace separately (Σλ²): one row per trace."""
     from daq.contracts.service.jobs import ValidateStudy
     from daq_cli.models.effect_choice import patterns
 
@@ -294,7 +298,7 @@ def simulate(
     no_rounding: NoRoundingOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Simulate every trace and compare it with the measurement: a row of errors for each."""
+    """Simulate every trace and compare it with the measurement: one row of errors per trace."""
     from extras.lab.batches.study import SimulateStudy
 
     study = SimulateStudy(loop="open" if open_loop else "closed", quantise=not no_rounding)
@@ -316,7 +320,7 @@ def diagnose(
     despite_doubts: DespiteDoubtsOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Diagnose every trace by itself: a row with verdict, effects and errors for each."""
+    """Diagnose every trace separately: one row with verdict, effects and errors per trace."""
     from daq.contracts.experiment import parse_joints
     from daq.contracts.service.jobs import DiagnoseStudy
     from daq_cli.models.effect_choice import candidate_effects

@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster, which its scheduler has."""
+"""Computes on the workers of a Dask cluster, by its scheduler."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from extras.lab.batches.program import PACKAGE, Checked, Program, program_here, 
 
 PATIENCE = 20.0
 """Time (s) within which a scheduler must answer, and have a worker."""
-LOST = "the connection to Dask's scheduler was lost, and with it the jobs; the same command goes on"
+LOST = "the connection to Dask's scheduler was lost, and with it the jobs; the same command continues"
 COUNT_EVERY = 5.0
-"""Time (s) between two counts of the workers, which may come and go."""
+"""Time (s) between two counts of the workers, whose number may change."""
 
 
 class DaskWorkers(Workers):
-    """Jobs as tasks of Dask, which computes those of a dead worker again elsewhere, three times at most."""
+    """Runs jobs as tasks of Dask, which repeats those of a dead worker elsewhere, up to three times."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
@@ -37,7 +37,7 @@ class DaskWorkers(Workers):
         self._lock = threading.Lock()
 
     def count(self) -> int:
-        """The number of threads of all workers; 1 where there are none now."""
+        """Returns the number of threads of all workers; 1 if there are none at present."""
         with self._lock:
             when, count = self._counted
             if time.monotonic() - when >= COUNT_EVERY:
@@ -49,25 +49,25 @@ class DaskWorkers(Workers):
         return count
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **named: Any) -> Future[Any]:
-        """As any executor does."""
+        """Submits a job, like any executor."""
         future: Future[Any] = Future()
-        # Without a key Dask would write the whole job out as text, to name it.
+        # Without a key Dask would write the whole job as text, to name it.
         given = self._executor.submit(Checked(function, program_here()), *args, key=f"job-{uuid4().hex}", **named)
         given.add_done_callback(partial(_pass_on, future))
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """As any executor does."""
+        """Shuts down, like any executor."""
         self._executor.shutdown(wait=wait and not cancel_futures)
         self._client.close()
 
     def abandon(self) -> None:
-        """Leaves the scheduler, which forgets the jobs; it may be gone itself."""
+        """Leaves the scheduler, which then drops the jobs; it may itself be gone."""
         self._client.close()
 
 
 def _pass_on(future: Future[Any], given: Future[Any]) -> None:
-    """Gives the end of Dask's future to another, with the exceptions of `concurrent.futures`."""
+    """Passes the end of Dask's future on to another, with the exceptions of `concurrent.futures`."""
     if not future.set_running_or_notify_cancel():
         return
     if given.cancelled():
@@ -83,7 +83,7 @@ def _pass_on(future: Future[Any], given: Future[Any]) -> None:
 
 
 def connected(url: str, scheduler: str) -> DaskWorkers:
-    """The workers of a scheduler, once there is one of them and all have this program's version.
+    """Returns the workers of a scheduler, once it has one and all have this program's version.
 
     Raises ReachError, OtherVersionError.
     """
@@ -104,7 +104,7 @@ def connected(url: str, scheduler: str) -> DaskWorkers:
 
 
 def require_same_versions(client: Client) -> None:
-    """Raises OtherVersionError, which names the worker, where one has another version than this program."""
+    """Raises OtherVersionError, which names the worker, if one has another version than this program."""
     versions: Any = client.get_versions(packages=[PACKAGE])
     for worker, has in versions["workers"].items():
         packages = has["packages"]

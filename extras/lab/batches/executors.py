@@ -1,4 +1,4 @@
-"""Who computes a batch, by URL: local://4, dask://host:8786, dask+tls://host:8786."""
+"""Opens the executor of a batch by URL: local://4, dask://host:8786, dask+tls://host:8786."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from daq.executors import LocalWorkers, Workers, cores
 LOCAL = "local://"
 MOST_WORKERS = 10_000
 PORT = 8786
-"""Port of Dask's scheduler where the URL has none."""
+"""Port of Dask's scheduler if the URL has none."""
 EXAMPLES = "write local://4 or dask://host:8786 or dask+tls://host:8786"
 
 
 @dataclass(frozen=True)
 class Address:
-    """A parsed URL. `place`: number of processes (empty: one a core), or address of a scheduler."""
+    """A parsed URL. `target`: number of processes (empty: one per core), or address of a scheduler."""
 
     url: str
     kind: str
-    place: str
+    target: str
 
 
 def parse_address(url: str) -> Address:
-    """Parses a URL. Raises SpecError, in one line, for one of no executor."""
+    """Parses a URL. Raises SpecError, in one line, if it is not that of an executor."""
     head = f"executor {shown(url)}"
     try:
         parts = urlsplit(url)
@@ -36,34 +36,34 @@ def parse_address(url: str) -> Address:
     except ValueError as error:
         raise SpecError(f"{head}: {error}; {EXAMPLES}") from None
     if "://" not in url or parts.path.strip("/") or parts.query or parts.fragment or parts.username is not None:
-        raise SpecError(f"{head}: is none; {EXAMPLES}")
-    place = parts.netloc
+        raise SpecError(f"{head}: is not an executor URL; {EXAMPLES}")
+    target = parts.netloc
     if parts.scheme == "local":
-        if not re.fullmatch(r"\d*", place, re.ASCII):
-            line = "write the number of processes, such as local://4, or local:// for one a core"
+        if not re.fullmatch(r"\d*", target, re.ASCII):
+            line = "write the number of processes, such as local://4, or local:// for one per core"
             raise SpecError(f"{head}: {line}")
-        if place and not 1 <= int(place) <= MOST_WORKERS:
-            raise SpecError(f"{head}: {place} workers; 1 to {MOST_WORKERS} are possible")
+        if target and not 1 <= int(target) <= MOST_WORKERS:
+            raise SpecError(f"{head}: {target} workers; 1 to {MOST_WORKERS} are possible")
     elif parts.scheme in ("dask", "dask+tls"):
-        if not place:
+        if not target:
             raise SpecError(f"{head}: names no scheduler; {EXAMPLES}")
-        place = place if port is not None else f"{place.rstrip(':')}:{PORT}"
+        target = target if port is not None else f"{target.rstrip(':')}:{PORT}"
     else:
-        raise SpecError(f"{head}: is none; {EXAMPLES}")
-    return Address(url, parts.scheme, place)
+        raise SpecError(f"{head}: is not an executor URL; {EXAMPLES}")
+    return Address(url, parts.scheme, target)
 
 
 def open_workers(url: str) -> Workers:
     """Opens the executor of a URL (docs/batches.md).
 
-    Raises SpecError for a URL of no executor; MissingExtraError; ReachError for a scheduler that does not answer;
+    Raises SpecError for another URL; MissingExtraError; ReachError for a scheduler that does not answer;
     OtherVersionError.
     """
     address = parse_address(url)
     if address.kind == "local":
-        return LocalWorkers(int(address.place) if address.place else cores())
+        return LocalWorkers(int(address.target) if address.target else cores())
     require_extra("cluster", f"executor {url}", "distributed")
     from extras.lab.batches.dask import connected
 
     scheme = "tls" if address.kind == "dask+tls" else "tcp"
-    return connected(url, f"{scheme}://{address.place}")
+    return connected(url, f"{scheme}://{address.target}")

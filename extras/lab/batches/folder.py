@@ -1,6 +1,6 @@
-"""The folder of a batch: what was asked, a line for each trace that is done, whole answers, and the tables.
+"""The folder of a batch: its request, a line for each completed trace, whole answers, and the tables.
 
-Rows as tables in files: CSV, and Parquet where `pyarrow` is installed.
+Tables are written as CSV, and as Parquet if `pyarrow` is installed.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from firmware_protocol.invalid import first_invalid
 
 
 def write_csv(rows: Sequence[Columns], path: Path) -> Path:
-    """Writes CSV as RFC 4180 describes it, with a line of names; an empty cell where a row has no value."""
+    """Writes CSV (RFC 4180) with a line of names; a cell is empty if a row has no value."""
     with replacing(path, synced=False) as part, part.open("w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, _names(rows), restval="")
         table.writeheader()
@@ -39,7 +39,7 @@ def write_csv(rows: Sequence[Columns], path: Path) -> Path:
 
 
 def write_parquet(rows: Sequence[Columns], path: Path) -> Path | None:
-    """Writes Parquet. Returns None where `pyarrow` is not installed (extra `tables`), and removes an older table."""
+    """Writes Parquet. Returns None if `pyarrow` is not installed (extra `tables`), and removes an older table."""
     if not is_installed("pyarrow"):
         path.unlink(missing_ok=True)
         return None
@@ -53,7 +53,7 @@ def write_parquet(rows: Sequence[Columns], path: Path) -> Path | None:
 
 
 def _names(rows: Sequence[Columns]) -> list[str]:
-    """The names of all columns, in the order in which the rows have them."""
+    """Returns the names of all columns, in the order in which the rows have them."""
     return list(dict.fromkeys(name for row in rows for name in row))
 
 
@@ -62,14 +62,17 @@ _HIDDEN_LOCK = ".lock"
 
 
 class BatchInUseError(DaqError):
-    """Another program computes into this folder."""
+    """Another program is computing into this folder."""
 
     exit_code = exit_codes.NOT_REACHED
 
 
 class Asked(FrozenRecord):
-    """What all rows of the table share, and what a batch must ask again to go on. `model`, `machine` and `effects` are
-    hashes; `machine` is that of traces that name none, and None where a model has its own."""
+    """Request that all rows of the table share, and that must be equal to continue a batch.
+
+    `model`, `machine` and `effects` are hashes; `machine` is that of traces that name none, and None if a model has its
+    own.
+    """
 
     format: int = 1
     software: str
@@ -80,7 +83,7 @@ class Asked(FrozenRecord):
 
 
 class Row(FrozenRecord):
-    """One trace of the table. `about`: what is known of the trace itself."""
+    """One trace of the table. `about`: properties of the trace itself."""
 
     key: str
     problem: str
@@ -91,13 +94,13 @@ class Row(FrozenRecord):
 
     @property
     def cells(self) -> Columns:
-        """The row of the table."""
+        """Returns the row of the table."""
         ended: Columns = {"state": "failed" if self.problem else "done", "problem": self.problem or None}
         return {"trace": self.key, **self.about, **ended, "seconds": round(self.seconds, 3), **self.columns}
 
 
 class BatchFolder:
-    """One batch. A trace has one row at most, the one that was written last."""
+    """One batch. A trace has at most one row, the last one written."""
 
     def __init__(self, path: Path, rows: dict[str, Row]) -> None:
         self.path = path
@@ -109,13 +112,12 @@ class BatchFolder:
         return [self._rows[key] for key in sorted(self._rows)]
 
     def is_done(self, key: str) -> bool:
-        """Whether a trace was studied with success."""
+        """Whether a trace was studied successfully."""
         row = self._rows.get(key)
         return row is not None and not row.problem
 
     def add(self, answer: Answer, about: Columns) -> Row:
-        """Keeps the answer about a trace, and waits until it is on the disk: the whole answer before the row that says
-        that there is one. Raises SpecError."""
+        """Saves the answer about a trace to disk: the whole answer before its row. Raises SpecError."""
         row = Row(
             key=answer.key,
             problem=answer.problem,
@@ -137,11 +139,11 @@ class BatchFolder:
         return row
 
     def answer_file(self, key: str) -> Path:
-        """The file of the whole answer about a trace."""
+        """Returns the file of the whole answer about a trace."""
         return self.path / ANSWERS / f"{key}.json"
 
     def write_tables(self) -> tuple[Path, Path | None]:
-        """Writes the tables anew. Returns their files; None for Parquet where `pyarrow` is not installed."""
+        """Rewrites the tables. Returns their files; None for Parquet if `pyarrow` is not installed."""
         cells = [row.cells for row in self.rows]
         try:
             return write_csv(cells, self.path / CSV), write_parquet(cells, self.path / PARQUET)
@@ -150,7 +152,7 @@ class BatchFolder:
 
 
 def asked_of(common: Common) -> Asked:
-    """What a batch asks."""
+    """Returns the request of a batch."""
     return Asked(
         software=str(program_here()),
         study=common.study,
@@ -162,9 +164,9 @@ def asked_of(common: Common) -> Asked:
 
 @contextmanager
 def opened(path: Path, asked: Asked) -> Iterator[BatchFolder]:
-    """The folder, made when it is new, for this program alone within the block.
+    """Yields the folder, created if new, for exclusive use by this program within the block.
 
-    Raises SpecError when it holds another batch or cannot be written; BatchInUseError.
+    Raises SpecError if it holds another batch or cannot be written; BatchInUseError.
     """
     try:
         (path / ANSWERS).mkdir(parents=True, exist_ok=True)
@@ -178,7 +180,7 @@ def opened(path: Path, asked: Asked) -> Iterator[BatchFolder]:
         except OSError as error:
             raise _unwritable(path, error) from error
         if not alone:
-            raise BatchInUseError(f"{path}: another batch computes into it; wait until it has ended")
+            raise BatchInUseError(f"{path}: another batch is computing into it; wait until it has ended")
         _require_same(path / ASKED, asked)
         yield BatchFolder(path, _read_rows(path / ROWS))
 
@@ -196,7 +198,7 @@ def _require_same(file: Path, asked: Asked) -> None:
         raise SpecError(f"{file}: not a batch's: {first_invalid(error).message}") from error
     for name in Asked.model_fields:
         if getattr(before, name) != getattr(asked, name):
-            raise SpecError(f"{file.parent}: holds a batch with another {_WORDS[name]}; take another folder")
+            raise SpecError(f"{file.parent}: holds a batch with another {_WORDS[name]}; use another folder")
 
 
 _WORDS = {
@@ -210,7 +212,7 @@ _WORDS = {
 
 
 def _read_rows(file: Path) -> dict[str, Row]:
-    """The rows of the file. A line that a crash cut short is taken out: its trace is studied again."""
+    """Reads the rows of the file. A line that a crash cut short is removed, and its trace is studied again."""
     found: dict[str, Row] = {}
     for line in _whole_lines(file):
         try:
@@ -218,7 +220,7 @@ def _read_rows(file: Path) -> dict[str, Row]:
         except UnicodeDecodeError as error:
             raise SpecError(f"{file}: a line is not UTF-8 text") from error
         except ValidationError as error:
-            raise SpecError(f"{file}: a line is no row of a batch: {first_invalid(error).message}") from error
+            raise SpecError(f"{file}: a line is not a row of a batch: {first_invalid(error).message}") from error
         found[row.key] = row
     return found
 
@@ -233,7 +235,7 @@ def _whole_lines(file: Path) -> list[bytes]:
         return []
     except OSError as error:
         raise SpecError(f"{file}: cannot be read: {error.strerror or error}") from error
-    # A row may hold other characters at which text is split into lines, such as U+2028.
+    # A row may contain other characters at which Python splits lines, such as U+2028.
     return content[:whole].split(b"\n")[:-1]
 
 

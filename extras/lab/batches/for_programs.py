@@ -1,4 +1,4 @@
-"""The same study of many traces, each by itself, with a table as result."""
+"""Runs the same study of many traces separately, with a table as result."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from model.machine_model.model import Model
 
 @dataclass(frozen=True)
 class Batch:
-    """A batch that has ended.
+    """A completed batch.
 
     Args:
         folder: holds `table.csv`, `table.parquet` and, in `answers`, the whole answer about each trace.
         rows: the table.
-        failed: the problem of each trace that failed, by its number.
+        failed: the problem of each trace that failed, by its ID.
     """
 
     folder: Path
@@ -53,17 +53,17 @@ def batch(
     cancel: Cancel | None = None,
     **options: Any,
 ) -> Batch:
-    """Studies every trace of a folder by itself, as `daq batch`. What `folder` holds is not done again.
+    """Studies every trace of a folder separately, as `daq batch`. Results that `folder` holds are not computed again.
 
     Args:
-        traces: folder of traces; `query` says which of them, as `ramp since:2026-11-01`.
-        executor: who computes (docs/batches.md). A script that has Dask start processes of this computer must keep
-            what it does behind `if __name__ == "__main__":`.
-        model: of all traces; None for the machine of each, or for `machine` where a trace names none.
+        traces: folder of traces; `query` selects some, as `ramp since:2026-11-01`.
+        executor: where to compute (docs/batches.md). A script that lets Dask start processes on this computer must
+            guard its code with `if __name__ == "__main__":`.
+        model: of all traces; None for the machine of each, or for `machine` if a trace names none.
         options: of the study, as the service's `FitStudy`, `ValidateStudy`, `SimulateStudy`, `DiagnoseStudy`.
 
-    A trace that fails keeps no other from being studied. Raises SpecError, TraceError, ReachError, OtherVersionError;
-    CancelledError when asked to end.
+    A trace that fails does not stop the others. Raises SpecError, TraceError, ReachError, OtherVersionError;
+    CancelledError when cancelled.
     """
     common = Common(
         study=_study(kind, options),

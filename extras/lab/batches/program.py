@@ -1,4 +1,4 @@
-"""Which version of this program computes a job: results of different versions do not belong into one table."""
+"""Identifies the version of this program that computes a job: one table must not mix versions."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ class Program:
 
 @cache
 def program_here() -> Program:
-    """The versions of this process."""
+    """Returns the versions of this process."""
     return Program(version(PACKAGE), ".".join(map(str, sys.version_info[:2])))
 
 
 def refuse_other(worker: str, has: Program, needed: Program) -> None:
-    """Raises OtherVersionError, which names the worker, where versions differ."""
+    """Raises OtherVersionError, which names the worker, if versions differ."""
     if has != needed:
-        raise OtherVersionError(f"worker {worker}: has {has}, and {needed} is needed; install that there")
+        raise OtherVersionError(f"worker {worker}: has {has}, but {needed} is needed; install that there")
 
 
 @dataclass(frozen=True)

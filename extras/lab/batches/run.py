@@ -1,7 +1,4 @@
-"""Runs a batch: gives the traces that are left to an executor, and keeps every answer when it comes.
-
-Which traces of a folder a batch studies.
-"""
+"""Runs a batch: selects traces, gives the remaining ones to an executor, and saves every answer when it arrives."""
 
 from __future__ import annotations
 
@@ -25,7 +22,7 @@ from extras.lab.batches.study import Answer, Common, OneTrace, Studying
 
 @dataclass(frozen=True)
 class Chosen:
-    """One trace of a batch; `about` are the columns that say which it is. `problem`: why it cannot be studied."""
+    """One trace of a batch; `about` are the columns that identify it. `problem`: why it cannot be studied."""
 
     job: OneTrace
     about: Columns
@@ -34,14 +31,14 @@ class Chosen:
 
 @dataclass(frozen=True)
 class Standing:
-    """How far a batch is. `before`: traces that an earlier run has done."""
+    """Progress of a batch. `before`: traces that an earlier run has done."""
 
     total: int
     before: int
     done: int
     failed: int
     seconds: float
-    """Time since the batch began or went on."""
+    """Time since the batch began or was continued."""
 
     @property
     def left(self) -> int:
@@ -50,13 +47,13 @@ class Standing:
 
     @property
     def a_minute(self) -> float | None:
-        """Traces a minute; None before the first."""
+        """Traces per minute; None before the first."""
         ended = self.done + self.failed
         return 60 * ended / self.seconds if ended and self.seconds > 0 else None
 
     @property
     def seconds_left(self) -> float | None:
-        """Time until the end at this rate."""
+        """Remaining time at this rate."""
         return None if self.a_minute is None else 60 * self.left / self.a_minute
 
     def __str__(self) -> str:
@@ -99,10 +96,10 @@ def run_batch(
     tell: Told = lambda _standing, _row: None,
     cancel: Cancel | None = None,
 ) -> Standing:
-    """Studies every trace that the folder has no answer for; those that failed before are tried again.
+    """Studies every trace without an answer in the folder; those that failed before are tried again.
 
-    The tables are written at the end, also when the batch is interrupted. Raises CancelledError; SpecError when the
-    folder cannot be written; MissingExtraError; what `done_in_any_order` raises.
+    The tables are written at the end, also when the batch is interrupted. Raises CancelledError; SpecError if the
+    folder cannot be written; MissingExtraError; as `done_in_any_order` does.
     """
     if isinstance(workers, LocalWorkers):
         require_extra("model", "a batch on this computer", "numba")
@@ -130,7 +127,7 @@ def run_batch(
 
 
 def _answer(job: OneTrace, future: Future[Answer]) -> Answer:
-    """The answer of a job; of one whose program failed, that."""
+    """Returns the answer of a job, or its problem if the program failed."""
     try:
         return future.result()
     except BrokenExecutor:
@@ -141,10 +138,10 @@ def _answer(job: OneTrace, future: Future[Answer]) -> Answer:
 
 
 def chosen_traces(summaries: Iterable[TraceSummary], query: TraceQuery) -> tuple[list[Chosen], list[str]]:
-    """Returns the traces of a folder that match, and a remark about each that is left out although it matches.
+    """Returns the traces of a folder that match, and a remark about each matching one that is left out.
 
-    A trace that is in two files is studied once. One that cannot be studied, such as an unreadable file, is chosen
-    with its problem, if no filter is set that it could not meet.
+    A trace in two files is studied once. A trace that cannot be studied, such as an unreadable file, is included with
+    its problem, unless a filter excludes it.
     """
     found: dict[str, Chosen] = {}
     remarks = []
@@ -152,7 +149,7 @@ def chosen_traces(summaries: Iterable[TraceSummary], query: TraceQuery) -> tuple
         if not query.matches(summary):
             continue
         if summary.state == "recording":
-            remarks.append(f"{summary.path.name}: is being recorded now, and left out")
+            remarks.append(f"{summary.path.name}: is being recorded now, so it is left out")
             continue
         one = chosen_of(summary)
         if one.job.key in found:
@@ -163,16 +160,16 @@ def chosen_traces(summaries: Iterable[TraceSummary], query: TraceQuery) -> tuple
 
 
 def require_any(chosen: list[Chosen], place: str) -> None:
-    """Raises SpecError where there is nothing to study."""
+    """Raises SpecError if there is nothing to study."""
     if not chosen:
-        raise SpecError(f"{place}: has no trace that matches; `daq traces ls` lists those there are")
+        raise SpecError(f"{place}: has no trace that matches; `daq traces ls` lists all traces")
 
 
 def chosen_of(summary: TraceSummary) -> Chosen:
-    """Returns a trace as a batch studies it; an unfinished or unreadable one with its problem."""
+    """Returns a trace for a batch; an unfinished or unreadable one with its problem."""
     problem = summary.problem or ""
     if summary.state == "unfinished":
-        problem = "a crash left it without an end; `daq traces salvage` finishes it"
+        problem = "a crash left it without an end; `daq traces salvage` completes it"
     key = summary.trace_id if summary.trace_id and summary.state == "finished" else _key_of(summary.path)
     about: Columns = {
         "file": summary.path.name,
@@ -185,5 +182,5 @@ def chosen_of(summary: TraceSummary) -> Chosen:
 
 
 def _key_of(path: Path) -> str:
-    """The key of a file whose trace has no number that could be read."""
+    """Returns the key of a file whose trace has no readable ID."""
     return path.name

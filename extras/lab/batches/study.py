@@ -1,4 +1,4 @@
-"""The study of one trace, as a worker carries it out: its answer as JSON, and as columns of the batch's table."""
+"""Studies one trace on a worker: returns the answer as JSON, and as columns of the batch's table."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ if TYPE_CHECKING:
 
 
 class SimulateStudy(Wire):
-    """How traces are simulated, to compare them with the simulation. The fields are the options of `daq simulate`."""
+    """Options for simulating traces to compare them. The fields are the options of `daq simulate`."""
 
     kind: Literal["simulate"] = "simulate"
     loop: Literal["closed", "open"] = "closed"
     quantise: StrictBool = True
-    """Whether readings and drive are rounded, as those of a real board."""
+    """Whether readings and drive are rounded, as by a real board."""
 
 
 Study = Annotated[FitStudy | ValidateStudy | SimulateStudy | DiagnoseStudy, Field(discriminator="kind")]
-"""What a batch does with each of its traces."""
+"""The kinds of study."""
 
 
 class Common(FrozenRecord):
-    """What all traces of a batch share.
+    """Data that all traces of a batch share.
 
     Args:
-        model: text of the model's file; None for the model that the machine of each trace describes.
+        model: text of the model's file; None for the model of each trace's machine.
         machine: the machine of traces that name none.
-        effect_files: effects of the user's own, which a worker runs.
+        effect_files: users' effects, which a worker runs.
     """
 
     study: Study
@@ -64,7 +64,7 @@ class OneTrace(FrozenRecord):
 
 
 class Answer(FrozenRecord):
-    """What was found about one trace; `problem` says why nothing was."""
+    """Result for one trace; `problem` says why there is none."""
 
     key: str
     problem: str = ""
@@ -76,13 +76,13 @@ class Answer(FrozenRecord):
 
 
 class Studying:
-    """The function that a worker calls with every trace. It is sent to the worker with each."""
+    """The function that a worker calls with every trace. It is sent to the worker each time."""
 
     def __init__(self, common: Common) -> None:
         self._text = common.model_dump_json()
 
     def __call__(self, one: OneTrace) -> Answer:
-        """Errors that the user should see are returned, not raised."""
+        """Returns errors for the user instead of raising them."""
         begun = time.perf_counter()
         where = f"{platform.node()}:{os.getpid()}"
         try:
@@ -128,7 +128,7 @@ def _model(common: Common, trace: Trace) -> Model:
         return base_model(machine)
     model = model_of(parse_json(common.model, "model"), "of the batch")
     if trace.record.machine is not None and machine.name != model.machine.name:
-        raise SpecError(f"the trace was made on {machine.name}, the model describes {model.machine.name}")
+        raise SpecError(f"the trace was recorded on {machine.name}, but the model describes {model.machine.name}")
     return model
 
 

@@ -1,4 +1,4 @@
-"""Several robots of one service: the same experiment on each, and how their fits change."""
+"""Several robots of one service: the same experiment on each, and changes of their fits."""
 
 from daq.plugins import Plugin
 

@@ -1,6 +1,6 @@
 """Compares the robots' fits to the same experiment over time, from the results of their jobs.
 
-Whether fitted numbers have changed by more than their intervals allow. Pure.
+It finds fitted values that have changed by more than their intervals allow.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from server.store.jobs import traces_of
 NORMAL_95 = NormalDist().inv_cdf(0.975)
 """Half the width of a normal distribution's 95 % interval, in standard deviations."""
 CHANCE = 0.05
-"""Probability that noise alone makes any of the numbers that are compared together count as changed."""
+"""Probability that noise alone makes any of the values that are compared together count as changed."""
 Numbers = Mapping[str, FittedNumber]
 
 
@@ -60,10 +60,10 @@ class Pair:
 
 
 def changes_of(pairs: tuple[Pair, ...]) -> dict[str, tuple[NumberChange, ...]]:
-    """Returns the changes of all robots' numbers, by robot.
+    """Returns the changes of all robots' values, by robot.
 
-    All of them are judged together (Bonferroni): of a hundred numbers that did not change, five would leave their 95 %
-    interval otherwise.
+    All of them are judged together (Bonferroni): otherwise five of a hundred unchanged values would leave their 95 %
+    interval.
     """
     count = sum(len(pair.names) for pair in pairs)
     limit = NormalDist().inv_cdf(1 - CHANCE / (2 * max(1, count)))
@@ -92,7 +92,7 @@ log = logging.getLogger("server.fleet")
 
 @dataclass(frozen=True)
 class Arm:
-    """What is asked of one robot: the file of a job's result, and the catalogue's entry of a trace."""
+    """Access to one robot's data: the file of a job's result, and the catalogue's entry of a trace."""
 
     robot: str
     result: Callable[[str], Path]
@@ -101,7 +101,7 @@ class Arm:
 
 @dataclass(frozen=True)
 class Kept:
-    """A fit, the experiment to which it was made, and how people write its parameters."""
+    """A fit, its experiment, and its parameters in words."""
 
     fit: ArmFit
     experiment: str
@@ -109,15 +109,17 @@ class Kept:
 
 
 class Comparisons(Part):
-    """Keeps what was read of each result, since results never change and are large. Safe to use from any thread."""
+    """Caches the parsed results, since results never change and are large. Safe to use from any thread."""
 
     def __init__(self, services: Services) -> None:
         self._jobs = services.jobs
         self._kept: dict[str, Kept] = {}
 
     def compare(self, arms: Sequence[Arm], experiment: str | None, days: float) -> FleetComparison:
-        """Compares the fits of these robots to one experiment; None for the one with the most fits. The newest fit of
-        each robot is compared with its newest one that is older by at least `days`."""
+        """Compares the fits of these robots to one experiment; None for the one with the most fits.
+
+        The newest fit of each robot is compared with its newest fit that is older by at least `days`.
+        """
         fits = {arm.robot: self._fits(arm) for arm in arms}
         counted = Counter(kept.experiment for every in fits.values() for kept in every)
         chosen = experiment if experiment is not None else next((name for name, _ in counted.most_common(1)), None)
@@ -160,7 +162,7 @@ class Comparisons(Part):
 
 
 def _read(arm: Arm, job: Job) -> Kept:
-    """Reads a fit from the result of its job. Raises the errors of a file that is gone or another program's."""
+    """Reads a fit from the result of its job. Raises the errors of a missing or foreign file."""
     data = json.loads(arm.result(job.id).read_bytes())["data"]
     traces = [arm.trace(number) for number in traces_of(job.request)]
     fit = ArmFit(

@@ -1,4 +1,4 @@
-"""Routes over several robots: the same experiment on each, and their fits beside one another."""
+"""Routes over several robots: the same experiment on each, and a comparison of their fits."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def submit_fleet_experiment(
 ) -> FleetExperiments:
     """Puts the same experiment into the queue of several robots. If one of them cannot run it, none gets it.
 
-    It begins where its robot's queue lets it: a paused queue stays paused. With the same Idempotency-Key each robot
+    It begins when its robot's queue allows it: a paused queue stays paused. With the same Idempotency-Key each robot
     gets it once.
     """
     rigs = _chosen(robots, body.robots)
@@ -57,7 +57,7 @@ def submit_fleet_experiment(
         _require_possible(motions, rig, body)
     names = [rig.robot.name for rig in rigs]
     made = experiments.submit_to_each(names, body.request, clock.utc(), caller.name, idempotency_key)
-    for rig, (experiment, is_new) in zip(rigs, made, strict=True):  # no queue begins before every one has it
+    for rig, (experiment, is_new) in zip(rigs, made, strict=True):  # no queue begins before all of them have it
         if is_new:
             rig.queue.submitted(experiment, caller.name)
     shown = [rig.queue.with_progress(experiment) for rig, (experiment, _) in zip(rigs, made, strict=True)]
@@ -74,7 +74,7 @@ def compare_fleet(
     experiment: Annotated[str | None, Query(max_length=400, description="Its name; else the most fitted one.")] = None,
     days: Annotated[float, Query(ge=0, le=36500, description="Least time between the compared fits, in days.")] = 30,
 ) -> FleetComparison:
-    """Compares the robots' fits to the same experiment over time, and says which numbers have changed."""
+    """Compares the robots' fits to the same experiment over time, and reports values that have changed."""
     arms = [
         Arm(
             rig.robot.name,
@@ -96,7 +96,7 @@ def _chosen(robots: list[RobotServices], names: tuple[str, ...] | None) -> list[
 
 
 def _require_possible(motions: Workers, rig: RobotServices, body: FleetExperimentRequest) -> None:
-    """Raises the problem of one robot, which its name begins."""
+    """Raises the problem of one robot, beginning with its name."""
     try:
         require_possible(motions, rig, body.request.spec)
         require_room(rig.catalogue.folder)

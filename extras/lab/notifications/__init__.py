@@ -1,4 +1,4 @@
-"""Notifications: people who are elsewhere are told by webhook or by e-mail."""
+"""Notifications: informs people elsewhere by webhook or by e-mail."""
 
 from daq.plugins import Command, Plugin
 

@@ -23,11 +23,12 @@ def notify() -> None:
 def try_all(
     context: typer.Context,
     name: Annotated[
-        str | None, typer.Argument(help="Name of one webhook or person; without it, all are told.", show_default=False)
+        str | None,
+        typer.Argument(help="Name of one webhook or person; without it, all are notified.", show_default=False),
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Send one message to each webhook and person, and say what was answered. Needs no running service."""
+    """Send one message to each webhook and person, and print the answers. Needs no running service."""
     from time import perf_counter
 
     from daq.contracts.service.notifications import Notification
@@ -43,7 +44,7 @@ def try_all(
         raise SpecError("no notifications are configured; add recipients under [notifications] (docs/notifications.md)")
     if not chosen:
         there = ", ".join(one.name for one in destinations)
-        raise SpecError(f"notifications: no destination {shown(str(name))}; there is {there}")
+        raise SpecError(f"notifications: no destination {shown(str(name))}; available: {there}")
     told = Notification(topic="test", kind="attention", at=SystemClock().utc(), text="a test: nothing has happened")
     found, failed = [], False
     for one in chosen:

@@ -1,4 +1,4 @@
-"""A message on its way to one destination, and why it did not arrive."""
+"""A message for one destination, and the errors of its delivery."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from daq.contracts.exit_codes import NOT_REACHED
 class DeliveryError(DaqError):
     """A message was not delivered. The text names the host and never repeats an answer's words.
 
-    for_good:    whether it makes no sense to try again
-    retry_after: time (s) for which the receiver asked to be left alone; None if it said nothing
+    for_good:    whether another attempt is pointless
+    retry_after: time (s) for which the receiver asked for no message; None if it did not
     """
 
     exit_code = NOT_REACHED
@@ -26,8 +26,10 @@ class DeliveryError(DaqError):
 
 
 def problem_of(error: Exception) -> str:
-    """Returns the line that tells why a message was not delivered. Of an error that nobody expected it has the kind
-    alone, since its words may repeat a secret."""
+    """Returns one line on why a message was not delivered.
+
+    For an unexpected error it states only the type, since its text may contain a secret.
+    """
     return (
         str(error) if isinstance(error, DeliveryError) else f"not sent: {type(error).__name__}, a fault of this program"
     )
@@ -35,8 +37,9 @@ def problem_of(error: Exception) -> str:
 
 @dataclass(frozen=True)
 class Message:
-    """A message in the outbox. `payload`: the text that is signed and posted, JSON; `id`: the same at each attempt, by
-    which a receiver recognises a message that arrives twice."""
+    """A message in the outbox. `payload`: the signed and posted text, JSON; `id`: the same at each attempt, so that a
+    receiver recognises repeated messages.
+    """
 
     id: str
     payload: str
@@ -47,5 +50,5 @@ class Sender(Protocol):
     """Delivers messages to one destination."""
 
     def send(self, message: Message) -> str:
-        """Delivers a message. Returns what was answered, in a few words of ours. Raises DeliveryError."""
+        """Delivers a message. Returns the answer, in a few words of this program. Raises DeliveryError."""
         ...

@@ -13,7 +13,7 @@ from extras.lab.notifications.settings import NotificationSettings
 
 @dataclass(frozen=True)
 class Destination:
-    """A webhook, or a person with e-mail. `host`: who is connected to, for people."""
+    """A webhook, or a person with e-mail. `host`: the server, for people."""
 
     channel: Literal["webhook", "email"]
     name: str
@@ -31,7 +31,7 @@ def destinations_of(settings: NotificationSettings) -> list[Destination]:
     """Returns all destinations. Raises SpecError for a file of a secret that cannot be used."""
     found = []
     if settings.webhooks:
-        from extras.lab.notifications.webhook import Webhook  # with a client for HTTP, which nothing else here needs
+        from extras.lab.notifications.webhook import Webhook  # imports an HTTP client, which nothing else here needs
 
         for name, one in settings.webhooks.items():
             sender = Webhook(one, private_hosts=settings.private_hosts)

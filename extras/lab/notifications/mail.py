@@ -18,7 +18,7 @@ from extras.lab.notifications.settings import EmailSettings, SmtpSettings
 WITHIN = 20.0
 """Time (s) for one answer of the mail server."""
 LOGGED_IN = 235
-"""Answer of a mail server to a right password (RFC 4954)."""
+"""Answer of a mail server to a correct password (RFC 4954)."""
 SUBJECTS = {"done": "done", "fault": "FAULT", "attention": "please look"}
 
 
@@ -31,13 +31,13 @@ class Mail:
         self._within = within
         try:
             self._trust = ssl.create_default_context(cafile=None if smtp.ca is None else str(smtp.ca))
-        except OSError as error:  # ssl.SSLError is one, too
+        except OSError as error:  # ssl.SSLError is an OSError, too
             raise SpecError(f"notifications.smtp.ca {smtp.ca}: cannot be read, or has no certificate") from error
         file = smtp.password
         self._password = None if file is None else read_text(file, f"notifications.smtp.password {file}").strip()
 
     def send(self, message: Message) -> str:
-        """Gives an e-mail to the mail server. Returns that it took it. Raises DeliveryError."""
+        """Sends the message. Returns a text for the log. Raises DeliveryError."""
         host = self._smtp.host
         try:
             with self._connected() as server:
@@ -50,7 +50,9 @@ class Mail:
             codes = ", ".join(str(code) for code, _ in error.recipients.values())
             raise DeliveryError(f"{host}: refused the recipient ({codes})") from error
         except smtplib.SMTPNotSupportedError as error:
-            raise DeliveryError(f"{host}: cannot do what the configuration asks (TLS, or a password)") from error
+            raise DeliveryError(
+                f"{host}: does not support what the configuration needs (TLS, or a password)"
+            ) from error
         except smtplib.SMTPResponseException as error:
             raise DeliveryError(f"{host}: answered {error.smtp_code}") from error
         except ssl.SSLError as error:
@@ -59,7 +61,7 @@ class Mail:
             raise DeliveryError(f"{host}: no answer within {self._within:g} s") from error
         except (OSError, smtplib.SMTPException) as error:
             raise DeliveryError(f"{host}: {getattr(error, 'strerror', None) or 'the connection failed'}") from error
-        return "taken by the mail server"
+        return "accepted by the mail server"
 
     def _connected(self) -> smtplib.SMTP:
         host, port = self._smtp.host, self._smtp.port
@@ -68,14 +70,14 @@ class Mail:
         return smtplib.SMTP(host, port, timeout=self._within)
 
     def _log_in(self, server: smtplib.SMTP, user: str, password: str) -> None:
-        """Gives user and password: as smtplib does, which knows ASCII alone, or else in UTF-8, as RFC 4616 has it."""
+        """Logs in. smtplib handles ASCII only; other credentials are sent by AUTH PLAIN in UTF-8 (RFC 4616)."""
         if (user + password).isascii():
             server.login(user, password)
             return
         server.ehlo_or_helo_if_needed()
         if "PLAIN" not in server.esmtp_features.get("auth", "").upper().split():
             raise DeliveryError(
-                f"{self._smtp.host}: takes a user and password of ASCII letters alone, since it has no AUTH PLAIN"
+                f"{self._smtp.host}: accepts only a user and password of ASCII letters, since it has no AUTH PLAIN"
             )
         given = b64encode(f"\0{user}\0{password}".encode()).decode()
         code, text = server.docmd("AUTH", f"PLAIN {given}")
@@ -83,15 +85,17 @@ class Mail:
             raise smtplib.SMTPAuthenticationError(code, text)
 
     def _written(self, message: Message) -> EmailMessage:
-        """Returns the e-mail. Only words of this program's are in its head, so that nobody else's can add a line."""
+        """Returns the e-mail. Headers contain only text of this program and printable characters, to prevent header
+        injection.
+        """
         told = Notification.model_validate(json.loads(message.payload)["data"])
         mail = EmailMessage()
         mail["From"], mail["To"] = self._smtp.sender, self._to
-        robot = "".join(sign if sign.isprintable() else " " for sign in told.robot or "MA2000 DAQ")
+        robot = "".join(character if character.isprintable() else " " for character in told.robot or "MA2000 DAQ")
         mail["Subject"] = f"{robot}: {SUBJECTS[told.kind]} ({told.topic})"
         mail["Date"] = format_datetime(message.created)
         mail["Message-ID"] = f"<{message.id}@{self._smtp.sender.rpartition('@')[2]}>"
-        mail["Auto-Submitted"] = "auto-generated"  # RFC 3834: nobody's absence is answered
+        mail["Auto-Submitted"] = "auto-generated"  # RFC 3834: suppresses auto-replies
         lines = [told.text, "", f"at {told.at:%Y-%m-%d %H:%M:%S %Z}"]
         lines += [f"{name} {value}" for name in ("experiment", "job") if (value := getattr(told, name)) is not None]
         mail.set_content("\n".join(lines) + "\n")

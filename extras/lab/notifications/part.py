@@ -1,8 +1,6 @@
-"""Notifications in a running service: what it hears of becomes messages.
+"""Notifications in a running service: turns events into messages, and reports the state.
 
-What people are told of: an end, a fault, and what waits for somebody.
-
-The state of notifications, to be read: only the configuration says who is told.
+Events are ends, faults, and conditions that need a person. Recipients are set only in the configuration.
 """
 
 from __future__ import annotations
@@ -36,7 +34,7 @@ from server.services import Services
 
 
 def kind_of_end(state: ExperimentState) -> NotificationKind:
-    """Returns what an end is: a fault, unless it was done or somebody has cancelled it."""
+    """Returns the kind of an end: a fault, unless the experiment was done or cancelled by somebody."""
     return "done" if state in ("done", "cancelled") else "fault"
 
 
@@ -75,14 +73,14 @@ def of_pause(robot: str, reason: str, at: datetime) -> Notification:
 
 
 class Faults:
-    """Notices when an arm comes to a fault. Safe to use from any thread."""
+    """Detects new faults of an arm. Safe to use from any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._at_fault: set[str] = set()
 
     def new(self, robot: str, report: Report, at: datetime) -> Notification | None:
-        """Returns the notification of a fault that this report is the first to tell of."""
+        """Returns the notification of a fault that this report is the first to show."""
         if not isinstance(report, ArmReport):
             return None
         with self._lock:
@@ -101,7 +99,7 @@ log = logging.getLogger("server.notifications")
 
 
 class Notifications(Part, Collector):
-    """Tells people elsewhere, and Prometheus how many messages wait."""
+    """Notifies people elsewhere, and reports the number of waiting messages to Prometheus."""
 
     def __init__(self, services: Services) -> None:
         settings = services.settings.section(NotificationSettings)
@@ -123,42 +121,42 @@ class Notifications(Part, Collector):
         self.notifier.start()
 
     def close(self, seconds: float) -> None:
-        """Writes what was taken."""
+        """Stops, and writes pending notifications."""
         self.notifier.close(seconds)
 
     def checks(self) -> dict[str, str]:
-        """Returns what is wrong with a destination."""
+        """Returns the problems of a destination."""
         return {"notifications": "; ".join(self.notifier.warnings())}
 
     def arm_reported(self, robot: str, report: Report) -> None:
-        """Tells of a new fault of an arm."""
+        """Notifies of a new fault of an arm."""
         if (fault := self._faults.new(robot, report, self._clock.utc())) is not None:
             self.notifier.tell(fault)
 
     def experiment_ended(self, robot: str, identity: str, state: ExperimentState, reason: str) -> None:
-        """Tells of the end of an experiment."""
+        """Notifies of the end of an experiment."""
         self.notifier.tell(of_experiment(robot, identity, state, reason, self._clock.utc()))
 
     def queue_paused(self, robot: str, reason: str) -> None:
-        """Tells that a queue is paused."""
+        """Notifies that a queue is paused."""
         self.notifier.tell(of_pause(robot, reason, self._clock.utc()))
 
     def job_changed(self, job: Job) -> None:
-        """Tells of the end of a job."""
+        """Notifies of the end of a job."""
         if job.state in ENDS:
             self.notifier.tell(of_job(job, self._clock.utc()))
 
     def collect(self) -> Iterable[Metric]:
-        """Returns how many messages wait."""
+        """Returns the number of waiting messages."""
         yield from self._told.collect()
         waiting = GaugeMetricFamily("daq_notifications_waiting", "Notifications that wait.", labels=("destination",))
-        with suppress(SQLAlchemyError, DamagedError):  # no figures while the database cannot be read
+        with suppress(SQLAlchemyError, DamagedError):  # no metrics while the database cannot be read
             for destination, count in self.notifier.waiting().items():
                 waiting.add_metric((destination,), count)
         yield waiting
 
     def describe(self) -> Iterable[Metric]:
-        """Returns nothing: what is collected is asked for when Prometheus asks."""
+        """Returns nothing: values are computed when Prometheus requests them."""
         return ()
 
     def _look(self) -> dict[str, Notification]:
@@ -174,6 +172,8 @@ router = Router(tags=["system"], responses=PROBLEMS)
 
 @router.get("/notifications")
 def get_notifications(notifications: Annotated[Notifications, part(Notifications)], _: Viewer) -> NotificationStatus:
-    """Returns how far the messages to each webhook and each person with e-mail are. The configuration alone says who
-    is told; no request can add or change an address."""
+    """Returns the state of the messages to each webhook and each person with e-mail.
+
+    Recipients are set only in the configuration; no request can add or change an address.
+    """
     return notifications.notifier.status()

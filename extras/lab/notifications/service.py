@@ -1,4 +1,4 @@
-"""Takes notifications from anybody, without delay, and delivers them from the outbox."""
+"""Accepts notifications from any thread, without delay, and delivers them from the outbox."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from server.clock import Clock
 from server.database_errors import DamagedError, one_line
 
 MOST_IN_MEMORY = 1000
-"""Number of notifications that wait for the database; further ones are only in the log."""
+"""Most notifications that wait for the database; further ones are only in the log."""
 LOOK_EVERY = 60.0
-"""Time (s) between two looks at what lasts: a full disk, an archive that is away, a queue that is held."""
+"""Time (s) between two looks at lasting conditions: a full disk, an unreachable archive, a held queue."""
 AGAIN_AFTER = 1.0
 """Time (s) after which the database is tried again."""
 CANNOT_BE_READ = (SQLAlchemyError, DamagedError)
-"""Errors of a database that cannot be read or written now."""
+"""Errors of a database that cannot be read or written at present."""
 log = logging.getLogger("server.notifications")
 
 
 @dataclass
 class _Count:
-    """What has happened at a destination since the service started."""
+    """Events at a destination since the service started."""
 
     sent: int = 0
     failed: int = 0
@@ -43,9 +43,9 @@ class _Count:
 
 
 class Notifier:
-    """Without a destination it does nothing, and has no thread.
+    """Delivers notifications. Without a destination it does nothing, and has no thread.
 
-    look:     returns what lasts and needs somebody, by a key; each is told when it was there at two looks in a row
+    look:     returns lasting conditions that need a person, by key; each is notified when two consecutive looks find it
     given_up: called with one line for each message that is given up
     count:    called with destination and result (`sent`, `failed`, `given-up`)
     """
@@ -72,20 +72,20 @@ class Notifier:
         self._told: deque[Message] = deque()
         self._about: dict[str, tuple[str, ...]] = {}
         self._seen: dict[str, bool] = {}
-        """What lasted at the last look, and whether it was told."""
+        """Conditions of the last look, and whether each was notified."""
         self._changed = threading.Condition()
         self._wakes = {key: threading.Event() for key in self._destinations}
         self._closing = threading.Event()
         self._threads: list[threading.Thread] = []
 
     def tell(self, notification: Notification) -> None:
-        """Takes a notification. May be called from any thread; never waits, never raises."""
+        """Accepts a notification. May be called from any thread; never waits, never raises."""
         keys = tuple(key for key, one in self._destinations.items() if notification.kind in one.about)
         if keys:
             self.send(notification, keys)
 
     def send(self, notification: Notification, keys: Sequence[str]) -> None:
-        """Takes a notification for these destinations."""
+        """Accepts a notification for these destinations."""
         message = message_of(notification)
         with self._changed:
             if len(self._told) >= MOST_IN_MEMORY:
@@ -96,7 +96,7 @@ class Notifier:
             self._changed.notify()
 
     def start(self) -> None:
-        """Starts the threads: one that takes notifications, and one for each destination."""
+        """Starts the threads: one that accepts notifications, and one for each destination."""
         if not self._destinations:
             return
         deliver = [
@@ -108,8 +108,11 @@ class Notifier:
             thread.start()
 
     def close(self, within: float) -> None:
-        """Ends, within this time (s). An attempt that is under way may have arrived, and is made again after the next
-        start; what was taken is written."""
+        """Ends, within this time (s).
+
+        An attempt in progress may have arrived, and is repeated after the next start. Accepted notifications are
+        written.
+        """
         self._closing.set()
         with self._changed:
             self._changed.notify()
@@ -122,15 +125,16 @@ class Notifier:
             log.error("notifications: the service ends: only here: %s", message.payload)
 
     def status(self) -> NotificationStatus:
-        """Returns how far every destination is. Raises the database's errors."""
+        """Returns the state of every destination. Raises the database's errors."""
         waiting = self._outbox.waiting() if self._destinations else {}
         return NotificationStatus(
             destinations=tuple(self._status_of(one, waiting) for one in self._destinations.values())
         )
 
     def warnings(self) -> list[str]:
-        """Returns what somebody should look at, one line each: destinations that cannot be reached, and messages that
-        were given up."""
+        """Returns problems that need a person, one line each: unreachable destinations, and messages that were given
+        up.
+        """
         found = []
         for key, count in self._counts.items():
             if count.problem:
@@ -140,7 +144,7 @@ class Notifier:
         return found
 
     def waiting(self) -> dict[str, int]:
-        """Returns the number of messages that wait, by destination. Raises the database's errors."""
+        """Returns the number of waiting messages, by destination. Raises the database's errors."""
         found = self._outbox.waiting() if self._destinations else {}
         return {key: found.get(key, 0) for key in self._destinations}
 
@@ -160,7 +164,7 @@ class Notifier:
             next_attempt=self._outbox.next_attempt(one.key) if left else None,
         )
 
-    # ---- the thread that takes
+    # ---- the thread that accepts notifications
 
     def _take(self) -> None:
         self._until_written(lambda: self._outbox.begin(list(self._destinations), self._clock.utc()))
@@ -193,11 +197,11 @@ class Notifier:
             self._wakes[key].set()
 
     def look(self) -> None:
-        """Looks at what lasts, and tells what was there at the last look as well."""
+        """Looks for lasting conditions, and notifies of those that the last look found as well."""
         try:
             there = self._look()
         except Exception:
-            log.exception("notifications: what lasts cannot be seen")
+            log.exception("notifications: lasting conditions cannot be read")
             return
         for key, notification in there.items():
             if self._seen.get(key) is False:
@@ -259,7 +263,7 @@ class Notifier:
         return None if moment is None else min(60.0, max(0.0, (moment - self._clock.utc()).total_seconds()))
 
     def _until_written(self, write: Callable[[], object]) -> bool:
-        """Writes to the database, again and again until it succeeds. Returns False if the service ends before."""
+        """Writes to the database, repeating until it succeeds. Returns False if the service ends before."""
         told = ""
         while True:
             try:
@@ -275,7 +279,7 @@ class Notifier:
 
 
 def message_of(notification: Notification) -> Message:
-    """Returns the message of a notification, with a number of its own."""
+    """Returns the message of a notification, with a new ID."""
     payload = {
         "type": notification.topic,
         "timestamp": notification.at.isoformat(timespec="milliseconds"),

@@ -1,4 +1,4 @@
-"""The configuration of notifications: who is told what, by webhook or by e-mail. No request can change it."""
+"""The configuration of notifications: recipients and kinds, by webhook or by e-mail. No request can change it."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from daq.contracts.service.notifications import KINDS, NotificationKind
 DestinationName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")]
 Host = Annotated[str, Field(min_length=1, max_length=253, pattern=r"^[A-Za-z0-9.:_-]+$")]
 MOST_DESTINATIONS = 16
-"""Largest number of webhooks, and of people with e-mail: an assumption. Each has a thread."""
+"""Most webhooks, and most people with e-mail: an assumption. Each has a thread."""
 _ADDRESS = re.compile(r"[^\s@<>,;:\"\\()\[\]]+@[^\s@<>,;:\"\\()\[\]]+")
 
 
 class WebhookSettings(FrozenRecord):
-    """Table `[notifications.webhooks.NAME]`: an address to which notifications are posted."""
+    """Table `[notifications.webhooks.NAME]`: a URL to which notifications are posted."""
 
     url: SecretStr
-    """Address, `https://…`. It is not shown, since with many services its path is a secret."""
+    """URL, `https://…`. It is not shown, since with many services its path is a secret."""
     secret: Path
-    """File with the secret that signs the messages (`whsec_` and base64), as Standard Webhooks has it."""
+    """File with the secret that signs the messages (`whsec_` and base64), as in Standard Webhooks."""
     about: tuple[NotificationKind, ...] = KINDS
-    """What is told: `done`, `fault`, `attention`."""
+    """Kinds of notification: `done`, `fault`, `attention`."""
 
     @field_validator("url")
     @classmethod
     def _is_address(cls, url: SecretStr) -> SecretStr:
-        """Raises ValueError for what is no address, without repeating it."""
+        """Raises ValueError for an invalid URL, without repeating it."""
         try:
             parts = urlsplit(url.get_secret_value())
             port = parts.port
         except ValueError:
-            raise ValueError("is no address; write https://host/path") from None
+            raise ValueError("is not a URL; write https://host/path") from None
         if parts.scheme not in ("https", "http") or not parts.hostname or parts.fragment or port == 0:
-            raise ValueError("is no address; write https://host/path")
+            raise ValueError("is not a URL; write https://host/path")
         if parts.username is not None or parts.password is not None:
             raise ValueError("has a user name or password in it; messages are signed instead")
         return url
@@ -52,7 +52,7 @@ class WebhookSettings(FrozenRecord):
 
     @property
     def host(self) -> str:
-        """The host of the address."""
+        """The host of the URL."""
         return urlsplit(self.url.get_secret_value()).hostname or ""
 
 
@@ -60,9 +60,9 @@ class EmailSettings(FrozenRecord):
     """Table `[notifications.email.NAME]`: a person who gets notifications by e-mail."""
 
     to: Annotated[str, Field(max_length=254)]
-    """Their address."""
+    """E-mail address."""
     about: tuple[NotificationKind, ...] = ("fault", "attention")
-    """What they are told: `done`, `fault`, `attention`."""
+    """Kinds of notification: `done`, `fault`, `attention`."""
 
     @field_validator("to")
     @classmethod
@@ -71,22 +71,22 @@ class EmailSettings(FrozenRecord):
 
 
 class SmtpSettings(FrozenRecord):
-    """Table `[notifications.smtp]`: the mail server that takes the e-mails."""
+    """Table `[notifications.smtp]`: the mail server that sends the e-mails."""
 
     host: Host
     """Name of the server."""
     port: Annotated[int, Field(ge=1, le=65535)] = 587
     """Port: 587 for `starttls`, 465 for `tls`."""
     tls: Literal["starttls", "tls", "none"] = "starttls"
-    """How the connection is encrypted. `none` sends everything as it is, and no password."""
+    """Encryption of the connection. `none` sends everything in plain text, and no password."""
     ca: Path | None = None
-    """File with the certificates to trust; None for those of the computer."""
+    """File with the certificates to trust; None for the computer's."""
     user: Annotated[str, Field(max_length=254)] | None = None
-    """Name at the server; None if it asks for none."""
+    """User name at the server; None if it needs none."""
     password: Path | None = None
     """File with the password."""
     sender: Annotated[str, Field(max_length=254)]
-    """Address from which the e-mails come."""
+    """Sender address of the e-mails."""
 
     @field_validator("sender")
     @classmethod
@@ -100,7 +100,7 @@ class SmtpSettings(FrozenRecord):
 
     @model_validator(mode="after")
     def _password_is_safe(self) -> SmtpSettings:
-        """Raises ValueError for a password without a name, or one that everybody on the way could read."""
+        """Raises ValueError for a password without a user name, or one that would be sent in plain text."""
         if (self.user is None) != (self.password is None):
             raise ValueError("user and password: give both, or neither")
         if self.password is not None and self.tls == "none":
@@ -109,7 +109,7 @@ class SmtpSettings(FrozenRecord):
 
 
 class NotificationSettings(Section):
-    """Section `[notifications]`. Without a table of a webhook or an e-mail nobody is told anything."""
+    """Section `[notifications]`. Without a webhook or an e-mail table nobody is notified."""
 
     SHOWN = frozenset(["about", "attempts", "host", "port", "sender", "tls", "to", "user"])
 
@@ -121,7 +121,8 @@ class NotificationSettings(Section):
     """The mail server; needed for e-mail."""
     private_hosts: tuple[Host, ...] = ()
     """Hosts of webhooks that may have private addresses (10.…, 192.168.…, this computer), and plain `http`. All others
-    must be public, and are refused if their name leads to a private address."""
+    must be public, and are rejected if their name resolves to a private address.
+    """
     attempts: Annotated[int, Field(ge=1, le=12)] = 10
     """Number of attempts after which a message is given up: 10 take two days."""
 
@@ -137,12 +138,12 @@ class NotificationSettings(Section):
         return self
 
     def digested(self) -> dict[str, Any]:
-        """Returns the same, with the hosts of webhooks, whose addresses are not shown."""
+        """Returns the same with the hosts of webhooks in place of their URLs."""
         return super().digested() | {"hosts": {name: webhook.host for name, webhook in self.webhooks.items()}}
 
 
 def require_mail_address(address: str) -> str:
-    """Returns an address of e-mail. Raises ValueError for anything that could be more than one address."""
+    """Returns an e-mail address. Raises ValueError for anything that may be more than one address."""
     if not address.isascii() or not address.isprintable() or _ADDRESS.fullmatch(address) is None:
-        raise ValueError("is no address of e-mail; write name@host")
+        raise ValueError("is not an e-mail address; write name@host")
     return address

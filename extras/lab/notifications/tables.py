@@ -24,7 +24,7 @@ class OutboxRow(NotificationTable):
 
     sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
     id: Mapped[str] = mapped_column(String(40))
-    """The number of the message, which is the same for all its destinations."""
+    """ID of the message, which is the same for all its destinations."""
     destination: Mapped[str] = mapped_column(String(48))
     payload: Mapped[str] = mapped_column(Text)
     created: Mapped[datetime]

@@ -1,11 +1,10 @@
-"""Posts messages to a webhook, signed as "Standard Webhooks" 1.0 says (https://www.standardwebhooks.com).
+"""Posts messages to a webhook, signed by "Standard Webhooks" 1.0 (https://www.standardwebhooks.com).
 
-Which addresses a webhook may reach: public ones, and those of hosts that the configuration lists.
-
-A webhook makes the service send requests from inside the laboratory's network, so a wrong or hostile address could
-reach what outsiders cannot (server-side request forgery; OWASP's cheat sheet of that name has the rules that are
-applied here). A name is resolved once for an attempt, and the connection goes to the very address that was checked, so
-that a name that changes its address in between (DNS rebinding) gains nothing.
+A webhook may reach public addresses, and those of hosts that the configuration lists. It makes the service send
+requests from inside the laboratory's network, so a wrong or hostile address could reach hosts that outsiders cannot
+(server-side request forgery; the rules follow OWASP's cheat sheet of that name). A name is resolved once per attempt,
+and the connection uses the checked address. So a name that changes its address in between (DNS rebinding) has no
+effect.
 """
 
 from __future__ import annotations
@@ -37,36 +36,39 @@ Address = IPv4Address | IPv6Address
 Resolver = Callable[[str, int], Iterable[str]]
 BROADCAST = IPv4Address("255.255.255.255")
 MOST_ADDRESSES = 8
-"""Number of addresses of a name that are looked at."""
+"""Most addresses of a name that are checked."""
 METADATA = tuple(
     map(ip_network, ("169.254.0.0/16", "100.100.100.200", "168.63.129.16", "fd00:ec2::/32", "fd20:ce::254"))
 )
-"""Addresses at which clouds tell a computer its own keys: Amazon, Google, Azure, Oracle and OpenStack (link-local, and
-their own of version 6), Alibaba, Azure's agent."""
+"""Addresses at which clouds give a computer its own keys: Amazon, Google, Azure, Oracle and OpenStack (link-local, and
+their own of version 6), Alibaba, Azure's agent.
+"""
 GLOBAL_UNICAST = IPv6Network("2000::/3")
-"""Outside it no address of version 6 is given to anybody (RFC 4291, and IANA's registry of the address space)."""
+"""The block of assigned IPv6 addresses (RFC 4291, and IANA's registry of the address space)."""
 ENDS_WITH_IPV4 = tuple(map(IPv6Network, ("::/96", "::ffff:0:0/96", "::ffff:0:0:0/96", "64:ff9b::/96")))
 """Blocks whose last four bytes are an IPv4 address: compatible (RFC 4291), mapped, translated (RFC 2765), NAT64."""
 LOCAL_NAT64 = IPv6Network("64:ff9b:1::/48")
 LOCAL_NAT64_BYTES = ((6, 7, 9, 10), (7, 9, 10, 11), (9, 10, 11, 12), (12, 13, 14, 15))
-"""Where its addresses have the bytes of an IPv4 address, for prefixes of 48, 56, 64 and 96 bits (RFC 6052)."""
+"""Positions of the bytes of an IPv4 address, for prefixes of 48, 56, 64 and 96 bits (RFC 6052)."""
 ISATAP = (b"\x00\x00\x5e\xfe", b"\x02\x00\x5e\xfe")
-"""Bytes 8 to 11 of an address that a router takes apart into the IPv4 address in the last four (RFC 5214)."""
+"""Bytes 8 to 11 of an address that a router splits into the IPv4 address in the last four (RFC 5214)."""
 
 
 class RefusedAddressError(DeliveryError):
-    """A webhook's host has an address that it may not have."""
+    """A webhook's host has an address that is not allowed."""
 
 
 def resolve(host: str, port: int) -> Iterable[str]:
-    """Returns the addresses of a host, as the computer's resolver has them. Raises OSError."""
+    """Returns the addresses of a host, from the computer's resolver. Raises OSError."""
     found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     return dict.fromkeys(str(place[4][0]) for place in found)
 
 
 def addresses_of(host: str, port: int, *, listed: bool, resolver: Resolver = resolve) -> list[Address]:
-    """Returns the addresses to connect to. Raises DeliveryError for a name that cannot be resolved, and
-    RefusedAddressError if any of its addresses is not allowed.
+    """Returns the addresses to connect to.
+
+    Raises DeliveryError for a name that cannot be resolved, and RefusedAddressError if any of its addresses is not
+    allowed.
 
     Args:
         listed: whether the configuration lists the host among those that may be private.
@@ -86,15 +88,16 @@ def addresses_of(host: str, port: int, *, listed: bool, resolver: Resolver = res
 
 
 def why_refused(address: Address, *, listed: bool = False) -> str:
-    """Returns why an address may not be reached; an empty text if it may.
+    """Returns why an address may not be used; an empty text if it may.
 
     Args:
-        listed: whether the address may be private. Metadata of clouds, multicast and no address at all stay refused.
+        listed: whether the address may be private. Cloud metadata, multicast and unspecified addresses are always
+            refused.
     """
     leads_to = (address, *_embedded(address))
     if any(one in network for one in leads_to for network in METADATA):
         return "it leads to a cloud's metadata"
-    # Of several readings of one address (NAT64 with a local prefix), only its owner knows the right one.
+    # If an address has several readings (NAT64 with a local prefix), only its owner knows the right one.
     sure = leads_to if len(leads_to) <= 2 else leads_to[:1]
     if any(one.is_multicast or one.is_unspecified or one == BROADCAST for one in sure):
         return "it leads to no single computer"
@@ -102,7 +105,7 @@ def why_refused(address: Address, *, listed: bool = False) -> str:
 
 
 def _is_public(address: Address) -> bool:
-    """Whether IANA's table says so. Python's own (`is_global`) is as old as the interpreter."""
+    """Whether IANA's table lists it as public. Python's own (`is_global`) is as old as the interpreter."""
     found = [(network.prefixlen, reachable) for network, reachable in _special() if address in network]
     if found:
         return max(found)[1]
@@ -135,13 +138,13 @@ WITHIN = 20.0
 """Time (s) for an attempt, from the connection to the status of the answer, whose body is not read."""
 SECRET_PREFIX = "whsec_"
 SHORTEST_SECRET, LONGEST_SECRET = 24, 64
-"""Sizes (bytes) of a secret, as the specification demands them."""
+"""Sizes (bytes) of a secret, as the specification requires."""
 LONGEST_PAUSE = 86_400.0
 GONE = 410
 
 
 def load_secret(file: Path) -> bytes:
-    """Reads a secret. Raises SpecError, which repeats none of it."""
+    """Reads a secret. Raises SpecError, without repeating any of it."""
     what = f"notifications: secret {file}"
     text = read_text(file, what).strip()
     try:
@@ -154,13 +157,13 @@ def load_secret(file: Path) -> bytes:
 
 
 def signature_of(secret: bytes, identity: str, timestamp: int, payload: str) -> str:
-    """Returns the header `webhook-signature`: HMAC-SHA256 of identity, time (s since 1970) and payload."""
+    """Returns the header `webhook-signature`: HMAC-SHA256 of ID, time (s since 1970) and payload."""
     signed = hmac.new(secret, f"{identity}.{timestamp}.{payload}".encode(), hashlib.sha256)
     return f"v1,{base64.b64encode(signed.digest()).decode()}"
 
 
 class Webhook:
-    """One webhook. Every attempt resolves its host once, checks the addresses, and connects to one of these."""
+    """One webhook. Every attempt resolves its host once, checks the addresses, and connects to one of them."""
 
     def __init__(
         self,
@@ -175,8 +178,8 @@ class Webhook:
         try:
             self._url = httpx.URL(settings.url.get_secret_value())
         except httpx.InvalidURL:
-            raise SpecError(f"notifications: the url of a webhook at {settings.host} is no address") from None
-        # Everything is read from this one parsed address: two parsers may see two hosts in one text.
+            raise SpecError(f"notifications: the URL of a webhook at {settings.host} is invalid") from None
+        # Everything is read from this one parsed URL: two parsers may see two hosts in one text.
         self._host = self._url.raw_host.decode("ascii")
         self._port = self._url.port or (443 if self._url.scheme == "https" else 80)
         self._listed = self._host in {host.lower() for host in private_hosts}
@@ -206,7 +209,7 @@ class Webhook:
 
     async def _post(self, message: Message, addresses: list[Address]) -> tuple[int, httpx.Headers]:
         async with asyncio.timeout(self._within):
-            # Neither a proxy nor a password of the surroundings: either would undo the checks of the address.
+            # Neither a proxy nor a password of the environment is used: either would bypass the checks of the address.
             async with httpx.AsyncClient(
                 verify=self._trust or ssl.create_default_context(),
                 trust_env=False,
@@ -231,7 +234,7 @@ class Webhook:
             "webhook-timestamp": str(timestamp),
             "webhook-signature": signature_of(self._secret, message.id, timestamp, message.payload),
         }
-        # The certificate is checked against the name, although the connection goes to the address that was checked.
+        # The certificate is checked against the name, although the connection uses the checked address.
         request = client.build_request(
             "POST",
             self._url.copy_with(host=str(address)),
@@ -240,12 +243,12 @@ class Webhook:
             extensions={"sni_hostname": self._host},
         )
         answer = await client.send(request, stream=True)
-        await answer.aclose()  # its body may be endless, and tells nobody anything
+        await answer.aclose()  # its body may be endless, and is not needed
         return answer.status_code, answer.headers
 
 
 def _kind_of(error: Exception) -> str:
-    """Returns what went wrong, in words of ours: an error's text may repeat an answer's."""
+    """Returns the kind of an error, in words of this program: an error's text may repeat an answer's."""
     cause: BaseException | None = error
     while cause is not None and not isinstance(cause, ssl.SSLError):
         cause = cause.__cause__ or cause.__context__
@@ -259,5 +262,5 @@ def _kind_of(error: Exception) -> str:
 
 
 def _seconds(text: str | None) -> float | None:
-    """Returns the time of a header `Retry-After` in s; None if it has none, or a date."""
+    """Returns the time of a header `Retry-After` in s; None without one, or for a date."""
     return min(float(text), LONGEST_PAUSE) if text is not None and text.isascii() and text.isdecimal() else None

@@ -1,4 +1,4 @@
-"""Signing in: people come to the page by an account at a provider of OpenID Connect; programs keep tokens."""
+"""Sign-in: people use an account at an OpenID Connect provider; programs keep using tokens."""
 
 from daq.plugins import Plugin
 

@@ -1,4 +1,4 @@
-"""People who have signed in: a name belongs to whoever had it first."""
+"""People who have signed in: a name belongs to the person who first had it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from server.store.tables import Table
 
 @dataclass(frozen=True)
 class Person:
-    """A person as the provider names them. `subject`: the provider's own number, which never changes."""
+    """A person as the provider identifies them. `subject`: the provider's own ID, which never changes."""
 
     issuer: str
     subject: str
@@ -31,7 +31,7 @@ class PeopleTable(DeclarativeBase):
 
 
 class PersonRow(PeopleTable):
-    """Somebody who has signed in, by the name of their first session. `subject`: the provider's number for them."""
+    """Somebody who has signed in, by the name of their first session. `subject`: the provider's ID for them."""
 
     __tablename__ = "people"
     __table_args__ = (UniqueConstraint("issuer", "subject"),)
@@ -43,8 +43,7 @@ class PersonRow(PeopleTable):
 
 
 def name_of(session: Session, person: Person, now: datetime) -> str:
-    """Returns the name that a person has here: that of their first session. Raises a 403 for a name that somebody else
-    has."""
+    """Returns the name of a person: that of their first session. Raises a 403 for a name of somebody else."""
     row = session.scalar(select(PersonRow).filter_by(issuer=person.issuer, subject=person.subject))
     if row is None:
         if person.name == LOCAL.name or session.get(PersonRow, person.name) is not None:

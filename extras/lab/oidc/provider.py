@@ -1,8 +1,8 @@
-"""The client of an OpenID Connect provider: authorization code with PKCE, state and nonce. Authlib speaks the protocol.
+"""Client of an OpenID Connect provider: authorization code with PKCE, state and nonce, by Authlib.
 
 Sources: OpenID Connect Core 1.0 (section 3.1), Discovery 1.0 (section 4), RP-Initiated Logout 1.0; RFC 7636 (PKCE), RFC
-9207 (the issuer in the answer). The service needs the provider for nothing but signing in: whatever it does, nobody who
-has signed in, and no token, waits for it.
+9207 (the issuer in the answer). The service needs the provider only for sign-in: if it fails, people who have signed
+in, and tokens, are not affected.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ ANSWER_WITHIN = 10.0
 LEEWAY = 60
 """Time (s) by which the provider's clock may differ from this computer's: an assumption."""
 ALGORITHMS = ["RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512", "EdDSA"]
-"""Signatures that are accepted: only those whose keys the provider alone has."""
+"""Accepted signatures: only those whose keys are known to the provider alone."""
 DISCOVERY_FOR = 3600.0
-"""Time (s) after which the provider's endpoints are asked for again."""
+"""Time (s) after which the provider's endpoints are read again."""
 CALLBACK = "/api/v1/login/callback"
 log = logging.getLogger("server.access")
 
@@ -56,7 +56,7 @@ class Provider:
         self._keys: KeySet | None = None
 
     async def ask(self, asked: Asked, now: float) -> str:
-        """Returns the address at the provider where a person signs in. Raises a 503.
+        """Returns the URL at the provider where a person signs in. Raises a 503.
 
         now: s, monotonic
         """
@@ -68,9 +68,9 @@ class Provider:
         return str(address)
 
     async def answered(self, asked: Asked, answer: Mapping[str, str], now: float) -> Person:
-        """Returns who has signed in, from the parameters with which the provider sent them back.
+        """Returns the person who has signed in, from the parameters with which the provider sent them back.
 
-        Raises a 403 for an answer that is refused or proves nothing, and a 503 if the provider does not answer.
+        Raises a 403 for a rejected or invalid answer, and a 503 if the provider does not answer.
         """
         if answer.get("iss", self.issuer) != self.issuer:
             raise _not_proven("the answer is another provider's")
@@ -90,7 +90,7 @@ class Provider:
         return person_of(claims, self._settings)
 
     async def sign_out_address(self, now: float) -> str | None:
-        """Returns where a person leaves the provider's session, too; None if the provider does not say."""
+        """Returns the URL that also ends the provider's session; None if the provider has none."""
         try:
             endpoint = (await self._discovered(now)).get("end_session_endpoint")
         except ProblemError:
@@ -109,7 +109,7 @@ class Provider:
         try:
             try:
                 decoded = jwt.decode(encoded, key=await self._key_set(now), registry=registry)
-            except (JoseError, ValueError):  # perhaps the provider has a new key: once more with its present ones
+            except (JoseError, ValueError):  # the provider may have a new key: once more with its present ones
                 decoded = jwt.decode(encoded, key=await self._key_set(now, anew=True), registry=registry)
             claims = CodeIDToken(
                 decoded.claims,
@@ -170,15 +170,17 @@ class Provider:
 
 
 def open_provider(settings: OidcSettings, address: str) -> Provider:
-    """Returns the configured provider, which is asked for nothing yet. `address`: where browsers reach this service.
-    Raises SpecError for a file of the secret that cannot be read."""
+    """Returns the configured provider, without a request to it. `address`: URL of this service for browsers.
+
+    Raises SpecError for a file of the secret that cannot be read.
+    """
     secret = None
     if settings.client_secret is not None:
         try:
             secret = settings.client_secret.read_text("utf-8-sig").strip()
         except (OSError, UnicodeDecodeError) as error:
-            # Without the value: whoever writes the secret itself there shall not find it in a log.
-            why = error.strerror if isinstance(error, OSError) else "it is no text"
+            # Without the value: a secret written there by mistake must not appear in a log.
+            why = error.strerror if isinstance(error, OSError) else "it is not a text"
             raise SpecError(f"oidc.client_secret: names a file that cannot be read: {why}") from None
         if not secret:
             raise SpecError("oidc.client_secret: names a file that is empty")
@@ -186,7 +188,7 @@ def open_provider(settings: OidcSettings, address: str) -> Provider:
 
 
 def person_of(claims: Mapping[str, Any], settings: OidcSettings) -> Person:
-    """Returns the person whom an ID token's claims describe. Raises a 403 without a usable name, or without a role."""
+    """Returns the person in an ID token's claims. Raises a 403 without a usable name, or without a role."""
     name, given = claims.get(settings.name_claim), claims.get(settings.role_claim)
     if not isinstance(name, str) or not 1 <= len(name) <= 64 or not name.isprintable():
         line = f"the claim {settings.name_claim!r} has no name of 1 to 64 printable characters"
@@ -195,12 +197,12 @@ def person_of(claims: Mapping[str, Any], settings: OidcSettings) -> Person:
     held = {settings.roles[group] for group in groups if isinstance(group, str) and group in settings.roles}
     if not held:
         line = f"{name} is in no group that has a role here"
-        raise ProblemError(403, "no-role", line, "ask whoever looks after the service: oidc.roles")
+        raise ProblemError(403, "no-role", line, "ask the administrator of the service: oidc.roles")
     return Person(str(claims["iss"]), str(claims["sub"]), name, max(held, key=ROLES.index))
 
 
 def _not_proven(line: str) -> ProblemError:
-    return ProblemError(403, "sign-in-not-proven", line, "sign in again; if it stays so, see the log")
+    return ProblemError(403, "sign-in-not-proven", line, "sign in again; if it still fails, see the log")
 
 
 def _away(error: Exception) -> ProblemError:

@@ -1,7 +1,4 @@
-"""Routes of signing in by OpenID Connect, and of leaving.
-
-Signing in to a running service.
-"""
+"""Routes for sign-in and sign-out by OpenID Connect."""
 
 from __future__ import annotations
 
@@ -32,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class SigningIn(Part):
-    """The provider, and people on their way to it; `provider` is None where the configuration names none."""
+    """The provider, and sign-ins in progress; `provider` is None if the configuration names none."""
 
     def __init__(self, services: Services) -> None:
         """Raises SpecError, and MissingExtraError without Authlib."""
@@ -50,14 +47,14 @@ class SigningIn(Part):
 
 START = "/api/v1/login/start"
 HOME = "../../../"
-"""The page, from the addresses below. A relative one: a proxy may serve the service below a path of its own."""
+"""The page, relative to the routes below: a proxy may serve the service below a path of its own."""
 router = Router(tags=["system"], responses=PROBLEMS)
 log = logging.getLogger("server.access")
 
 
 @router.get("/login")
 async def get_login_ways(services: ServicesDep) -> LoginWays:
-    """Returns how people sign in: by a token always, and by OpenID Connect where it is configured. Needs no token."""
+    """Returns the ways to sign in: always by token, and by OpenID Connect if it is configured. Needs no token."""
     signing_in = services.part(SigningIn)
     if signing_in.provider is None:
         return LoginWays()
@@ -78,16 +75,16 @@ async def start_login(
     except ProblemError as problem:
         return _told(request, services, problem)
     answer = RedirectResponse(address, 303)
-    # It must come with a link from the provider's page, so it is `lax`; the session's cookie is `strict`.
+    # It must be sent with a link from the provider's page, so it is `lax`; the session's cookie is `strict`.
     _set_cookie(answer, services, sign_in_cookie(_address(services)), cookie, GOOD_FOR, "lax")
     return answer
 
 
 @router.get("/login/callback", include_in_schema=False)
 async def finish_login(services: ServicesDep, request: Request) -> Response:
-    """Takes the provider's answer, begins a session, and sends the browser to the page.
+    """Processes the provider's answer, begins a session, and sends the browser to the page.
 
-    A refused answer leads to the page's sign-in, with the problem's kind in the address.
+    A rejected answer leads to the page's sign-in, with the problem's kind in the URL.
     """
     signing_in, provider = _signing_in(services)
     given = dict(request.query_params)
@@ -114,7 +111,7 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
 
 @router.post("/logout")
 async def log_out(services: ServicesDep, caller: Viewer, response: Response) -> SignedOut:
-    """Ends the caller's session; a token stays. Returns where the provider's own session is left."""
+    """Ends the caller's session; a token stays valid. Returns the URL that ends the provider's own session."""
     address = None
     if caller.expires is not None and caller.token is not None:
         await run_in_threadpool(services.sessions.end, caller.token)
@@ -127,7 +124,7 @@ async def log_out(services: ServicesDep, caller: Viewer, response: Response) -> 
 
 
 def _of_sign_in(request: Request, caller: Caller, services: Services) -> AuditNote:
-    """Returns the audit log's note of a sign-in, which the gate does not make, since browsers come back by GET."""
+    """Returns the audit log's note of a sign-in. The gate does not make it, since browsers come back by GET."""
     return AuditNote(
         at=services.clock.utc(),
         actor=caller.name,
@@ -141,7 +138,7 @@ def _of_sign_in(request: Request, caller: Caller, services: Services) -> AuditNo
 
 
 def _signing_in(services: Services) -> tuple[SigningIn, Provider]:
-    """Returns the part and its provider. Raises a 404 where there is none."""
+    """Returns the part and its provider. Raises a 404 without a provider."""
     found = services.part(SigningIn)
     if found.provider is None:
         raise not_found("sign-in by OpenID Connect", "the section [oidc] of the configuration names a provider")
@@ -153,7 +150,7 @@ def _address(services: Services) -> str | None:
 
 
 def _set_cookie(answer: Response, services: Services, name: str, value: str, seconds: int, same_site: str) -> None:
-    """Both cookies are for the whole service: the prefix of their names (`__Host-`) demands it."""
+    """Both cookies are for the whole service, as the prefix of their names (`__Host-`) requires."""
     answer.set_cookie(
         name,
         value,
@@ -170,8 +167,10 @@ def _forget_cookie(answer: Response, services: Services, name: str) -> None:
 
 
 def _told(request: Request, services: Services, problem: ProblemError) -> Response:
-    """Sends the browser to the page's sign-in, which has words for each kind of problem; the logs have the details.
-    Anybody can cause them without end."""
+    """Sends the browser to the page's sign-in, which describes each kind of problem. The logs have the details.
+
+    Anybody can cause such problems without limit.
+    """
     log.warning("sign-in: %s: %s", problem.kind, problem.detail)
     services.tell(lambda part: part.refused(problem.kind))
     note = AuditNote(

@@ -1,4 +1,4 @@
-"""The configuration of signing in by OpenID Connect: which provider, and which of its claims give names and roles."""
+"""The configuration of sign-in by OpenID Connect: the provider, and its claims that give names and roles."""
 
 from __future__ import annotations
 
@@ -17,29 +17,30 @@ Claim = Annotated[str, Field(min_length=1, max_length=200)]
 
 
 class OidcSettings(Section):
-    """Section `[oidc]`. Without an issuer there is none, and people use tokens. The provider sends people back to
-    /api/v1/login/callback below `server.address`."""
+    """Section `[oidc]`. Without an issuer, people use tokens. The provider sends people back to /api/v1/login/callback
+    below `server.address`.
+    """
 
     SHOWN = frozenset(["issuer", "client_id", "label", "scopes", "name_claim", "role_claim", "roles", "hours"])
 
     issuer: Annotated[str, Field(max_length=500)] | None = None
-    """Address of the provider, exactly as it names itself. Its keys and endpoints are found below it."""
+    """URL of the provider, exactly as it identifies itself. Its keys and endpoints are found below it."""
     client_id: Annotated[str, Field(min_length=1, max_length=200)] | None = None
-    """Name by which the provider knows this service."""
+    """ID of this service at the provider."""
     client_secret: Path | None = None
-    """File with the secret that the provider gave this service; None for a public client, which has PKCE alone."""
+    """File with the secret that the provider gave this service; None for a public client, which uses only PKCE."""
     label: Annotated[str, Field(min_length=1, max_length=60)] = "single sign-on"
-    """What the page calls the provider: "Sign in with …"."""
+    """Name of the provider on the page: "Sign in with …"."""
     scopes: tuple[Annotated[str, Field(pattern=r"^[\x21\x23-\x5b\x5d-\x7e]{1,100}$")], ...] = ("openid", "profile")
-    """Scopes that are asked for. `openid` is always among them."""
+    """Requested scopes. `openid` is always included."""
     name_claim: Claim = "preferred_username"
-    """Claim with a person's name at this service. Choose one that the provider gives, and that people cannot change."""
+    """Claim with a person's name at this service. Choose one that people cannot change."""
     role_claim: Claim = "groups"
     """Claim with a person's groups, one text or several."""
     roles: dict[Claim, Role] = {}
-    """Role of each value of that claim; the highest one counts. Whoever has none of them is not admitted."""
+    """Role for each value of that claim; the highest one counts. People with none of them are not admitted."""
     hours: Annotated[float, Field(gt=0, le=720)] = 12.0
-    """Time (h) after which people must sign in again. A role that the provider takes away lasts until then."""
+    """Time (h) after which people must sign in again. A role that the provider withdraws lasts until then."""
 
     @field_validator("issuer")
     @classmethod
@@ -53,7 +54,7 @@ class OidcSettings(Section):
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
-        """Raises ValueError for a provider without what is needed to use it."""
+        """Raises ValueError for a provider with incomplete settings."""
         if self.issuer is not None:
             for name in ("client_id", "roles"):
                 if not getattr(self, name):
@@ -62,14 +63,14 @@ class OidcSettings(Section):
 
 
 def check(settings: Settings) -> None:
-    """Raises SpecError where people are to sign in, and the service's own address is not said."""
+    """Raises SpecError if sign-in is configured but the service's own URL is not."""
     section = settings.section(OidcSettings)
     if section.issuer is not None:
         require_address(section, settings.server)
 
 
 def require_address(section: OidcSettings, server: ServiceSettings) -> str:
-    """Returns the address at which browsers reach the service. Raises SpecError where it is not said."""
+    """Returns the URL of the service for browsers. Raises SpecError if it is not configured."""
     if server.address is None:
         raise SpecError(f"server.address is missing, which oidc.issuer {section.issuer} needs")
     return server.address

@@ -1,6 +1,6 @@
-"""People on their way to the provider and back: each answer is accepted once, in the browser that asked.
+"""Sign-ins in progress: each answer is accepted once, in the browser that started it.
 
-Nothing is kept of somebody who has not come back, however many begin. What was asked follows from a cookie of their
+Nothing is stored for somebody who has not come back, however many begin. The request follows from a cookie of their
 browser and a key of this process.
 """
 
@@ -22,7 +22,7 @@ GOOD_FOR = 600
 
 @dataclass(frozen=True)
 class Asked:
-    """What was asked of the provider, to compare its answer with."""
+    """Parameters of the request to the provider, for comparison with its answer."""
 
     state: str
     nonce: str
@@ -31,37 +31,39 @@ class Asked:
 
 @dataclass(frozen=True)
 class OnTheWay:
-    """Somebody who has come back from the provider. robot: what to show them, empty for the first page."""
+    """A sign-in that has come back from the provider. robot: to show afterwards, empty for the first page."""
 
     asked: Asked
     robot: str
 
 
 class SignIns:
-    """Everybody on their way. Use it on the event loop only."""
+    """All sign-ins in progress. Use it on the event loop only."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._key = secrets.token_bytes(32)
         self._used: dict[str, int] = {}
-        """The states with which somebody has signed in, or is about to, and until when they would be good."""
+        """The states of completed or present sign-ins, and the times until which they would be valid."""
 
     def begin(self, robot: str) -> tuple[Asked, str]:
-        """Returns what to ask for a person, and the text of their browser's cookie."""
+        """Returns the request for a person, and the text of their browser's cookie."""
         cookie = f"{secrets.token_urlsafe(32)}.{int(self._clock.monotonic()) + GOOD_FOR}.{robot}"
         return self._asked(cookie), cookie
 
     @contextmanager
     def answer(self, state: str, cookie: str) -> Iterator[OnTheWay]:
-        """Takes the answer to what was asked with this `state`. It is used up unless the block raises, and nobody else
-        can take it meanwhile. Raises a 403 if nothing was asked, if it is too old, if it is used, or if another browser
-        brings it."""
+        """Yields the sign-in with this `state`.
+
+        The state is used up unless the block raises, and nobody else can use it meanwhile. Raises a 403 if there is no
+        such request, if it is too old or used, or if another browser brings it.
+        """
         asked, now = self._asked(cookie), self._clock.monotonic()
         known = hmac.compare_digest(asked.state.encode(), state.encode("utf-8", "replace"))
         _, until, robot = cookie.split(".") if known else ("", "0", "")  # as it was written, or the states would differ
         if not known or int(until) <= now or state in self._used:
-            line = "this answer of the provider was used, is too old, or was asked for by another browser"
-            raise ProblemError(403, "sign-in-unknown", line, "begin anew")
+            line = "this answer of the provider was used, is too old, or belongs to another browser"
+            raise ProblemError(403, "sign-in-unknown", line, "start the sign-in again")
         self._used = {state: until for state, until in self._used.items() if until > now}
         self._used[state] = int(until)
         try:
@@ -74,6 +76,6 @@ class SignIns:
         return Asked(*(self._derived(f"{what} {cookie}") for what in ("state", "nonce", "verifier")))
 
     def _derived(self, text: str) -> str:
-        """Returns 43 letters of base64url, 256 bits, which only this process can make."""
+        """Returns 43 letters of base64url, 256 bits, which only this process can compute."""
         made = hmac.digest(self._key, text.encode("utf-8", "replace"), "sha256")
         return urlsafe_b64encode(made).rstrip(b"=").decode()

@@ -1,4 +1,4 @@
-"""A database of PostgreSQL: its lock, its check, and its tokens for the stop listener."""
+"""A PostgreSQL database for the service: its lock, its check, and its tokens for the stop listener."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ensures that one service at a time uses a database of PostgreSQL, by a lock that ends with its process."""
+"""Ensures that only one service uses a PostgreSQL database, by a lock that ends with its process."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from server.store.address import StoreError, masked, open_engine, parse_address
 from server.store.databases import InUseError
 
 LOOKED_AT = 10.0
-"""Time (s) between two looks at the lock, which is lost when the server is started again."""
+"""Time (s) between two checks of the lock, which is lost when the server restarts."""
 _NUMBER = int.from_bytes(b"ma2000dq")
-"""Number of the advisory lock. Locks of different databases of one server do not meet."""
+"""ID of the advisory lock. Locks of different databases of one server are independent."""
 log = logging.getLogger("server")
 
 
@@ -42,14 +42,17 @@ class ServerLock:
     """An advisory lock of a PostgreSQL server, held by a connection of its own."""
 
     def __init__(self, engine: Engine, place: str, lost: Callable[[], None]) -> None:
-        """Takes the lock. Calls `lost` if another service has taken it while the database's server was away. Raises
-        InUseError and StoreError."""
+        """Acquires the lock. Calls `lost` if another service has acquired it while the database's server was
+        unreachable.
+
+        Raises InUseError and StoreError.
+        """
         self._engine = engine
         self._place = place
         self._lost = lost
         self._closing = threading.Event()
         self._using = threading.Lock()
-        """Held by who uses the connection."""
+        """Held while the connection is used."""
         try:
             self._connection: Connection | None = self._taken()
         except DatabaseError as error:
@@ -58,8 +61,10 @@ class ServerLock:
         self._watch.start()
 
     def look(self) -> bool:
-        """Returns whether the lock is held, after taking it again if the connection was lost. False, with one line in
-        the log, if another service has it. A server that cannot be reached changes nothing: nobody can take the lock.
+        """Returns whether the lock is held, after acquiring it again if the connection was lost.
+
+        False, with one line in the log, if another service has it. An unreachable server changes nothing: nobody can
+        acquire the lock.
         """
         with self._using:
             return self._look()
@@ -77,12 +82,12 @@ class ServerLock:
         except InUseError as error:
             log.warning("%s: this service ends", error)
             return False
-        except DatabaseError:  # the server is away: the next look tries again
+        except DatabaseError:  # the server is unreachable: the next check tries again
             pass
         return True
 
     def close(self) -> None:
-        """Gives the lock back."""
+        """Releases the lock."""
         self._closing.set()
         self._watch.join()
         self._release()

@@ -1,4 +1,4 @@
-"""Metrics for Prometheus: counts, and the state of the service whenever it asks."""
+"""Metrics for Prometheus: counts, and the state of the service at each request."""
 
 from daq.plugins import Plugin
 

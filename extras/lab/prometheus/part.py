@@ -1,11 +1,4 @@
-"""What a running service counts for Prometheus.
-
-Counters and histograms for Prometheus.
-
-Metrics of the state of the service, read whenever Prometheus asks.
-
-The route that Prometheus asks.
-"""
+"""Counters, histograms and state of a running service, and the route from which Prometheus reads them."""
 
 from __future__ import annotations
 
@@ -83,7 +76,7 @@ class Counts:
             self._lateness.labels(robot).observe(max(0.0, report.lateness))
 
     def count_event(self, robot: str, kind: str) -> None:
-        """Counts an event of this kind, where it is a stop."""
+        """Counts an event of this kind, if it is a stop."""
         if kind == "stop":
             self._stops.labels(robot).inc()
 
@@ -104,7 +97,7 @@ class Counts:
 WAITING_OR_RUNNING: tuple[JobState, ...] = ("queued", "running")
 ROUND_TRIPS = {f"round_trip_{figure}_s": f"round_trip_{figure}" for figure in ("mean", "p50", "p99", "max")}
 ROUND_TRIPS["round_trip_count"] = "round_trip_count"
-"""Labels of the times of the link, by the names of its figures."""
+"""Labels of the times of the link, by the names of its measurements."""
 
 
 class StateMetrics(Collector):
@@ -114,7 +107,7 @@ class StateMetrics(Collector):
         self._services = services
 
     def describe(self) -> Iterable[Metric]:
-        """Returns nothing: what is collected is asked for when Prometheus asks."""
+        """Returns nothing: values are computed when Prometheus requests them."""
         return ()
 
     def collect(self) -> Iterable[Metric]:
@@ -157,7 +150,7 @@ class StateMetrics(Collector):
             queued.add_metric((name,), queue.queued)
             paused.add_metric((name,), queue.paused)
             running.add_metric((name,), queue.running is not None)
-            with suppress(SQLAlchemyError, DamagedError):  # no figures while the database cannot be read
+            with suppress(SQLAlchemyError, DamagedError):  # no metrics while the database cannot be read
                 counts = self._services.experiments.count_by_state(name)
                 for state in sorted(ENDS):
                     ended.add_metric((name, state), counts.get(state, 0))
@@ -178,17 +171,17 @@ class StateMetrics(Collector):
         rigs = self._services.robots()
         folders = {f"traces/{rig.robot.name}" if len(rigs) > 1 else "traces": rig.catalogue.folder for rig in rigs}
         for name, folder in (*folders.items(), ("service", self._services.folder)):
-            with suppress(ProblemError):  # no figure for a folder that is not there
+            with suppress(ProblemError):  # no metric for a missing folder
                 free.add_metric((name,), free_room(folder.absolute()))
         yield free
-        warnings = "Number of warnings about disk and archive, which GET /api/v1/system has in words."
+        warnings = "Number of warnings about disk and archive, which GET /api/v1/system describes."
         yield GaugeMetricFamily("daq_storage_warnings", warnings, value=len(self._services.warnings()))
-        reserve = "Free room on the disk of traces below which no experiment is taken."
+        reserve = "Free space on the disk of traces below which no experiment is accepted."
         yield GaugeMetricFamily("daq_disk_reserve_bytes", reserve, value=RESERVE)
 
 
 class Prometheus(Part):
-    """Counts what it hears of. Other parts that have a `collect` are asked, too."""
+    """Counts events. Other parts with a `collect` are collected, too."""
 
     def __init__(self, services: Services) -> None:
         self._services = services
@@ -196,7 +189,7 @@ class Prometheus(Part):
         self.registry = self._counts.registry
 
     def robots_made(self, robots: Sequence[Any]) -> None:
-        """Registers what is asked for when Prometheus asks."""
+        """Registers the collectors."""
         del robots
         self.registry.register(StateMetrics(self._services))
         for part in self._services.parts:

@@ -180,7 +180,9 @@ def test_angles_of_more_than_20_rad_are_taken_for_degrees(angle: float, allowed:
     if allowed:
         assert len(inputs_of(still(position=position), MA2000)) == 60
     else:
-        with pytest.raises(TraceError, match=r"joint 2 reaches 20 rad; degrees\? angles must be in rad, up to 20"):
+        with pytest.raises(
+            TraceError, match=r"joint 2 reaches 20 rad; are these degrees\? angles must be in rad, up to 20"
+        ):
             inputs_of(still(position=position), MA2000)
 
 

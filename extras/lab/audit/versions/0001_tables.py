@@ -1,6 +1,6 @@
-"""The table, as `tables.py` has it, and triggers that keep it append-only.
+"""Creates the table of `tables.py`, and triggers that keep it append-only.
 
-After a release it is written out, and a change is a migration of its own.
+After a release this file is fixed, and each change is a migration of its own.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ REFUSED = "the audit log is append-only"
 NEXT = "new.sequence = COALESCE((SELECT MAX(sequence) FROM audit), 0) + 1"
 FOLLOWS = f"new.previous = COALESCE((SELECT digest FROM audit ORDER BY sequence DESC LIMIT 1), '{'0' * 64}')"
 
-# The trigger of inserts also refuses SQLite's INSERT OR REPLACE, which deletes a row without a trigger of deletes.
+# The trigger of inserts also forbids SQLite's INSERT OR REPLACE, which deletes a row without the trigger of deletes.
 SQLITE = (
     f"CREATE TRIGGER audit_update BEFORE UPDATE ON audit BEGIN SELECT RAISE(ABORT, '{REFUSED}'); END",
     f"CREATE TRIGGER audit_delete BEFORE DELETE ON audit BEGIN SELECT RAISE(ABORT, '{REFUSED}'); END",
@@ -35,7 +35,7 @@ POSTGRESQL = (
 
 
 def upgrade(connection: Connection) -> None:
-    """Makes the table."""
+    """Creates the table."""
     AuditTable.metadata.create_all(connection, checkfirst=False)
     for statement in SQLITE if connection.dialect.name == "sqlite" else POSTGRESQL:
         connection.exec_driver_sql(statement)

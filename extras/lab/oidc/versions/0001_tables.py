@@ -1,4 +1,4 @@
-"""The table, as `people.py` has it. After a release it is written out, and a change is a migration of its own."""
+"""Creates the table of `people.py`. After a release this file is fixed, and each change is a migration of its own."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from extras.lab.oidc.people import PeopleTable
 
 
 def upgrade(connection: Connection) -> None:
-    """Makes the table."""
+    """Creates the table."""
     PeopleTable.metadata.create_all(connection, checkfirst=False)

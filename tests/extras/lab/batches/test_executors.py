@@ -35,7 +35,7 @@ from tests.daq_cli.invoke import CommandLine
 )
 def test_what_is_understood(url: str, kind: str, place: str) -> None:
     found = parse_address(url)
-    assert (found.kind, found.place) == (kind, place)
+    assert (found.kind, found.target) == (kind, place)
 
 
 @pytest.mark.parametrize(
