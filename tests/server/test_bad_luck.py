@@ -7,7 +7,7 @@ import resource
 import select
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -94,13 +94,12 @@ def _without_the_acquisition_process(service: Service) -> str:
 
 def _ends_while_somebody_waits(service: Service, waiting: str) -> None:
     """Whoever waits for an end that does not come is told how it is when the service ends."""
-    waits = http.client.HTTPConnection("127.0.0.1", int(service.url.rpartition(":")[2]), timeout=60)
-    waits.request("GET", f"/api/v1/robots/ma2000/experiments/{waiting}?wait=60")
-    service.status()  # what was sent before has begun by now
-    assert service.end() == 0
-    answer = waits.getresponse()
-    assert (answer.status, json.loads(answer.read())["state"]) == (200, "queued")
-    waits.close()
+    with closing(http.client.HTTPConnection("127.0.0.1", int(service.url.rpartition(":")[2]), timeout=60)) as waits:
+        waits.request("GET", f"/api/v1/robots/ma2000/experiments/{waiting}?wait=60")
+        service.status()  # what was sent before has begun by now
+        assert service.end() == 0
+        answer = waits.getresponse()
+        assert (answer.status, json.loads(answer.read())["state"]) == (200, "queued")
 
 
 def _without_the_worker(service: Service, trace: str) -> None:

@@ -1,6 +1,7 @@
 """Databases of both kinds, new for each test."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -17,9 +18,8 @@ def postgresql() -> Iterator[PostgresServer]:
     if found is None:
         pytest.skip("PostgreSQL is not installed")
     with running_postgresql(found) as server:
-        made = Store(server.database())
-        made.migrate()
-        made.close()
+        with closing(Store(server.database())) as made:
+            made.migrate()
         yield server
 
 
