@@ -264,10 +264,7 @@ def test_whoever_does_not_ask_in_time_keeps_no_place(tmp_path: Path, monkeypatch
 
     monkeypatch.setattr("server.stopping.listener.READ_WITHIN", 1000.0)
     monkeypatch.setattr("server.stopping.listener.time", SimpleNamespace(monotonic=later_at_every_look))
-    with (
-        listener_of(tmp_path, {}, lambda *_: None) as address,
-        socket.create_connection(address, timeout=60) as slow,
-    ):
+    with listener_of(tmp_path, {}, lambda *_: None) as address, socket.create_connection(address, timeout=60) as slow:
         slow.sendall(b"POST ")
         while slow.recv(4096):  # what it has sent is no request
             pass
