@@ -270,9 +270,8 @@ def test_whoever_does_not_ask_in_time_keeps_no_place(tmp_path: Path, monkeypatch
             pass
 
 
-def test_viewers_may_stop_and_strangers_may_not(tmp_path: Path) -> None:
-    clock, store = HandClock(), migrated_store(tmp_path / "service.sqlite")
-    tokens = TokenStore(store)
+def test_viewers_may_stop_and_strangers_may_not(store: Store) -> None:
+    clock, tokens = HandClock(), TokenStore(store)
     token = tokens.add("anna", "viewer", clock.utc())
     gate = StopGate(KnownTokens(tokens, clock), False, (), 8300)
     assert gate.admit({"host": "10.0.0.1:8301", "authorization": f"Bearer {token}"}) == Caller("anna", "viewer")
@@ -286,7 +285,6 @@ def test_viewers_may_stop_and_strangers_may_not(tmp_path: Path) -> None:
         with pytest.raises(ProblemError) as refused:
             gate.admit(proxied)
         assert refused.value.status == 401
-    store.close()
 
 
 @pytest.mark.parametrize(

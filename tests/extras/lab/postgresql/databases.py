@@ -8,7 +8,7 @@ import pytest
 
 from server.store.engine import Store
 from tests.extras.lab.postgresql.server import PostgresServer, programs, running_postgresql
-from tests.server.store.conftest import sqlite_store
+from tests.server.conftest import sqlite_store
 
 
 @pytest.fixture(scope="package")
