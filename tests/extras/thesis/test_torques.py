@@ -22,13 +22,10 @@ from extras.thesis.tables import (
 )
 from extras.thesis.torques import TorqueAnalysis, largest, torques_along, torques_of_run
 from model import layout as at
-from model.analysis.sensitivity import sensitivity_curves
 from model.dynamics import recursive
 from model.machine_model.model import Model
 from model.simulation.bodies import rod_arm_body
 from model.simulation.chain_of_model import chain_of
-from model.simulation.prepared import Options
-from model.simulation.simulate import simulate
 from tests.model.fitting.imagined import arm
 from tests.model.validation.synthetic import ramp_trace
 
@@ -86,19 +83,6 @@ def test_a_model_s_own_motion_is_analysed_under_the_name_of_its_trace(model: Mod
     run = torques_of_run(model, trace)
     assert run.source == f"simulation of {trace.record.trace_id}"
     assert len(run.time) == len(run.gravity[1].whole)
-
-
-def test_sensitivity_curves_are_the_change_of_the_readings(model: Model) -> None:
-    trace = ramp_trace(model)
-    name = "joint2.motor.back_emf_constant"
-    curves = sensitivity_curves(model, trace, ("link1.mass", name))
-    assert [c.name for c in curves.curves] == [name, "link1.mass"]
-    plain = Options(quantise=False)
-    curve, value = curves.curves[0], model.parameter(name).value
-    step = 1e-4 * curve.expected
-    above, below = (simulate(model.with_values({name: value + s}), trace, plain).reading for s in (step, -step))
-    change = (above - below) / (2 * step) * curve.expected
-    np.testing.assert_allclose(np.transpose(curve.by_joint), change, atol=1e-4 * np.abs(change).max())
 
 
 # ---- control laws
