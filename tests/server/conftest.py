@@ -1,11 +1,14 @@
 """One service for most tests, and one for jobs: starting one costs more than most of them."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
+from server.store.engine import Store
 from tests.daq_cli.invoke import CommandLine
+from tests.server.migrated import migrated_store
 from tests.server.other_user import other_users_command_line
 from tests.server.polling import reset
 from tests.server.queue.bench import Bench
@@ -61,3 +64,16 @@ def here(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest
     """The command of another user, in a folder of their own, who has no configuration."""
     with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
         yield daq
+
+
+@pytest.fixture
+def sqlite_store(tmp_path: Path) -> Iterator[Store]:
+    """A new SQLite database."""
+    with closing(migrated_store(tmp_path / "service.sqlite")) as made:
+        yield made
+
+
+@pytest.fixture
+def store(sqlite_store: Store) -> Store:
+    """The same; plug-ins have other kinds (tests/extras/lab/postgresql)."""
+    return sqlite_store

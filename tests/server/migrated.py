@@ -2,6 +2,7 @@
 longer than most of what is tried on them. The migrations themselves are tried in tests/server/store."""
 
 import tempfile
+from contextlib import closing
 from functools import cache
 from pathlib import Path
 
@@ -26,7 +27,6 @@ def place_database(file: Path) -> None:
 def _new_database() -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "service.sqlite"
-        store = Store(f"sqlite:///{file}")
-        store.migrate()
-        store.close()
+        with closing(Store(f"sqlite:///{file}")) as store:
+            store.migrate()
         return file.read_bytes()

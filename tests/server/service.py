@@ -52,10 +52,6 @@ class Service:
         """Asks until the state of the connection to the robot is told. The status."""
         return self._until("/robots/ma2000", lambda found: found["connection"] == state)
 
-    def until_rest(self) -> dict[str, Any]:
-        """Asks until nothing that moves the robot is under way. The status."""
-        return self._until("/robots/ma2000", lambda found: found["activity"] == "none")
-
     def until_paused(self) -> dict[str, Any]:
         """Asks until the queue is paused: it is some time after what pauses it has been answered. The queue."""
         return self._until("/robots/ma2000/queue", lambda found: found["paused"])

@@ -57,11 +57,7 @@ def test_options_that_cannot_be_fitted_are_refused(
     [
         ({"amplitude": 0.0}, "", ("no motion", "4 counts")),
         ({"count": 2}, "", ("2 samples", "at least 3")),
-        (
-            {"count": 12},
-            f"--effects {EIGHT_EFFECTS} --parameters *",
-            ("12 samples for", "more samples than"),
-        ),
+        ({"count": 12}, f"--effects {EIGHT_EFFECTS} --parameters *", ("12 samples for", "more samples than")),
     ],
     ids=["still", "two samples", "fewer than parameters"],
 )

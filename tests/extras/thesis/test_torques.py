@@ -1,4 +1,4 @@
-"""Torques along a motion, and control laws on the arm in continuous time."""
+"""Torques along a motion, control laws on the arm in continuous time, and what follows from published tables alone."""
 
 from dataclasses import replace
 
@@ -6,16 +6,26 @@ import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
+from daq.contracts.machine import load_machine
 from extras.thesis.closed_loop import ClassicalPid, Partitioned, Sinusoid, control
 from extras.thesis.driven_arm import DrivenArm, equation_of_motion
-from extras.thesis.tables import VISCOUS_AND_COULOMB
+from extras.thesis.figures import influence_tables
+from extras.thesis.tables import (
+    BASIC,
+    LADDER,
+    SYMBOLS,
+    VISCOUS_AND_COULOMB,
+    basis_of_symbol,
+    model_of,
+    recomputed_fidelities,
+    unfitted,
+)
 from extras.thesis.torques import TorqueAnalysis, largest, torques_along, torques_of_run
-from model.analysis.sensitivity import sensitivity_curves
+from model import layout as at
 from model.dynamics import recursive
 from model.machine_model.model import Model
+from model.simulation.bodies import rod_arm_body
 from model.simulation.chain_of_model import chain_of
-from model.simulation.prepared import Options
-from model.simulation.simulate import simulate
 from tests.model.fitting.imagined import arm
 from tests.model.validation.synthetic import ramp_trace
 
@@ -73,19 +83,6 @@ def test_a_model_s_own_motion_is_analysed_under_the_name_of_its_trace(model: Mod
     run = torques_of_run(model, trace)
     assert run.source == f"simulation of {trace.record.trace_id}"
     assert len(run.time) == len(run.gravity[1].whole)
-
-
-def test_sensitivity_curves_are_the_change_of_the_readings(model: Model) -> None:
-    trace = ramp_trace(model)
-    name = "joint2.motor.back_emf_constant"
-    curves = sensitivity_curves(model, trace, ("link1.mass", name))
-    assert [c.name for c in curves.curves] == [name, "link1.mass"]
-    plain = Options(quantise=False)
-    curve, value = curves.curves[0], model.parameter(name).value
-    step = 1e-4 * curve.expected
-    above, below = (simulate(model.with_values({name: value + s}), trace, plain).reading for s in (step, -step))
-    change = (above - below) / (2 * step) * curve.expected
-    np.testing.assert_allclose(np.transpose(curve.by_joint), change, atol=1e-4 * np.abs(change).max())
 
 
 # ---- control laws
@@ -156,3 +153,59 @@ def test_an_unstable_loop_is_an_error_not_a_number(plant: DrivenArm) -> None:
         control(plant, ClassicalPid(amplifier=-1e4), STILL, (3.0, 0.5, 0.1), 5.0)
     with pytest.raises(SpecError, match="must be positive"):
         control(plant, ClassicalPid(), STILL, START, 0.0)
+
+
+# ---- what follows from the published tables alone
+
+
+@pytest.mark.parametrize("index", range(4))
+def test_published_sums_follow_from_the_tables_within_three_percent(index: int) -> None:
+    found = recomputed_fidelities("source")[index]
+    assert found.published == (0.2449, 0.4431, 0.5973, 0.9313)[index]
+    assert found.ours == pytest.approx((0.2426, 0.4452, 0.5834, 0.9295)[index], abs=5e-4)
+    assert abs(found.relative_difference) < 0.03
+
+
+def test_three_sigma_taken_literally_gives_over_forty_percent_more() -> None:
+    assert all(0.42 <= f.relative_difference <= 0.46 for f in recomputed_fidelities("three_sigma"))
+
+
+def test_each_table_has_the_parameters_of_its_model() -> None:
+    assert [len(m.free) for m in LADDER] == [8, 9, 12, 13]
+    assert all(set(m.deviations) == set(m.values) for m in LADDER)
+    assert [s.name for s in SYMBOLS if basis_of_symbol(s.name) == "mass"] == ["m1", "m2", "m3", "MLOAD"]
+    assert [s.name for s in SYMBOLS if basis_of_symbol(s.name) == "length"] == ["R1", "A2", "A3"]
+
+
+def test_a_table_becomes_a_model_with_its_values() -> None:
+    machine = load_machine("ma2000")
+    model = model_of(VISCOUS_AND_COULOMB, machine)
+    for symbol in SYMBOLS:
+        assert model.parameter(symbol.parameter).value == VISCOUS_AND_COULOMB.values[symbol.name]
+    assert model.published_inertia
+    basic = model_of(BASIC, machine)
+    assert not basic.effects
+    assert basic.parameter("joint2.motor.back_emf_constant").value == 0.0334
+
+
+def test_the_model_and_the_arm_of_chapter_8_have_the_same_bodies() -> None:
+    model = model_of(VISCOUS_AND_COULOMB, load_machine("ma2000"))
+    joints = model.vector[at.SHARED :].reshape(3, at.PER_JOINT).copy()
+    body = rod_arm_body(model.vector[: at.SHARED].copy(), joints, model.flags.copy())
+    arm = VISCOUS_AND_COULOMB.arm().vector()
+    assert arm[: len(body)] == pytest.approx(body, rel=1e-9)
+
+
+def test_fits_start_where_the_source_starts() -> None:
+    start = unfitted(VISCOUS_AND_COULOMB, load_machine("ma2000"))
+    assert start.parameter("link2.length").value == 0.23
+    assert start.parameter("joint2.viscous_friction.coefficient").value == 0.0
+    assert start.parameter("joints1+2+3.load_dependent_friction.arm").value == 0.0
+
+
+def test_tables_of_chapter_5_hold_but_for_the_waist() -> None:
+    entries = {(e.table, e.joint): e for e in influence_tables()}
+    wrong = {key for key, e in entries.items() if e.published_too_many or e.published_too_few}
+    assert wrong == {("5.1", 1), ("5.2", 1)}
+    assert entries["5.1", 1].published_too_many == ("m2", "c2x", "c2y", "c2z", "I2zz", "I3zz")
+    assert entries["5.1", 1].published_too_few == ()

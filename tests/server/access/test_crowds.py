@@ -3,6 +3,7 @@
 import asyncio
 import resource
 import socket
+from contextlib import closing
 from typing import Any
 
 import httpx
@@ -200,10 +201,9 @@ def test_nobody_waits_for_ever() -> None:
 def test_a_long_motion_is_the_same_wherever_it_is_worked_out() -> None:
     spec = ExperimentSpec(trajectory=Sine(amplitude=0.1, period=2.0, cycles=40), joints=(1, 2), repeats=2)
     order = WorkOutMotion(spec=spec, machine=load_machine("ma2000"), most_shown=500)
-    workers = Workers(Limits(memory=1 << 30, seconds=60.0), 1)
-    answer = workers.ask(order)
-    wrong = workers.ask(order.model_copy(update={"spec": spec.model_copy(update={"repeats": 1000})}))
-    workers.close()
+    with closing(Workers(Limits(memory=1 << 30, seconds=60.0), 1)) as workers:
+        answer = workers.ask(order)
+        wrong = workers.ask(order.model_copy(update={"spec": spec.model_copy(update={"repeats": 1000})}))
     assert MotionPreview.model_validate(answer.data) == preview_of(order)
     assert "longer than" in wrong.problem or "allowed" in wrong.problem
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import threading
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -18,7 +17,6 @@ from server.access.tickets import Tickets
 from server.access.tokens import KnownTokens, TokenStore
 from server.store.engine import Store
 from tests.server.clocks import HandClock
-from tests.server.migrated import migrated_store
 
 ROBOT = "/api/v1/robots/ma2000"
 PIECE = 1 << 20
@@ -34,11 +32,9 @@ NO_UPLOADS = [
 
 
 @pytest.fixture
-def tokens(tmp_path: Path) -> Iterator[KnownTokens]:
+def tokens(store: Store) -> KnownTokens:
     """None that opens anything."""
-    store = migrated_store(tmp_path / "service.sqlite")
-    yield KnownTokens(TokenStore(store), HandClock())
-    store.close()
+    return KnownTokens(TokenStore(store), HandClock())
 
 
 @dataclass
@@ -147,8 +143,7 @@ class _Hanging(TokenStore):
         return super().callers(now)
 
 
-def test_an_old_cookie_delays_no_stop_that_needs_no_token(tmp_path: Path) -> None:
-    store = migrated_store(tmp_path / "service.sqlite")
+def test_an_old_cookie_delays_no_stop_that_needs_no_token(store: Store) -> None:
     tokens = _Hanging(store)
     gate = _gate(KnownTokens(tokens, HandClock()))
     asked = Request("POST", f"{ROBOT}/stop", headers={"cookie": "daq-session=old", "origin": "http://127.0.0.1:8300"})
@@ -160,7 +155,6 @@ def test_an_old_cookie_delays_no_stop_that_needs_no_token(tmp_path: Path) -> Non
 
     asyncio.run(answered_while_it_hangs())
     assert asked.status == 200
-    store.close()
 
 
 def test_an_old_cookie_refuses_no_stop_while_the_database_cannot_be_read(tmp_path: Path) -> None:

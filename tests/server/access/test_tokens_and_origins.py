@@ -1,7 +1,6 @@
 """Who gets in, and what browsers may not do behind a person's back."""
 
 import asyncio
-from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 
@@ -28,7 +27,6 @@ from server.store.tables import TokenRow
 from tests.daq_cli.invoke import CommandLine
 from tests.server.access.people import kind_of
 from tests.server.clocks import HandClock
-from tests.server.migrated import migrated_store
 from tests.server.service import Service, running_service
 
 
@@ -36,14 +34,6 @@ from tests.server.service import Service, running_service
 def clock() -> HandClock:
     """Of whoever reads tokens."""
     return HandClock()
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    """A database without tokens."""
-    made = migrated_store(tmp_path / "service.sqlite")
-    yield made
-    made.close()
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """Taught programs that the service keeps: until they are deleted, whoever has the control and whatever restarts."""
 
 import json
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,6 @@ from server.store.engine import Store
 from server.store.programs import MOST_PROGRAMS, ProgramStore
 from tests.daq_cli.invoke import CommandLine
 from tests.server.clocks import HandClock
-from tests.server.migrated import migrated_store
 from tests.server.polling import until
 from tests.server.service import Service
 
@@ -31,14 +29,6 @@ def _program(name: str = "pick", duration: float = 1.0) -> Program:
 def clock() -> HandClock:
     """The store's."""
     return HandClock()
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    """A database."""
-    made = migrated_store(tmp_path / "service.sqlite")
-    yield made
-    made.close()
 
 
 @pytest.fixture

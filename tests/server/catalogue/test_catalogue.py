@@ -4,7 +4,6 @@ import errno
 import json
 import logging
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -20,10 +19,10 @@ from daq.traces.store import write_trace
 from server.catalogue.catalogue import UPLOAD, Catalogue
 from server.catalogue.room import by_disk, disk_warnings, free_room, room_of, storage_warnings
 from server.problems import ProblemError
+from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.traces import TraceStore
 from tests.server.meanwhile import Meanwhile, raising
-from tests.server.migrated import migrated_store
 
 ROBOT = "ma2000"
 
@@ -46,9 +45,8 @@ class Shelf:
 
 
 @pytest.fixture
-def shelf(tmp_path: Path) -> Iterator[Shelf]:
+def shelf(tmp_path: Path, store: Store) -> Shelf:
     """In a folder of its own."""
-    store = migrated_store(tmp_path / "service.sqlite")
     traces = TraceStore(store)
     experiments: Any = Meanwhile(ExperimentStore(store))
     catalogue = Catalogue(tmp_path / "traces", ROBOT, traces, experiments)
@@ -61,8 +59,7 @@ def shelf(tmp_path: Path) -> Iterator[Shelf]:
     path.write_bytes(copy.read_bytes())
     assert catalogue.add(path) == trace.record.trace_id
     traces.change(ROBOT, trace.record.trace_id, TraceChange(tags=("rig b",), notes="loose belt"))
-    yield Shelf(catalogue, traces, experiments, trace.record.trace_id, path, copy)
-    store.close()
+    return Shelf(catalogue, traces, experiments, trace.record.trace_id, path, copy)
 
 
 @pytest.mark.parametrize("noticed", [False, True])

@@ -7,6 +7,7 @@ import resource
 import signal
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -81,9 +82,8 @@ def test_what_needs_too_much_memory_is_refused_and_the_next_file_is_read(workers
 
 def test_what_takes_too_long_is_refused(tmp_path: Path) -> None:
     hasty = Workers(Limits(memory=LIMITS.memory, seconds=0.01), 1, start_within=0.0)
-    with pytest.raises(ExhaustedError, match=r"takes more than the 0\.01 s"):
+    with closing(hasty), pytest.raises(ExhaustedError, match=r"takes more than the 0\.01 s"):
         hasty.ask(_order(tmp_path, SOUND))
-    hasty.close()
 
 
 def test_a_reader_that_is_killed_is_told_and_another_takes_its_place(workers: Workers, tmp_path: Path) -> None:

@@ -16,13 +16,7 @@ from sqlalchemy.orm import Session
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq.contracts.service.archive import Transfer
-from daq.contracts.service.jobs import (
-    CompareRequest,
-    DiagnoseRequest,
-    FitRequest,
-    Job,
-    JobRequest,
-)
+from daq.contracts.service.jobs import CompareRequest, DiagnoseRequest, FitRequest, Job, JobRequest
 from daq.contracts.trace_limits import TraceLimits
 from daq.executors import Workers
 from model.machine_model.model import base_model

@@ -2,6 +2,7 @@
 
 import tempfile
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -292,10 +293,9 @@ def test_what_was_changed_in_the_database_does_not_begin(people: dict[str, Perso
     anna, bert = people["anna"], people["bert"]
     identity = anna.submit(at=None)
     bert.ask("PUT", f"/experiments/{identity}/approval", {"content": _content(bert, identity)})
-    store = Store(f"sqlite:///{tmp_path / 'service' / 'service.sqlite'}")
-    with store.writing() as session:
+    address = f"sqlite:///{tmp_path / 'service' / 'service.sqlite'}"
+    with closing(Store(address)) as store, store.writing() as session:
         session.execute(text("UPDATE experiments SET spec = json_set(spec, '$.trajectory.duration', 0.3)"))
-    store.close()
     assert anna.ask("POST", "/connect").status_code == 200
     anna.ask("POST", "/queue/resume", {"moves_real_arm": True})
     _until_it_waits_for(anna.robot, "the approval of 1 experiment")

@@ -2,6 +2,7 @@
 
 import queue
 from collections.abc import Iterator
+from contextlib import closing
 
 import pytest
 
@@ -78,18 +79,17 @@ def test_a_listener_that_fails_ends_neither_the_watch_nor_the_next_lease(clock: 
         heard.put(holder)
         raise OSError("database or disk is full")
 
-    control = ControlService(clock, fails)
-    for name in ("anna", "bert"):
-        control.take(name, moves_real_arm=False)
+    with closing(ControlService(clock, fails)) as control:
+        for name in ("anna", "bert"):
+            control.take(name, moves_real_arm=False)
+            clock.turn(LEASE_TIME)
+            if control.take_for_queue("an experiment"):  # the watch looks at the clock, where it has not done so before
+                control.give_back_for_queue()
+            assert heard.get(timeout=WITHIN) == name
+        control.take("carl", moves_real_arm=False)
         clock.turn(LEASE_TIME)
-        if control.take_for_queue("an experiment"):  # the watch looks at the clock, where it has not done so before
-            control.give_back_for_queue()
-        assert heard.get(timeout=WITHIN) == name
-    control.take("carl", moves_real_arm=False)
-    clock.turn(LEASE_TIME)
-    assert control.take("dora", moves_real_arm=False).lease
-    assert heard.get(timeout=WITHIN) == "carl"
-    control.close()
+        assert control.take("dora", moves_real_arm=False).lease
+        assert heard.get(timeout=WITHIN) == "carl"
 
 
 def test_the_queue_has_the_control_only_after_it_was_told_that_a_client_went_silent(

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Future
+from contextlib import closing
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -193,9 +194,8 @@ def test_a_stop_that_finds_no_file_for_its_socket_says_that_it_was_not_delivered
         raise OSError(24, "Too many open files")
 
     monkeypatch.setattr("server.stopping.arm.request_stop", no_socket)
-    stop_service = StopService(idle)
-    told = stop_service.stop_now()
-    stop_service.close()
+    with closing(StopService(idle)) as stop_service:
+        told = stop_service.stop_now()
     assert (told.delivered, told.confirmed) == (False, False)
     assert told.text == f"stop NOT DELIVERED: {told.detail}"
     assert told.detail == f"{told.note}. Use the emergency stop."

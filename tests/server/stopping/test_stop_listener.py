@@ -264,18 +264,14 @@ def test_whoever_does_not_ask_in_time_keeps_no_place(tmp_path: Path, monkeypatch
 
     monkeypatch.setattr("server.stopping.listener.READ_WITHIN", 1000.0)
     monkeypatch.setattr("server.stopping.listener.time", SimpleNamespace(monotonic=later_at_every_look))
-    with (
-        listener_of(tmp_path, {}, lambda *_: None) as address,
-        socket.create_connection(address, timeout=60) as slow,
-    ):
+    with listener_of(tmp_path, {}, lambda *_: None) as address, socket.create_connection(address, timeout=60) as slow:
         slow.sendall(b"POST ")
         while slow.recv(4096):  # what it has sent is no request
             pass
 
 
-def test_viewers_may_stop_and_strangers_may_not(tmp_path: Path) -> None:
-    clock, store = HandClock(), migrated_store(tmp_path / "service.sqlite")
-    tokens = TokenStore(store)
+def test_viewers_may_stop_and_strangers_may_not(store: Store) -> None:
+    clock, tokens = HandClock(), TokenStore(store)
     token = tokens.add("anna", "viewer", clock.utc())
     gate = StopGate(KnownTokens(tokens, clock), False, (), 8300)
     assert gate.admit({"host": "10.0.0.1:8301", "authorization": f"Bearer {token}"}) == Caller("anna", "viewer")
@@ -289,7 +285,6 @@ def test_viewers_may_stop_and_strangers_may_not(tmp_path: Path) -> None:
         with pytest.raises(ProblemError) as refused:
             gate.admit(proxied)
         assert refused.value.status == 401
-    store.close()
 
 
 @pytest.mark.parametrize(
@@ -308,24 +303,23 @@ def test_what_a_page_may_connect_to_is_a_name_and_a_port(host: str, origin: str 
 
 def test_tokens_are_read_while_a_writer_holds_the_database_and_count_on_when_it_is_gone(tmp_path: Path) -> None:
     clock, file = HandClock(), tmp_path / "service.sqlite"
-    store = migrated_store(file)
-    tokens = TokenStore(store)
-    anna, bert = tokens.add("anna", "viewer", clock.utc()), tokens.add("bert", "operator", clock.utc())
-    found = StopTokens(reader_of(store.url, file), clock=clock.monotonic)
-    with store.writing() as writing:  # as a service that was put aside in the middle of it
-        writing.execute(text("UPDATE tokens SET role = 'operator'"))
-        assert found.look_up(anna) == Caller("anna", "viewer")
-    found.look_up("daq_wrong")
-    assert found.remembered("daq_wrong") == (True, None)
-    clock.turn(UNKNOWN_FOR)
-    assert found.remembered("daq_wrong") == (False, None)
-    found.look_up("daq_wrong")
-    assert found.remembered(bert) == (True, Caller("bert", "operator"))
-    tokens.revoke("bert", clock.utc())
-    clock.turn(UNKNOWN_FOR)
-    found.look_up("daq_wrong")  # as the thread does by itself every READ_AGAIN_AFTER s
-    assert found.look_up(bert) is None
-    store.close()
+    with closing(migrated_store(file)) as store:
+        tokens = TokenStore(store)
+        anna, bert = tokens.add("anna", "viewer", clock.utc()), tokens.add("bert", "operator", clock.utc())
+        found = StopTokens(reader_of(store.url, file), clock=clock.monotonic)
+        with store.writing() as writing:  # as a service that was put aside in the middle of it
+            writing.execute(text("UPDATE tokens SET role = 'operator'"))
+            assert found.look_up(anna) == Caller("anna", "viewer")
+        found.look_up("daq_wrong")
+        assert found.remembered("daq_wrong") == (True, None)
+        clock.turn(UNKNOWN_FOR)
+        assert found.remembered("daq_wrong") == (False, None)
+        found.look_up("daq_wrong")
+        assert found.remembered(bert) == (True, Caller("bert", "operator"))
+        tokens.revoke("bert", clock.utc())
+        clock.turn(UNKNOWN_FOR)
+        found.look_up("daq_wrong")  # as the thread does by itself every READ_AGAIN_AFTER s
+        assert found.look_up(bert) is None
     file.unlink()
     clock.turn(UNKNOWN_FOR)
     found.look_up("daq_wrong")
@@ -337,15 +331,14 @@ def test_tokens_are_read_while_a_writer_holds_the_database_and_count_on_when_it_
 
 def test_a_fault_in_the_sessions_takes_nobody_s_token(tmp_path: Path) -> None:
     file = tmp_path / "service.sqlite"
-    store = migrated_store(file)
-    token = TokenStore(store).add("anna", "viewer", HandClock().utc())
-    _, bert = SessionStore(store).begin(lambda _session: "bert", "viewer", datetime.now(UTC), timedelta(hours=1))
-    known, unread = (reader_of(store.url, file) for _ in range(2))
-    everybody = {digest_of(token): Caller("anna", "viewer"), bert.token: bert}
-    assert known() == everybody
-    with store.writing() as session:
-        session.execute(text("DROP TABLE sessions"))
-    store.close()
+    with closing(migrated_store(file)) as store:
+        token = TokenStore(store).add("anna", "viewer", HandClock().utc())
+        _, bert = SessionStore(store).begin(lambda _session: "bert", "viewer", datetime.now(UTC), timedelta(hours=1))
+        known, unread = (reader_of(store.url, file) for _ in range(2))
+        everybody = {digest_of(token): Caller("anna", "viewer"), bert.token: bert}
+        assert known() == everybody
+        with store.writing() as session:
+            session.execute(text("DROP TABLE sessions"))
     assert known() == everybody, "who was known stays so"
     assert unread() == {digest_of(token): Caller("anna", "viewer")}
 
@@ -359,18 +352,17 @@ def test_no_stop_with_a_known_token_waits_for_a_database_that_does_not_answer() 
         return {}
 
     anna = Caller("anna", "viewer", digest_of("daq_anna"))
-    found = StopTokens(hangs, {digest_of("daq_anna"): anna}, clock.monotonic)
-    assert asked.wait(60)
-    clock.turn(3600)
-    assert found.remembered("daq_anna") == (True, anna)
-    assert found.look_up("daq_wrong") is None  # after a moment, from what is known
-    never = StopTokens(hangs, clock=clock.monotonic)
-    with pytest.raises(TokensCannotBeReadError, match="not answered"):
-        never.look_up("daq_anna")
-    never.update({digest_of("daq_anna"): anna})
-    assert never.look_up("daq_anna") == anna
-    answered.set()
-    found.close()
+    with closing(StopTokens(hangs, {digest_of("daq_anna"): anna}, clock.monotonic)) as found:
+        assert asked.wait(60)
+        clock.turn(3600)
+        assert found.remembered("daq_anna") == (True, anna)
+        assert found.look_up("daq_wrong") is None  # after a moment, from what is known
+        never = StopTokens(hangs, clock=clock.monotonic)
+        with pytest.raises(TokensCannotBeReadError, match="not answered"):
+            never.look_up("daq_anna")
+        never.update({digest_of("daq_anna"): anna})
+        assert never.look_up("daq_anna") == anna
+        answered.set()
     never.close()
 
 

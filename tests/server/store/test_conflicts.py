@@ -1,9 +1,7 @@
 """What a refusal says: people know experiments, traces, jobs and models by their names and times, not by numbers."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +15,6 @@ from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.models import ModelStore, NewModel
 from server.store.traces import TraceStore
-from tests.server.migrated import migrated_store
 from tests.server.store.rows import new_trace
 
 ROBOT = "ma2000"
@@ -26,12 +23,10 @@ TRACE = new_trace(0, created=NOW, name="loose belt")
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
+def store(sqlite_store: Store) -> Store:
     """A new database with one trace."""
-    made = migrated_store(tmp_path / "service.sqlite")
-    TraceStore(made).insert(TRACE)
-    yield made
-    made.close()
+    TraceStore(sqlite_store).insert(TRACE)
+    return sqlite_store
 
 
 def test_a_trace_in_use_names_itself_and_its_users(store: Store) -> None:

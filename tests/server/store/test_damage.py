@@ -74,9 +74,8 @@ def _opened(store: Store) -> None:
 @pytest.mark.parametrize("damage", AT_THE_START.values(), ids=AT_THE_START)
 def test_a_damaged_database_is_one_line_at_the_start_that_offers_the_backup(tmp_path: Path, damage: Damage) -> None:
     path = tmp_path / FILE
-    whole = Store(f"sqlite:///{path}")
-    whole.migrate()
-    whole.close()
+    with closing(Store(f"sqlite:///{path}")) as whole:
+        whole.migrate()
     for beside in tmp_path.glob(f"{FILE}-*"):
         beside.unlink()
     damage(path)
@@ -129,14 +128,13 @@ def test_a_table_that_breaks_while_it_runs_is_named_and_everything_else_goes_on(
 
 @pytest.mark.parametrize("address", ["postgresql://anna:secret@lab/daq", "postgresql://lab/daq?password=secret"])
 def test_no_line_about_damage_tells_the_password(tmp_path: Path, address: str) -> None:
-    store = Store(f"sqlite:///{tmp_path / FILE}")
-    store.migrate()
-    with store.writing() as session:
-        session.execute(text("DROP TABLE queues"))
-    store.place = masked(make_url(address))
-    with pytest.raises(DamagedError, match="queues") as refused:
-        store.require_sound()
-    store.close()
+    with closing(Store(f"sqlite:///{tmp_path / FILE}")) as store:
+        store.migrate()
+        with store.writing() as session:
+            session.execute(text("DROP TABLE queues"))
+        store.place = masked(make_url(address))
+        with pytest.raises(DamagedError, match="queues") as refused:
+            store.require_sound()
     assert "secret" not in str(refused.value)
     assert "lab/daq" in str(refused.value)
 
@@ -162,12 +160,11 @@ def test_a_backup_is_advised_against_damage_alone(code: int, restore: bool) -> N
 
 
 def test_what_fails_while_something_is_written_is_damage_only_where_a_row_is_to_blame(tmp_path: Path) -> None:
-    store = Store(f"sqlite:///{tmp_path / FILE}")
-    store.migrate()
-    with store.writing() as session:
-        session.execute(text("INSERT INTO queues VALUES ('a', 0, '', 'noon')"))
-    with pytest.raises(ValueError, match="invalid literal"), store.writing():
-        int("an error of this program")
-    with pytest.raises(DamagedError, match="table queues"), store.writing() as session:
-        session.get(QueueRow, "a")
-    store.close()
+    with closing(Store(f"sqlite:///{tmp_path / FILE}")) as store:
+        store.migrate()
+        with store.writing() as session:
+            session.execute(text("INSERT INTO queues VALUES ('a', 0, '', 'noon')"))
+        with pytest.raises(ValueError, match="invalid literal"), store.writing():
+            int("an error of this program")
+        with pytest.raises(DamagedError, match="table queues"), store.writing() as session:
+            session.get(QueueRow, "a")

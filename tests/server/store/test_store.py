@@ -1,5 +1,6 @@
 """The database: catalogue and cursors do what they say, each robot's rows its own."""
 
+from contextlib import closing
 from datetime import timedelta
 from pathlib import Path
 
@@ -42,9 +43,8 @@ def test_a_folders_name_is_no_syntax_of_an_address(tmp_path: Path, name: str) ->
     folder = tmp_path / name / "service"
     address = address_of(ServiceSettings(folder=folder))
     assert sqlite_file(address) == sqlite_file(address.render_as_string()) == folder / "service.sqlite"
-    store = Store(address)
-    store.migrate()
-    store.close()
+    with closing(Store(address)) as store:
+        store.migrate()
     assert [path.name for path in tmp_path.iterdir()] == [name]
     assert reader_of(str(address), folder / "service.sqlite")() == {}
 

@@ -315,12 +315,7 @@ def test_hashes_prints_the_tables_of_a_registration(daq: CommandLine) -> None:
     assert expected[thresholds] == sha256((source_tree() / thresholds).read_bytes()).hexdigest()
 
 
-STAGE_MODULES = (
-    "trials.blind",
-    "daq.owner",
-    "server.jobs.next_experiment",
-    "mock_controller",
-)
+STAGE_MODULES = ("trials.blind", "daq.owner", "server.jobs.next_experiment", "mock_controller")
 AROUND = ("daq_cli", "daq.client", "daq.config", "daq.executors")
 """What only the command line around a trial uses, which decides nothing."""
 

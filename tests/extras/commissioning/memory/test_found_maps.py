@@ -1,6 +1,7 @@
 """A map that was found is proved by smallest steps of a set point; a person completes it where a part is missing."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
@@ -78,23 +79,32 @@ def test_the_value_that_is_there_is_written_first_then_one_unit_more_and_at_last
 
 
 def test_steps_go_down_where_the_high_byte_would_change() -> None:
-    arm = Arm(510)
-    assert prove_by_command(arm, [evidence()], 1).step == -1
+    assert prove_by_command(Arm(510), [evidence()], 1).step == -1
 
 
-def test_a_drive_of_the_wrong_sign_ends_the_proof_and_the_old_value_is_written_again() -> None:
-    arm = Arm(500, sign=-1)
-    proof = prove_by_command(arm, [evidence()], 1)
-    assert "moves away from its set point" in proof.problem
-    assert arm.writes[-1] == (BASE + 4, 0xF4)
+WRONG_PLACE = JointEvidence(1, Pair(Place(0, 1), Place(4), 1.0, 0.0), None, evidence().set_point)
 
 
-def test_a_byte_that_does_not_keep_what_is_written_is_no_set_point() -> None:
-    arm = Arm(500, kept=False)
-    proof = prove_by_command(arm, [evidence()], 1)
-    assert not proof.proved
-    assert "stands there" in proof.problem
-    assert len(arm.writes) <= 3
+@pytest.mark.parametrize(
+    ("changes", "given", "problem", "most_writes"),
+    [
+        ({"sign": -1}, evidence(), "moves away from its set point", 3),
+        ({"kept": False}, evidence(), "stands there", 3),
+        ({}, evidence(proved=False), "not proved", 0),
+        ({}, WRONG_PLACE, "", 0),
+    ],
+    ids=["a drive of the wrong sign", "no set point", "a place that is not proved", "no error plus position"],
+)
+def test_a_proof_that_fails_says_why_and_leaves_the_old_value(
+    changes: dict[str, Any], given: JointEvidence, problem: str, most_writes: int
+) -> None:
+    arm = Arm(500, **changes)
+    proof = prove_by_command(arm, [given], 1)
+    assert proof.problem
+    assert problem in proof.problem
+    assert not (proof.proved and proof.sign >= 0)
+    assert len(arm.writes) <= most_writes
+    assert arm.writes[-1:] == ([(BASE + 4, 0xF4)] if most_writes else [])
 
 
 @pytest.mark.parametrize("changed", [0x2F4, 0x177])
@@ -122,21 +132,6 @@ def test_a_large_error_after_a_write_ends_the_proof() -> None:
 
     proof = prove_by_command(Stuck(500), [evidence()], 1)
     assert "the error of joint 1 is 30" in proof.problem
-
-
-def test_nothing_is_written_where_the_place_of_the_set_point_is_not_proved() -> None:
-    arm = Arm(500)
-    proof = prove_by_command(arm, [evidence(proved=False)], 1)
-    assert "not proved" in proof.problem
-    assert arm.writes == []
-
-
-def test_nothing_is_written_where_the_register_does_not_hold_error_plus_position() -> None:
-    arm = Arm(500)
-    wrong = JointEvidence(1, Pair(Place(0, 1), Place(4), 1.0, 0.0), None, evidence().set_point)
-    proof = prove_by_command(arm, [wrong], 1)
-    assert proof.problem
-    assert arm.writes == []
 
 
 def test_the_drives_get_no_power_while_an_error_is_large_or_unknown() -> None:

@@ -14,18 +14,8 @@ from tests.extras.formats.bags.test_ros_bag import bag
 
 def test_the_joints_that_are_named_become_a_trace(daq: CommandLine, tmp_path: Path) -> None:
     path = bag(tmp_path / "a", [{}] * 5, topics=("/left", "/right"))
-    words = (
-        "--topic",
-        "/right",
-        "--joints",
-        "lift, pan",
-        "--received",
-        "--drive-unit",
-        "none",
-        "--folder",
-        tmp_path / "kept",
-        "--json",
-    )
+    choice = ("--topic", "/right", "--joints", "lift, pan", "--received", "--drive-unit", "none")
+    words = (*choice, "--folder", tmp_path / "kept", "--json")
     made = json.loads(daq("traces", "import", path, *words).out)
     trace = read_trace(Path(made["file"]))
     np.testing.assert_array_equal(trace.position, [[-0.2 * k, 0.1 * k] for k in range(5)])

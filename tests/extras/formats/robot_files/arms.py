@@ -60,17 +60,8 @@ ARMS = {
         "pr2_description/urdf/pr2.urdf",
         (
             "torso_lift_joint",
-            *(
-                f"r_{part}_joint"
-                for part in (
-                    "shoulder_pan",
-                    "shoulder_lift",
-                    "upper_arm_roll",
-                    "elbow_flex",
-                    "forearm_roll",
-                    "wrist_flex",
-                )
-            ),
+            *(f"r_{part}_joint" for part in ("shoulder_pan", "shoulder_lift", "upper_arm_roll", "elbow_flex")),
+            *("r_forearm_roll_joint", "r_wrist_flex_joint"),
         ),
     ),
     "baxter, wrist and sliding finger": PublishedArm(

@@ -22,6 +22,16 @@ def robot(*parts: str, before: str = "") -> str:
     return f'<?xml version="1.0"?>{before}<robot name="Two arms">{"".join(parts)}</robot>'
 
 
+def turning(content: str = TURNING, *, kind: str = "revolute", carried: str = INERTIAL) -> str:
+    """One joint between two links."""
+    return robot(link("a"), link("b", carried), joint("j", "a", "b", kind, content))
+
+
+def unlike(number: str, other: str) -> str:
+    """The same where one number of what it carries is another."""
+    return turning(carried=INERTIAL.replace(f'"{number}"', f'"{other}"'))
+
+
 TWO_JOINTS = robot(
     link("base"), link("upper"), link("lower"), joint("shoulder", "base", "upper"), joint("elbow", "upper", "lower")
 )
@@ -45,40 +55,25 @@ HOSTILE: dict[str, tuple[str, str]] = {
     "MJCF": ('<mujoco><include file="/etc/passwd"/></mujoco>', "its outermost element is <mujoco>; a URDF has <robot>"),
     "no links": (robot(), "has no links"),
     "no joints": (robot(link("a")), "has no joint that moves"),
-    "NaN inertia": (
-        robot(link("a"), link("b", INERTIAL.replace('"0.03"', '"nan"')), joint("j", "a", "b")),
-        "link 'b': inertia iyy is 'nan'; a finite number is needed",
-    ),
-    "infinite mass": (
-        robot(link("a"), link("b", INERTIAL.replace('"2"', '"inf"')), joint("j", "a", "b")),
-        "link 'b': mass value is 'inf'",
-    ),
-    "decimal comma": (
-        robot(link("a"), link("b", INERTIAL.replace('"2"', '"2,5"')), joint("j", "a", "b")),
-        "link 'b': mass value is '2,5'; a finite number is needed",
-    ),
-    "negative mass": (
-        robot(link("a"), link("b", INERTIAL.replace('"2"', '"-2"')), joint("j", "a", "b")),
-        "link 'b': mass is -2.0 kg",
-    ),
-    "negative moment": (
-        robot(link("a"), link("b", INERTIAL.replace('"0.03"', '"-0.03"')), joint("j", "a", "b")),
-        "what joint 'j' carries has the negative moment of inertia",
-    ),
+    "NaN inertia": (unlike("0.03", "nan"), "link 'b': inertia iyy is 'nan'; a finite number is needed"),
+    "infinite mass": (unlike("2", "inf"), "link 'b': mass value is 'inf'"),
+    "decimal comma": (unlike("2", "2,5"), "link 'b': mass value is '2,5'; a finite number is needed"),
+    "negative mass": (unlike("2", "-2"), "link 'b': mass is -2.0 kg"),
+    "negative moment": (unlike("0.03", "-0.03"), "what joint 'j' carries has the negative moment of inertia"),
     "two numbers for three": (
-        robot(link("a"), link("b"), joint("j", "a", "b", content='<axis xyz="0 1"/>')),
+        turning('<axis xyz="0 1"/>'),
         "joint 'j': axis xyz is '0 1'; 3 finite numbers are needed",
     ),
     "an axis beyond measure": (
-        robot(link("a"), link("b"), joint("j", "a", "b", content='<axis xyz="1e308 1e308 0"/>')),
+        turning('<axis xyz="1e308 1e308 0"/>'),
         "joint 'j': axis xyz is '1e308 1e308 0'; 3 finite numbers are needed, ±1e+09 at most",
     ),
     "no axis to speak of": (
-        robot(link("a"), link("b"), joint("j", "a", "b", content='<axis xyz="0 0 0"/>')),
+        turning('<axis xyz="0 0 0"/>'),
         "joint 'j': axis xyz is [0.0, 0.0, 0.0]; a direction is needed",
     ),
     "limits the wrong way round": (
-        robot(link("a"), link("b"), joint("j", "a", "b", content='<limit lower="2" upper="1"/>')),
+        turning('<limit lower="2" upper="1"/>'),
         "joint 'j': limit lower 2.0 is above upper 1.0",
     ),
     "a loop": (
@@ -103,15 +98,9 @@ HOSTILE: dict[str, tuple[str, str]] = {
         "joint 'j': there is more than one of that name",
     ),
     "no such link": (robot(link("a"), joint("j", "a", "z")), "joint 'j': its child is 'z', which is no link"),
-    "a floating joint": (
-        robot(link("a"), link("b"), joint("j", "a", "b", "floating")),
-        "'j': is floating, it moves freely",
-    ),
-    "a planar joint": (
-        robot(link("a"), link("b"), joint("j", "a", "b", "planar")),
-        "'j': is planar, it moves in a plane",
-    ),
-    "an unknown joint": (robot(link("a"), link("b"), joint("j", "a", "b", "hinge")), "joint 'j': type is 'hinge'"),
+    "a floating joint": (turning(kind="floating"), "'j': is floating, it moves freely"),
+    "a planar joint": (turning(kind="planar"), "'j': is planar, it moves in a plane"),
+    "an unknown joint": (turning(kind="hinge"), "joint 'j': type is 'hinge'"),
     "a link without a name": (robot("<link/>"), "a <link> has no name"),
     "two arms": (
         robot(*map(link, "abc"), joint("left", "a", "b"), joint("right", "a", "c")),

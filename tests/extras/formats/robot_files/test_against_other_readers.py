@@ -11,11 +11,7 @@ from extras.formats.robot_files.machine_of_arm import machine_from_urdf
 from model.arrays import Floats
 from model.base_parameters.base_parameters import random_motion
 from model.base_parameters.grouping import DEPENDENT, grouped, preferred_order
-from model.base_parameters.standard import (
-    Motion,
-    inertial_regressor,
-    link_parameters,
-)
+from model.base_parameters.standard import Motion, inertial_regressor, link_parameters
 from model.dynamics import recursive
 from model.machine_model.model import base_model
 from model.simulation.chain_of_model import chain_of

@@ -4,7 +4,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from http.client import HTTPConnection
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -145,14 +145,13 @@ def faulty(store: ObjectStore) -> Iterator[FaultyStore]:
                     return
                 case fault:
                     pass
-            connection = HTTPConnection(str(behind.hostname), int(behind.port or 0), timeout=30)
-            connection.request(self.command, self.path, body, dict(self.headers))
-            answer = connection.getresponse()
-            content = answer.read()
-            headers = {name: value for name, value in answer.getheaders() if name.lower() not in HOP}
-            if fault == "wrong" and content:
-                content = bytes([content[0] ^ 1]) + content[1:]
-            connection.close()
+            with closing(HTTPConnection(str(behind.hostname), int(behind.port or 0), timeout=30)) as connection:
+                connection.request(self.command, self.path, body, dict(self.headers))
+                answer = connection.getresponse()
+                content = answer.read()
+                headers = {name: value for name, value in answer.getheaders() if name.lower() not in HOP}
+                if fault == "wrong" and content:
+                    content = bytes([content[0] ^ 1]) + content[1:]
             self._answer(answer.status, headers, content, cut=fault == "cut")
 
         def _answer(self, status: int, headers: dict[str, str], content: bytes, *, cut: bool = False) -> None:

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -147,72 +148,60 @@ def test_a_fetch_waits_until_the_store_is_back(
     assert bench.path(trace).read_bytes() == content
 
 
-def test_wrong_bytes_never_become_a_trace(bench: Bench, dropped: tuple[str, bytes], proxy: FaultyStore) -> None:
-    trace, content = dropped
-    proxy.fail("wrong", "GET")
-    bench.service.fetch(trace)
-    bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
-    transfer = bench.service.of(trace).transfer
-    assert transfer is not None
-    assert (transfer.state, transfer.problem[-30:]) == ("failed", "is not what was sent (SHA-256)"[-30:])
-    assert list(bench.catalogue.folder.iterdir()) == []
-    assert bench.service.fetch(trace).kind == "archive"
-    proxy.fail("")
-    assert bench.service.fetch(trace).kind == "trace-in-archive"
-    bench.until(lambda: bench.service.of(trace).local)
-    assert bench.path(trace).read_bytes() == content
-
-
-def test_bytes_that_were_wrong_once_are_fetched_again(
-    bench: Bench, dropped: tuple[str, bytes], proxy: FaultyStore
+@pytest.mark.parametrize("times", [1, None], ids=["once", "always"])
+def test_wrong_bytes_never_become_a_trace(
+    bench: Bench, dropped: tuple[str, bytes], proxy: FaultyStore, times: int | None
 ) -> None:
     trace, content = dropped
-    proxy.fail("wrong", "GET", times=1)
+    proxy.fail("wrong", "GET", times=times)
     bench.service.fetch(trace)
+    if times is None:
+        bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
+        transfer = bench.service.of(trace).transfer
+        assert transfer is not None
+        assert (transfer.state, transfer.problem[-30:]) == ("failed", "is not what was sent (SHA-256)"[-30:])
+        assert list(bench.catalogue.folder.iterdir()) == []
+        assert bench.service.fetch(trace).kind == "archive"
+        proxy.fail("")
+        assert bench.service.fetch(trace).kind == "trace-in-archive"
     bench.until(lambda: bench.service.of(trace).local)
     assert bench.path(trace).read_bytes() == content
 
 
-def test_an_object_that_was_damaged_since_is_found_before_the_local_copy_goes(bench: Bench, store: ObjectStore) -> None:
+@pytest.mark.parametrize("changes", ["the object is damaged", "the file is changed"])
+def test_a_local_copy_goes_only_when_the_archive_has_these_very_bytes(
+    bench: Bench, store: ObjectStore, changes: str
+) -> None:
     trace = bench.trace()
     bench.service.start()
     bench.until_archived(trace)
-    found = bench.archived.get(trace)
+    found, content = bench.archived.get(trace), bench.path(trace).read_bytes()
     assert found is not None
-    content = bench.path(trace).read_bytes()
     bucket = bench.service.status().place.split()[0]
-    store.client.put_object(Bucket=bucket, Key=found.object, Body=bytes(len(content)))
-    bench.clock.ahead = timedelta(hours=2)
+    if changes == "the file is changed":
+        content += b"more"
+        bench.path(trace).write_bytes(content)
+    else:
+        store.client.put_object(Bucket=bucket, Key=found.object, Body=bytes(len(content)))
+        bench.clock.ahead = timedelta(hours=2)
     bench.nobody_reads()
     bench.service.send_and_drop(trace, drop=True)
     bench.until(lambda: not bench.path(trace).exists())  # not before it was sent again
-    assert store.objects(bucket)[found.object] == content
-    assert any("the local copy stays, and is sent again" in line for line in bench.told)
-
-
-def test_a_file_that_has_changed_is_sent_again_before_it_goes(bench: Bench, store: ObjectStore) -> None:
-    trace = bench.trace()
-    bench.service.start()
-    bench.until_archived(trace)
-    changed = bench.path(trace).read_bytes() + b"more"
-    bench.path(trace).write_bytes(changed)
-    bench.nobody_reads()
-    bench.service.send_and_drop(trace, drop=True)
-    bench.until(lambda: not bench.path(trace).exists())
-    assert changed in store.objects(bench.service.status().place.split()[0]).values()
+    assert content in store.objects(bucket).values()
+    told = any("the local copy stays, and is sent again" in line for line in bench.told)
+    assert told is (changes == "the object is damaged")
 
 
 def test_old_copies_go_unless_they_are_used_opened_or_not_yet_archived(store: ObjectStore, make: Make) -> None:
-    bench = make(store.bucket(), store.url, keep_days=30)
-    old, used, opened = bench.trace(), bench.trace(), bench.trace()
-    _model_of(bench, used)
-    bench.nobody_reads()
-    bench.catalogue.path_of(opened)
-    bench.clock.ahead = timedelta(days=31)
-    bench.service.start()
-    bench.until(lambda: not bench.path(old).exists())
-    bench.until_archived(used, opened)
-    bench.close()
+    with closing(make(store.bucket(), store.url, keep_days=30)) as bench:
+        old, used, opened = bench.trace(), bench.trace(), bench.trace()
+        _model_of(bench, used)
+        bench.nobody_reads()
+        bench.catalogue.path_of(opened)
+        bench.clock.ahead = timedelta(days=31)
+        bench.service.start()
+        bench.until(lambda: not bench.path(old).exists())
+        bench.until_archived(used, opened)
     assert bench.path(used).exists()
     assert bench.path(opened).exists()
 
@@ -268,18 +257,6 @@ def test_a_deleted_trace_is_deleted_in_the_archive_even_if_that_is_away(
     proxy.fail("")
     bench.until(lambda: len(store.objects(bucket)) == 1)
     assert bench.archived.get(kept) is not None
-
-
-def test_a_fetch_without_room_says_so(
-    bench: Bench, dropped: tuple[str, bytes], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    trace, _ = dropped
-    monkeypatch.setattr("extras.lab.archive.service.RESERVE", 1 << 60)
-    bench.service.fetch(trace)
-    bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
-    transfer = bench.service.of(trace).transfer
-    assert transfer is not None
-    assert "MB are free, fetching needs" in transfer.problem
 
 
 def test_a_trace_of_the_archive_is_not_uploaded_a_second_time_and_without_an_archive_it_says_so(
@@ -361,7 +338,7 @@ def test_a_trace_that_always_fails_holds_up_no_other(bench: Bench, proxy: Faulty
     bench.until(lambda: bench.service.of(bad).local)
 
 
-def test_what_failed_before_somebody_asked_is_fetched_again(
+def test_what_failed_for_want_of_room_before_somebody_asked_is_fetched_again(
     bench: Bench, dropped: tuple[str, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trace, _ = dropped
@@ -370,6 +347,9 @@ def test_what_failed_before_somebody_asked_is_fetched_again(
         disk.setattr("extras.lab.archive.service.RESERVE", 1 << 60)
         bench.service.fetch_now(trace)
         bench.until(lambda: bench.counted.count(("fetch", "failed", 0)) == 1)
+        transfer = bench.service.of(trace).transfer
+        assert transfer is not None
+        assert "MB are free, fetching needs" in transfer.problem
         assert bench.service.bring([trace], full).state == "failed"
         bench.service.fetch_now(trace)
         bench.until(lambda: bench.counted.count(("fetch", "failed", 0)) == 2)

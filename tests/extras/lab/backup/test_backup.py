@@ -69,12 +69,11 @@ def add_trace(store: Store, places: Places, number: str, robot: str = "ma2000") 
 def filled(folder: Path) -> Places:
     """A service's folders with an experiment that waits, traces, a model and a job's result."""
     places = places_in(folder)
-    store = Store(places.url)
-    store.migrate()
-    ExperimentStore(store).submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
-    for number in ("aaa", "bbb"):
-        add_trace(store, places, number)
-    store.close()
+    with closing(Store(places.url)) as store:
+        store.migrate()
+        ExperimentStore(store).submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
+        for number in ("aaa", "bbb"):
+            add_trace(store, places, number)
     (places.traces["ma2000"] / "ccc.mcap.part").write_bytes(b"is being recorded")
     (places.service / "models").mkdir()
     (places.service / "models" / "0123456789ab.json").write_text("{}")
@@ -96,11 +95,8 @@ def everything(folder: Path) -> dict[str, bytes]:
 
 
 def traces_in(places: Places) -> list[str]:
-    store = Store(places.url)
-    with store.reading() as session:
-        found = list(session.scalars(select(TraceRow.file).order_by(TraceRow.file)))
-    store.close()
-    return found
+    with closing(Store(places.url)) as store, store.reading() as session:
+        return list(session.scalars(select(TraceRow.file).order_by(TraceRow.file)))
 
 
 @pytest.fixture
@@ -121,48 +117,43 @@ def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path
     assert {name: after[name] for name in set(after) - changed} == {name: before[name] for name in set(after) - changed}
     task = json.loads(after["service/jobs/0123456789ab/request.json"])
     assert task["traces"] == {"aaa": str(places.traces["ma2000"] / "aaa.mcap")}
-    store = Store(places.url)
-    store.migrate()
-    assert ExperimentStore(store).count_waiting("ma2000") == 1
-    store.close()
+    with closing(Store(places.url)) as store:
+        store.migrate()
+        assert ExperimentStore(store).count_waiting("ma2000") == 1
 
 
 @pytest.mark.parametrize("before", [None, QueueState(False, "resumed", NOW), QueueState(True, "by anna", NOW)])
 def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) -> None:
     here, there, later = filled(tmp_path / "here"), places_in(tmp_path / "there"), NOW + timedelta(days=7)
-    store = Store(here.url)
-    if before is not None:
-        QueueStore(store).set("ma2000", before)
-    store.close()
+    with closing(Store(here.url)) as store:
+        if before is not None:
+            QueueStore(store).set("ma2000", before)
     back_up(here, tmp_path / "arm.zip", NOW, quietly)
     restore(tmp_path / "arm.zip", there, later, quietly)
-    store = Store(there.url)
-    line = "restored from a backup: look at the arm, then resume the queue"
-    expected = before if before is not None and before.paused else QueueState(True, line, later)
-    assert QueueStore(store).get("ma2000") == expected
-    store.close()
+    with closing(Store(there.url)) as store:
+        line = "restored from a backup: look at the arm, then resume the queue"
+        expected = before if before is not None and before.paused else QueueState(True, line, later)
+        assert QueueStore(store).get("ma2000") == expected
 
 
 def test_what_may_have_ended_since_does_not_come_back(tmp_path: Path) -> None:
     here, there = filled(tmp_path / "here"), places_in(tmp_path / "there")
-    store = Store(here.url)
-    SessionStore(store).begin(lambda _session: "anna", "owner", NOW, timedelta(days=9))
-    experiments, review = ExperimentStore(store), Review.of("ma2000", load_machine("ma2000"), "operator")
-    made, _ = experiments.submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
-    content = review.content(experiments.get("ma2000", made.id).content)
-    experiments.approve("ma2000", made.id, review, Given(content, "bert", False), NOW)
-    with store.writing() as session:
-        row = {"id": "1", "destination": "x", "payload": "{}", "created": NOW, "next_attempt": NOW, "attempts": 0}
-        session.add(OutboxRow(**row, state="waiting"))
-    store.close()
+    with closing(Store(here.url)) as store:
+        SessionStore(store).begin(lambda _session: "anna", "owner", NOW, timedelta(days=9))
+        experiments, review = ExperimentStore(store), Review.of("ma2000", load_machine("ma2000"), "operator")
+        made, _ = experiments.submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
+        content = review.content(experiments.get("ma2000", made.id).content)
+        experiments.approve("ma2000", made.id, review, Given(content, "bert", False), NOW)
+        with store.writing() as session:
+            row = {"id": "1", "destination": "x", "payload": "{}", "created": NOW, "next_attempt": NOW, "attempts": 0}
+            session.add(OutboxRow(**row, state="waiting"))
     back_up(here, tmp_path / "arm.zip", NOW, quietly)
     restore(tmp_path / "arm.zip", there, NOW + timedelta(days=1), quietly)
-    store = Store(there.url)
-    assert SessionStore(store).callers(NOW) == {}
-    assert ExperimentStore(store).get("ma2000", made.id).approval is None
-    with store.reading() as session:
-        assert list(session.scalars(select(OutboxRow.state))) == ["given-up"]
-    store.close()
+    with closing(Store(there.url)) as store:
+        assert SessionStore(store).callers(NOW) == {}
+        assert ExperimentStore(store).get("ma2000", made.id).approval is None
+        with store.reading() as session:
+            assert list(session.scalars(select(OutboxRow.state))) == ["given-up"]
 
 
 def test_a_backup_is_for_nobody_else_to_read_and_never_written_over(archive: Path, tmp_path: Path) -> None:
@@ -177,12 +168,11 @@ def test_what_a_backup_names_is_in_it_however_much_is_written_meanwhile(tmp_path
     ended = threading.Event()
 
     def record() -> None:
-        store = Store(places.url)
-        number = 0
-        while not ended.is_set():
-            add_trace(store, places, f"n{number:04}")
-            number += 1
-        store.close()
+        with closing(Store(places.url)) as store:
+            number = 0
+            while not ended.is_set():
+                add_trace(store, places, f"n{number:04}")
+                number += 1
 
     writer = threading.Thread(target=record)
     writer.start()
@@ -217,13 +207,12 @@ def test_a_trace_that_is_archived_and_dropped_meanwhile_is_noted_as_archived(tmp
     store.close()
     assert manifest.left_out == ("traces/bbb.mcap",)
     restore(tmp_path / "arm.zip", there, NOW, quietly)
-    store = Store(there.url)
-    traces = TraceStore(store)
-    traces.archived = ArchivedStore(store)  # as the archive's part does
-    entries = [traces.get("ma2000", number) for number in ("aaa", "bbb")]
-    assert traces.archived.get("bbb") == made
-    assert [(one.local, one.archived) for one in entries] == [(True, False), (False, True)]
-    store.close()
+    with closing(Store(there.url)) as store:
+        traces = TraceStore(store)
+        traces.archived = ArchivedStore(store)  # as the archive's part does
+        entries = [traces.get("ma2000", number) for number in ("aaa", "bbb")]
+        assert traces.archived.get("bbb") == made
+        assert [(one.local, one.archived) for one in entries] == [(True, False), (False, True)]
 
 
 def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archive: Path, tmp_path: Path) -> None:
@@ -365,10 +354,9 @@ def test_what_a_backups_database_has_beside_this_programs_tables_is_not_brought_
     there = places_in(tmp_path / "there")
     done = restore(archive, there, NOW, quietly)
     assert done.removed == ("trigger spy", "view seen", 'table of "others"')
-    store = Store(there.url)
-    store.require_sound()
-    assert ExperimentStore(store).count_waiting("ma2000") == 1, "the trigger did not act while the queue was paused"
-    store.close()
+    with closing(Store(there.url)) as store:
+        store.require_sound()
+        assert ExperimentStore(store).count_waiting("ma2000") == 1, "the trigger did not act while the queue was paused"
     assert (there.service / "jobs" / "0123456789ab" / "request.json").read_text() == "[]", "no worker accepts it"
 
 
@@ -452,12 +440,11 @@ def test_a_backup_of_a_running_service_is_brought_back_elsewhere(
     assert said.code == 0, said.err
     assert f"{trace[:8]}" in daq("traces", "ls").out
     daq("restore", "../arm.zip").complains(2, "exist already")
-    store = Store(f"sqlite:///{tmp_path / 'elsewhere' / 'service' / 'service.sqlite'}")
-    experiments = ExperimentStore(store)
-    assert experiments.get("ma2000", done).state == "done"
-    assert experiments.get("ma2000", waits).state == "queued"
-    assert [one.id for one in experiments.settle_after_restart("ma2000", NOW)] == [long]
-    store.close()
+    with closing(Store(f"sqlite:///{tmp_path / 'elsewhere' / 'service' / 'service.sqlite'}")) as store:
+        experiments = ExperimentStore(store)
+        assert experiments.get("ma2000", done).state == "done"
+        assert experiments.get("ma2000", waits).state == "queued"
+        assert [one.id for one in experiments.settle_after_restart("ma2000", NOW)] == [long]
 
 
 def test_what_cannot_be_backed_up_or_restored_is_one_line(daq: CommandLine, tmp_path: Path) -> None:
@@ -480,11 +467,10 @@ def test_the_configured_places(tmp_path: Path) -> None:
 
 def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> None:
     here, there = (places_in(tmp_path / name, "left", "right") for name in ("here", "there"))
-    store = Store(here.url)
-    store.migrate()
-    for number, robot in (("aaa", "left"), ("bbb", "right"), ("ccc", "right")):
-        add_trace(store, here, number, robot)
-    store.close()
+    with closing(Store(here.url)) as store:
+        store.migrate()
+        for number, robot in (("aaa", "left"), ("bbb", "right"), ("ccc", "right")):
+            add_trace(store, here, number, robot)
     (here.traces["right"] / "ccc.mcap").unlink()  # only the archive has it
     job = here.service / "jobs" / "0123456789ab"
     job.mkdir(parents=True)
@@ -499,18 +485,16 @@ def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> No
     assert [path.name for path in there.traces["right"].glob("*.mcap")] == ["bbb.mcap"]
     found = json.loads((there.service / "jobs" / "0123456789ab" / "request.json").read_text())
     assert found["traces"] == {number: str(there.traces["right"] / f"{number}.mcap") for number in ("bbb", "ccc")}
-    store = Store(there.url)
-    states = [QueueStore(store).get(robot) for robot in ("left", "right")]
-    store.close()
+    with closing(Store(there.url)) as store:
+        states = [QueueStore(store).get(robot) for robot in ("left", "right")]
     assert all(state is not None and state.paused for state in states)
 
 
 @pytest.mark.parametrize("name", ["why?", "a%41b", "50%", "a#b", "x?mode=memory&y", "ü :@"])
 def test_a_database_is_read_whatever_its_folder_is_called(tmp_path: Path, name: str) -> None:
     places = places_in(tmp_path / name)
-    store = Store(places.url)
-    store.migrate()
-    store.close()
+    with closing(Store(places.url)) as store:
+        store.migrate()
     assert revision_of(places.database) == max(migrations()[VERSION])
     assert head_of_audit(places.database) == "nothing"
 

@@ -100,14 +100,6 @@ def test_a_cluster_gives_the_same_table_as_this_computer(tmp_path: Path) -> None
     assert tables[0] == tables[1]
 
 
-def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path: Path) -> None:
-    traces = folder_of_traces(tmp_path / "traces", 1)
-    url = "dask://127.0.0.1:9"
-    done = daq("batch", "simulate", traces, "--out", tmp_path / "out", "--executor", url)
-    assert done.returncode == 3
-    assert "executor dask://127.0.0.1:9: no scheduler answers" in done.stderr.splitlines()[-1]
-
-
 def test_jobs_are_answered_once_with_their_own_errors_and_a_missing_scheduler_is_told_in_one_line() -> None:
     """As far as one process shows it."""
     found = json.loads(finished("tests.extras.lab.batches.one_process_cluster").stdout)

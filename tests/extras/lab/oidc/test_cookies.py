@@ -1,6 +1,6 @@
 """Names of the cookies of people who sign in."""
 
-from contextlib import suppress
+from contextlib import closing, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
@@ -97,9 +97,8 @@ def test_a_browser_takes_both_cookies_over_tls_and_a_page_of_another_path_or_hos
             for name in names:
                 _set_cookie(answer, services, name, "secret", GOOD_FOR, "lax")
             set_cookies[:] = [one + spoilt for one in answer.headers.getlist("set-cookie")]
-            context = browser.new_context(ignore_https_errors=True)
-            context.new_page().goto(f"{address}/")
-            kept = {one["name"] for one in context.cookies()}
-            assert kept == (set() if spoilt else set(names)), (spoilt, kept)
-            context.close()
+            with closing(browser.new_context(ignore_https_errors=True)) as context:
+                context.new_page().goto(f"{address}/")
+                kept = {one["name"] for one in context.cookies()}
+                assert kept == (set() if spoilt else set(names)), (spoilt, kept)
         server.shutdown()

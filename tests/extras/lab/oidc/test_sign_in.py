@@ -227,14 +227,6 @@ def test_two_services_at_one_host_name_keep_their_sessions_apart(
         assert stops() == [200, 401]
 
 
-def test_a_secret_of_a_session_is_not_in_the_database(browser: Browser, provider: Provider) -> None:
-    browser.sign_in(provider)
-    secret = browser.client.cookies[_cookie(browser.service)]
-    files = [path for path in (browser.service.folder / "service").glob("service.sqlite*") if path.is_file()]
-    assert files
-    assert all(secret.encode() not in path.read_bytes() for path in files)
-
-
 def _rows(service: Service, action: str, subject: str | None = None) -> list[tuple[str, str]]:
     """Outcome and detail of the audit log's rows, as soon as there is one."""
     query = "SELECT outcome, detail FROM audit WHERE action = ? AND (? IS NULL OR subject = ?)"
@@ -250,17 +242,20 @@ def test_refused_sign_ins_and_sign_outs_by_command_have_rows(provider: Provider,
         assert browser.back(f"{service.url}/api/v1/login/callback?state=unknown") == "/?sign-in=sign-in-unknown"
         assert _rows(service, "finish_login") == [("refused", "sign-in-unknown")]
         browser.sign_in(provider)
-        store = Store(f"sqlite:///{service.folder / 'service' / 'service.sqlite'}")
-        now = datetime.now(UTC)
-        assert SessionStore(store).end_all("anna", now, "root") == 1
-        assert SessionStore(store).end_all("anna", now, "root") == 0
-        store.close()
+        with closing(Store(f"sqlite:///{service.folder / 'service' / 'service.sqlite'}")) as store:
+            now = datetime.now(UTC)
+            assert SessionStore(store).end_all("anna", now, "root") == 1
+            assert SessionStore(store).end_all("anna", now, "root") == 0
         assert _rows(service, "sign_out", "anna") == [("done", "")]
 
 
-def test_a_session_s_secret_is_no_token(browser: Browser, provider: Provider) -> None:
+def test_a_session_s_secret_is_not_in_the_database_and_is_no_token(browser: Browser, provider: Provider) -> None:
     browser.sign_in(provider)
-    headers = {"Authorization": f"Bearer {browser.client.cookies[_cookie(browser.service)]}"}
+    secret = browser.client.cookies[_cookie(browser.service)]
+    files = [path for path in (browser.service.folder / "service").glob("service.sqlite*") if path.is_file()]
+    assert files
+    assert all(secret.encode() not in path.read_bytes() for path in files)
+    headers = {"Authorization": f"Bearer {secret}"}
     for path in ("/api/v1/robots/ma2000/queue/pause", "/api/v1/robots/ma2000/stop"):
         answer = httpx.post(f"{browser.service.url}{path}", headers=headers, timeout=TIMEOUT)
         assert kind_of(answer) == (401, "token-unknown")

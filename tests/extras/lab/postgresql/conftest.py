@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import pytest
 
 from server.store.engine import Store
-from tests.extras.lab.postgresql.databases import postgresql, sqlite_store
 from tests.extras.lab.postgresql.server import PostgresServer
 
 
@@ -15,6 +14,3 @@ def store(postgresql: PostgresServer) -> Iterator[Store]:
     made = Store(postgresql.database(template="made1"))
     yield made
     made.close()
-
-
-__all__ = ["postgresql", "sqlite_store", "store"]

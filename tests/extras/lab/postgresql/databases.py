@@ -1,13 +1,14 @@
 """Databases of both kinds, new for each test."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from server.store.engine import Store
 from tests.extras.lab.postgresql.server import PostgresServer, programs, running_postgresql
-from tests.server.store.conftest import sqlite_store
+from tests.server.conftest import sqlite_store
 
 
 @pytest.fixture(scope="package")
@@ -17,9 +18,8 @@ def postgresql() -> Iterator[PostgresServer]:
     if found is None:
         pytest.skip("PostgreSQL is not installed")
     with running_postgresql(found) as server:
-        made = Store(server.database())
-        made.migrate()
-        made.close()
+        with closing(Store(server.database())) as made:
+            made.migrate()
         yield server
 
 

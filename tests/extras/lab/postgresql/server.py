@@ -37,18 +37,8 @@ class PostgresServer:
             made.mkdir(mode=0o700)
             if self._user is not None:
                 shutil.chown(made, self._user)
-        self._run(
-            "initdb",
-            "--pgdata",
-            str(self._data),
-            "--auth",
-            "trust",
-            "--auth-host",
-            "scram-sha-256",
-            "--encoding",
-            "UTF8",
-            "--no-sync",
-        )
+        told = "--auth trust --auth-host scram-sha-256 --encoding UTF8 --no-sync"
+        self._run("initdb", "--pgdata", str(self._data), *told.split())
         self._made = 0
         self.start()
 

@@ -1,5 +1,6 @@
 """PostgreSQL below the service: one service at a time, nothing lost when its server ends, wrong values refused."""
 
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -48,28 +49,25 @@ def test_the_lock_is_taken_again_after_the_server_was_away_unless_another_servic
 ) -> None:
     address = postgresql.database()
     engine = open_engine(address)
-    lock = ServerLock(engine, "database", _must_not_be_called)
-    postgresql.stop()
-    assert lock.look()  # nobody else can have it
-    postgresql.start()
-    assert lock.look()
-    with pytest.raises(InUseError), sole_use(address):
-        pass
-    postgresql.stop()
-    postgresql.start()
-    with sole_use(address):
-        assert not lock.look()
-    lock.close()
+    with closing(ServerLock(engine, "database", _must_not_be_called)) as lock:
+        postgresql.stop()
+        assert lock.look()  # nobody else can have it
+        postgresql.start()
+        assert lock.look()
+        with pytest.raises(InUseError), sole_use(address):
+            pass
+        postgresql.stop()
+        postgresql.start()
+        with sole_use(address):
+            assert not lock.look()
     engine.dispose()
 
 
 def test_the_stop_listener_reads_its_tokens_there(postgresql: PostgresServer) -> None:
     address = postgresql.database(template="made1")
-    store = Store(address)
-    with store.writing() as session:
+    with closing(Store(address)) as store, store.writing() as session:
         row = {"id": "1", "name": "anna", "role": "operator", "digest": "d", "created": NOW.replace(tzinfo=None)}
         session.execute(text("INSERT INTO tokens VALUES (:id, :name, :role, :digest, :created, NULL)"), row)
-    store.close()
     callers = reader_of(address, None)()
     assert {digest: (caller.name, caller.role) for digest, caller in callers.items()} == {"d": ("anna", "operator")}
 
@@ -78,9 +76,8 @@ def test_the_service_keeps_everything_in_it_and_refuses_what_it_cannot_hold(
     postgresql: PostgresServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     address = postgresql.database(template="made1")
-    store = Store(address)
-    TraceStore(store).insert(new_trace(1))
-    store.close()
+    with closing(Store(address)) as store:
+        TraceStore(store).insert(new_trace(1))
     with service_inside(tmp_path, SystemClock(), monkeypatch, address) as api:
         assert api.post("/queue/pause", json={}).status_code == 200
         made = api.post("/experiments", json={}).json()
