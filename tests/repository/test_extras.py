@@ -1,7 +1,8 @@
-"""What needs an extra that is not installed says in one line which one, from Python and on the command line."""
+"""What needs an extra says in one line which one; and the command starts fast."""
 
 import json
 import re
+import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
@@ -77,15 +78,12 @@ def test_the_table_of_packages_and_extras_is_that_of_the_package() -> None:
         assert set(found) == contained[name] | {deeper for extra in contained[name] for deeper in contained[extra]}
 
 
-def test_all_is_everything() -> None:
+def test_all_is_everything_and_a_client_needs_little() -> None:
     (line,) = EXTRAS["all"]
     found = set(line.extras)
     found |= {inner for extra in found for inner in CONTAINS.get(extra, ())}
     assert found | {"all", "client"} == set(EXTRAS)
     assert set(get_args(Extra)) == found
-
-
-def test_a_client_needs_little() -> None:
     asked = {Requirement(line).name for line in PROJECT["dependencies"]}
     assert asked == {"httpx", "lz4", "mcap", "numpy", "pint", "pydantic", "zstandard"}
     assert EXTRAS["client"] == []
@@ -179,3 +177,26 @@ def test_what_needs_a_package_only_when_it_is_called_says_so_then(
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(MissingExtraError, match=line.replace("[", r"\[")):
         needs_it()
+
+
+# ---- The command starts fast because no heavy library is loaded before a subcommand's work begins
+
+HEAVY = ["numba", "mujoco", "matplotlib", "fastapi", "scipy"]
+
+EVERY_SUBCOMMAND = """
+import importlib, json, pkgutil, sys
+import daq_cli
+modules = [module.name for module in pkgutil.walk_packages(daq_cli.__path__, "daq_cli.")]
+for name in modules:
+    if not name.endswith("__main__"):
+        importlib.import_module(name)
+print(json.dumps([modules, sorted({name.partition(".")[0] for name in sys.modules})]))
+"""
+
+
+def test_importing_the_command_line_and_every_subcommand_loads_no_heavy_library() -> None:
+    program = [sys.executable, "-c", EVERY_SUBCOMMAND]
+    run = subprocess.run(program, check=True, capture_output=True, text=True, timeout=60)
+    modules, loaded = json.loads(run.stdout)
+    assert "daq_cli.app.command" in modules
+    assert [name for name in HEAVY if name in loaded] == []
