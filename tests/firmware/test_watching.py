@@ -208,7 +208,7 @@ def test_without_gains_and_gripper_the_bridge_refuses_them_and_writes_nothing(br
             lambda: robot.write_outputs(1, 1),
             lambda: robot.set_gripper(closed=True),
         ):
-            with pytest.raises(RequestRefusedError, match="memory map leaves out the registers"):
+            with pytest.raises(RequestRefusedError, match="memory map lacks the registers"):
                 refused()
         assert set(robot.errors_positions_powers()) == {1, 2, 3, 4, 5, 6}
         assert told_by(control, "written")["written"] == {}

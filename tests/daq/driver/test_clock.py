@@ -179,9 +179,9 @@ def test_no_rate_takes_more_of_the_line_than_may_be_taken_and_none_faster_would_
 def test_rates_are_told_with_joints_share_and_stop_for_one_for_three_and_for_all() -> None:
     words = line_rate(1920, PERIOD, 3, 3, can_be_compact=True).in_words
     assert words == (
-        "25 samples a second of 3 joints, every 2nd control period, 74 % of the line; a stop takes up to 45 ms"
+        "25 samples per second of 3 joints, every 2nd control period, 74 % of the line; a stop takes up to 45 ms"
     )
-    assert line_rate(11520, PERIOD, 1, 1).in_words.startswith("50 samples a second of 1 joint, every control period")
+    assert line_rate(11520, PERIOD, 1, 1).in_words.startswith("50 samples per second of 1 joint, every control period")
     found = told_rates(1920, PERIOD, can_be_compact=True)
     assert [(rate.joints, rate.moving) for rate in found] == [(1, 1), (3, 3), (6, 6)]
     assert found == tuple(line_rate(1920, PERIOD, joints, joints, can_be_compact=True) for joints in (1, 3, 6))

@@ -53,7 +53,7 @@ def test_a_host_that_another_has_replaced_commands_no_more(
     controller: Controller, endpoint: InProcess, command: Callable[[Controller], object]
 ) -> None:
     greeted_by_another(endpoint)
-    with pytest.raises(RequestRefusedError, match="another host has taken the control; connect again") as caught:
+    with pytest.raises(RequestRefusedError, match="another host has taken control; connect again") as caught:
         command(controller)
     assert caught.value.reason == Refusal.BAD_SESSION
     assert controller.next_snapshot().positions, "reading goes on"
@@ -80,14 +80,14 @@ def test_a_release_ends_the_stop_that_it_names_and_no_later_one(controller: Cont
     seen = controller.status().stop
     endpoint.bridge.receive(to_frame(0, Stop()))
     greeted_by_another(endpoint)
-    with pytest.raises(RequestRefusedError, match="another stop has come meanwhile, and holds"):
+    with pytest.raises(RequestRefusedError, match="a newer stop is in force"):
         controller.release(seen)
     assert endpoint.board.frozen
     controller.release(controller.status().stop)
     assert not endpoint.board.frozen
     assert controller.stop().acknowledged
     endpoint.bridge.before = Release
-    with pytest.raises(RequestRefusedError, match="another stop has come meanwhile, and holds"):
+    with pytest.raises(RequestRefusedError, match="a newer stop is in force"):
         controller.release(controller.status().stop)
     assert endpoint.board.frozen
     controller.release(controller.status().stop)

@@ -121,9 +121,9 @@ def test_a_word_of_the_parent_is_a_stop_and_a_reset_forgets_only_what_came_befor
     with guarded() as scene:
         before = time.monotonic()
         request_stop()
-        assert not scene.guardian.forget(before)
+        assert not scene.guardian.clear_cause(before)
         assert scene.guardian.cause is EndCause.STOP
-        assert scene.guardian.forget(time.monotonic())
+        assert scene.guardian.clear_cause(time.monotonic())
         assert scene.guardian.cause is None
     with guarded() as scene:
         os.write(scene.parent, 2 * CANCEL)
@@ -160,7 +160,7 @@ def test_a_socket_whose_folder_is_removed_is_made_again_and_who_had_found_it_is_
         while not (found := request_stop()) and time.monotonic() < until:
             time.sleep(guardian.LOOK_EVERY / 10)
         assert [attempt.answer for attempt in found] == [CONFIRMED]
-        assert scene.guardian.unheard == ""
+        assert scene.guardian.socket_problem == ""
 
 
 def test_stops_of_two_threads_at_once_are_both_answered_and_a_reset_between_them_forgets_nothing() -> None:
@@ -179,10 +179,10 @@ def test_stops_of_two_threads_at_once_are_both_answered_and_a_reset_between_them
             go_on.release()
             done, (left,) = wait([first, second], timeout=10, return_when=FIRST_COMPLETED)
             assert [one.result() for one in done] == [CONFIRMED]
-            assert not watched.forget(time.monotonic()), "the other one is still under way"
+            assert not watched.clear_cause(time.monotonic()), "the other one is still under way"
             go_on.release()
             assert left.result(10) == CONFIRMED
-        assert watched.forget(time.monotonic())
+        assert watched.clear_cause(time.monotonic())
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
@@ -193,9 +193,9 @@ def test_a_guardian_that_fails_freezes_the_arm_and_ends_the_run() -> None:
         os.close(reader)  # under its hands: reading it fails
         os.write(guardian._wake_write, b"\0")
         freezes.wait()
-        assert guardian.cause is EndCause.DEAF
+        assert guardian.cause is EndCause.LISTENER_FAILED
     os.close(writer)
-    assert freezes.causes == [EndCause.DEAF.value]
+    assert freezes.causes == [EndCause.LISTENER_FAILED.value]
 
 
 # ---- Whoever asks for a stop is answered in time, with what is known by then

@@ -275,7 +275,7 @@ def test_a_stop_after_the_reset_was_asked_for_holds(scene: Scene, here: bool) ->
     """The owner came to the reset late: it was repeating another request on a bad line."""
     asked = time.monotonic()
     scene.press_stop()
-    with pytest.raises(SafetyError, match=f"stopped since this was asked for .{EndCause.STOP.value}"):
+    with pytest.raises(SafetyError, match=f"stopped after this request was sent .{EndCause.STOP.value}"):
         scene.reset(here=here, asked=asked)
     assert scene.is_stopped()
     assert scene.guardian.cause is EndCause.STOP
@@ -289,7 +289,7 @@ def test_a_stop_while_the_reset_is_carried_out_holds(
     scene: Scene, here: bool, request_under_way: type[Request]
 ) -> None:
     scene.between(request_under_way, scene.press_stop)
-    with pytest.raises(SafetyError, match="ask again"):
+    with pytest.raises(SafetyError, match="try again"):
         scene.reset(here=here)
     assert scene.is_stopped()
     assert scene.guardian.cause is EndCause.STOP
@@ -297,7 +297,7 @@ def test_a_stop_while_the_reset_is_carried_out_holds(
 
 def test_a_stop_just_before_the_one_of_a_reset_here_holds(scene: Scene) -> None:
     scene.between(Stop, scene.press_stop)
-    with pytest.raises(SafetyError, match="stopped since this was asked for"):
+    with pytest.raises(SafetyError, match="stopped after this request was sent"):
         scene.reset(here=True)
     assert scene.is_stopped()
     assert scene.guardian.cause is EndCause.STOP
@@ -306,7 +306,7 @@ def test_a_stop_just_before_the_one_of_a_reset_here_holds(scene: Scene) -> None:
 @pytest.mark.parametrize("here", [False, True])
 def test_a_stop_of_another_computer_holds(scene: Scene, here: bool) -> None:
     scene.between(Release, scene.endpoint.bridge.hear_a_stop)
-    with pytest.raises(SafetyError, match="stopped since this was asked for: look at it, then ask again"):
+    with pytest.raises(SafetyError, match="stopped after this request was sent: look at it, then try again"):
         scene.reset(here=here)
     assert scene.is_stopped()
     assert scene.control.halted is not None
@@ -321,7 +321,7 @@ def test_a_reset_ends_no_stop_that_its_sender_had_not_seen_however_late_it_is_sa
     """The service was so busy that the reset got the time at which it was read."""
     seen = scene.newest_stop()
     scene.press_stop()
-    with pytest.raises(SafetyError, match="stopped since this was asked for"):
+    with pytest.raises(SafetyError, match="stopped after this request was sent"):
         scene.reset(here=here, stop=seen)
     assert scene.is_stopped()
 
@@ -331,7 +331,7 @@ def test_what_arrived_before_the_newest_stop_changes_nothing_after_its_reset(sce
     scene.press_stop()
     scene.reset(here=False)
     late = MoveGripper(number=1, asked=asked, closed=True, while_stopped=True)
-    with pytest.raises(SafetyError, match="gripper: the arm has been stopped since this was asked for"):
+    with pytest.raises(SafetyError, match="gripper: the arm has been stopped after this request was sent"):
         carry_out(scene.robot, late)
     carry_out(scene.robot, late.model_copy(update={"asked": time.monotonic()}))
 

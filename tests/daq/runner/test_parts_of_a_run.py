@@ -272,7 +272,7 @@ def test_a_status_has_the_rates_of_its_line_and_the_longest_time_of_a_stop(baud:
 def test_one_line_tells_the_rates_and_the_stop_as_far_as_they_are_known() -> None:
     line = rates_line(with_rates(LINK, 1920.0, identity()))
     assert (
-        line == "the line gives samples a second: 1 joint 16.7, 3 joints 16.7, 6 joints 12.5; a stop takes up to 45 ms"
+        line == "samples per second on this line: 1 joint 16.7, 3 joints 16.7, 6 joints 12.5; a stop takes up to 45 ms"
     )
     found = with_rates(LINK, 1920.0, identity(samples=False))
     assert (found.rates, found.stop_seconds) == ((), pytest.approx(66 / 1920 + 0.010))

@@ -108,7 +108,7 @@ def test_a_run_on_a_slow_line_is_complete_and_says_at_what_rate(tmp_path: Path) 
     assert trace.tick is not None
     assert set(np.diff(trace.tick)) == {2}
     (told,) = [event.message for event in trace.events if event.message.startswith("slow line")]
-    assert told.startswith("slow line: 25 samples a second of 3 joints, every 2nd control period")
+    assert told.startswith("slow line: 25 samples per second of 3 joints, every 2nd control period")
 
 
 # ---- Set points that the computer sends late are told: the controller has then worked with the one before

@@ -35,7 +35,7 @@ def test_an_arm_that_follows_is_left_alone() -> None:
     assert guards.check(row(1, error=(128, 0, 0)), {}).findings == ()
     verdict = guards.check(row(2, error=(127, 0, 0)), {})
     assert not verdict.hold
-    assert [(f.kind, f.message) for f in verdict.findings] == [("resume", "set points go on after 0.04 s")]
+    assert [(f.kind, f.message) for f in verdict.findings] == [("resume", "set points continue after 0.04 s")]
 
 
 @pytest.mark.parametrize(("error", "held"), [(127, False), (128, True), (-127, False), (-128, True)])
@@ -50,7 +50,7 @@ def test_a_pause_is_counted_from_its_first_period_and_one_that_lasts_is_a_fault(
     assert guards.check(row(100, error=(0, -130, 0)), {}).findings == (
         Finding("pause", "joint 2: positional error of -130 ADC counts, set points pause outside ±127", 2),
     )
-    assert guards.check(row(103), {}).findings[-1].message == "set points go on after 0.06 s"
+    assert guards.check(row(103), {}).findings[-1].message == "set points continue after 0.06 s"
     guards = running()
     verdicts = [guards.check(row(tick, error=(0, 0, 130)), {}) for tick in range(27)]
     assert [bool(verdict.trips) for verdict in verdicts] == [False] * 26 + [True]
@@ -177,7 +177,7 @@ def test_missing_control_periods_are_reported() -> None:
     guards = RunningGuards(MA2000, LIMITS, (1, 2, 3), (1, 2, 3), every=3)
     assert guards.check(row(10), {}) == guards.check(row(13), {}) == Verdict()
     (finding,) = guards.check(row(19), {}).findings
-    assert finding.message == "ticks 13 and 19 are 6 control periods apart, 3 were asked for"
+    assert finding.message == "ticks 13 and 19 are 6 control periods apart, 3 were requested"
     guards = running()
     guards.check(row(5), {})
     guards.check(row(15), {})
@@ -241,7 +241,7 @@ def test_missed_set_points_are_counted_and_a_run_of_them_is_a_fault() -> None:
     (finding,) = guards.check(row(1), start, expected={1: 502}).findings
     assert finding.message == "joint 1: tick 1 took posture 500, sent was 502"
     (finding,) = running().check(row(9, status=StatusFlag.SET_POINT_MISSED), {}).findings
-    assert finding.message == "tick 9: the controller wanted the memory while the host had it"
+    assert finding.message == "tick 9: the controller could not read its set points: the host had the memory"
 
 
 @given(st.lists(st.tuples(st.integers(-300, 300), st.integers(400, 600)), max_size=60))

@@ -30,7 +30,7 @@ from daq.transport import (
     ports,
     terminal_at,
 )
-from daq.transport.holders import _ours, other_holders, sharing_words
+from daq.transport.holders import _ours, other_holders, shared_port_advice
 from daq.transport.url import serial_url
 
 
@@ -158,14 +158,14 @@ def test_a_port_has_one_owner_and_a_stranger_that_reads_is_named(terminal: tuple
         other = subprocess.Popen(["sleep", "60"], stdin=held)
     try:
         assert other_holders(device) == []  # what this process started is no stranger
-        asked = f"from daq.transport import holders; print(holders.sharing_words({device!r}))"
+        asked = f"from daq.transport import holders; print(holders.shared_port_advice({device!r}))"
         told = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout
         assert f"sleep (process {other.pid}) has {device} open too, and takes its bytes: end that program" in told
     finally:
         other.kill()
         other.wait()
-    assert "ModemManager and brltty open new ports by themselves" in sharing_words(device)
-    assert sharing_words("127.0.0.1:5000") == ""
+    assert "ModemManager and brltty open new ports by themselves" in shared_port_advice(device)
+    assert shared_port_advice("127.0.0.1:5000") == ""
     me = os.getpid()
     parents = {1: 0, 10: 1, 11: 10, me: 11, me + 1: me, me + 2: me + 1, 12: 10, me + 3: 12}
     assert _ours(parents) == {10, 11, me, me + 1, me + 2}

@@ -260,7 +260,7 @@ def written(folder: Path, parameter: str = PARAMETER, torque: str = TORQUE, name
     ("fields", "said"),
     [
         ({"name": "Pull-1"}, "write lower-case"),
-        ({"name": "backlash"}, "the library has an effect backlash"),
+        ({"name": "backlash"}, "the library already has an effect backlash"),
         ({"parameter": 'OwnParameter("q", unit="N·m", deviation=0.1)'}, "parameter q is not an argument"),
         ({"parameter": 'OwnParameter("k", unit="N·m", deviation=-1)'}, "expected deviation -1 must be above"),
         ({"parameter": 'OwnParameter("k", unit="N·m", deviation=1, low=2, high=1)'}, "lower bound 2 is not below"),

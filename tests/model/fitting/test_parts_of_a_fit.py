@@ -51,7 +51,7 @@ def test_what_a_fit_knows_has_an_interval_within_bounds_and_what_it_does_not_the
     own = Unknown(mass, 1.0, expected=1.1)
     verdict = judged(np.array([[100.0]]), np.ones(1), [own]).verdict("load.mass")
     assert fitted_parameter(own, 1.0, 0.1, verdict).expected is None
-    assert verdict.reason == "the data alone give it to 0.01 of its value"
+    assert verdict.reason == "the data alone determine it to 0.01 of its value"
     assert verdict.expected_deviation is None
 
 
@@ -70,12 +70,12 @@ def test_a_parameter_is_known_where_the_data_leave_half_of_its_size_unless_other
         report = judged(np.array([[slope]]), np.ones(1), [unknown("a", "m", 1.0, 1.0)])
         assert report.verdict("a").verdict == verdict
     told = judged(np.array([[20.0]]), np.ones(1), [unknown("a", "m", 1.0, 0.5)]).verdict("a")
-    assert told.reason == "the data alone give it to 0.1 of its expected deviation"
+    assert told.reason == "the data alone determine it to 0.1 of its expected deviation"
     assert (told.data_deviation, told.alone, told.expected_deviation) == (pytest.approx(0.05), pytest.approx(0.05), 0.5)
     jacobian = np.array([[10.0, 10.0]])
     told = judged(jacobian, np.ones(2), [unknown("a", "m", 1.0, 0.5), unknown("b", "m", 1.0, 0.5)]).verdict("a")
     assert told.verdict == "combination"
-    assert told.reason.startswith("alone it would be known to 0.2 of its expected deviation, but others can stand in")
+    assert told.reason.startswith("alone it would be known to 0.2 of its expected deviation, but others can compensate")
     assert told.reason.endswith((": together a +1 %, b −1 %", ": together a −1 %, b +1 %"))
     assert (told.alone, told.data_deviation) == (pytest.approx(0.1), None)
 
@@ -207,7 +207,7 @@ def test_the_simplex_starts_towards_more_room_and_ends_at_its_goal() -> None:
     assert max(values.max() for values in problem.tried) <= 0.9
     np.testing.assert_allclose(found.values, [0.9, 0.81], atol=1e-3)
     found = climb(Rosenbrock(), START, Never(), 2000, 1e-9, goal=0.5)
-    assert (found.converged, found.message) == (True, "the error asked for is reached")
+    assert (found.converged, found.message) == (True, "the requested error is reached")
     assert found.cost <= 0.5
     short = climb(Rosenbrock(), START, Never(), 10, 1e-9)
     assert (short.converged, short.evaluations) == (False, 10)

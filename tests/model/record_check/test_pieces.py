@@ -91,6 +91,6 @@ def test_motions_and_readings_that_tell_little_are_said() -> None:
     assert reports(drive=np.round(2 * SWING))["drive"].there == "-2 to 2 V, only 5 different values"
     assert reports(drive=0 * SWING)["drive"].there == "0 to 0 V, constant"
     held = np.repeat(SWING[::4], 4, axis=0)
-    assert reports(position=held, drive=held)["rows"].there == "75% of the rows repeat the row before"
+    assert reports(position=held, drive=held)["rows"].there == "75% of the rows repeat the previous row"
     uneven = np.sort(np.random.default_rng(1).uniform(0, 2, 400))
     assert "Uneven times" in reports(time=uneven)["time"].means

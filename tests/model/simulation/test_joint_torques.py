@@ -252,11 +252,11 @@ def arm_with(folder: Path, arguments: str, torque: str) -> Callable[[], Model]:
 @pytest.mark.parametrize(
     ("arguments", "torque", "says"),
     [
-        ("k, speed", "-k * abs(speed) * speed", "derivative of its torque by speed does not come out right"),
-        ("k, drive", "k * (drive if drive.real > 0 else drive.real)", "torque by drive does not come out right"),
+        ("k, speed", "-k * abs(speed) * speed", "derivative of its torque by speed is wrong"),
+        ("k, drive", "k * (drive if drive.real > 0 else drive.real)", "torque by drive is wrong"),
         ("k, speed", "k if speed > 0 else -k", "pull: its torque cannot be compiled in dual numbers: "),
         ("k, speed", "k * speed.nothing", "pull: its torque cannot be compiled in real numbers: "),
-        ("k", "k + 1.0", "pull: gives 1 N·m where its parameters are at null, not 0"),
+        ("k", "k + 1.0", "pull: its torque is 1 N·m where its parameters are at null; it must be 0"),
         ("k, time", "k * time.imag * 1e30 + k * time", "its torque differs in real and in dual numbers"),
     ],
 )

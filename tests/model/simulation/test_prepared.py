@@ -177,10 +177,10 @@ def test_a_carriage_and_a_shaft_may_go_further_and_nothing_moves_without_drive()
     far = np.full((60, 1), 25.0)
     assert len(inputs_of(trace_of(np.zeros((60, 1)), 0.01, position=far), slide())) == 60
     assert len(inputs_of(trace_of(np.zeros((60, 1)), 0.01, position=far, drive=far), pendulum())) == 60
-    with pytest.raises(TraceError, match="has no drive, and pendulum has no controller to form one"):
+    with pytest.raises(TraceError, match="has no drive, and pendulum has no controller that could compute it"):
         inputs_of(trace_of(np.zeros((60, 1)), 0.01), pendulum())
     inputs = replace(inputs_of(still(), MA2000), joints=(1, 2))
-    with pytest.raises(SpecError, match=r"inputs are for joints \(1, 2\), the model moves joints \(1, 2, 3\)"):
+    with pytest.raises(SpecError, match=r"inputs are for joints \(1, 2\), but the model moves joints \(1, 2, 3\)"):
         prepare(base_model(MA2000), inputs, Options())
 
 

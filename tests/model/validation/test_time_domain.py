@@ -79,7 +79,7 @@ def test_what_tells_nothing_is_noted_and_what_cannot_be_used_is_refused(model: M
     name = next(p.name for p in offset.parameters if p.effect == "potentiometer_offset")
     result = vary_in_time(offset, swinging_trace(model, 2.0), (name, VISCOUS_2))
     assert result.parameter(name).alone_varying == 0.0
-    assert any(name in note and "does not act" in note for note in result.notes)
+    assert any(name in note and "does not influence" in note for note in result.notes)
     trace = ramp_trace(model)
     with pytest.raises(TraceError, match="no recorded drive"):
         vary_in_time(model, replace(trace, drive=None), NAMES)
