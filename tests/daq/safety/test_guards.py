@@ -25,7 +25,7 @@ def running(own: Limits = LIMITS, moving: tuple[int, ...] = (1, 2, 3)) -> Runnin
     return RunningGuards(MA2000, own, (1, 2, 3), moving)
 
 
-def test_an_arm_that_follows_is_left_alone() -> None:
+def test_an_arm_that_follows_is_left_alone_and_set_points_go_on_when_it_is_back() -> None:
     guards = running()
     for tick in range(5):
         verdict = guards.check(row(tick, error=(20, 50, 15)), REST_POSTURES)

@@ -145,18 +145,22 @@ def test_gears_that_give_twist_with_their_load_or_let_the_link_fall_by_their_pla
 G = 9.81
 
 
-def test_friction_of_a_level_or_of_a_law_of_speed_is_as_large_as_its_law() -> None:
-    posture = list(STRETCHED)
-    before, after = CoulombLevel(default_plant()), CoulombLevel(changed("coulomb_friction", joint=3, torque=1.5))
-    difference = [a - b for a, b in zip(after.at(posture), before.at(posture), strict=True)]
-    assert difference == pytest.approx([0.0, 0.0, 1.5, 0.0, 0.0, 0.0])
-    stribeck = effect("stribeck_friction", joint=1, torque=3.0, speed=0.1)
-    assert stribeck.friction_level(1.0, 0.0, 0.0) == 4.0
-    assert stribeck.friction_level(1.0, 0.0, -0.1) == pytest.approx(1.0 + 3.0 / math.e)
-    assert stribeck.friction_level(1.0, 0.0, 5.0) == pytest.approx(1.0)
-    drag = effect("quadratic_drag", joint=1, coefficient=4.0)
-    assert drag.joint_torque(0.0, 0.0, 0.5) == pytest.approx(-1.0)
-    assert drag.joint_torque(0.0, 0.0, -1.0) == pytest.approx(4.0)
+def test_coulomb_and_load_dependent_friction_are_levels_of_their_own_joint() -> None:
+    body, plain = default_plant().rigid_body, CoulombLevel(default_plant())
+    for name, values, level in (
+        ("coulomb_friction", {"torque": 1.5}, None),
+        ("load_dependent_friction", {"arm": 0.1}, 0.1),
+    ):
+        own = CoulombLevel(changed(name, joint=3, **values))
+        for shoulder in (0.3, 1.2, 2.0):
+            posture = [math.pi, shoulder, 0.2, 0.0, 0.0, 0.0]
+            difference = [a - b for a, b in zip(own.at(posture), plain.at(posture), strict=True)]
+            weight = (body.m3 + body.m_load) * G * abs(math.sin(shoulder + 0.2))
+            expected = 1.5 if level is None else level * weight
+            assert difference == pytest.approx([0.0, 0.0, expected, 0.0, 0.0, 0.0]), name
+
+
+def test_viscous_friction_damps_its_joint_by_the_coefficient() -> None:
     before, after = default_plant().joints, changed("viscous_friction", joint=2, coefficient=7.0).joints
     difference = [
         DriveTrain(b, STEP_S).damping - DriveTrain(a, STEP_S).damping for a, b in zip(before, after, strict=True)
@@ -167,14 +171,12 @@ def test_friction_of_a_level_or_of_a_law_of_speed_is_as_large_as_its_law() -> No
     damping = DriveTrain(default_plant().joints[0], STEP_S).damping
     ratio = steady_rate(fast, 1, 0.5) / steady_rate(slow, 1, 0.5)
     assert ratio == pytest.approx((damping + 46.0) / damping, rel=1e-3)
-    body = default_plant().rigid_body
-    before = CoulombLevel(default_plant())
-    after = CoulombLevel(changed("load_dependent_friction", joint=3, arm=0.1))
-    for shoulder in (0.3, 1.2, 2.0):
-        posture = [math.pi, shoulder, 0.2, 0.0, 0.0, 0.0]
-        difference = [a - b for a, b in zip(after.at(posture), before.at(posture), strict=True)]
-        weight = (body.m3 + body.m_load) * G * abs(math.sin(shoulder + 0.2))
-        assert difference == pytest.approx([0.0, 0.0, 0.1 * weight, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("rate", [0.0, -0.1, 5.0])
+def test_stribeck_friction_falls_to_its_eth_part_at_its_speed(rate: float) -> None:
+    stribeck = effect("stribeck_friction", joint=1, torque=3.0, speed=0.1)
+    assert stribeck.friction_level(1.0, 0.0, rate) == pytest.approx(1.0 + 3.0 * math.exp(-((rate / 0.1) ** 2)))
 
 
 @pytest.mark.parametrize("payload", [0.0, 1.0])
@@ -198,7 +200,7 @@ def test_friction_under_gravity_is_a_share_of_what_the_joint_has_to_hold(payload
         )
 
 
-def test_stiction_pushes_back_like_a_spring_until_the_breakaway_torque() -> None:
+def test_stiction_pushes_back_like_a_spring_before_it_slips() -> None:
     bond = effect("stiction", joint=1, breakaway=2.0, speed=0.02)
     forces = [bond.joint_torque(0.0, 0.0, 0.001) for _ in range(400)]
     stiffness = 2.0 / default_plant().friction.presliding
@@ -208,6 +210,8 @@ def test_stiction_pushes_back_like_a_spring_until_the_breakaway_torque() -> None
     bond.restart()
     assert bond.joint_torque(0.0, 0.0, 0.0) == 0.0
 
+
+def test_stiction_holds_a_joint_until_the_breakaway_torque_and_lets_it_go_then() -> None:
     def moved(torque: float, *modifications: Any) -> float:
         """How far the waist has come while its motor's torque rose slowly to so many N·m."""
         plant = plant_with(*modifications, parameters=without_friction())
@@ -233,23 +237,29 @@ def test_direction_dependent_friction_resists_one_direction_only(torque: float) 
     assert against[-1] == 0.0
 
 
-@pytest.mark.parametrize("coefficient", [7.0, -7.0])
-def test_direction_dependent_viscous_friction_grows_with_the_rate_in_one_direction(coefficient: float) -> None:
-    one_way = effect("direction_dependent_viscous_friction", joint=2, coefficient=coefficient)
-    ahead = math.copysign(1.0, coefficient)
-    assert [one_way.joint_torque(0.0, 0.0, ahead * rate) for rate in (0.0, 0.5, 1.0)] == [
-        0.0,
-        -3.5 * ahead,
-        -7.0 * ahead,
-    ]
-    assert one_way.joint_torque(0.0, 0.0, -ahead) == 0.0
+@pytest.mark.parametrize(
+    ("name", "values", "angle", "rate", "torque"),
+    [
+        ("quadratic_drag", {"coefficient": 4.0}, 0.0, 0.5, -1.0),
+        ("quadratic_drag", {"coefficient": 4.0}, 0.0, -1.0, 4.0),
+        ("tight_spot", {"coefficient": 10.0, "centre": 0.5, "width": 0.1}, 0.5, 0.3, -3.0),
+        ("tight_spot", {"coefficient": 10.0, "centre": 0.5, "width": 0.1}, 0.6, -0.3, 3.0 * math.exp(-0.5)),
+        ("tight_spot", {"coefficient": 10.0, "centre": 0.5, "width": 0.1}, 1.2, 0.3, 0.0),
+        ("direction_dependent_viscous_friction", {"coefficient": 7.0}, 0.0, 0.5, -3.5),
+        ("direction_dependent_viscous_friction", {"coefficient": 7.0}, 0.0, 1.0, -7.0),
+        ("direction_dependent_viscous_friction", {"coefficient": 7.0}, 0.0, -1.0, 0.0),
+        ("direction_dependent_viscous_friction", {"coefficient": -7.0}, 0.0, -1.0, 7.0),
+        ("direction_dependent_viscous_friction", {"coefficient": -7.0}, 0.0, 1.0, 0.0),
+        ("direction_dependent_viscous_friction", {"coefficient": -7.0}, 0.0, 0.0, 0.0),
+    ],
+)
+def test_a_torque_of_place_and_speed_is_that_of_its_law(
+    name: str, values: dict[str, float], angle: float, rate: float, torque: float
+) -> None:
+    assert effect(name, joint=1, **values).joint_torque(0.0, angle, rate) == pytest.approx(torque, abs=1e-9)
 
 
-def test_a_tight_spot_damps_at_its_place_and_a_cable_remembers_where_it_was() -> None:
-    spot = effect("tight_spot", joint=1, coefficient=10.0, centre=0.5, width=0.1)
-    assert spot.joint_torque(0.0, 0.5, 0.3) == pytest.approx(-3.0)
-    assert spot.joint_torque(0.0, 0.6, -0.3) == pytest.approx(3.0 * math.exp(-0.5))
-    assert abs(spot.joint_torque(0.0, 1.2, 0.3)) < 1e-9
+def test_a_cable_remembers_where_it_was_and_ageing_friction_how_long_it_rested() -> None:
     cable = effect("cable_hysteresis", joint=1, torque=2.0, reach=0.1)
     there = [cable.joint_torque(0.0, 0.0, 1.0) for _ in range(100)]  # 0.1 rad
     assert there[-1] == pytest.approx(-2.0 * (1 - math.exp(-1.0)), rel=1e-6)
