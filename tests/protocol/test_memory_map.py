@@ -19,6 +19,7 @@ SHIPPED = resources.files("firmware_protocol").joinpath("memory_map.toml").read_
 
 
 def test_all_but_the_documented_addresses_of_section_6_5_are_assumed() -> None:
+    # The documented addresses are those of section 6 5 and no others
     memory_map = default_memory_map()
     documented = {
         (name, i + 1): (register.low[i], register.high[i] if register.high else None)
@@ -31,11 +32,13 @@ def test_all_but_the_documented_addresses_of_section_6_5_are_assumed() -> None:
         ("position", 2): (0xFC21, 0xFC29),
         ("position", 3): (0xFC22, 0xFC2A),
     }
+    # Everything else says that it is assumed
     memory_map = default_memory_map()
     every = sum(len(register.low) for register in memory_map.registers.values())
     assert len(memory_map.assumed) == every - 3
     assert {"position 4", "error 1", "gripper"} <= set(memory_map.assumed)
     assert "position 1" not in memory_map.assumed
+    # A laboratory's own file moves a register and touches no code
     own = parse_memory_map(SHIPPED.replace("low = [0xFC72]", "low = [0xFC7F]"), "ours.toml")
     assert own["gripper"].low == (0xFC7F,)
     assert own["position"] == default_memory_map()["position"]

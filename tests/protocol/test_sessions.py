@@ -106,6 +106,7 @@ def stamps(dialect: FramedDialect) -> Iterator[c.Stamp]:
 
 
 def test_commands_are_stamped_and_counted_and_none_becomes_new_again() -> None:
+    # Commands are stamped with the session and counted in it
     dialect = FramedDialect()
     stamped = stamps(dialect)
     assert next(stamped) == c.UNSTAMPED
@@ -119,6 +120,7 @@ def test_commands_are_stamped_and_counted_and_none_becomes_new_again() -> None:
     assert next(stamped) == c.Stamp(71, 2), "a repeated greeting begins nothing"
     dialect.reset()
     assert next(stamped) == c.UNSTAMPED, "a new connection has no session"
+    # All sequence numbers come round and no command becomes new again
     dialect, session = FramedDialect(), greeted(number=70)
     conversation(dialect, 7, 70)
     request, commands = c.SetGripper(1), []

@@ -189,11 +189,13 @@ def test_each_job_names_its_permissions_and_its_longest_time(name: str) -> None:
 
 
 def test_jobs_that_publish_need_all_others_and_build_nothing() -> None:
+    # Only what signs and publishes has an identity and it builds nothing
     trusted = {name for name, job in jobs("release.yml").items() if "id-token: write" in job}
     assert trusted == {"attest", "publish"}
     for name in trusted:
         assert "run:" not in jobs("release.yml")[name]
         assert "actions/checkout" not in jobs("release.yml")[name]
+    # Nothing is published before it is described tested built and attested
     needs = {
         name: re.findall(r"^    needs: \[?([\w, ]+)\]?$", job, re.MULTILINE)
         for name, job in jobs("release.yml").items()
@@ -206,6 +208,7 @@ def test_jobs_that_publish_need_all_others_and_build_nothing() -> None:
         "publish": ["attest"],
         "page": ["publish"],
     }
+    # An action has one commit everywhere
     used = {match for text in WORKFLOWS.values() for match in re.findall(r"uses: ([^@\s]+)@(\S+)", text)}
     assert len({action for action, _ in used}) == len(used)
 

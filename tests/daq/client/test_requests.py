@@ -168,6 +168,7 @@ def test_who_waits_in_a_queue_that_a_person_must_resume_hears_it_soon_and_once()
 
 
 def test_a_file_is_whole_or_not_there_and_never_written_over_another(tmp_path: Path) -> None:
+    # A file that breaks off leaves nothing
     def broken(_: httpx.Request) -> httpx.Response:
         def pieces() -> object:
             yield b"half"
@@ -178,6 +179,7 @@ def test_a_file_is_whole_or_not_there_and_never_written_over_another(tmp_path: P
     with pytest.raises(ServiceNotReachedError, match="cable"):
         StandIn([broken]).connection().download("robots/ma2000/traces/a/data.mcap", tmp_path / "a.mcap")
     assert list(tmp_path.iterdir()) == []
+    # A trace is never written over another
     target = tmp_path / "a.mcap"
     target.write_bytes(b"one")
     traces = Traces(StandIn([httpx.Response(200, content=b"one")]).connection(), "robots/ma2000")

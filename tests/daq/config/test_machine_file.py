@@ -264,6 +264,7 @@ def test_a_machine_is_written_and_read_back_as_it_was(path: Path) -> None:
 
 
 def test_a_file_is_written_as_tidying_leaves_it() -> None:
+    # Tidying keeps comments and changes nothing twice
     text = (ROOT / "examples" / "pan_tilt.toml").read_text("utf-8")
     assert tidied(text, "pan_tilt.toml") == text
     old = """# A rod.
@@ -295,6 +296,7 @@ drive = { kind = "gain", gain = { value = 0.5, unit = "N·m/V", source = "data s
     ]
     with pytest.raises(SpecError, match=r"my.toml: line 1: colour: there is no such field"):
         tidied(f'colour = "red"\n{old}', "my.toml")
+    # What ships is written as it would be tidied
     assert "ma2000" in shipped_machines()
     path = ROOT / "daq" / "contracts" / "machines" / "ma2000.toml"
     assert len(tidied(path.read_text("utf-8"), path.name).splitlines()) < 160

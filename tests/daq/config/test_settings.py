@@ -38,16 +38,19 @@ def test_the_guides_configuration_can_be_said_and_says_everything() -> None:
 def test_what_is_configured_goes_before_the_mock_the_file_asked_for_first(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    # With nothing configured the mock is used
     settings, path = load_settings()
     assert path is None
     assert settings.port == "mock://"
     assert settings.machine() == load_machine("ma2000")
 
+    # A user without a home has no file of his own
     def homeless(_name: str) -> str:
         raise RuntimeError("Could not determine home directory.")
 
     monkeypatch.setattr("daq.config.settings.platformdirs.user_config_dir", homeless)
     assert config_files() == [Path("daq.toml")]
+    # The file asked for goes before the folders and that before the users
     users = tmp_path / "configuration" / "ma2000-daq" / "config.toml"
     users.parent.mkdir(parents=True)
     for path, name in ((users, "users"), (tmp_path / "daq.toml", "here"), (tmp_path / "other.toml", "asked")):

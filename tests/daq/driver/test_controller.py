@@ -132,17 +132,20 @@ def test_only_a_greeting_after_a_reset_of_the_board_says_that_it_has_restarted()
 
 
 def test_a_board_that_restarted_is_told_by_the_first_status_or_refusal() -> None:
+    # A board without supply is told by the first status
     restarted = c.Status(7, c.StatusFlag.RESTARTED, 3, 0, 0)
     taken = c.SetPointsTaken(7, c.StatusFlag.RESTARTED)
     replies: dict[type[c.Request], c.Reply] = {c.ReadStatus: restarted, c.WriteSetPoints: taken}
     controller = controller_that(lambda request: replies.get(type(request)))
     with pytest.raises(ControllerRestartedError, match="gains are those of power-up"):
         controller.set_points({1: 500})
+    # A sample that never comes from a board that restarted is a restart
     restarted = c.Status(7, c.StatusFlag.RESTARTED, 3, 0, 0)
     controller = controller_that(lambda request: restarted if isinstance(request, c.ReadStatus) else None)
     with pytest.raises(ControllerRestartedError):
         controller.next_snapshot(after=100)
 
+    # What is refused since the board restarted is a restart and no refusal
     def answers(request: c.Request, status: int) -> c.Reply:
         if isinstance(request, c.ReadStatus):
             return c.Status(7, status, 3, 0, 0)

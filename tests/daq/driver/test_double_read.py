@@ -117,6 +117,7 @@ def reader_of_bytes(values: Iterable[int]) -> tuple[DoubleReader, Link, Scripted
 
 
 def test_readings_that_do_not_agree_in_time_deliver_nothing() -> None:
+    # Readings that all differ deliver nothing however many there are
     reader, link, channel = reader_of_bytes(range(1, 100))
     assert reader.read((1, 2, 3)) is None
     assert reader.disturbed
@@ -133,12 +134,15 @@ def test_readings_that_do_not_agree_in_time_deliver_nothing() -> None:
     channel.time = 2 * PERIOD_S
     assert reader.read((1, 2, 3)) is None
     assert link.counters.torn == 0, "nothing tells the two readings apart but the time they took"
+    # A line too slow for two readings in a period delivers nothing
     reader, _, channel = reader_of(MemoryBoard(lambda _: [(2048, 0, 0)] * 6, delay_s=0.012))
     channel.time = 2 * PERIOD_S
     assert reader.read((1, 2, 3)) is None
+    # The memory of a board without supply is no reading
     reader, _, channel = reader_of(MemoryBoard(lambda _: [(0, 0, 0)] * 6))
     channel.time = 2 * PERIOD_S
     assert reader.read((1, 2, 3)) is None
+    # Only the two readings that agree tell whether the board has its supply
     reader, _, _ = reader_of_bytes([5, 6, 0, 0])
     assert reader.read((1, 2, 3)) is None
     reader, _, _ = reader_of_bytes([5, 0, 7, 7])

@@ -140,6 +140,7 @@ def test_set_points_are_goals_and_samples_come_every_twentieth_tick(controller: 
 def test_a_stop_holds_for_whoever_comes_next_and_cannot_be_undone_by_a_repeat(
     controller: Controller, line: Line
 ) -> None:
+    # A stop holds and whoever comes next finds it
     controller.set_points({1: 3000})
     line.sleep_until(line.now() + 0.05)
     stopped = controller.stop()
@@ -152,6 +153,7 @@ def test_a_stop_holds_for_whoever_comes_next_and_cannot_be_undone_by_a_repeat(
         assert StatusFlag.FROZEN in other.status().flags
         other.release(other.status().stop)
         assert StatusFlag.FROZEN not in other.status().flags
+    # A repeat of set points cannot undo a stop
     dialect = DIALECT.LineStageDialect((1, 2))
     late = FineSetPoints(((1, 2600),), 4096)
     frame = dialect.encode(7, late)

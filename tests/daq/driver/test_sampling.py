@@ -279,18 +279,21 @@ def missed(watch: SetPointWatch, tick: int, joints: tuple[tuple[int, JointReadin
 
 
 def test_a_confirmed_batch_must_show_in_the_next_period_for_the_joints_it_names() -> None:
+    # The period after the confirmed one must show what was sent
     watch = SetPointWatch()
     watch.confirmed(watch.sending({1: 510}), due=8)
     assert not missed(watch, 7, shows(500)), "on its way: the old one is right"
     assert missed(watch, 8, shows(500))
     assert missed(watch, 9, shows(500))
     assert not missed(watch, 10, shows(510))
+    # A batch may show before its confirmation has come
     watch = SetPointWatch()
     watch.confirmed(watch.sending({1: 510}), due=8)
     late = watch.sending({1: 511})  # its first confirmation is lost on the way
     assert not missed(watch, 9, shows(511))
     watch.confirmed(late, due=11)
     assert missed(watch, 11, shows(510))
+    # Joints that were sent earlier keep their set points
     watch = SetPointWatch()
     watch.confirmed(watch.sending({1: 510}), due=5)
     watch.confirmed(watch.sending({2: 520}), due=6)

@@ -73,16 +73,19 @@ def test_set_points_are_goals_and_a_stop_holds_where_the_servos_are(
 def test_samples_have_the_tick_of_their_measurement_on_the_servos_own_clock(
     controller: Controller, bench: VirtualBench
 ) -> None:
+    # Samples come every twentieth tick of the servos own clock
     ticks = [controller.next_snapshot().tick]
     for _ in range(50):
         ticks.append(controller.next_snapshot(ticks[-1] + 19).tick)
     assert {later - earlier for earlier, later in pairwise(ticks)} <= {19, 20, 21}
     assert abs(ticks[-1] - ticks[0] - 50 * 20) <= 1  # a sample beside its tick does not move those after it
+    # Every tick can be asked for
     tick = controller.next_snapshot().tick
     for _ in range(5):
         later = controller.next_snapshot(tick).tick
         assert tick < later <= tick + 3
         tick = later
+    # A sample has the tick at which it was measured
     clocks: list[int] = []
     bench.saying = lambda data: clocks.append(bench.bench.servos[0][Table.REALTIME_TICK]) or data  # type: ignore[func-returns-value]
     seen: list[tuple[int, int]] = []
@@ -124,6 +127,7 @@ def test_set_points_from_before_a_stop_are_not_repeated_after_its_release(bench:
 
 
 def test_a_stop_is_remembered_by_every_host_until_a_release(bench: VirtualBench) -> None:
+    # A stop lasts for other hosts until it is released
     with bench.controller() as first:
         first.set_points({1: 2300})
         assert first.stop().acknowledged
@@ -136,6 +140,7 @@ def test_a_stop_is_remembered_by_every_host_until_a_release(bench: VirtualBench)
         assert c.StatusFlag.FROZEN not in second.status().flags
         second.set_points({1: 2100})
     assert goals(bench)[0] == 2100
+    # A greeting does not forget a stop under way
     dialect = DynamixelDialect((1, 2))
     dialect.encode(1, c.Stop())
     dialect.feed(bench.bench.receive(dialect.encode(2, c.Hello(2, 1))))

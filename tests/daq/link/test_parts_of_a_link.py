@@ -214,14 +214,17 @@ def test_a_reply_missing_at_the_mark_has_timed_out_and_the_board_is_given_the_ti
 
 
 def test_silence_ends_a_turn_or_uses_up_the_budget_at_once() -> None:
+    # A controller that never answers uses up the budget at once
     link, channel = scripted_link(lambda _sequence, _request: [], lock_step=True)
     with pytest.raises(LinkTimeoutError, match=rf"asked {RETRIES + 1} times"):
         link.request(ReadStatus(), Status)
     assert sum(isinstance(request, Advance) for _, request in channel.asked) == RETRIES
+    # Silence in the middle of a turn is a dead process
     link, channel = scripted_link(lambda _sequence, _request: [], lock_step=True)
     channel.marks = False
     with pytest.raises(LinkLostError, match=r"silent for 10\.0 s in the middle of a turn"):
         link.request(ReadStatus(), Status)
+    # A stop is two frames and ends with two marks
     stopped = Stopped(7, (500,) * 6)
 
     link, channel = scripted_link(

@@ -159,6 +159,7 @@ def test_after_the_channel_has_ended_nothing_is_asked_until_reconnected() -> Non
 
 
 def test_nothing_of_an_ended_channel_reaches_the_next() -> None:
+    # Connecting again ends the old channel even one that still works
     first, second = ScriptedChannel(says(STATUS)), ScriptedChannel(says(STATUS))
     link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
     link.request(c.ReadStatus(), c.Status)
@@ -167,6 +168,7 @@ def test_nothing_of_an_ended_channel_reaches_the_next() -> None:
     link.request(c.ReadStatus(), c.Status)
     assert (len(first.asked), len(second.asked)) == (1, 1)
 
+    # Half a reply is forgotten with the channel it came over
     def breaks_off(sequence: int, _request: c.Request) -> list[tuple[float, bytes]]:
         if len(first.asked) > 1:
             first.broken = "cable pulled"
@@ -246,6 +248,7 @@ def greeted(*replies: c.HelloReply) -> c.HelloReply | None:
 
 
 def test_a_greeting_is_answered_by_its_own_nonce_which_is_the_time_in_lock_step() -> None:
+    # A greeting is answered by its own nonce or by another version
     own = c.HelloReply(c.PROTOCOL_VERSION, c.Capability.SAMPLE, 20_000, 8, 3, 5, 7)
     replayed = c.HelloReply(c.PROTOCOL_VERSION, c.Capability.SAMPLE, 20_000, 8, 3, 6, 7)
     short = c.HelloReply(c.PROTOCOL_VERSION, c.Capability.SAMPLE, 20_000, 8, 3)
@@ -254,6 +257,7 @@ def test_a_greeting_is_answered_by_its_own_nonce_which_is_the_time_in_lock_step(
     assert greeted(newer) == newer
     assert greeted(replayed, short) is None
 
+    # In lock step the nonce is the controller's time so that a run repeats to the bit
     def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
         if isinstance(request, c.Advance):
             return [(0.0, frame_of(sequence, c.Advanced(3 * 2**32 + 2**32 - 2, 0)))]
@@ -264,6 +268,7 @@ def test_a_greeting_is_answered_by_its_own_nonce_which_is_the_time_in_lock_step(
     link.greet()
     assert [type(request).__name__ for _, request in channel.asked] == ["Advance", "Hello"]
     assert channel.asked[1][1] == c.Hello(2, 2**32 - 2)
+    # A controller in lock step that knows no time is greeted all the same
     refused = c.Refused(c.Advance.OPCODE, c.Refusal.NOT_CAPABLE)
     hello = c.HelloReply(1, c.Capability.LOCK_STEP, 20_000, 0, 1)
     link, _ = scripted_link(says(lambda request: refused if isinstance(request, c.Advance) else hello), lock_step=True)

@@ -110,6 +110,7 @@ def test_a_client_is_answered_with_what_became_of_the_stop_also_at_the_end() -> 
 
 
 def test_a_word_of_the_parent_is_a_stop_and_a_reset_forgets_only_what_came_before() -> None:
+    # A word of the parent is a stop and its end the loss of it
     with guarded() as scene:
         os.write(scene.parent, b"stop\n")
         scene.freezes.wait()
@@ -125,6 +126,7 @@ def test_a_word_of_the_parent_is_a_stop_and_a_reset_forgets_only_what_came_befor
         assert scene.guardian.cause is EndCause.STOP
         assert scene.guardian.clear_cause(time.monotonic())
         assert scene.guardian.cause is None
+    # A cancel of the service is called one however often it is said
     with guarded() as scene:
         os.write(scene.parent, 2 * CANCEL)
         scene.freezes.wait()

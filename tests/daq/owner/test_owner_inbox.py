@@ -56,6 +56,7 @@ def test_what_waited_behind_another_order_ends_with_the_first() -> None:
 
 
 def test_an_order_that_waits_takes_no_end_back_and_an_overtaken_jog_drives_nothing() -> None:
+    # An order that waits does not take back the end of the one before
     drive = JogDrive(velocities={1: 0.1}, said=5.0)
     with inbox_told(JogBegin(number=1, asked=0.0), drive, Finish(), LeadBegin(number=2, asked=0.0, joints=(1,))) as (
         inbox,
@@ -65,6 +66,7 @@ def test_an_order_that_waits_takes_no_end_back_and_an_overtaken_jog_drives_nothi
         assert inbox.take(WITHIN) is not None
         assert inbox.finish.is_set()
         assert inbox.drive() == drive
+    # A jog command that was overtaken drives nothing
     hold, late = JogDrive(velocities={}, said=5.0), JogDrive(velocities={1: 0.1}, said=4.9)
     with inbox_told(JogBegin(number=1, asked=0.0), hold, late, LeadBegin(number=2, asked=0.0, joints=(1,))) as (
         inbox,

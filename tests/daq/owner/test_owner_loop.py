@@ -146,6 +146,7 @@ def test_a_robot_that_answers_again_is_connected_again_and_a_damaged_drive_is_a_
 
 
 def test_nothing_moves_a_silent_robot_or_comes_late() -> None:
+    # What would move a robot that is silent is refused
     order = cast(Any, RunProgram).model_construct(number=7, asked=time.monotonic(), activity="program")
     states, answers = served({2: order})
     assert [(a.number, a.exit_code) for a in answers] == [(7, ReachError.exit_code)]

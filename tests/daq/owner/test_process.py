@@ -131,6 +131,7 @@ def test_a_client_that_goes_while_the_robot_is_being_reached_leaves_nothing_behi
 
 
 def test_a_key_pressed_early_lets_no_run_begin_and_follows_an_order(tmp_path: Path) -> None:
+    # A key pressed before the run begins lets none begin
     with OwnerOnDemand(opening(tmp_path / "traces")) as owner:
         owner.halt()
         with pytest.raises(OrderFailedError, match="nothing moved") as refused:

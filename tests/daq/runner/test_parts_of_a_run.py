@@ -71,16 +71,19 @@ def test_after_a_stop_no_step_of_a_run_is_taken(step: Event) -> None:
 
 
 def test_only_a_reset_ends_a_halt_the_one_that_it_names() -> None:
+    # Only a reset ends a halt
     control, _ = make()
     control.stop("now")
     control.handle(Event.RESET)
     assert control.halted is None
     control.handle(Event.ARM)
     assert control.arm.state is State.ARMED
+    # A reset ends the stop that it names
     control, written = make()
     control.stop("now")
     assert control.handle(Event.RESET, stop=7) is None
     assert written.released == 7
+    # After a reset an error freezes anew
     control, written = make()
     control.stop("now")
     control.handle(Event.RESET)
@@ -119,6 +122,7 @@ def test_the_first_cause_is_kept_and_named() -> None:
 
 
 def test_an_error_freezes_first_and_until_it_is_confirmed() -> None:
+    # An error freezes before anything else and once is enough
     control, written = make()
 
     def fail() -> None:
@@ -133,6 +137,7 @@ def test_an_error_freezes_first_and_until_it_is_confirmed() -> None:
     with pytest.raises(RuntimeError):
         fail()
     assert written.requests == ["stop", "stop"]
+    # What became of a freeze is the answer to what asked for it
     control, written = make()
     assert control.handle(Event.ARM) is None
     assert control.handle(Event.TRIP) is written.answer
@@ -204,6 +209,7 @@ def snapshot(tick: int) -> BoardSnapshot:
 
 
 def test_a_row_has_si_units_and_its_time_from_the_first() -> None:
+    # A row has the chosen joints in si units
     row = RowMaker(MACHINE, (2, 1), 0.02).row(snapshot(100))
     one, scale = MACHINE.calibration(1), MACHINE.joint(1).dc_motor.scale
     middle = one.angle_at_zero_rad + one.direction * FULL_TURN_OF_JOINT_1 / 2
@@ -216,14 +222,17 @@ def test_a_row_has_si_units_and_its_time_from_the_first() -> None:
     assert row.drive == pytest.approx((-volts, volts))
     assert row.power_raw == (-127, 127)
     assert (row.status, row.host_time, row.tick) == (5, 7.5, 100)
+    # A positive power turns a joint to where its counts grow
     for sensor, gear, sign in ((False, False, 1), (True, False, -1), (False, True, -1), (True, True, 1)):
         machine = turned(MACHINE, (sensor,), (gear,))
         row = RowMaker(machine, (1,), 0.02).row(snapshot(100))
         assert row.power_raw == (127,)
         assert np.sign(row.drive[0]) == sign
         assert np.sign(row.error[0]) == (1 if sensor else -1)
+    # Time is counted in periods from the first row
     rows = RowMaker(MACHINE, (1,), 0.02)
     assert [rows.row(snapshot(tick)).time for tick in (100, 101, 150)] == pytest.approx([0.0, 0.02, 1.0])
+    # A joint without a motor file cannot be recorded
     with pytest.raises(SpecError):
         RowMaker(MACHINE, (7,), 0.02)
 

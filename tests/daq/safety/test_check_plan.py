@@ -72,6 +72,7 @@ def test_what_lies_exactly_at_a_limit_is_allowed() -> None:
     inside = limits(joints=(JointLimits(high=high),))
     assert check_plan(plan_of(1, REST[0], high + 0.002), MA2000, inside) == []
     assert [v.rule for v in check_plan(plan_of(1, REST[0], high + 0.003), MA2000, inside)] == ["range"]
+    # An angle may lie half a posture unit and a rounding outside
     slack = math.pi / 1000 / 2 + 1e-9
     for joint_limits, side in ((JointLimits(high=0.0), 1), (JointLimits(low=0.0), -1)):
         own = Limits(joints=(*[JointLimits()] * 3, joint_limits))
@@ -80,6 +81,7 @@ def test_what_lies_exactly_at_a_limit_is_allowed() -> None:
         assert (found.rule, found.joint, found.time, found.limit) == ("range", 4, 0.0, 0.0)
         side_said = "any to 0.00°" if side > 0 else "0.00° to any"
         assert str(found).endswith(f"allowed are {side_said}")
+    # The largest speed and the largest step are allowed
     own = Limits(joints=(*[JointLimits()] * 3, JointLimits(speed=0.5)), following_error_counts=112)
     change = 0.5 * 0.02 + 1e-9
     assert check_plan(plan_of(4, 0.0, change), MA2000, own) == []
@@ -89,6 +91,7 @@ def test_what_lies_exactly_at_a_limit_is_allowed() -> None:
     assert check_plan(plan_of(4, 0.0, step, jumps=True), MA2000, own) == []
     (found,) = check_plan(plan_of(4, 0.0, math.nextafter(step, 1), jumps=True), MA2000, own)
     assert (found.rule, found.joint, found.time) == ("step", 4, 0.02)
+    # A link that is exactly the tolerance beyond floor or reach is allowed
     still = plan_of(2, REST[1], REST[1])
     ends = link_ends(MA2000, still.angles)
     lowest, furthest = float(ends[:, :, 2].min()), float(np.linalg.norm(ends, axis=2).max())
@@ -156,11 +159,13 @@ def test_an_arm_outside_its_limits_may_come_back_but_not_go_further() -> None:
 
 
 def test_a_link_below_the_floor_or_beyond_the_reach_is_a_violation() -> None:
+    # A link below the floor is a violation
     way = np.linspace(REST[1], math.radians(-44), 501)
     (found,) = check_plan(plan_of(2, *way), MA2000, LIMITS)
     assert str(found) == "end of link 3: height of -315 mm at 10.00 s: allowed are -300 mm and above"
     assert (found.rule, found.joint, found.limit) == ("floor", 3, -0.3)
     assert (found.value, found.time) == (pytest.approx(-0.315, abs=5e-4), pytest.approx(10.0))
+    # A link beyond the reach is a violation
     way = np.linspace(math.radians(90), 0, 501)
     assert check_plan(plan_of(3, *way), MA2000, limits(reach=0.4545)) == []
     (found,) = check_plan(plan_of(3, *way), MA2000, limits(reach=0.45))

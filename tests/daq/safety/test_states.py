@@ -61,20 +61,25 @@ def test_an_arm_whose_link_was_lost_is_reset_as_one_that_is_not_there(before: St
 
 
 def test_faults_and_stops_outlive_a_lost_link_and_a_reset_that_is_not_theirs() -> None:
+    # A fault is latched when the link comes back and the arm is frozen again
     lost, _ = advance(UP[State.RUNNING], Event.LINK_LOST)
     back, actions = advance(lost, Event.CONNECTED)
     assert (back.state, back.connected, actions) == (State.FAULT, True, (Action.FREEZE,))
+    # A stop outlives a lost link and is sent again when it is back
     stopped, _ = advance(UP[State.RUNNING], Event.STOP, "somebody")
     lost, _ = advance(stopped, Event.LINK_LOST)
     back, actions = advance(lost, Event.CONNECTED)
     assert (back.state, back.cause, actions) == (State.STOPPED, "somebody", (Action.FREEZE,))
+    # Arming releases nobodys stop
     with pytest.raises(IllegalEventError, match="cannot arm while stopped"):
         advance(UP[State.STOPPED], Event.ARM)
+    # A reset without a link cannot end the boards freeze so the arm comes back stopped
     lost, _ = advance(UP[State.RUNNING], Event.LINK_LOST, "cable")
     arm, actions = advance(lost, Event.RESET)
     assert (arm, actions) == (Arm(State.DISCONNECTED, connected=False, cause="cable"), ())
     arm, actions = advance(arm, Event.CONNECTED)
     assert (arm.state, actions) == (State.STOPPED, (Action.FREEZE,))
+    # A refusal says what to do
     with pytest.raises(IllegalEventError, match=r"^cannot start while idle: arm first$"):
         advance(UP[State.IDLE], Event.START)
     with pytest.raises(IllegalEventError, match=r"cannot arm while fault: .*reset a stop or a fault first"):

@@ -74,6 +74,7 @@ def test_a_speed_is_kept_across_gaps_and_never_runs_ahead_of_the_arm() -> None:
     arm = StandIn()
     driven(arm, {1: 0.02}, held_until=500, periods=500)
     assert arm.position[0] - REST[0] == pytest.approx(0.02 * 500 * PERIOD, abs=0.01)
+    # After a gap a joint goes on where it was
     arm = StandIn(every=2)
     jogger = Jogger(MA2000, LIMITS, arm.joints, every=2)
     before = jogger.step(arm.next_sample(), JogCommand({1: 0.2}, arm.tick * PERIOD))
@@ -81,6 +82,7 @@ def test_a_speed_is_kept_across_gaps_and_never_runs_ahead_of_the_arm() -> None:
     arm.tick += 50
     after = jogger.step(arm.next_sample(), JogCommand({1: 0.2}, arm.tick * PERIOD))
     assert after.angles[1] - before.angles[1] == pytest.approx(0.2 * 2 * PERIOD)
+    # Set points never run further ahead than the following error limit
     arm = StandIn()
     arm.push = {1: 0.0}
     arm.gain[1] = (0, 0, 0)  # joint 1 does not follow

@@ -46,6 +46,7 @@ def moving(trace: Trace, *joints: int) -> Trace:
 
 
 def test_a_figure_shows_every_signal_of_the_joints_that_move_or_are_asked_for(trace: Trace) -> None:
+    # A figure shows every signal with its unit and every joint
     axes = figure_of(trace).axes
     assert [axis.get_ylabel() for axis in axes if axis.get_ylabel()] == ["position / °", "error / °", "drive / V"]
     assert [axis.get_title("left") for axis in axes[:3]] == ["joint 1, waist", "joint 2, shoulder", "joint 3, elbow"]
@@ -55,6 +56,7 @@ def test_a_figure_shows_every_signal_of_the_joints_that_move_or_are_asked_for(tr
     np.testing.assert_allclose(values[np.isfinite(values)], np.degrees(trace.position[:, 1]))
     assert np.flatnonzero(np.isnan(values)).tolist() == [30], "behind the last sample before the gap"
     assert np.asarray(measured.get_xdata())[30] == trace.time[29]
+    # Only the joints that the experiment moves are drawn unless others are asked for
     held = moving(trace, 1, 3)
 
     def drawn(joints: tuple[int, ...] | None) -> list[str]:
@@ -103,6 +105,7 @@ def test_missing_samples_are_shaded_and_explained(trace: Trace, tmp_path: Path) 
 
 
 def test_panels_span_as_much_with_a_twentieth_above_and_below(trace: Trace) -> None:
+    # Panels of one signal span as much so that joints can be compared
     axes = figure_of(trace).axes
     position, error = [axis.get_ylim() for axis in axes[:3]], [axis.get_ylim() for axis in axes[3:6]]
     assert [high - low for low, high in position] == pytest.approx([position[0][1] - position[0][0]] * 3)
@@ -114,6 +117,7 @@ def test_panels_span_as_much_with_a_twentieth_above_and_below(trace: Trace) -> N
     assert len(set(error)) == 1, "about zero, the same for all"
     assert error[0][0] < 0.0
     assert error[0][1] > np.degrees(0.03)
+    # Limits leave a twentieth above and below and zero is among them
     lasting = figure_of(trace).axes
     span = np.degrees(
         np.ptp(np.stack([trace.position, trace.position + np.array([0.01, 0.02, 0.03])]), axis=(0, 1)).max()

@@ -157,6 +157,7 @@ def test_a_trace_written_at_once_reads_back_with_the_signals_it_has(
 
 
 def test_a_name_is_never_used_twice_and_writers_of_one_do_not_meet(tmp_path: Path) -> None:
+    # A name tells moment and kind and is never used twice
     path = trace_path(tmp_path, record())
     assert path.name == "2026-11-21T05-14-42Z_ramp_ab12cd.mcap"
     write(path)
@@ -169,6 +170,7 @@ def test_a_name_is_never_used_twice_and_writers_of_one_do_not_meet(tmp_path: Pat
     numbers = {new_trace_id() for _ in range(100)}
     assert len(numbers) == 100
     assert all(len(number) == 12 and set(number) <= set("0123456789abcdef") for number in numbers)
+    # Two writers of one name do not meet
     with TraceWriter(tmp_path / "a.mcap", record(), JOINTS) as writer:
         with pytest.raises(TraceError, match=r"a\.mcap\.part: exists already"):
             TraceWriter(tmp_path / "a.mcap", record(), JOINTS)

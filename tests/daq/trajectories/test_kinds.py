@@ -27,17 +27,21 @@ from tests.daq.trajectories.machines import MA2000, PERIOD, UNIT, motion, planne
 
 
 def test_a_ramp_has_equal_increments_and_ends_together_at_rest() -> None:
+    # Increments are equal but the last which is the rest of the line
     plan = motion(joints=(1,))
     increments = np.diff(plan.angles[:, 0])
     assert len(increments) == 33
     assert increments[:-1] == pytest.approx(80 * UNIT * PERIOD / 0.65)
     assert increments[-1] == pytest.approx(80 * UNIT * PERIOD / 0.65 / 2)
+    # All joints arrive together whatever their amplitudes
     plan = motion(trajectory={"kind": "ramp", "amplitude": {1: 0.3, 2: -0.1, 3: 0.02}, "duration": 0.5})
     fraction = (plan.angles[:, :3] - plan.angles[0, :3]) / [0.3, -0.1, 0.02]
     assert fraction == pytest.approx(np.repeat(np.linspace(0, 1, 26)[:, None], 3, axis=1))
+    # A ramp of one period is one set point and a shorter one is none
     assert len(motion(trajectory={"kind": "ramp", "duration": PERIOD, "amplitude": 0.01})) == 2
     with pytest.raises(SpecError, match=r"ramp: duration: 0.019 s is too short"):
         motion(trajectory={"kind": "ramp", "duration": 0.019, "amplitude": 0.01})
+    # Settle and hold stand still on both sides
     plan = planned(settle=0.5, hold=2.0)
     kinds = {mark.kind: mark.index for mark in plan.marks}
     assert kinds == {"start": 0, "ramp_start": 25, "ramp_end": 58, "end": 158}
@@ -118,23 +122,28 @@ def test_a_lag_starts_later_and_never_jumps(phase: float) -> None:
 
 
 def test_a_multisine_reaches_its_amplitude_is_faded_and_repeats_to_the_bit() -> None:
+    # Multisine stays within its amplitude and reaches it
     planned = motion(joints=(1, 2), trajectory={"kind": "multisine", "amplitude": {1: 0.2, 2: 0.1}})
     assert np.abs(offsets(planned, 1)).max() == pytest.approx(0.2)
     assert np.abs(offsets(planned, 2)).max() == pytest.approx(0.1)
+    # Multisine is faded in and out
     edge = offsets(motion(joints=(1,), trajectory={"kind": "multisine", "amplitude": 0.2}))
     assert np.abs(edge[:5]).max() < 0.2 * 0.01
     assert np.abs(edge[-5:]).max() < 0.2 * 0.01
+    # Multisine has only the frequencies asked for
     move = {"kind": "multisine", "duration": 40.0, "lowest": 0.5, "highest": 2.0, "tones": 4}
     signal = offsets(motion(joints=(1,), trajectory=move))[:-1]
     power = np.abs(np.fft.rfft(signal)) ** 2
     frequency = np.fft.rfftfreq(len(signal), PERIOD)
     inside = (frequency > 0.4) & (frequency < 2.1)
     assert power[inside].sum() > 0.99 * power.sum()
+    # Multisine repeats to the bit and changes with the seed
     first, again, other = (
         motion(joints=(1,), trajectory={"kind": "multisine", "seed": seed}).angles for seed in (7, 7, 8)
     )
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
+    # Leaving a joint out of a multisine does not change the others
     both = motion(joints=(1, 2), trajectory={"kind": "multisine"})
     alone = motion(joints=(2,), trajectory={"kind": "multisine"})
     assert np.array_equal(both.angles[:, 1], alone.angles[:, 1])

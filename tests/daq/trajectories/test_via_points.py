@@ -134,6 +134,7 @@ def pick_and_place(**own: object) -> dict[str, object]:
 
 
 def test_a_pick_and_place_passes_above_both_places_and_is_at_rest_at_its_ends() -> None:
+    # The arms end passes straight above both places
     made = motion(start=BENT, trajectory=pick_and_place(lift=0.05))
     ends = link_ends(MA2000, made.angles)[:, -1]
     for lifted, place in ((50, 0), (150, -1)):
@@ -145,11 +146,13 @@ def test_a_pick_and_place_passes_above_both_places_and_is_at_rest_at_its_ends() 
         (50, "lift-off point"),
         (150, "set-down point"),
     ]
+    # It begins and ends at rest without a jerk
     made = motion(start=BENT, trajectory=pick_and_place())
     speed = np.diff(made.angles, axis=0) / PERIOD
     acceleration = np.diff(speed, axis=0) / PERIOD
     assert np.abs(speed[[0, -1]]).max() < 0.01 * np.abs(speed).max()
     assert np.abs(np.diff(acceleration, axis=0)).max() < 0.2 * np.abs(acceleration).max()
+    # A lift of less than a quarter of the last link is refused
     assert last_link(MA2000) == pytest.approx(0.16841)
     with pytest.raises(SpecError, match=r"lift of 0.042 m: allowed are 0.0421 m and more"):
         motion(start=BENT, trajectory=pick_and_place(lift=0.042))

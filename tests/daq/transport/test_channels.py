@@ -145,6 +145,7 @@ def test_every_byte_passes_a_pseudo_terminal_unchanged(terminal: tuple[int, str]
 
 
 def test_a_port_has_one_owner_and_a_stranger_that_reads_is_named(terminal: tuple[int, str]) -> None:
+    # A port has one owner
     _, device = terminal
     endpoint = open_endpoint(f"serial://{device}")
     with (
@@ -166,6 +167,7 @@ def test_a_port_has_one_owner_and_a_stranger_that_reads_is_named(terminal: tuple
         other.wait()
     assert "ModemManager and brltty open new ports by themselves" in shared_port_advice(device)
     assert shared_port_advice("127.0.0.1:5000") == ""
+    # Relatives of a process are no strangers
     me = os.getpid()
     parents = {1: 0, 10: 1, 11: 10, me: 11, me + 1: me, me + 2: me + 1, 12: 10, me + 3: 12}
     assert _ours(parents) == {10, 11, me, me + 1, me + 2}

@@ -196,6 +196,7 @@ def test_plant_effects_reach_the_arm_through_the_board(make_board: MakeBoard) ->
 
 
 def test_a_hand_leads_a_joint_evenly_to_its_end_stop_while_its_drive_has_no_power() -> None:
+    # A hand leads a joint evenly and the others rest
     board = make_device().board
     board.run_until(100_000)
     board.press_emergency_stop(True)
@@ -205,10 +206,12 @@ def test_a_hand_leads_a_joint_evenly_to_its_end_stop_while_its_drive_has_no_powe
     assert board.plant.joint_angles[0] == pytest.approx(held[0] + 0.2, abs=0.01)
     board.run_until(2_000_000)
     assert board.plant.joint_angles == pytest.approx([held[0] + 0.4, *held[1:]])
+    # A hand does not pass an end stop
     board = make_device().board
     board.press_emergency_stop(True)
     with pytest.raises(BoardError, match="end stop"):
         board.lead({1: math.radians(400)}, 1.0)
+    # The end stops are where the plant has them
     board = make_device().board
     board.press_emergency_stop(True)
     ends = [board.end_stop(1, high=high) for high in (False, True)]
@@ -216,6 +219,7 @@ def test_a_hand_leads_a_joint_evenly_to_its_end_stop_while_its_drive_has_no_powe
     board.lead({1: ends[1]}, 1.0)
     board.run_until(1_500_000)
     assert board.plant.joint_angles[0] == pytest.approx(ends[1])
+    # Nobody moves the arm by hand while its drives have power
     board = make_device().board
     with pytest.raises(BoardError, match="emergency stop"):
         board.lead({1: 3.0}, 1.0)

@@ -144,20 +144,24 @@ def test_the_same_seed_and_faults_give_the_same_bytes(options: dict[str, object]
 
 
 def test_bytes_take_their_time_one_after_the_other_both_ways() -> None:
+    # Bytes follow one another on the line
     line = Line(115_200)
     assert line.carry(57, 1000) == 1000 + 4948
     assert line.carry(1, 1000) == 1000 + 4948 + 87
     assert line.carry(1, 100_000) == 100_087
     assert Line(None).carry(1000, 7) == 7
+    # A round trip takes both ways on the line
     host = RealTimeHost(baud=9600)
     host.wait(1000)
     host.send(1, c.Hello(2, 5))
     ((moment, sequence, reply),) = host.wait(100_000)
     assert (sequence, type(reply)) == (1, c.HelloReply)
     assert moment == -(-14 * 10_000_000 // 9600) + -(-27 * 10_000_000 // 9600)
+    # Bytes take their time on the line
     host = LockStepHost(baud=115_200)
     host.ask(c.ReadStatus())
     assert host.board.time_us == -(-9 * 10_000_000 // 115_200) + -(-24 * 10_000_000 // 115_200)
+    # Replies to all requests in one write come in order
     host = RealTimeHost()
     host.pace.receive(b"".join(host.dialect.encode(number, c.ReadStatus()) for number in range(5)))
     assert [number for _, number, _ in host.wait(100)] == [0, 1, 2, 3, 4]

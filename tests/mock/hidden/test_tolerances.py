@@ -218,6 +218,7 @@ def test_process_arguments_and_output_hold_the_seed_and_nothing_else() -> None:
 
 
 def test_a_secret_repeats_to_the_bit_and_greets_as_any_other_mock() -> None:
+    # A secret repeats to the bit and noise is another seed
     def snapshots(seed: int) -> list[Any]:
         board = make_device(secret=SEED, seed=seed).board
         board.write_set_points({1: 510, 2: 340, 3: 490})
@@ -233,7 +234,9 @@ def test_a_secret_repeats_to_the_bit_and_greets_as_any_other_mock() -> None:
         for a, b in zip(one.positions, two.positions, strict=True)
     )
     assert worst <= 6, "another noise, the same potentiometers"
+    # A host is greeted as by any other mock
     assert LockStepHost(secret=SEED).ask(Hello(2, 1)) == LockStepHost().ask(Hello(2, 1))
+    # Secret and modify are one or the other
     with pytest.raises(OptionsError, match="secret and modify"):
         read_options(["--pty", "--secret", "20", "--modify", "payload:mass=1"])
     assert read_options(["--pty", "--secret", "20"]).secret == 20

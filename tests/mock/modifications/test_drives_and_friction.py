@@ -65,21 +65,25 @@ def test_a_winding_warmed_from_outside_loses_torque_with_time_and_not_with_curre
 
 
 def test_amplifiers_lose_what_is_below_a_threshold_above_a_supply_or_too_steep() -> None:
+    # A threshold passes nothing below it and all above
     plant = plant_with(effect("amplifier_threshold", joint=2, width=2.0))
     plant.advance([0.0, 0.07, 0.0, 0, 0, 0], 1000)
     assert plant.motor_volts[1] == 0.0
     plant.advance([0.0, -0.5, 0.07, 0, 0, 0], 1000)
     assert plant.motor_volts[1:3] == pytest.approx((-14.0, 1.96))
+    # Supply limit cuts its joint and no other
     plant = plant_with(effect("supply_limit", joint=2, reduction=10.0))
     plant.advance([1.25, 1.25, -1.25, 0, 0, 0], 1000)
     assert plant.motor_volts[:3] == pytest.approx((35.0, 26.0, -35.0))
     plant.advance([0, -1.25, 0, 0, 0, 0], 1000)
     assert plant.motor_volts[1] == pytest.approx(-26.0)
+    # Slew rate lets the output climb so much a step
     plant = plant_with(effect("amplifier_slew_rate", joint=1, time_per_volt=1e-3))
     plant.advance([0.5, 0.5, 0, 0, 0, 0], 3000)
     assert plant.motor_volts[:2] == pytest.approx((3.0, 14.0))
     plant.advance([0.5, 0.5, 0, 0, 0, 0], 20_000)
     assert plant.motor_volts[:2] == pytest.approx((14.0, 14.0))
+    # Coupled drives share volts in one direction
     plant = plant_with(effect("drive_coupling", joint=1, onto=2, share=0.1))
     plant.advance([0.5, 0, 0, 0, 0, 0], 1000)
     assert plant.motor_volts[:3] == pytest.approx((14.0, 1.4, 0.0))
@@ -120,6 +124,7 @@ def test_gears_ripple_and_lose_a_share_of_the_torque_that_they_transmit() -> Non
 
 
 def test_gears_that_give_twist_with_their_load_or_let_the_link_fall_by_their_play() -> None:
+    # A compliant joint twists in proportion to its load
     (spring,) = build_modifications([("joint_compliance", {"joint": 2, "compliance": 1e-3, "damping": 4.0})])
     plant = plant_with(spring, angles=(math.pi, 0.3, 0.0, 0.0, 0.0, 0.0))
     plant._rotors[1]._inertia = 1e9  # the rotor is held
@@ -130,6 +135,7 @@ def test_gears_that_give_twist_with_their_load_or_let_the_link_fall_by_their_pla
     weight = 9.81 * (0.5 * body.m2 * body.a2 + body.m3 * (body.a2 + 0.5 * body.a3) + body.m_load * reach)
     assert sag == pytest.approx(1e-3 * weight * math.cos(0.3), rel=0.35)  # friction holds a part of it
     assert plant.joint_angles[0] == pytest.approx(math.pi, abs=1e-3)
+    # Backlash lets the link fall by its play and no further
     (loose,) = build_modifications([("backlash", {"joint": 3, "play": 0.02, "stiffness": 4000.0, "damping": 1.0})])
     plant = plant_with(loose, parameters=default_plant(), angles=(math.pi, 0.3, -0.3, 0.0, 0.0, 0.0))
     plant._rotors[2]._inertia = 1e9

@@ -158,11 +158,13 @@ def test_bristle_never_exceeds_its_level_and_ignores_how_motion_is_cut_in_steps(
 
 
 def test_end_stops_hold_and_a_stalled_joint_moves_again_when_released() -> None:
+    # End stops hold against full drive
     plant = Plant(default_plant(), angles=UP)
     plant.advance([1.0, 0, 1.0, 0.5, 0.5, 0.5], 6_000_000)
     overshoot = [a - j.upper_stop for a, j in zip(plant.joint_angles, plant.parameters.joints, strict=True)]
     assert max(overshoot) < math.radians(0.5)
     assert overshoot[0] > -math.radians(1)
+    # Stalled joint stays and moves again when released
     plant = Plant(default_plant(), angles=UP)
     plant.advance([0.5, 0, 0, 0, 0, 0], 100_000)
     plant.stall(1)
@@ -172,9 +174,11 @@ def test_end_stops_hold_and_a_stalled_joint_moves_again_when_released() -> None:
     plant.release(1)
     plant.advance([1.0, 0, 0, 0, 0, 0], 100_000)
     assert plant.joint_angles[0] > jammed_at + 0.05
+    # Held wrist does not move while the arm does
     plant = Plant(default_plant(), angles=(math.pi, 0.8, 0.3, 0.0, 0.0, 0.0))
     plant.advance([0.8, 0.9, 0.6, 0, 0, 0], 500_000)
     assert max(map(abs, plant.joint_angles[3:])) < 1e-4
+    # Start outside the end stops is refused
     with pytest.raises(PlantError, match="joint 2"):
         Plant(default_plant(), angles=(math.pi, 7.0, 0, 0, 0, 0))
 

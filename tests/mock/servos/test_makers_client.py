@@ -153,6 +153,7 @@ def after(secret: Secret, volts: tuple[float, float], motor: Motor = SMOOTH, sec
 
 
 def test_a_seed_hides_one_effect_that_reveal_tells(capsys: pytest.CaptureFixture[str]) -> None:
+    # A seed hides one effect and reveal tells it
     assert reveal(["--servos", "4", "5"]) == 0
     told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [one["seed"] for one in told] == [4, 5]
@@ -167,6 +168,7 @@ def test_a_seed_hides_one_effect_that_reveal_tells(capsys: pytest.CaptureFixture
         "dead_zone",
         "spring_torque",
     }
+    # A seed without a meaning is one line
     assert reveal(["--servos", "-1"]) == 2
     assert start(["--secret", "-1"]) == 2
     lines = capsys.readouterr().err.splitlines()

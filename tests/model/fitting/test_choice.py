@@ -28,10 +28,12 @@ def test_by_default_every_number_with_an_expected_deviation_is_found_but_what_fi
 
 
 def test_a_named_parameter_is_found_between_its_bounds_unless_it_is_held() -> None:
+    # A parameter that is named is found between its own bounds about its expected value
     (mass,) = chosen_unknowns(arm(), MASS)
     own = arm().parameter("load.mass")
     assert (mass.start, mass.low, mass.high) == (own.value, own.low, own.high)
     assert (mass.expected, mass.deviation, mass.nuisance) == (own.value, own.deviation, False)
+    # What is held is held even where it is named
     both = FitOptions(parameters=("load.mass", "joint2.motor.*"), held=("joint2.motor.resistance",))
     names = {u.name for u in chosen_unknowns(arm(), both)}
     assert "load.mass" in names

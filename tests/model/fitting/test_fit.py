@@ -94,6 +94,7 @@ def test_missing_samples_and_a_crackling_sensor_decide_nothing() -> None:
 
 
 def test_progress_grows_to_one_and_says_what_is_done() -> None:
+    # Progress never goes back and ends at one
     told: list[float] = []
     fit(arm(), traces(arm(), 1, 4.0), QUICK.model_copy(update={"rounds": 1}), lambda f, _text: told.append(f))
     assert told == sorted(told)
@@ -232,14 +233,17 @@ def test_what_the_data_say_nothing_of_is_wide_and_never_of_negative_variance() -
 
 
 def test_scores_of_neighbours_count_less_the_further_they_are_apart() -> None:
+    # Scores of neighbours count less the further they are apart and never across runs
     one, other = np.array([[1.0], [2.0], [4.0], [8.0]]), np.array([[3.0], [5.0]])
     squares = 1 + 4 + 16 + 64 + 9 + 25
     next_to, two_apart = 2 + 8 + 32 + 15, 4 + 16
     found = score_covariance([one, other], bandwidth=2)
     assert found[0, 0] == pytest.approx(squares + 2 * (2 / 3 * next_to + 1 / 3 * two_apart))
     assert score_covariance([one, other], bandwidth=0)[0, 0] == squares
+    # The inverse is the inverse where there is one
     matrix = np.diag([1e12, 1.0, 1e-9]) + 1e-11
     np.testing.assert_allclose(inverse(matrix) @ matrix, np.eye(3), atol=1e-9)
+    # The covariance of scores is symmetric
     scores = np.random.default_rng(4).normal(size=(30, 3))
     found = score_covariance([scores], bandwidth=4)
     np.testing.assert_array_equal(found, found.T)

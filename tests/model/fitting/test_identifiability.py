@@ -50,6 +50,7 @@ UNKNOWNS = (
 
 
 def test_the_scale_of_torque_is_found_named_and_fixed_once_one_torque_is_held() -> None:
+    # The scale of torque is found and named
     report = judged(pendulum_jacobian(VALUES, 1e-3), VALUES, UNKNOWNS)
     assert report.torque_scale_free
     assert len(report.undetermined) == 1
@@ -66,6 +67,7 @@ def test_the_scale_of_torque_is_found_named_and_fixed_once_one_torque_is_held() 
     assert verdicts["link1.mass"] == verdicts["joint1.motor.torque_constant"] == "combination"
     assert "scale of torque" in report.verdict("link1.mass").reason
     assert report.verdict("link1.mass").data_deviation is None
+    # The scale is fixed once one torque is held
     held = [0, 1, 3]
     report = judged(pendulum_jacobian(VALUES, 1e-3)[:, held], VALUES[held], [UNKNOWNS[k] for k in held])
     assert not report.torque_scale_free

@@ -82,11 +82,13 @@ def found_elsewhere(problem: Curve, robust: bool = False) -> Floats:
 
 
 def test_finds_the_least_squares_with_few_jacobians_and_says_when_it_had_too_few() -> None:
+    # Finds the least squares with few jacobians
     problem = curve()
     solution = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-9))
     np.testing.assert_allclose(solution.values, found_elsewhere(problem), rtol=1e-5)
     assert solution.converged
     assert problem.jacobians < solution.evaluations
+    # Says when it was not given enough evaluations
     solution = solve(curve(), [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-9, 2))
     assert not solution.converged
     assert solution.evaluations == 2

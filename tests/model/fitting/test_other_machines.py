@@ -149,11 +149,13 @@ def test_a_model_that_does_not_stay_finite_is_told_with_its_record() -> None:
 
 
 def test_a_result_is_asked_for_parameters_by_name_and_told_from_a_model(sliding: FitResult, tmp_path: Path) -> None:
+    # A result is asked for its parameters by name
     assert sliding.parameter(NAME).unit == "N·s/m"
     with pytest.raises(SpecError, match=rf"parameter 'mass': was not fitted; fitted were {NAME}"):
         sliding.parameter("mass")
     assert sliding.covariance_matrix.shape == (1, 1)
     assert sliding.names == (NAME,)
+    # A result is told from a model
     sliding.save(tmp_path / "fit.json")
     save_model(sliding.model, tmp_path / "model.json")
     (tmp_path / "list.json").write_text("[]")
@@ -164,6 +166,7 @@ def test_a_result_is_asked_for_parameters_by_name_and_told_from_a_model(sliding:
     assert (tmp_path / "fit.json").read_text("utf-8").endswith("}\n")
     with pytest.raises(SpecError, match=r"absent/fit\.json: cannot be written: No such file or directory"):
         sliding.save(tmp_path / "absent" / "fit.json")
+    # A result of a newer version
     (tmp_path / "new.json").write_text(json.dumps({"format": 99}), "utf-8")
     with pytest.raises(SpecError, match="format 99 is newer"):
         load_result(tmp_path / "new.json")

@@ -279,6 +279,7 @@ REPORT = IdentifiabilityReport(parameters=(), undetermined=(UNDETERMINED,), corr
 
 
 def test_the_table_has_numbers_where_the_data_determine_one_in_terminal_and_notebook() -> None:
+    # The table in a terminal has numbers where the data determine one
     head, *rows, below = text_of((LOAD, EMF, ARM), REPORT).splitlines()
     assert head.split() == ["parameter", "value", "95", "%", "interval", "unit", "before"]
     assert [row.split() for row in rows] == [
@@ -289,6 +290,7 @@ def test_the_table_has_numbers_where_the_data_determine_one_in_terminal_and_note
     assert len({row.rindex(f" {unit} ") for row, unit in zip(rows, ("kg", "V·s/rad", "m"), strict=True)}) == 1
     assert below == "not determined: together a +1 %, <b> −1 %"
     assert known_of((LOAD, EMF, ARM)) == "2 of 3 parameters known"
+    # The table of a notebook has the same and names are no html
     page = ET.fromstring(html_of("FitResult <of it>", (LOAD, EMF, ARM), REPORT))
     rows = [["".join(cell.itertext()) for cell in row] for row in page.iter("tr")]
     assert rows[0][:4] == ["parameter", "value", "95 % interval", "unit"]

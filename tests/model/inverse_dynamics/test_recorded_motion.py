@@ -146,6 +146,7 @@ def share_left(record: RecordedMotion, missing: Floats) -> float:
 
 
 def test_torque_missing_only_at_a_limit_leaves_little_and_elsewhere_all() -> None:
+    # A torque that is missing only while a drive stands at its largest value leaves next to nothing
     record = motion_of(standing(0.12, 0.8))
     at_limit = record.at_limit[:, 0]
     assert 0.1 < at_limit.mean() < 0.2
@@ -154,12 +155,14 @@ def test_torque_missing_only_at_a_limit_leaves_little_and_elsewhere_all() -> Non
     slowly = np.where(at_limit, 1.0 + 0.8 * np.sin(11.0 * TIME[: len(at_limit)]), 0.0)
     assert share_left(record, constant) < 1e-3
     assert share_left(record, slowly) < 1e-2
+    # A torque that is missing elsewhere is kept
     record = motion_of(standing(0.12, 0.8))
     time = TIME[: len(record.at_limit)]
     far = np.abs(((time - 0.56) % 0.8) - 0.4) < 0.15
     assert not (far & record.at_limit[:, 0]).any()
     assert share_left(record, np.where(far, np.sin(9.0 * time), 0.0)) > 0.9
     assert share_left(record, 0.3 + np.sin(2.0 * time)) > 0.6, "what acts all the time is kept between"
+    # A joint with too many pieces is not known at all
     record = motion_of(standing(0.16, 0.32))
     assert 0.4 < record.at_limit.mean() < 0.6
     assert share_left(record, np.sin(2.0 * TIME)) < 1e-20

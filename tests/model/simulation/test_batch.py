@@ -228,11 +228,13 @@ def test_what_is_not_a_model_is_refused(text: str, says: str, tmp_path: Path) ->
 
 
 def test_parameters_have_places_of_their_own_and_ties_share_one_value(model: Model) -> None:
+    # Every parameter is within its bounds and lies in its own place
     slots = [s for p in model.parameters for s in p.slots]
     assert len(slots) == len(set(slots))
     for p in model.parameters:
         assert p.low <= p.value <= p.high
         assert model.vector[list(p.slots)] == pytest.approx(p.value)
+    # Changing values leaves the first model as it was
     before = model.vector.copy()
     heavier = model.with_values({"load.mass": 2.0})
     assert heavier.vector[at.LOAD] == 2.0
@@ -241,6 +243,7 @@ def test_parameters_have_places_of_their_own_and_ties_share_one_value(model: Mod
         model.with_values({"load.mass": -1.0})
     with pytest.raises(SpecError, match="not in this model"):
         model.with_values({"load.masses": 1.0})
+    # Ties share one value
     tied = model.tied("motor.back_emf_constant", ("joint1.motor.back_emf_constant", "joint3.motor.back_emf_constant"))
     changed = tied.with_values({"motor.back_emf_constant": 0.04})
     assert [changed.vector[at.slot(j, at.BACK_EMF)] for j in (1, 2, 3)] == [

@@ -116,16 +116,19 @@ def test_the_sum_does_not_grow_further_into_a_limit_that_is_reached() -> None:
 
 
 def test_readings_round_to_counts_and_power_is_that_of_the_same_period() -> None:
+    # Readings round half up to counts
     joint = row(3)
     angle = joint[at.AT_ZERO] + joint[at.RAD_PER_COUNT] * np.array([2047.4, 2047.5, 2048.0])
     assert [reading(float(a), 0.0, True, joint) for a in angle] == [2047.0, 2048.0, 2048.0]
     assert reading(float(angle[0]), 0.0, False, joint) == pytest.approx(2047.4)
+    # Power is the gain times the error of the same period
     model = base_model(load_machine("ma2000"))
     run = simulate(model, ramp_inputs(model.machine))
     counts = run.error / [model.machine.calibration(j).rad_per_count for j in (1, 2, 3)]
     assert np.abs(counts - np.round(counts)).max() < 1e-6
     assert np.array_equal(run.power, np.clip(2 * np.round(counts), -127, 127))
     assert np.abs(run.drive - run.power * 36 / 127).max() < 1e-12
+    # Static error falls with the gain
     machine = load_machine("ma2000")
     model = base_model(machine, friction=False)
     inputs = ramp_inputs(machine, duration=3.0)

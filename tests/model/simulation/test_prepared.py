@@ -38,6 +38,7 @@ def prepared(machine: Machine, trace: Trace, **options: object) -> Prepared:
 
 
 def test_set_points_are_whole_posture_units_or_counts_of_the_sensor() -> None:
+    # The board takes set points in whole posture units and those in whole counts
     unit = 1.5 * np.pi / 1000
     low = MA2000.calibration(1).posture_to_rad(0)
     wanted = np.tile(START, (4, 1))
@@ -48,6 +49,7 @@ def test_set_points_are_whole_posture_units_or_counts_of_the_sensor() -> None:
     assert found.settings[at.PUBLISHED_LOADS] == 1
     assert found.settings[at.DRIVE_RECORDED] == 0
     assert found.period == 0.02
+    # A board with a finer sensor counts in its own counts
     first = MA2000.joints[0]
     assert first.sensor is not None
     finer = first.model_copy(update={"sensor": first.sensor.model_copy(update={"bits": 14})})
@@ -115,6 +117,7 @@ def test_options_reach_the_record(quantise: bool) -> None:
 
 
 def test_gains_and_period_are_the_record_s_else_the_machine_s() -> None:
+    # Gains are the record's own else the machine s
     controller = MA2000.controller
     record = still().record.model_copy(update={"gains": {2: (7, 3, 1)}})
     found = inputs_of(replace(still(), record=record), MA2000).gains
@@ -125,6 +128,7 @@ def test_gains_and_period_are_the_record_s_else_the_machine_s() -> None:
     assert (found[:, pid.SCALE] == controller.dac_counts_per_adc_count.value).all()  # type: ignore[union-attr]
     assert not found[:, [pid.INNER_P, pid.INNER_I, pid.INNER_D, pid.RESOLUTION]].any()
 
+    # The period is the record's else the controller's else that of the samples
     def period(machine: Machine, joints: int, **signals: Floats) -> float:
         made = trace_of(np.zeros((60, joints)), 0.03, **signals)
         record = made.record.model_copy(update={"period": None})

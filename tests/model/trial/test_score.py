@@ -39,12 +39,14 @@ def test_a_second_wrong_name_is_wrong_and_a_rejected_step_names_nothing() -> Non
 
 
 def test_a_group_is_no_name_but_the_effect_may_be_in_its_final_answer() -> None:
+    # A group is no name but the effect may be in it
     given = answer("ambiguous", step("input_delay", 2, ranked=("input_delay",), group=("input_delay", "backlash")))
     result = judged(BACKLASH, given)
     assert result.named_right is False
     assert result.in_answer
     assert result.place == "group"
     assert result.joint_right
+    # A group that is not the final answer gives nothing
     taken = step("input_delay", 2, ranked=("input_delay",), group=("input_delay", "backlash"))
     withdrawn = taken.model_copy(update={"adopted": False, "rejected_because": "it only resembles what is missing"})
     for given in (
