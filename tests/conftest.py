@@ -19,8 +19,6 @@ settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 DETERMINISTIC = (
     "daq/owner/test_guardian.py",
-    "daq/owner/test_guardian.py",
-    "mock/process/test_control.py",
     "mock/process/test_control.py",
     "server/robot/test_control.py",
     "server/access/test_gate.py",

@@ -70,8 +70,8 @@ def test_bounds_and_priors_may_be_left_out_or_be_all_that_is_possible() -> None:
     ("bounds", "says"),
     [
         ((1.0, 1.0), "lower bound 1 kg is not below the upper bound 1 kg"),
-        ((-0.001, 2.0), "bounds -0.001 to 2 kg leave what is possible, 0 to inf"),
-        ((None, 2.0), "bounds -inf to 2 kg leave what is possible, 0 to inf"),
+        ((-0.001, 2.0), "bounds -0.001 to 2 kg exceed the physical limits, 0 to inf"),
+        ((None, 2.0), "bounds -inf to 2 kg exceed the physical limits, 0 to inf"),
     ],
 )
 def test_bounds_are_in_order_and_within_what_is_possible(bounds: tuple[float | None, float], says: str) -> None:
