@@ -18,10 +18,8 @@ SKIPS_ARE_ERRORS = os.environ.get("CI", "").lower() in ("1", "true")
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
 DETERMINISTIC = (
-    "daq/owner/test_freezer.py",
     "daq/owner/test_guardian.py",
     "mock/process/test_control.py",
-    "mock/process/test_options.py",
     "server/robot/test_control.py",
     "server/access/test_gate.py",
     "server/jobs/test_job_service.py",

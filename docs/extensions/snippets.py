@@ -21,14 +21,14 @@ RUN: Mapping[tuple[str, str], str] = {
     ("feedforward.md", "python"): "tests/extras/motion/test_command.py",
     ("fleet.md", "console"): "tests/extras/lab/fleet/test_several_arms.py",
     ("fleet.md", "python"): "tests/extras/lab/fleet/test_several_arms.py",
-    ("index.md", "python"): "tests/repository/test_snippets.py",
+    ("index.md", "python"): "tests/repository/test_documentation.py",
     ("notifications.md", "console"): "tests/extras/lab/notifications/test_service.py",
-    ("own-effect.md", "python"): "tests/model/effects/test_own_effect.py",
+    ("own-effect.md", "python"): "tests/model/effects/test_effects.py",
     ("python.md", "python"): "tests/ma2000/test_public_interface.py",
     ("robots-from-urdf.md", "python"): "tests/extras/formats/command_line/test_pages.py",
     ("service.md", "console"): "tests/server/api/test_guide.py",
     ("service.md", "python"): "tests/server/api/test_guide.py",
-    ("traces.md", "python"): "tests/repository/test_snippets.py",
+    ("traces.md", "python"): "tests/repository/test_documentation.py",
 }
 """The test that runs a page's blocks of a language."""
 NOT_RUN: Mapping[tuple[str, str], str] = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from model.arrays import Floats
 from model.dynamics.recursive import inverse_dynamics_along
@@ -50,7 +51,7 @@ class NeededTorque:
         self._latest = numbers, self._moved(self._first, numbers, far)
         return self._latest[1]
 
-    def _moved(self, known: tuple[Floats, Floats], numbers: Floats, changed: Floats) -> Floats:
+    def _moved(self, known: tuple[Floats, Floats], numbers: Floats, changed: NDArray[np.intp]) -> Floats:
         torque = known[1].copy()
         for c in changed.tolist():
             torque += (numbers[c] - known[0][c]) * self._units[c]

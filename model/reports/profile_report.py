@@ -25,8 +25,8 @@ def profile_report(fitted: FitResult, profiles: Sequence[Profile]) -> Report:
     """Returns the page of some parameters' profiles about a fit."""
     picture = Picture(
         drawn(lambda figure: _draw(figure, fitted, profiles), PANEL_HEIGHT * len(profiles)),
-        "Rise of −2 ln L when the parameter is fixed elsewhere and all others are refitted. The line is the rise at which "
-        "the 95 % interval ends; the band is the interval. Dashed: the parabola of the fit's covariance.",
+        "Rise of −2 ln L when the parameter is fixed elsewhere and all others are refitted. The line is the rise at "
+        "which the 95 % interval ends; the band is the interval. Dashed: the parabola of the fit's covariance.",
     )
     blocks: list[Table | Text] = [bounds_table(profiles)]
     if better := [one.name for one in profiles if one.better]:

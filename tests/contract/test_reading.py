@@ -13,16 +13,13 @@ AT_REST_COUNTS = 12
 """Counts by which two readings of an arm at rest may differ: noise of its potentiometers, and what it still creeps."""
 
 
-def test_a_controller_identifies_itself(controller: Controller) -> None:
+def test_a_controller_identifies_itself_and_has_not_restarted(controller: Controller) -> None:
     identity = controller.identity
     assert identity.version == c.PROTOCOL_VERSION
     assert 0.001 <= identity.period_s <= 1.0
     assert identity.boots >= 1
     assert (identity.ring_depth >= 8) == (c.Capability.SAMPLE in identity.capabilities)
     assert controller.hello() == identity
-
-
-def test_once_greeted_it_has_not_restarted(controller: Controller) -> None:
     status = controller.status()
     assert c.StatusFlag.RESTARTED not in status.flags
     assert status.boots == controller.identity.boots
@@ -45,7 +42,7 @@ def test_each_period_is_delivered_once_and_in_order(controller: Controller) -> N
     assert all(snapshot.tick_time <= snapshot.host_time for snapshot in snapshots)
 
 
-def test_a_sample_is_whole(controller: Controller) -> None:
+def test_a_sample_is_whole_of_any_joints(controller: Controller) -> None:
     snapshot = controller.next_snapshot()
     assert [joint for joint, _ in snapshot.joints] == list(EVERY_JOINT)
     for _, reading in snapshot.joints:
@@ -54,13 +51,14 @@ def test_a_sample_is_whole(controller: Controller) -> None:
     by_sample = c.Capability.SAMPLE in controller.identity.capabilities
     assert snapshot.consistent_by == ("sample" if by_sample else "double-read")
     assert snapshot.tick_is_estimate != by_sample
-
-
-def test_any_joints_can_be_sampled(controller: Controller) -> None:
     assert [joint for joint, _ in controller.next_snapshot(joints=(1, 3)).joints] == [1, 3]
     assert controller.next_snapshot(joints=(5,))[5].position >= 0
     with pytest.raises(KeyError):
         controller.next_snapshot(joints=(5,))[1]
+    gains = controller.gains()
+    assert list(gains) == list(EVERY_JOINT)
+    assert all(0 <= value <= 20 for gain in gains.values() for value in gain)
+    assert controller.link.request(c.ReportGains(), c.Gains).gains == tuple(gains.values())
 
 
 def test_a_host_that_was_late_loses_nothing_that_is_in_the_ring(controller: Controller) -> None:
@@ -89,13 +87,6 @@ def test_reports_memory_and_samples_agree(controller: Controller) -> None:
         assert abs(reported[joint].position - reading.position) <= AT_REST_COUNTS
         assert abs(in_memory - reading.position) <= AT_REST_COUNTS
         assert reported[joint].set_point == reading.set_point
-
-
-def test_gains_are_reported_for_every_joint(controller: Controller) -> None:
-    gains = controller.gains()
-    assert list(gains) == list(EVERY_JOINT)
-    assert all(0 <= value <= 20 for gain in gains.values() for value in gain)
-    assert controller.link.request(c.ReportGains(), c.Gains).gains == tuple(gains.values())
 
 
 def test_requests_beyond_a_controllers_capabilities_are_refused(controller: Controller) -> None:

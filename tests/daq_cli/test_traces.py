@@ -9,8 +9,8 @@ import pytest
 
 from daq.traces.reader import read_trace
 from tests.daq.traces.samples import write
-from tests.daq.traces.test_files_that_are_no_trace import foreign, ours
 from tests.daq.traces.test_hostile_files import bomb
+from tests.daq.traces.test_scan import foreign, ours
 from tests.daq_cli.invoke import CommandLine
 
 

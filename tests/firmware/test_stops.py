@@ -1,16 +1,25 @@
-"""A stop of the core in C freezes the posture of now, and is answered, whatever the memory and the bus do."""
+"""The core in C: stops freeze the posture of now, and every vector of vectors.json is true."""
 
+import json
 from collections.abc import Callable
 from itertools import count, pairwise
+from random import Random
+from typing import Any
 
 import pytest
 
 from firmware_protocol import commands as c
+from firmware_protocol.commands import Refusal
+from firmware_protocol.framing import Frame, FrameDecoder, encode_frame
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.units import counts_to_posture
+from tests.firmware.bench import Bench, partner
 from tests.firmware.compiled import need
 from tests.firmware.core import PeriodSource
 from tests.firmware.machine import MAP, PERIOD_US, Machine, noisy, sweeping
+from tests.protocol.make_vectors import FILE
+from tests.protocol.play import play
+from tests.protocol.second_implementation import frame_of
 
 ANSWERED_US = 10_000
 """PROTOCOL.md, section 3: a stop whose posture has to be read."""
@@ -76,14 +85,7 @@ def test_a_snapshot_is_not_new_again_when_the_clock_has_gone_round() -> None:
     assert machine.ask(c.Stop(), ANSWERED_US).postures == postures_now(machine)
 
 
-def test_while_the_wire_tells_periods_a_stop_takes_the_newest_snapshot_at_once() -> None:
-    machine = Machine(moving, PeriodSource.TOLD)
-    machine.greet()
-    tell(machine, 5)
-    assert machine.ask(c.Stop(), 500).postures == postures_now(machine, 2), "told last"
-
-
-def test_a_bit_that_flickers_in_a_power_leaves_no_old_posture_to_a_stop() -> None:
+def test_no_old_posture_is_left_to_a_stop_by_a_flickering_power_or_told_periods() -> None:
     machine = Machine(moving)
     machine.greet()
     machine.periods(5)
@@ -91,6 +93,10 @@ def test_a_bit_that_flickers_in_a_power_leaves_no_old_posture_to_a_stop() -> Non
     machine.periods(100)
     stopped = machine.ask(c.Stop(), ANSWERED_US)
     assert stopped.postures in (postures_now(machine), postures_now(machine, 2))
+    machine = Machine(moving, PeriodSource.TOLD)
+    machine.greet()
+    tell(machine, 5)
+    assert machine.ask(c.Stop(), 500).postures == postures_now(machine, 2), "told last"
 
 
 @pytest.mark.parametrize("source", [PeriodSource.WATCHED, PeriodSource.UNSEEN], ids=["SAMPLE", "no SAMPLE"])
@@ -144,3 +150,86 @@ def test_a_period_that_cannot_be_read_costs_that_sample_and_no_other() -> None:
     gaps = sorted(later - earlier for earlier, later in pairwise(ticks))
     assert gaps[:-1] == [1] * 10
     assert gaps[-1] in (2, 3)
+
+
+# ---- The core in C finds every vector of vectors.json true, and says to the byte what the second bridge says
+
+VECTORS: dict[str, Any] = json.loads(FILE.read_text("utf-8"))
+REFUSED = [vector for vector in VECTORS["refused"] if vector["direction"] == "request"]
+DIALOGUES = [dialogue for dialogue in VECTORS["dialogues"] if "COMPACT" not in dialogue["needs"]]
+"""The core is for lines that carry a turn in every period: it goes without the ability COMPACT."""
+UNSEEN = [dialogue for dialogue in DIALOGUES if "SAMPLE" not in dialogue["needs"]]
+NOT_THERE = {0x11: "UNKNOWN_OPCODE", 0x40: "NOT_CAPABLE"}
+"""Requests of abilities that the core has not, and how it refuses them."""
+LONGEST_PIECE = 55
+"""Bytes between two zeros; the receiver drops what is longer before it looks at the stuffing."""
+STATUS = frame_of(0x7777, 0x33, b"")
+
+
+def answers(bench: Bench, line: bytes) -> list[Frame]:
+    """The frames that the core sends to some bytes."""
+    return FrameDecoder().feed(bench.receive(line))
+
+
+def test_every_crc_and_every_stuffing_is_that_of_the_vectors() -> None:
+    core = Bench().core
+    for vector in VECTORS["crc"]:
+        assert f"{core.crc_of(bytes.fromhex(vector['data'])):04x}" == vector["crc"]
+    for vector in VECTORS["cobs"]:
+        body, stuffed = bytes.fromhex(vector["body"]), bytes.fromhex(vector["stuffed"])
+        assert core.stuff(body) == stuffed
+        assert core.unstuff(stuffed) == body
+    for encoded in VECTORS["cobs_broken"]:
+        piece = bytes.fromhex(encoded)
+        assert len(piece) > LONGEST_PIECE or core.unstuff(piece) is None
+
+
+@pytest.mark.parametrize("vector", VECTORS["frames"], ids=lambda v: f"{v['message']} {v['sequence']}")
+def test_every_frame_is_answered_under_its_number(vector: dict[str, Any]) -> None:
+    """A request by its reply or a refusal, a reply, which no bridge is sent, as an unknown request."""
+    line = bytes.fromhex(vector["frame"])
+    (sent,) = FrameDecoder().feed(line)
+    replies = answers(Bench(), line)
+    if sent.opcode == 0x10:  # waits for a period
+        assert not replies
+        return
+    (reply,) = replies
+    assert reply.sequence == sent.sequence
+    if sent.opcode >= 0x80:
+        assert (reply.opcode, reply.payload) == (0xFF, bytes((sent.opcode, Refusal.UNKNOWN_OPCODE)))
+    else:
+        assert reply.opcode in (sent.opcode | 0x80, 0xFF)
+
+
+@pytest.mark.parametrize("vector", VECTORS["damaged"], ids=lambda v: v["why"])
+def test_damaged_lines_are_not_answered_and_the_next_frame_is(vector: dict[str, str]) -> None:
+    bench = Bench()
+    assert answers(bench, bytes.fromhex(vector["line"])) == []
+    assert answers(bench, STATUS)[-1].opcode == 0xB3
+
+
+@pytest.mark.parametrize("vector", REFUSED, ids=lambda v: f"{v['opcode']:02x} {v['why']}")
+def test_payloads_that_must_be_refused_are_refused(vector: dict[str, Any]) -> None:
+    opcode = vector["opcode"]
+    (reply,) = answers(Bench(), frame_of(1, opcode, bytes.fromhex(vector["payload"])))
+    wanted = NOT_THERE.get(opcode, vector["reason"])
+    assert (reply.opcode, reply.payload) == (0xFF, bytes((opcode, Refusal[wanted])))
+
+
+@pytest.mark.parametrize("dialogue", DIALOGUES, ids=lambda d: d["rule"])
+def test_a_dialogue_goes_as_the_second_bridge_has_it_to_the_byte(dialogue: dict[str, Any]) -> None:
+    bridge = partner()
+    for number, step in enumerate(dialogue["steps"]):
+        if "board" in step:
+            bridge.happens(step["board"])
+        elif "host" in step:
+            bridge.send(bytes.fromhex(step["frame"]))
+        else:
+            assert encode_frame(bridge.reply(step["sequence"])).hex() == step["frame"], (number, step)
+    assert not bridge.rest()
+
+
+@pytest.mark.parametrize("dialogue", UNSEEN, ids=lambda d: d["rule"])
+def test_a_bridge_that_sees_no_period_keeps_the_same_rules(dialogue: dict[str, Any]) -> None:
+    chance = Random(dialogue["rule"])
+    play(dialogue["steps"], partner(PeriodSource.UNSEEN), lambda: chance.getrandbits(32))

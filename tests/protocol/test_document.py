@@ -42,7 +42,8 @@ def table(title: str) -> list[list[str]]:
 # ---- frames
 
 
-def test_the_frames_constants_are_those_of_the_document() -> None:
+def test_constants_and_example_of_a_frame_are_those_of_the_document() -> None:
+    # The frames constants are those of the document
     constants = {name: int(value, 0) for name, value in table("Frames")}
     assert constants == {
         "largest payload, bytes": framing.MAX_PAYLOAD,
@@ -53,9 +54,7 @@ def test_the_frames_constants_are_those_of_the_document() -> None:
         "bytes that a frame adds to its payload": framing.FRAME_OVERHEAD,
         "CRC of 31 32 33 34 35 36 37 38 39": crc16(b"123456789"),
     }
-
-
-def test_the_documents_example_frame_is_what_the_code_makes() -> None:
+    # The documents example frame is what the code makes
     steps = {step: bytes.fromhex(data) for step, data in table("A frame step by step")}
     request = c.WriteSetPoints(((1, 500), (2, 508), (3, 515)))
     frame = c.to_frame(1, request, c.Stamp(0x10001, 1))
@@ -203,7 +202,8 @@ def test_codes_are_those_of_the_document(title: str, kind: Iterable[Any]) -> Non
     assert {(int(row[0]), row[1]) for row in table(title)} == {(code.value, code.name) for code in kind}
 
 
-def test_every_example_of_the_conversation_is_what_the_code_says() -> None:
+def test_every_example_of_the_conversation_is_what_the_code_says_by_its_rules() -> None:
+    # Every example of the conversation is what the code says
     rows = table("A conversation")
     assert len(rows) >= 10
     for name, sequence, fields, line in rows:
@@ -213,9 +213,7 @@ def test_every_example_of_the_conversation_is_what_the_code_says() -> None:
         told = (vars(stamp) if stamp else {}) | as_json(message)
         assert (type(message).__name__, frame.sequence, told) == (name, int(sequence), json.loads(fields))
         assert encode_frame(c.to_frame(frame.sequence, message, stamp or c.UNSTAMPED)) == bytes.fromhex(line)
-
-
-def test_the_conversation_is_true_to_its_own_rules() -> None:
+    # The conversation is true to its own rules
     said = {row[0]: json.loads(row[2]) for row in reversed(table("A conversation"))}
     sent = dict(said["WriteSetPoints"]["postures"])
     readings = dict(said["Snapshot"]["joints"])
@@ -228,15 +226,13 @@ def test_the_conversation_is_true_to_its_own_rules() -> None:
         low, high = position.low[joint - 1], position.high[joint - 1]
         start = said["ReadBlock"]["address"]
         assert position.decode(block[low - start], block[high - start]) == reading["position"]
-
-
-# ---- units, memory, line
-
-
-def test_the_documents_rounding_tables_are_right() -> None:
+    # The documents rounding tables are right
     for posture, counts, _, reading, nearest in table("Units and rounding"):
         assert posture_to_counts(int(posture)) == int(counts)
         assert counts_to_posture(int(reading)) == int(nearest)
+
+
+# ---- units, memory, line
 
 
 def test_the_memory_map_is_the_one_that_ships() -> None:

@@ -1,4 +1,8 @@
-"""Frames: stuffing, CRC, and a decoder that survives whatever a line delivers."""
+"""Frames: stuffing, CRC, damage that never passes, and a decoder that survives whatever a line delivers."""
+
+from functools import reduce
+from itertools import combinations
+from operator import xor
 
 import pytest
 from hypothesis import example, given
@@ -124,9 +128,8 @@ def test_the_longest_frame_fits_and_one_byte_more_does_not() -> None:
     assert len(decoder.feed(longest)) == 1
     assert decoder.feed(longest[:-1] + b"\x01\0") == []
     assert decoder.oversized == 1
-
-
-def test_reset_forgets_the_unfinished_frame_and_keeps_the_counters() -> None:
+    with pytest.raises(ProtocolError, match="body of 55 bytes: at most 54"):
+        stuff(bytes(MAX_BODY + 1))
     decoder = FrameDecoder()
     frame = Frame(1, 2, b"three")
     decoder.feed(b"noise\0" + encode_frame(frame)[:6])
@@ -150,11 +153,6 @@ def test_a_frame_that_does_not_fit_cannot_be_made(fields: tuple[int, int, bytes]
         Frame(*fields)
 
 
-def test_too_long_a_body_is_refused_by_stuffing() -> None:
-    with pytest.raises(ProtocolError, match="body of 55 bytes: at most 54"):
-        stuff(bytes(MAX_BODY + 1))
-
-
 @given(st.lists(st.tuples(st.integers(0, 0xFFFF), replies), max_size=6))
 def test_the_dialect_delivers_replies_and_counts_what_is_none(sent: list[tuple[int, object]]) -> None:
     dialect = FramedDialect()
@@ -166,3 +164,43 @@ def test_the_dialect_delivers_replies_and_counts_what_is_none(sent: list[tuple[i
 @given(st.lists(frames, min_size=1, max_size=5))
 def test_frames_never_make_the_idle_mark(sent: list[Frame]) -> None:
     assert IDLE_MARK not in b"".join(map(encode_frame, sent))
+
+
+# ---- Short damage never passes for a frame: errors of one to three bits, and bursts of up to 16
+
+BITS = MAX_BODY * 8
+
+
+@pytest.fixture(scope="module")
+def syndromes() -> list[int]:
+    """What each single wrong bit of the largest body does to the CRC taken over the whole body, first bit first.
+
+    The CRC is linear: several wrong bits do the exclusive or of what each does, and are found unless that is 0.
+    """
+    right = crc16(bytes(MAX_BODY))
+    return [crc16((1 << (BITS - 1 - bit)).to_bytes(MAX_BODY, "big")) ^ right for bit in range(BITS)]
+
+
+def rank(vectors: list[int]) -> int:
+    """Rank over the field of two elements."""
+    basis: list[int] = []
+    for vector in vectors:
+        reduced = reduce(lambda value, row: min(value, value ^ row), basis, vector)
+        if reduced:
+            basis.append(reduced)
+            basis.sort(reverse=True)
+    return len(basis)
+
+
+def test_every_short_error_and_every_burst_is_found(syndromes: list[int]) -> None:
+    # Guards the two tests above: the CRC really is linear, through the real function
+    wrong = (3, 17, 200, 431)
+    body = sum(1 << (BITS - 1 - bit) for bit in wrong).to_bytes(MAX_BODY, "big")
+    assert crc16(body) ^ crc16(bytes(MAX_BODY)) == reduce(xor, (syndromes[bit] for bit in wrong))
+    single = set(syndromes)
+    assert 0 not in single
+    assert len(single) == BITS, "two wrong bits cancel"
+    assert not any(one ^ other in single for one, other in combinations(syndromes, 2)), "three wrong bits cancel"
+    # 16 syndromes in a row are independent, at every place: no choice of them but the empty one gives 0
+    for start in range(BITS - 15):
+        assert rank(syndromes[start : start + 16]) == 16

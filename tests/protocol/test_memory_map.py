@@ -1,18 +1,25 @@
-"""The memory map: what is documented, and one clear line for each way a laboratory's file can be wrong."""
+"""The memory map: what is documented, one clear line for each mistake, and its header for the bridge in C."""
 
+import re
 from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import BaseModel, Field, ValidationError, field_validator
 
+from firmware_protocol.c_header import c_header, main
 from firmware_protocol.errors import MemoryMapError, UnitsError
+from firmware_protocol.invalid import Invalid, first_invalid
 from firmware_protocol.memory_map import MemoryMap, default_memory_map, parse_memory_map
 
 SHIPPED = resources.files("firmware_protocol").joinpath("memory_map.toml").read_text("utf-8")
 
 
-def test_the_documented_addresses_are_those_of_section_6_5_and_no_others() -> None:
+def test_all_but_the_documented_addresses_of_section_6_5_are_assumed() -> None:
+    # The documented addresses are those of section 6 5 and no others
     memory_map = default_memory_map()
     documented = {
         (name, i + 1): (register.low[i], register.high[i] if register.high else None)
@@ -25,17 +32,13 @@ def test_the_documented_addresses_are_those_of_section_6_5_and_no_others() -> No
         ("position", 2): (0xFC21, 0xFC29),
         ("position", 3): (0xFC22, 0xFC2A),
     }
-
-
-def test_everything_else_says_that_it_is_assumed() -> None:
+    # Everything else says that it is assumed
     memory_map = default_memory_map()
     every = sum(len(register.low) for register in memory_map.registers.values())
     assert len(memory_map.assumed) == every - 3
     assert {"position 4", "error 1", "gripper"} <= set(memory_map.assumed)
     assert "position 1" not in memory_map.assumed
-
-
-def test_a_laboratory_s_own_file_moves_a_register_and_touches_no_code() -> None:
+    # A laboratory's own file moves a register and touches no code
     own = parse_memory_map(SHIPPED.replace("low = [0xFC72]", "low = [0xFC7F]"), "ours.toml")
     assert own["gripper"].low == (0xFC7F,)
     assert own["position"] == default_memory_map()["position"]
@@ -85,14 +88,11 @@ def test_a_mistake_is_told_in_one_line(right: str, wrong: str, says: str) -> Non
     assert "\n" not in str(caught.value)
 
 
-def test_a_register_the_protocol_does_not_know_is_refused() -> None:
+def test_a_register_is_known_and_has_every_joint() -> None:
     extra = SHIPPED + '\n[registers.lamp]\nunit = "on_off"\nbits = 1\nsigned = false\naccess = "read"\n'
     extra += 'low = [0xFC7F]\nprovenance = ["assumed"]\n'
     with pytest.raises(MemoryMapError, match="register lamp is not one that the protocol knows"):
         parse_memory_map(extra)
-
-
-def test_a_register_short_of_a_joint_is_refused() -> None:
     short = SHIPPED.replace(", 0xFC45]", "]").replace(
         'low = [0xFC40, 0xFC41, 0xFC42, 0xFC43, 0xFC44]\nprovenance = ["assumed", ',
         "low = [0xFC40, 0xFC41, 0xFC42, 0xFC43, 0xFC44]\nprovenance = [",
@@ -139,10 +139,15 @@ def test_a_register_has_as_many_bits_as_its_use_allows(name: str) -> None:
         assert f"register {name} has {bits} bits: allowed are {fewest} to {most}" in with_bits(name, bits)
 
 
-def test_the_memory_may_reach_to_the_end_of_the_address_space() -> None:
+def test_the_memory_may_be_the_whole_address_space() -> None:
     assert parse_memory_map(SHIPPED.replace("size = 0x80", "size = 0x400")).size == 0x400
     with pytest.raises(MemoryMapError, match="1025 bytes from FC00: the address space ends at FFFF"):
         parse_memory_map(SHIPPED.replace("size = 0x80", "size = 0x401"))
+    whole = parse_memory_map(SHIPPED.replace("size = 0x80", "size = 0x10000").replace("base = 0xFC00", "base = 0"))
+    assert (whole.base, whole.size) == (0, 0x10000)
+    ends = parse_memory_map(SHIPPED.replace("[0xFC72]", "[0xFC7F]").replace("[0xFC70]", "[0xFC06]"))
+    assert (ends["gripper"].low, ends["process_inputs"].low) == ((0xFC7F,), (0xFC06,))
+    assert default_memory_map()["position"].decode(0x34, 0xF2) == 0x234
 
 
 @given(st.text(max_size=60), st.integers(0, len(SHIPPED)), st.integers(0, 60))
@@ -165,12 +170,96 @@ def test_every_value_of_a_register_survives_its_bytes(name: str) -> None:
             register.encode(value)
 
 
-def test_the_memory_may_begin_at_nothing_and_be_the_whole_address_space() -> None:
-    whole = parse_memory_map(SHIPPED.replace("size = 0x80", "size = 0x10000").replace("base = 0xFC00", "base = 0"))
-    assert (whole.base, whole.size) == (0, 0x10000)
-    ends = parse_memory_map(SHIPPED.replace("[0xFC72]", "[0xFC7F]").replace("[0xFC70]", "[0xFC06]"))
-    assert (ends["gripper"].low, ends["process_inputs"].low) == ((0xFC7F,), (0xFC06,))
+# ---- What pydantic refuses, in one line: where, what is wrong, and nothing of pydantic's own words
 
 
-def test_bits_above_a_reading_are_ignored() -> None:
-    assert default_memory_map()["position"].decode(0x34, 0xF2) == 0x234
+class Part(BaseModel):
+    size: Annotated[float, Field(le=2.0)]
+
+
+class Whole(BaseModel):
+    parts: tuple[Part, ...]
+    name: str = ""
+
+    @field_validator("name")
+    @classmethod
+    def _no_blanks(cls, name: str) -> str:
+        if " " in name:
+            raise ValueError("a name has no blanks")
+        return name
+
+
+def refused(data: Any) -> Invalid:
+    with pytest.raises(ValidationError) as caught:
+        Whole.model_validate(data)
+    return first_invalid(caught.value)
+
+
+def test_a_wrong_value_is_told_with_place_rule_and_bounds_or_as_a_whole() -> None:
+    found = refused({"parts": [{"size": 1}, {"size": 3}], "name": "a b"})
+    assert (found.where(), found.where(first=1)) == ("parts.1.size", "parts.2.size")
+    assert (found.value, found.kind, found.bounds) == (3, "less_than_equal", {"le": 2.0})
+    assert refused(1).where("file") == "file"
+
+
+# ---- The memory map as a header of the bridge in C
+
+ROOT = Path(__file__).parents[2]
+HEADER = ROOT / "firmware_protocol" / "bridge" / "core" / "memory_map.h"
+
+
+def defined(header: str) -> dict[str, str]:
+    """What each macro stands for."""
+    return dict(re.findall(r"^#define (\w+) (.+)$", header, re.MULTILINE))
+
+
+def distances(text: str) -> list[int]:
+    return [int(number, 16) for number in re.findall(r"0x([0-9A-F]+)", text)]
+
+
+def test_the_header_that_ships_has_every_register_of_the_map_that_ships() -> None:
+    header = HEADER.read_text("utf-8")
+    assert header == c_header(default_memory_map()), "run: python -m firmware_protocol.c_header > …/core/memory_map.h"
+    memory_map = default_memory_map()
+    found = defined(c_header(memory_map))
+    assert (found["MEMORY_BASE"], found["MEMORY_SIZE"]) == ("0xFC00u", "0x80u")
+    for name, register in memory_map.registers.items():
+        for half, addresses in (("LOW", register.low), ("HIGH", register.high)):
+            macro = f"{name.upper()}_{half}"
+            assert (macro in found) == (addresses is not None)
+            if addresses is not None:
+                assert distances(found[macro]) == [address - 0xFC00 for address in addresses]
+                assert ("{" in found[macro]) == (len(addresses) > 1), "a list where there is one a joint"
+    widths = {macro: int(value) for macro, value in found.items() if macro.endswith("_BITS")}
+    assert widths == {"SET_POINT_BITS": 10, "POSITION_BITS": 12, "ERROR_BITS": 16, "POWER_BITS": 8}
+    assert defined(c_header(larger(256)))["MEMORY_SIZE"] == "0x100u"
+    with pytest.raises(MemoryMapError, match="257 bytes: the core serves 256 at most"):
+        c_header(larger(257))
+
+
+def larger(size: int) -> MemoryMap:
+    return default_memory_map().model_copy(update={"size": size})
+
+
+def test_the_program_prints_the_header_of_the_map_it_is_given(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([]) == 0
+    assert capsys.readouterr().out == HEADER.read_text("utf-8")
+    own = tmp_path / "ours.toml"
+    own.write_text((ROOT / "firmware_protocol" / "memory_map.toml").read_text("utf-8").replace("0xFC72", "0xFC7F"))
+    assert main([str(own)]) == 0
+    assert defined(capsys.readouterr().out)["GRIPPER_LOW"] == "0x7Fu"
+
+
+@pytest.mark.parametrize("text", [None, "version =", "version = 3"], ids=["no file", "no TOML", "no map"])
+def test_what_is_no_map_is_one_line_and_an_exit_code(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str | None
+) -> None:
+    path = tmp_path / "ours.toml"
+    if text is not None:
+        path.write_text(text)
+    assert main([str(path)]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert re.fullmatch(r"c_header: .*ours\.toml.*\n", said.err)

@@ -117,12 +117,24 @@ def test_unknown_opcodes_are_refused_as_such(opcode: int) -> None:
             assert c.refusal_of(caught.value) is c.Refusal.UNKNOWN_OPCODE
 
 
-def test_joint_masks_have_bit_0_for_joint_1() -> None:
+def test_joint_masks_and_numbers_are_checked_in_one_line() -> None:
     assert c.joints_of(0b100101) == (1, 3, 6)
     assert c.mask_of((6, 1, 3)) == 0b100101
     for joint in (0, 7, -1):
         with pytest.raises(ProtocolError, match=f"joint {joint}: allowed are 1 to 6"):
             c.mask_of((joint,))
+    with pytest.raises(ProtocolError, match="Advance: required argument is not an integer"):
+        c.to_frame(0, c.Advance(1.5))  # type: ignore[arg-type]
+    long = c.HelloReply(2, 0, 20_000, 8, 1, 5, 7).pack()
+    assert len(long) == 18
+    assert len(c.HelloReply(2, 0, 20_000, 8, 1).pack()) == 10
+    with pytest.raises(ProtocolError, match="a session has another number than 0"):
+        c.HelloReply.parse(long[:14] + bytes(4))
+    assert c.MoveAndSample.parse(bytes((9, 0, 0, 0, 1, 0))) == c.MoveAndSample(9, 1)
+    with pytest.raises(PayloadLengthError, match="set points of no joint"):
+        c.MoveAndSample.parse(bytes((9, 0, 0, 0, 1, 0, 0)))
+    with pytest.raises(PayloadLengthError, match="payload of 5 bytes, expected at least 6"):
+        c.MoveAndSample.parse(bytes((9, 0, 0, 0, 1)))
 
 
 READING = c.JointReading(0, 0, 0, 0)
@@ -251,24 +263,3 @@ def test_the_set_point_of_a_compact_reading_is_what_position_and_error_come_to(
     assert c.CompactReading(position, error, 3).whole == c.JointReading(set_point, position, error, 3)
     mirrored = c.CompactReading(4096 - position, -error, 3).whole
     assert mirrored.set_point == (500 if set_point == 500 else 0)
-
-
-def test_a_turn_whose_set_points_are_of_no_joint_has_nothing_behind_their_mask() -> None:
-    assert c.MoveAndSample.parse(bytes((9, 0, 0, 0, 1, 0))) == c.MoveAndSample(9, 1)
-    with pytest.raises(PayloadLengthError, match="set points of no joint"):
-        c.MoveAndSample.parse(bytes((9, 0, 0, 0, 1, 0, 0)))
-    with pytest.raises(PayloadLengthError, match="payload of 5 bytes, expected at least 6"):
-        c.MoveAndSample.parse(bytes((9, 0, 0, 0, 1)))
-
-
-def test_a_session_has_another_number_than_none() -> None:
-    long = c.HelloReply(2, 0, 20_000, 8, 1, 5, 7).pack()
-    assert len(long) == 18
-    assert len(c.HelloReply(2, 0, 20_000, 8, 1).pack()) == 10
-    with pytest.raises(ProtocolError, match="a session has another number than 0"):
-        c.HelloReply.parse(long[:14] + bytes(4))
-
-
-def test_a_value_that_is_no_integer_is_refused_in_one_line() -> None:
-    with pytest.raises(ProtocolError, match="Advance: required argument is not an integer"):
-        c.to_frame(0, c.Advance(1.5))  # type: ignore[arg-type]

@@ -105,7 +105,8 @@ def stamps(dialect: FramedDialect) -> Iterator[c.Stamp]:
         yield c.stamp_of(frame)
 
 
-def test_commands_are_stamped_with_the_session_and_counted_in_it() -> None:
+def test_commands_are_stamped_and_counted_and_none_becomes_new_again() -> None:
+    # Commands are stamped with the session and counted in it
     dialect = FramedDialect()
     stamped = stamps(dialect)
     assert next(stamped) == c.UNSTAMPED
@@ -119,9 +120,7 @@ def test_commands_are_stamped_with_the_session_and_counted_in_it() -> None:
     assert next(stamped) == c.Stamp(71, 2), "a repeated greeting begins nothing"
     dialect.reset()
     assert next(stamped) == c.UNSTAMPED, "a new connection has no session"
-
-
-def test_all_sequence_numbers_come_round_and_no_command_becomes_new_again() -> None:
+    # All sequence numbers come round and no command becomes new again
     dialect, session = FramedDialect(), greeted(number=70)
     conversation(dialect, 7, 70)
     request, commands = c.SetGripper(1), []
@@ -139,12 +138,24 @@ def stamp_in(line: bytes) -> c.Stamp:
     return c.Stamp.parse(unstuff(line[1:-1])[HEADER:])
 
 
-def test_a_recorded_answer_to_a_greeting_begins_no_session() -> None:
+def test_an_answer_of_before_begins_no_session() -> None:
     dialect = FramedDialect()
     conversation(dialect, 7, 70)
     for nonce, session in ((6, 60), (7, 61)):
         dialect.feed(encode_frame(c.to_frame(0, c.HelloReply(2, 0, 20_000, 0, 1, nonce, session))))
         assert next(stamps(dialect)).session == 70
+    dialect = FramedDialect()
+    dialect.encode(0, c.Hello(2, 7))
+    dialect.reset()
+    dialect.feed(encode_frame(c.to_frame(0, c.HelloReply(2, 0, 20_000, 0, 1, 7, 70))))
+    assert next(stamps(dialect)) == c.UNSTAMPED
+    dialect = FramedDialect()
+    line = encode_frame(c.to_frame(3, c.HelloReply(2, 0, 20_000, 0, 1, 7, 70)))
+    dialect.feed(b"x" * 100 + b"\0" + line[:8])
+    dialect.reset()
+    assert dialect.feed(line[8:]) == []
+    assert dialect.feed(line) == [(3, c.HelloReply(2, 0, 20_000, 0, 1, 7, 70))]
+    assert dialect.damaged == 2, "one piece too long to be a frame, and the rest of the one that was forgotten"
 
 
 # ---- lock-step
@@ -210,21 +221,3 @@ def test_the_last_advance_lags_behind_by_the_window_at_most(start: int) -> None:
         order.judge(start, c.Advance(1))
         order.judge((start + ahead) & 0xFFFF, c.ReadStatus())
         assert order.judge(start, c.Advance(1)) is judged
-
-
-def test_an_unfinished_answer_is_forgotten_with_the_connection_and_what_was_damaged_is_not() -> None:
-    dialect = FramedDialect()
-    line = encode_frame(c.to_frame(3, c.HelloReply(2, 0, 20_000, 0, 1, 7, 70)))
-    dialect.feed(b"x" * 100 + b"\0" + line[:8])
-    dialect.reset()
-    assert dialect.feed(line[8:]) == []
-    assert dialect.feed(line) == [(3, c.HelloReply(2, 0, 20_000, 0, 1, 7, 70))]
-    assert dialect.damaged == 2, "one piece too long to be a frame, and the rest of the one that was forgotten"
-
-
-def test_an_answer_to_a_greeting_of_before_a_new_connection_begins_nothing() -> None:
-    dialect = FramedDialect()
-    dialect.encode(0, c.Hello(2, 7))
-    dialect.reset()
-    dialect.feed(encode_frame(c.to_frame(0, c.HelloReply(2, 0, 20_000, 0, 1, 7, 70))))
-    assert next(stamps(dialect)) == c.UNSTAMPED

@@ -23,16 +23,16 @@ def half_up(value: Fraction) -> int:
     return math.floor(value + Fraction(1, 2))
 
 
-def test_every_posture_has_the_nearest_count_and_comes_back() -> None:
+def test_postures_and_readings_are_each_other_s_nearest_and_127_counts_are_28_v() -> None:
     for posture in range(1000):
         counts = posture_to_counts(posture)
         assert counts == half_up(Fraction(posture * 4096, 1000))
         assert counts_to_posture(counts) == posture
-
-
-def test_every_reading_has_the_nearest_posture() -> None:
     for counts in range(4096):
         assert counts_to_posture(counts) == min(half_up(Fraction(counts * 1000, 4096)), 999)
+    scale = DriveScale(full_scale_v=1.0, amplifier_gain=28.0)
+    assert scale.counts_to_volts(127) == 28.0
+    assert scale.counts_to_volts(-127) == -28.0
 
 
 @pytest.mark.parametrize("posture", [-1, 1000, math.nan])
@@ -72,12 +72,6 @@ def test_a_set_point_is_never_clipped(calibration: JointCalibration, angle: floa
 def test_impossible_calibrations_are_refused(fields: tuple[int, float, float, int]) -> None:
     with pytest.raises(UnitsError, match="joint 1"):
         JointCalibration(*fields)
-
-
-def test_127_counts_of_a_converter_of_1_v_and_gain_28_are_28_v() -> None:
-    scale = DriveScale(full_scale_v=1.0, amplifier_gain=28.0)
-    assert scale.counts_to_volts(127) == 28.0
-    assert scale.counts_to_volts(-127) == -28.0
 
 
 @pytest.mark.parametrize("fields", [(0.0, 28.0), (1.0, -28.0), (math.nan, 28.0), (1.0, math.inf)])

@@ -1,6 +1,8 @@
-"""Benchmarks tell a missed target by their exit code, and reach no robot but their own."""
+"""Benchmarks tell a missed target by their exit code, reach no robot but their own, and tell the spread of runs."""
 
+import runpy
 import subprocess
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +10,7 @@ import pytest
 
 import benchmarks.__main__ as listing
 from benchmarks.stop_latency import stop_command
+from tests.repository.tracked import ROOT
 
 
 @pytest.mark.parametrize("name", ["startup", "main-job"])
@@ -35,3 +38,34 @@ def test_the_stop_that_is_measured_knows_no_robot_of_the_caller(
     assert told["cwd"] == tmp_path
     assert {name for name in told["env"] if name.upper().startswith("DAQ_")} == {"DAQ_RUNTIME_FOLDER"}
     assert "the caller's" not in told["env"].values()
+
+
+# ---- The study of repeatability tells the spread of runs, not of these few alone
+
+
+def study(monkeypatch: pytest.MonkeyPatch, runs: str) -> None:
+    """The script, with overshoots made up here in place of a service."""
+    overshoots = iter(({1: 1.0}, {1: 3.0}))
+    script = runpy.run_path(str(ROOT / "examples" / "repeatability.py"))
+    main: Any = script["main"]
+    robot = type("Robot", (), {"robot": lambda _: None})
+    monkeypatch.setitem(main.__globals__, "run_once", lambda *_: next(overshoots))
+    monkeypatch.setitem(main.__globals__, "Client", lambda *_: nullcontext(robot()))
+    main(["http://nowhere", "--runs", runs])
+
+
+def test_the_spread_is_that_of_all_runs_estimated_from_these(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    study(monkeypatch, "2")
+    assert capsys.readouterr().out == "joint 1: overshoot 2.00° ± 1.414°\n"
+
+
+@pytest.mark.parametrize("runs", ["0", "1"])
+def test_fewer_than_two_runs_are_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], runs: str
+) -> None:
+    with pytest.raises(SystemExit):
+        study(monkeypatch, runs)
+    assert f"--runs {runs}: the spread of runs needs at least 2" in capsys.readouterr().err

@@ -32,20 +32,17 @@ def processes_left(before: Running) -> Running:
     return left
 
 
-def test_it_names_a_thread_that_was_left() -> None:
+def test_it_names_a_thread_that_was_left_and_waits_for_one_that_is_about_to_end() -> None:
     before = Running.now()
     with a_thread():
         left = (Running.now() - before).wait(grace_s=0.01)
     assert "'forgotten'" in str(left)
-
-
-def test_it_waits_for_a_thread_that_is_about_to_end() -> None:
     before = Running.now()
     threading.Thread(target=time.sleep, args=(0.05,)).start()
     assert not (Running.now() - before).wait()
 
 
-def test_it_names_a_process_that_was_left_and_can_end_it() -> None:
+def test_it_names_processes_that_were_left_by_anyone_and_can_end_them() -> None:
     before = Running.now()
     with subprocess.Popen([sys.executable, "-c", SLEEPER]) as process:
         left = processes_left(before)
@@ -54,9 +51,6 @@ def test_it_names_a_process_that_was_left_and_can_end_it() -> None:
         left.kill_processes()
         assert process.wait(timeout=10) < 0
     assert not Running.now() - before
-
-
-def test_it_finds_a_process_whose_parent_has_ended() -> None:
     before = Running.now()
     subprocess.run([sys.executable, "-c", GRANDPARENT], check=True)
     left = processes_left(before)

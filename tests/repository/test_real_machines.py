@@ -112,16 +112,15 @@ def test_a_record_is_renamed_and_imported_by_the_product(pendulum: Any, tmp_path
     assert linear.held_out < 0.02
 
 
-def test_of_a_file_with_many_records_one_is_read(pendulum: Any, tmp_path: Path) -> None:
+def test_a_file_with_many_records_is_read_and_a_torque_that_is_added_is_the_drive_s(
+    pendulum: Any, tmp_path: Path
+) -> None:
     series = [{"x": [1.0] * 100}, {"x": [2.0] * 100}]
     (tmp_path / "bam" / "data" / "many.json").write_text(json.dumps({"data": series}))
     rig = replace(pendulum, map={"time": "0.5*#", "position": "{part}.x"})
     columns = read_columns(rig, Record(("many.json",), 0.0, 1.5, "data.1"), tmp_path)
     assert np.array_equal(columns["position_1"], [2.0, 2.0, 2.0])
     assert np.array_equal(columns["time"], [0.0, 0.5, 1.0])
-
-
-def test_a_torque_that_is_added_is_one_that_the_drive_gives(pendulum: Any, tmp_path: Path) -> None:
     columns = read_columns(pendulum, pendulum.fitted[0], tmp_path)
     sprung = add_torque(columns, Torque("spring", 1, 0.3), gain=0.1)
     assert np.allclose(sprung["drive_1"] - columns["drive_1"], 3.0 * columns["position_1"])
@@ -166,15 +165,12 @@ def test_marks(answer: Any, mark: str) -> None:
     assert judge(COULOMB, answer, {"coulomb_friction", "viscous_friction"})[1] == mark
 
 
-def test_what_was_withdrawn_is_shown_and_names_that_nobody_asked_for_are_told() -> None:
+def test_names_that_were_withdrawn_or_unasked_and_numbers_far_off_are_told() -> None:
     answer = _answer(
         ("coulomb_friction", (), (1, 2), False), ("spring_torque", (), (1,), True), verdict="unknown-effect"
     )
     assert judge(COULOMB, answer, ())[0] == "unknown (coulomb_friction withdrawn: found-one-way)"
     assert wrong_names(answer, {"coulomb_friction"}) == ["spring_torque on 1"]
-
-
-def test_a_warning_of_a_number_that_is_far_off_counts_where_it_is_the_right_one() -> None:
     question = replace(COULOMB, moved=Number(("link1.mass",), 85.0, 105.0, "kg"))
     note = {"numbers": [{"name": "link1.mass", "value": 94.6}]}
     assert moved(question, note) == "link1.mass 94.6 kg"

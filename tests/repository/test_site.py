@@ -49,7 +49,8 @@ class Inside(HTMLParser):
             self.found.append(address)
 
 
-def test_every_page_has_a_place_in_the_site() -> None:
+def test_every_page_key_and_effect_has_its_place_and_meaning() -> None:
+    # Every page has a place in the site
     named = set()
     for index in (*DOCS.glob("*/index.md"), DOCS / "index.md", DOCS / "gallery" / "index.md"):
         if index.is_file():
@@ -58,18 +59,14 @@ def test_every_page_has_a_place_in_the_site() -> None:
             named |= {(index.parent / f"{entry}.md").resolve() for entry in entries}
     pages = {page for page in DOCS.rglob("*.md") if page.parent.name not in ("decisions", "_site")}
     assert pages - named == {DOCS / "index.md"}
-
-
-def test_every_key_of_the_configuration_has_a_meaning() -> None:
+    # Every key of the configuration has a meaning
     from docs.extensions import configuration
 
     page = configuration.page()
     assert "## `[robot.limits]`" in page
     assert "`following_error_time`\n: Time (s)" in page
     assert page.count("\n: ") > 35
-
-
-def test_the_page_of_the_mocks_effects_has_their_bounds_and_sizes() -> None:
+    # The page of the mocks effects has their bounds and sizes
     from docs.extensions import mock_effects
 
     (row,) = (

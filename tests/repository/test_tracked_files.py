@@ -1,8 +1,11 @@
-"""What must not be in the repository: package registries, this machine's paths, large files."""
+"""What must not be in the repository: registries, this machine's paths, large files, circles of imports."""
 
 import re
+import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
+import grimp
 import pytest
 
 from tests.repository.tracked import ROOT, tracked_files, tracked_texts
@@ -35,23 +38,44 @@ def test_the_search_knows_the_address_of_a_registry(line: str) -> None:
     assert REGISTRY.search(line)
 
 
-def test_no_tracked_file_holds_the_address_of_a_package_registry() -> None:
+def test_no_tracked_file_holds_a_registry_a_path_of_this_machine_or_too_much() -> None:
     found = {f"{path.relative_to(ROOT)}: {hit[0]}" for path, text in tracked_texts() if (hit := REGISTRY.search(text))}
     assert not found
-
-
-def test_no_tracked_file_holds_a_path_of_this_machine() -> None:
     here = [f"{folder}/" for folder in (ROOT, Path.home()) if folder != Path("/")]
     found = {f"{path.relative_to(ROOT)}: {place}" for path, text in tracked_texts() for place in here if place in text}
     assert not found
-
-
-def test_no_tracked_file_is_large() -> None:
     sizes = {str(path.relative_to(ROOT)): path.stat().st_size for path in tracked_files()}
     assert {name: size for name, size in sizes.items() if size > LARGEST_BYTES} == {}
-
-
-def test_the_floors_of_the_house_are_folders() -> None:
     floors = ["firmware_protocol", "daq", "daq/contracts", "daq_cli", "mock_controller", "model", "server", "tests"]
     tracked_folders = {folder for path in tracked_files() for folder in path.parents}
     assert [floor for floor in floors if ROOT / floor not in tracked_folders] == []
+
+
+# ---- No file imports, directly or through others, a file that imports it
+
+NAMES = tomllib.loads(Path(__file__).parents[2].joinpath("pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
+    "root_packages"
+]
+PACKAGES = [name for name in NAMES if Path(__file__).parents[2].joinpath(name).is_dir()]
+
+
+def circles(graph: grimp.ImportGraph) -> Iterator[set[str]]:
+    """Sets of files, of two or more, each of which reaches every other by imports."""
+    left = set(graph.modules)
+    while left:
+        module = left.pop()
+        together = {other for other in graph.find_upstream_modules(module) if other in left}
+        together &= graph.find_downstream_modules(module)
+        left -= together
+        if together:
+            yield together | {module}
+
+
+def test_no_file_is_imported_by_what_it_imports() -> None:
+    graph = grimp.build_graph(*PACKAGES, cache_dir=None)
+    found = [sorted(circle) for circle in circles(graph)]
+    assert found == []
+    circular = grimp.ImportGraph()
+    for importer, imported in (("a", "b"), ("b", "c"), ("c", "b"), ("c", "d")):
+        circular.add_import(importer=importer, imported=imported)
+    assert list(circles(circular)) == [{"b", "c"}]

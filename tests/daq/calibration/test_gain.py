@@ -44,12 +44,20 @@ def refused(errors: np.ndarray, powers: np.ndarray, gains: tuple[int, int, int] 
     return str(result)
 
 
-def test_the_default_gain_is_found_with_its_physical_value() -> None:
+def test_a_trace_gives_the_gain_of_every_joint_without_saturated_samples() -> None:
     result = estimated(ERRORS, 2 * ERRORS, (2, 0, 0))
     assert result.gain == pytest.approx(2)
     assert result.per_unit == pytest.approx(1)
     assert result.volts_per_rad == pytest.approx(493, abs=0.5)
     assert result.volts_per_rad_error == pytest.approx(result.volts_per_rad * result.standard_error / result.gain)
+    errors = np.arange(-200, 201)
+    result = estimated(errors, powers_of(2, errors))
+    assert result.gain == pytest.approx(2)
+    assert result.saturated == 2 * (200 - 63)
+    assert result.samples == 127
+    (result,) = gains_from_trace(trace_of(ERRORS, 2 * ERRORS), MA2000)
+    assert isinstance(result, GainEstimate)
+    assert (result.joint, result.per_unit) == (1, pytest.approx(1))
 
 
 @given(
@@ -77,47 +85,29 @@ def test_the_standard_error_is_that_of_repeated_measurements(rounding: str) -> N
     assert 0.6 < float(np.std(missed)) < 1.2
 
 
-def test_saturated_samples_are_left_out() -> None:
-    errors = np.arange(-200, 201)
-    result = estimated(errors, powers_of(2, errors))
-    assert result.gain == pytest.approx(2)
-    assert result.saturated == 2 * (200 - 63)
-    assert result.samples == 127
-
-
-def test_errors_of_a_few_counts_cannot_tell() -> None:
+def test_what_cannot_tell_a_gain_is_refused() -> None:
     errors = np.array([1, 2, 3, 4])
     assert refused(errors, 2 * errors) == (
         "joint 1: errors of up to 4 ADC counts leave any gain between 1.750 and 2.250 possible: make larger steps"
     )
+    powers = 2 * ERRORS
+    powers[50] += 3
+    assert refused(ERRORS, powers).startswith("joint 1: power 13 at error 5, where the others give 10.")
+    with pytest.raises(SpecError, match=r"errors of shape \(3,\), powers of \(2,\)"):
+        estimate_gain(MA2000, 1, np.zeros(3, dtype=np.int64), np.zeros(2, dtype=np.int64))
 
 
-def test_an_integral_term_is_refused() -> None:
+def test_a_record_with_i_or_d_action_is_refused() -> None:
     errors = np.round(40 * np.exp(-np.arange(60) / 15)).astype(np.int64)
     powers = np.floor(2 * errors + 0.05 * np.cumsum(errors)).astype(np.int64)
     assert "not proportional: I and D must be 0" in refused(errors, powers)
-
-
-def test_an_integral_term_shows_at_rest_too() -> None:
     errors = np.append(ERRORS, 0)
     powers = np.append(2 * ERRORS, 0)
     powers[errors == 0] = 7
     assert refused(errors, powers).startswith("joint 1: power 7 at error 0, not proportional")
-
-
-def test_a_derivative_term_is_refused() -> None:
     errors = np.round(40 * np.cos(np.arange(80) / 5)).astype(np.int64)
     powers = 2 * errors + np.diff(errors, prepend=40)
     assert "not proportional: I and D must be 0" in refused(errors, powers)
-
-
-def test_one_wrong_sample_is_refused_and_named() -> None:
-    powers = 2 * ERRORS
-    powers[50] += 3
-    assert refused(ERRORS, powers).startswith("joint 1: power 13 at error 5, where the others give 10.")
-
-
-def test_gains_with_i_or_d_are_refused_before_any_fit() -> None:
     assert refused(ERRORS, 2 * ERRORS, (2, 0, 1)) == (
         "joint 1: gains are P 2, I 0, D 1: set I and D to 0, the law must be proportional"
     )
@@ -135,23 +125,12 @@ def test_any_data_give_an_estimate_that_agrees_with_them_or_a_reason(pairs: list
         assert str(result).startswith("joint 3: ")
 
 
-def test_arrays_of_different_length_are_an_error() -> None:
-    with pytest.raises(SpecError, match=r"errors of shape \(3,\), powers of \(2,\)"):
-        estimate_gain(MA2000, 1, np.zeros(3, dtype=np.int64), np.zeros(2, dtype=np.int64))
-
-
 def trace_of(errors: np.ndarray, powers: np.ndarray) -> Trace:
     record = TraceRecord(
         trace_id="t", created=datetime(2024, 1, 1, tzinfo=UTC), software="test", source="mock", gains={1: (2, 0, 0)}
     )
     rad = errors[:, None] * MA2000.calibration(1).rad_per_count
     return Trace(record, (1,), np.arange(len(errors)) * 0.02, rad * 0, error=rad, power_raw=powers[:, None])
-
-
-def test_a_trace_gives_the_gain_of_every_joint() -> None:
-    (result,) = gains_from_trace(trace_of(ERRORS, 2 * ERRORS), MA2000)
-    assert isinstance(result, GainEstimate)
-    assert (result.joint, result.per_unit) == (1, pytest.approx(1))
 
 
 @pytest.mark.parametrize("missing", ["error", "power_raw"])

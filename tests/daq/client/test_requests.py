@@ -36,23 +36,18 @@ def queue_status(**changes: object) -> dict[str, object]:
     return {"paused": False, "reason": "", "since": "2026-01-01T00:00:00Z", "queued": 1} | changes
 
 
-def test_what_changes_nothing_is_asked_again_after_growing_pauses() -> None:
+def test_what_changes_nothing_is_asked_again_a_few_times_after_growing_pauses() -> None:
     network = StandIn([BROKEN, httpx.ReadTimeout("slow"), httpx.Response(200, json=ME)])
     assert network.connection().get(Me, "me").name == "anna"
     assert network.pauses == list(PAUSES[:2])
-
-
-def test_a_request_is_tried_again_a_limited_number_of_times() -> None:
     network = StandIn([BROKEN] * 10)
     with pytest.raises(ServiceNotReachedError, match=r"http://127.0.0.1:8300: not reached: connection refused"):
         network.connection().get(Me, "me")
     assert len(network.asked) == 1 + len(PAUSES)
-
-
-def test_a_name_that_somebody_typed_is_no_syntax_of_an_address() -> None:
-    network = StandIn([httpx.Response(200, json=ME)])
-    network.connection().get(Me, "robots/ma2000/traces/why?wait=9#50%")
-    assert network.asked[0].url.raw_path == b"/api/v1/robots/ma2000/traces/why%3Fwait%3D9%2350%25"
+    busy = problem(429, "too-many", Retry_After="2")
+    network = StandIn([busy, problem(429, "too-many", Retry_After="3600"), httpx.Response(200, json=ME)])
+    network.connection().get(Me, "me")
+    assert network.pauses == [2.0, 5.0]
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE"])
@@ -64,7 +59,7 @@ def test_what_changes_something_is_sent_once(method: str) -> None:
         assert len(network.asked) == 1
 
 
-def test_an_experiment_is_submitted_again_under_the_same_key() -> None:
+def test_an_experiment_is_submitted_again_under_its_key_and_a_refusal_is_not_asked_again() -> None:
     network = StandIn([httpx.ReadTimeout("lost answer"), httpx.Response(200, json=EXPERIMENT)])
     made = Experiments(network.connection(), "robots/ma2000").submit(ExperimentSpec())
     assert made.id == EXPERIMENT["id"]
@@ -72,16 +67,6 @@ def test_an_experiment_is_submitted_again_under_the_same_key() -> None:
     assert len(network.asked) == 2
     assert len(keys) == 1
     assert len({request.content for request in network.asked}) == 1
-
-
-def test_a_service_that_says_when_to_ask_again_is_asked_then() -> None:
-    busy = problem(429, "too-many", Retry_After="2")
-    network = StandIn([busy, problem(429, "too-many", Retry_After="3600"), httpx.Response(200, json=ME)])
-    network.connection().get(Me, "me")
-    assert network.pauses == [2.0, 5.0]
-
-
-def test_a_refusal_is_one_line_with_what_to_do_and_is_not_asked_again() -> None:
     network = StandIn([problem(409, "control-held", "bert has the control", "wait until it is given back")])
     with pytest.raises(ServiceError) as refused:
         network.connection().get(Me, "me")
@@ -109,27 +94,22 @@ def test_a_refusal_ends_a_command_as_the_local_one_would(status: int, kind: str,
     assert refused.value.exit_code == exit_code
 
 
-def test_something_else_that_answers_is_told_as_such() -> None:
+def test_what_else_answers_is_told_and_what_a_newer_service_adds_is_borne() -> None:
     with pytest.raises(ServiceError, match="502 Bad Gateway"):
         StandIn([httpx.Response(502, text="<html>")]).connection().get(Me, "me")
     with pytest.raises(ServiceNotReachedError, match="not as this version's service: name"):
         StandIn([httpx.Response(200, json={"role": "viewer"})]).connection().get(Me, "me")
     with pytest.raises(ServiceNotReachedError, match="not as this version's service"):
         StandIn([httpx.Response(200, text="<html>")]).connection().get(Me, "me")
-
-
-def test_a_newer_service_may_say_more_than_this_client_knows() -> None:
     assert StandIn([httpx.Response(200, json=ME | {"shoe": 44})]).connection().get(Me, "me").name == "anna"
 
 
-def test_the_token_goes_with_every_request() -> None:
+def test_the_token_goes_with_every_request_and_a_list_comes_part_by_part() -> None:
     network = StandIn([httpx.Response(200, json=ME)])
     network.connection(token="daq_x").get(Me, "me")
     assert network.asked[0].headers["Authorization"] == "Bearer daq_x"
     assert network.asked[0].url.path == "/api/v1/me"
 
-
-def test_a_list_comes_part_by_part() -> None:
     def part(number: int, following: str | None) -> httpx.Response:
         event = {"number": number, "at": "2026-01-01T00:00:00Z", "kind": "stop", "text": "x"}
         return httpx.Response(200, json={"items": [event], "next": following})
@@ -150,6 +130,17 @@ def test_a_wait_ends_with_the_experiment_or_with_its_time() -> None:
     with pytest.raises(TimeoutError, match="is queued after 10 s"):
         Experiments(network.connection(), "robots/ma2000").wait("0123456789ab", 10, lambda: next(now))
     assert network.asked[0].url.params["wait"] == "2.0"
+    for ask in (
+        lambda connection: Experiments(connection, "robots/ma2000").cancel("0123456789ab", within=1.0),
+        lambda connection: Queue(connection, "robots/ma2000").attend(within=1.0),
+    ):
+        network = StandIn([httpx.ReadTimeout("slow")])
+        with pytest.raises(ServiceNotReachedError):
+            ask(network.connection())
+        assert set(network.asked[0].extensions["timeout"].values()) == {1.0}
+    network = StandIn([httpx.Response(200, json=ME)])
+    network.connection().get(Me, "me", patience=5.0)
+    assert network.asked[0].extensions["timeout"]["read"] == ANSWER_WITHIN + 5.0
 
 
 def test_who_waits_in_a_queue_that_a_person_must_resume_hears_it_soon_and_once() -> None:
@@ -176,7 +167,8 @@ def test_who_waits_in_a_queue_that_a_person_must_resume_hears_it_soon_and_once()
     assert [request.url.params.get("wait") for request in network.asked[::2]] == ["2.0", *["30.0"] * 4]
 
 
-def test_a_file_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:
+def test_a_file_is_whole_or_not_there_and_never_written_over_another(tmp_path: Path) -> None:
+    # A file that breaks off leaves nothing
     def broken(_: httpx.Request) -> httpx.Response:
         def pieces() -> object:
             yield b"half"
@@ -187,9 +179,7 @@ def test_a_file_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(ServiceNotReachedError, match="cable"):
         StandIn([broken]).connection().download("robots/ma2000/traces/a/data.mcap", tmp_path / "a.mcap")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_trace_is_never_written_over_another(tmp_path: Path) -> None:
+    # A trace is never written over another
     target = tmp_path / "a.mcap"
     target.write_bytes(b"one")
     traces = Traces(StandIn([httpx.Response(200, content=b"one")]).connection(), "robots/ma2000")
@@ -198,6 +188,10 @@ def test_a_trace_is_never_written_over_another(tmp_path: Path) -> None:
     with pytest.raises(TraceError, match="exists and is not trace a"):
         traces.download("a", target)
     assert target.read_bytes() == b"one"
+    assert list(tmp_path.iterdir()) == [target]
+    network = StandIn([httpx.Response(302, text="<html>log in", headers={"Location": "http://proxy.lab"})])
+    with pytest.raises(ServiceError, match="302 Found"):
+        network.connection().download("robots/ma2000/traces/a/data.mcap", tmp_path / "b.mcap")
     assert list(tmp_path.iterdir()) == [target]
 
 
@@ -243,10 +237,13 @@ def test_an_address_that_can_be_no_services_is_refused(text: str) -> None:
         parse_url(text)
 
 
-def test_an_address_may_have_a_path_and_a_slash() -> None:
+def test_an_address_takes_a_path_and_no_syntax_from_a_name() -> None:
     network = StandIn([httpx.Response(200, json=ME)])
     network.connection("https://lab.example/arm/").get(Me, "me")
     assert str(network.asked[0].url) == "https://lab.example/arm/api/v1/me"
+    network = StandIn([httpx.Response(200, json=ME)])
+    network.connection().get(Me, "robots/ma2000/traces/why?wait=9#50%")
+    assert network.asked[0].url.raw_path == b"/api/v1/robots/ma2000/traces/why%3Fwait%3D9%2350%25"
 
 
 @pytest.mark.parametrize("token", ["", "schlüssel", "daq_x\n", "daq x"])
@@ -254,27 +251,6 @@ def test_a_token_that_no_header_can_carry_is_refused_and_not_shown(token: str) -
     with pytest.raises(SpecError) as wrong:
         StandIn([]).connection(token=token)
     assert str(wrong.value).startswith("token: only ASCII characters without spaces are allowed")
-
-
-def test_what_is_asked_for_within_a_time_is_asked_once_and_waits_no_longer() -> None:
-    for ask in (
-        lambda connection: Experiments(connection, "robots/ma2000").cancel("0123456789ab", within=1.0),
-        lambda connection: Queue(connection, "robots/ma2000").attend(within=1.0),
-    ):
-        network = StandIn([httpx.ReadTimeout("slow")])
-        with pytest.raises(ServiceNotReachedError):
-            ask(network.connection())
-        assert set(network.asked[0].extensions["timeout"].values()) == {1.0}
-    network = StandIn([httpx.Response(200, json=ME)])
-    network.connection().get(Me, "me", patience=5.0)
-    assert network.asked[0].extensions["timeout"]["read"] == ANSWER_WITHIN + 5.0
-
-
-def test_a_redirection_is_no_file(tmp_path: Path) -> None:
-    network = StandIn([httpx.Response(302, text="<html>log in", headers={"Location": "http://proxy.lab"})])
-    with pytest.raises(ServiceError, match="302 Found"):
-        network.connection().download("robots/ma2000/traces/a/data.mcap", tmp_path / "a.mcap")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_stream_takes_the_proxy_that_requests_take(monkeypatch: pytest.MonkeyPatch) -> None:

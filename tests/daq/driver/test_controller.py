@@ -32,13 +32,16 @@ def asked_of(
     return asked, order(controller)
 
 
-def test_another_protocol_is_refused_with_both_versions() -> None:
+def test_a_controller_that_cannot_be_spoken_to_is_refused_and_not_kept_connected(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     newer = c.HelloReply(3, c.Capability.SAMPLE, 20_000, 8, 1)
     with pytest.raises(ProtocolVersionError, match="speaks protocol 3, this software 2: update this software"):
         controller_that(lambda _: None, newer)
+    lock_step = c.HelloReply(2, c.Capability.LOCK_STEP, 20_000, 0, 1, 0, 7)
+    with pytest.raises(TransportError, match=r"runs in lock-step: add \?lock_step=1 to the URL"):
+        controller_that(lambda _: None, lock_step)
 
-
-def test_a_controller_that_cannot_be_spoken_to_is_not_kept_connected(monkeypatch: pytest.MonkeyPatch) -> None:
     def newer(sequence: int, _: c.Request) -> list[tuple[float, bytes]]:
         return [(0.0, frame_of(sequence, c.HelloReply(3, c.Capability.SAMPLE, 20_000, 8, 1)))]
 
@@ -77,40 +80,12 @@ def test_a_bridge_of_version_1_is_refused_in_one_line_and_can_be_stopped_all_the
     assert link.stop() == stopped
 
 
-def test_a_controller_in_lock_step_must_be_named_so() -> None:
-    lock_step = c.HelloReply(2, c.Capability.LOCK_STEP, 20_000, 0, 1, 0, 7)
-    with pytest.raises(TransportError, match=r"runs in lock-step: add \?lock_step=1 to the URL"):
-        controller_that(lambda _: None, lock_step)
-
-
 def test_gains_that_read_back_otherwise_are_reported() -> None:
     def answers(request: c.Request) -> c.Reply:
         return c.GainsSet() if isinstance(request, c.SetGains) else c.Gains(((2, 0, 0),) * 6)
 
     with pytest.raises(GainsNotTakenError, match=r"joint 3: gains \(4, 1, 0\) written, \(2, 0, 0\) read back"):
         controller_that(answers).set_gains(3, 4, 1, 0)
-
-
-def test_a_stop_that_nobody_answers_is_told_and_not_raised() -> None:
-    confirmation = controller_that(lambda _: None).stop()
-    assert confirmation.sent
-    assert not confirmation.acknowledged
-    assert confirmation.frozen == {}
-    assert confirmation.problem is not None
-    assert "no reply to Stop" in confirmation.problem
-
-
-def test_a_refused_stop_was_sent_and_is_not_confirmed() -> None:
-    confirmation = controller_that(lambda request: c.Refused(request.OPCODE, c.Refusal.UNKNOWN_OPCODE)).stop()
-    assert (confirmation.sent, confirmation.acknowledged) == (True, False)
-    assert "refused Stop" in str(confirmation.problem)
-
-
-def test_a_stop_over_an_ended_channel_was_not_sent() -> None:
-    controller = controller_that(lambda _: None)
-    controller.close()
-    confirmation = controller.stop()
-    assert (confirmation.sent, confirmation.acknowledged) == (False, False)
 
 
 def snapshots_of(snapshot: c.Snapshot) -> Controller:
@@ -120,17 +95,20 @@ def snapshots_of(snapshot: c.Snapshot) -> Controller:
     return controller_that(lambda request: replies.get(type(request)))
 
 
-def test_a_period_without_set_points_by_the_board_s_own_flag_is_told_though_none_were_sent() -> None:
+def test_only_set_points_in_force_can_be_missed() -> None:
     flagged = c.Snapshot(8, c.StatusFlag.SET_POINT_MISSED, ((1, JointReading(500, 2048, 0, 0)),))
     controller = snapshots_of(flagged)
     assert controller.next_snapshot().set_points_missed
     assert controller.counters.missed_set_points == 1
-
-
-def test_set_points_of_before_a_new_greeting_are_not_missed_after_it() -> None:
     controller = snapshots_of(c.Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),)))
     controller.set_points({1: 510})
     controller.hello()
+    assert not controller.next_snapshot().set_points_missed
+    shown = c.Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),))
+    refused = c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.FROZEN)
+    controller = controller_that(lambda request: refused if isinstance(request, c.WriteSetPoints) else shown)
+    with pytest.raises(RequestRefusedError):
+        controller.next_snapshot(set_points={1: 510})
     assert not controller.next_snapshot().set_points_missed
 
 
@@ -153,23 +131,21 @@ def test_only_a_greeting_after_a_reset_of_the_board_says_that_it_has_restarted()
     assert controller.counters.restarts == 1
 
 
-def test_a_board_without_supply_is_told_by_the_first_status() -> None:
+def test_a_board_that_restarted_is_told_by_the_first_status_or_refusal() -> None:
+    # A board without supply is told by the first status
     restarted = c.Status(7, c.StatusFlag.RESTARTED, 3, 0, 0)
     taken = c.SetPointsTaken(7, c.StatusFlag.RESTARTED)
     replies: dict[type[c.Request], c.Reply] = {c.ReadStatus: restarted, c.WriteSetPoints: taken}
     controller = controller_that(lambda request: replies.get(type(request)))
     with pytest.raises(ControllerRestartedError, match="gains are those of power-up"):
         controller.set_points({1: 500})
-
-
-def test_a_sample_that_never_comes_from_a_board_that_restarted_is_a_restart() -> None:
+    # A sample that never comes from a board that restarted is a restart
     restarted = c.Status(7, c.StatusFlag.RESTARTED, 3, 0, 0)
     controller = controller_that(lambda request: restarted if isinstance(request, c.ReadStatus) else None)
     with pytest.raises(ControllerRestartedError):
         controller.next_snapshot(after=100)
 
-
-def test_what_is_refused_since_the_board_restarted_is_a_restart_and_no_refusal() -> None:
+    # What is refused since the board restarted is a restart and no refusal
     def answers(request: c.Request, status: int) -> c.Reply:
         if isinstance(request, c.ReadStatus):
             return c.Status(7, status, 3, 0, 0)
@@ -181,16 +157,7 @@ def test_what_is_refused_since_the_board_restarted_is_a_restart_and_no_refusal()
         controller_that(lambda request: answers(request, 0)).set_points({1: 500})
 
 
-def test_set_points_that_were_refused_are_not_missed_later() -> None:
-    shown = c.Snapshot(8, 0, ((1, JointReading(500, 2048, 0, 0)),))
-    refused = c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.FROZEN)
-    controller = controller_that(lambda request: refused if isinstance(request, c.WriteSetPoints) else shown)
-    with pytest.raises(RequestRefusedError):
-        controller.next_snapshot(set_points={1: 510})
-    assert not controller.next_snapshot().set_points_missed
-
-
-def test_set_points_travel_with_the_question_for_the_joints_asked_for() -> None:
+def test_a_sample_is_asked_for_with_set_points_and_joints_or_as_the_next() -> None:
     shown = c.Snapshot(9, c.StatusFlag.FROZEN, ((2, JointReading(500, 2048, 0, 0)), (3, JointReading(501, 2052, 0, 0))))
     asked, found = asked_of(
         lambda request: c.SetPointsTaken(7, 0) if isinstance(request, c.WriteSetPoints) else shown,
@@ -200,16 +167,17 @@ def test_set_points_travel_with_the_question_for_the_joints_asked_for() -> None:
     assert (found.tick, found.flags, found.missing_before) == (9, c.StatusFlag.FROZEN, 0)
     assert (found.set_points, found.consistent_by, found.tick_is_estimate) == ({2: 500, 3: 501}, "sample", False)
     assert not found.set_points_missed
-
-
-def test_the_next_sample_is_waited_for_where_none_is_named() -> None:
     shown = c.Snapshot(9, 0, ((1, JointReading(500, 2048, 0, 0)),))
     asked, found = asked_of(lambda _: shown, Controller.next_snapshot)
     assert found.missing_before == 0
     assert asked == [c.Sample(c.AFTER_NEWEST, 0b111111)]
+    reading = JointReading(500, 2048, 3, 6)
+    shown = c.ErrorsPositionsPowers(((2, reading),))
+    asked, found = asked_of(lambda _: shown, lambda controller: controller.errors_positions_powers((2,)))
+    assert (asked, found) == ([c.ReportErrorsPositionsPowers(0b10)], {2: reading})
 
 
-def test_a_numbered_stop_is_timed_from_its_sending_to_its_own_confirmation() -> None:
+def test_a_stop_is_timed_to_its_own_confirmation_and_its_set_points_are_due_a_period_later() -> None:
     hello = c.HelloReply(2, c.Capability.SAMPLE, 20_000, 8, 3, 0, 7)
 
     def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
@@ -221,6 +189,12 @@ def test_a_numbered_stop_is_timed_from_its_sending_to_its_own_confirmation() -> 
 
     confirmation, number = Controller(scripted_link(answer)[0]).stop_numbered()
     assert (confirmation.seconds, number) == (pytest.approx(0.004), 5)
+    # 505 from period 8 on; period 7 may still show the old ones
+    for tick, missed in ((7, False), (8, True)):
+        controller = snapshots_of(c.Snapshot(tick, 0, ((1, JointReading(500, 2048, 0, 0)),)))
+        controller.set_points({1: 500})
+        controller.stop()
+        assert controller.next_snapshot().set_points_missed is missed
 
 
 @pytest.mark.parametrize("reason", [c.Refusal.OTHER_STOP, c.Refusal.FROZEN])
@@ -235,7 +209,13 @@ def test_a_release_that_is_refused_for_another_reason_is_not_tried_again(reason:
     assert controller.counters.refused == 1
 
 
-def test_the_status_is_that_of_board_and_link() -> None:
+def test_identity_and_status_are_those_of_greeting_board_and_link() -> None:
+    simulated = c.HelloReply(2, c.Capability.SAMPLE | c.Capability.SIMULATED, 15_000, 8, 3, 0, 7)
+    own = controller_that(lambda _: None, simulated)
+    identity = own.identity
+    assert (identity.version, identity.period_s, identity.ring_depth, identity.boots) == (2, 0.015, 8, 3)
+    assert (identity.simulated, identity.restarted, own.period_s) == (True, False, 0.015)
+    assert not controller_that(lambda _: None).identity.simulated
     status = controller_that(lambda _: c.Status(70, 5, 3, 9, 4)).status()
     assert (status.tick, status.flags, status.boots, status.missed, status.stop) == (
         70,
@@ -245,15 +225,6 @@ def test_the_status_is_that_of_board_and_link() -> None:
         4,
     )
     assert (status.link, status.counters.requests) == (LinkState.CONNECTED, 2)
-
-
-def test_the_identity_is_what_the_greeting_says() -> None:
-    simulated = c.HelloReply(2, c.Capability.SAMPLE | c.Capability.SIMULATED, 15_000, 8, 3, 0, 7)
-    own = controller_that(lambda _: None, simulated)
-    identity = own.identity
-    assert (identity.version, identity.period_s, identity.ring_depth, identity.boots) == (2, 0.015, 8, 3)
-    assert (identity.simulated, identity.restarted, own.period_s) == (True, False, 0.015)
-    assert not controller_that(lambda _: None).identity.simulated
 
 
 def test_outputs_and_gripper_are_asked_for_as_given() -> None:
@@ -272,27 +243,24 @@ def test_outputs_and_gripper_are_asked_for_as_given() -> None:
     assert controller.process() == c.Process(1, 2, 1)
 
 
-def test_values_that_may_be_torn_are_read_for_the_joints_asked_for() -> None:
-    reading = JointReading(500, 2048, 3, 6)
-    shown = c.ErrorsPositionsPowers(((2, reading),))
-    asked, found = asked_of(lambda _: shown, lambda controller: controller.errors_positions_powers((2,)))
-    assert (asked, found) == ([c.ReportErrorsPositionsPowers(0b10)], {2: reading})
-
-
-def test_a_stop_s_confirmation_says_where_the_arm_was_frozen() -> None:
+def test_what_a_stop_s_confirmation_tells() -> None:
     confirmation = controller_that(lambda _: c.Stopped(7, (1, 2, 3, 4, 5, 6))).stop()
     assert (confirmation.sent, confirmation.acknowledged, confirmation.tick) == (True, True, 7)
     assert confirmation.frozen == {1: 1, 2: 2, 3: 3, 4: 4, 5: 5, 6: 6}
     assert confirmation.problem is None
-
-
-def test_the_frozen_set_points_are_due_in_the_period_after_the_stop_s() -> None:
-    """505 from period 8 on; period 7 may still show the old ones."""
-    for tick, missed in ((7, False), (8, True)):
-        controller = snapshots_of(c.Snapshot(tick, 0, ((1, JointReading(500, 2048, 0, 0)),)))
-        controller.set_points({1: 500})
-        controller.stop()
-        assert controller.next_snapshot().set_points_missed is missed
+    confirmation = controller_that(lambda _: None).stop()
+    assert confirmation.sent
+    assert not confirmation.acknowledged
+    assert confirmation.frozen == {}
+    assert confirmation.problem is not None
+    assert "no reply to Stop" in confirmation.problem
+    confirmation = controller_that(lambda request: c.Refused(request.OPCODE, c.Refusal.UNKNOWN_OPCODE)).stop()
+    assert (confirmation.sent, confirmation.acknowledged) == (True, False)
+    assert "refused Stop" in str(confirmation.problem)
+    controller = controller_that(lambda _: None)
+    controller.close()
+    confirmation = controller.stop()
+    assert (confirmation.sent, confirmation.acknowledged) == (False, False)
 
 
 def test_the_greeting_tells_the_link_how_long_a_sample_may_take() -> None:
@@ -363,7 +331,7 @@ class LockStepBoard:
         return [(0.0, frame_of(sequence, reply))]
 
 
-def test_in_lock_step_the_clock_is_the_controller_s_and_is_asked_for_anew_by_a_greeting() -> None:
+def test_in_lock_step_the_clock_is_the_controller_s() -> None:
     board = LockStepBoard()
     link, _ = scripted_link(board.answer, lock_step=True)
     controller = Controller(link)
@@ -374,9 +342,6 @@ def test_in_lock_step_the_clock_is_the_controller_s_and_is_asked_for_anew_by_a_g
     controller.hello()
     assert controller.clock.now() == pytest.approx(0.04)
     assert controller.next_snapshot().tick == 2
-
-
-def test_a_reply_s_time_on_the_line_is_none_in_lock_step() -> None:
     board = LockStepBoard()
     link, channel = scripted_link(board.answer, lock_step=True)
     controller = Controller(link)

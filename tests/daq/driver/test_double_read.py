@@ -1,15 +1,17 @@
-"""Readings through the documented addresses: whole or not at all, whatever moment the controller chooses."""
+"""Readings through the documented addresses: whole or not at all, and never what the host's map leaves out."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from daq.driver import Controller
 from daq.driver.double_read import MOST_READINGS, SETTLING_S, DoubleReader, Span, spans
-from daq.link import Link, LinkError
-from firmware_protocol.commands import Block, ReadBlock, Request
+from daq.link import Link, LinkError, RequestRefusedError
+from firmware_protocol.commands import Block, ReadBlock, Refusal, Request
 from firmware_protocol.memory_map import MemoryMap, default_memory_map
+from tests.control_port import told_by
 from tests.daq.driver.memory_board import PERIOD_S, MemoryBoard
 from tests.daq.link.scripted import ScriptedChannel, ScriptedEndpoint, frame_of
 
@@ -40,13 +42,10 @@ def counting(period: int) -> list[tuple[int, int, int]]:
     return [(value, period % 128 - 64, period % 128)] * 6
 
 
-def test_the_documented_positions_are_one_request_of_eleven_bytes() -> None:
+def test_a_reading_is_one_request_for_documented_positions_and_for_all_values() -> None:
     register = default_memory_map()["position"]
     assert register.high is not None
     assert spans([*register.low[:3], *register.high[:3]]) == (Span(0xFC20, 11),)
-
-
-def test_positions_errors_and_powers_of_all_joints_fit_in_one_request() -> None:
     memory_map = default_memory_map()
     wanted = [address for name in ("position", "error", "power") for address in memory_map[name].addresses]
     assert spans(wanted) == (Span(0xFC20, 38),)
@@ -85,7 +84,7 @@ def test_no_reading_mixes_two_periods(phase: float, store: float, byte: float, d
     assert delivered > 20 or delay > 0.003, "two readings hardly fit in a period"
 
 
-def test_a_torn_reading_is_caught_counted_and_read_again() -> None:
+def test_a_torn_reading_is_read_again_and_a_period_s_own_readings_are_not_torn() -> None:
     # The reading begins at 40 ms + 1 ms and takes 0.76 ms; the memory changes in its middle.
     board = MemoryBoard(counting, phase_s=0.0014)
     reader, link, channel = reader_of(board)
@@ -95,6 +94,13 @@ def test_a_torn_reading_is_caught_counted_and_read_again() -> None:
     assert [(reading.position, reading.error, reading.power) for _, reading in joints] == counting(2)
     assert link.counters.torn == 1
     assert reader.disturbed
+    # The memory changes between the readings of one period, not within one: nothing was torn
+    reader, link, _ = reader_of_bytes([5, 5, 5, 6, 6, 7, 8, 8])
+    for _ in range(2):
+        assert reader.read((1, 2, 3)) is not None
+    assert (link.counters.torn, reader.disturbed) == (0, True)
+    assert reader.read((1, 2, 3)) is not None
+    assert link.counters.torn == 1, "7 is neither of this period nor of the last"
 
 
 def reader_of_bytes(values: Iterable[int]) -> tuple[DoubleReader, Link, ScriptedChannel]:
@@ -110,24 +116,14 @@ def reader_of_bytes(values: Iterable[int]) -> tuple[DoubleReader, Link, Scripted
     return DoubleReader(link, default_memory_map(), ChannelClock(channel), PERIOD_S), link, channel
 
 
-def test_readings_that_all_differ_deliver_nothing_however_many_there_are() -> None:
+def test_readings_that_do_not_agree_in_time_deliver_nothing() -> None:
+    # Readings that all differ deliver nothing however many there are
     reader, link, channel = reader_of_bytes(range(1, 100))
     assert reader.read((1, 2, 3)) is None
     assert reader.disturbed
     assert len(channel.asked) == MOST_READINGS
     assert link.counters.torn == MOST_READINGS - 1
 
-
-def test_only_the_two_readings_that_agree_tell_whether_the_board_has_its_supply() -> None:
-    reader, _, _ = reader_of_bytes([5, 6, 0, 0])
-    assert reader.read((1, 2, 3)) is None
-    reader, _, _ = reader_of_bytes([5, 0, 7, 7])
-    joints = reader.read((1, 2, 3))
-    assert joints is not None
-    assert {reading.power for _, reading in joints} == {7}
-
-
-def test_a_mixture_that_two_changes_leave_alike_is_not_taken() -> None:
     # Two slow readings, 20.45 ms apart. The first meets a change behind joint 2, the second one behind joint 1, and
     # both read 10, 10, 20, which no period holds.
     def results(period: int) -> list[tuple[int, int, int]]:
@@ -138,18 +134,21 @@ def test_a_mixture_that_two_changes_leave_alike_is_not_taken() -> None:
     channel.time = 2 * PERIOD_S
     assert reader.read((1, 2, 3)) is None
     assert link.counters.torn == 0, "nothing tells the two readings apart but the time they took"
-
-
-def test_a_line_too_slow_for_two_readings_in_a_period_delivers_nothing() -> None:
+    # A line too slow for two readings in a period delivers nothing
     reader, _, channel = reader_of(MemoryBoard(lambda _: [(2048, 0, 0)] * 6, delay_s=0.012))
     channel.time = 2 * PERIOD_S
     assert reader.read((1, 2, 3)) is None
-
-
-def test_the_memory_of_a_board_without_supply_is_no_reading() -> None:
+    # The memory of a board without supply is no reading
     reader, _, channel = reader_of(MemoryBoard(lambda _: [(0, 0, 0)] * 6))
     channel.time = 2 * PERIOD_S
     assert reader.read((1, 2, 3)) is None
+    # Only the two readings that agree tell whether the board has its supply
+    reader, _, _ = reader_of_bytes([5, 6, 0, 0])
+    assert reader.read((1, 2, 3)) is None
+    reader, _, _ = reader_of_bytes([5, 0, 7, 7])
+    joints = reader.read((1, 2, 3))
+    assert joints is not None
+    assert {reading.power for _, reading in joints} == {7}
 
 
 def elsewhere() -> MemoryMap:
@@ -164,7 +163,7 @@ def elsewhere() -> MemoryMap:
     return MemoryMap.model_validate(data)
 
 
-def test_another_memory_map_is_followed() -> None:
+def test_another_memory_map_is_followed_and_a_set_point_is_the_one_used() -> None:
     board = MemoryBoard(counting, memory_map=elsewhere(), delay_s=0.0005)
     reader, _, channel = reader_of(board)
     channel.time = 3.2 * PERIOD_S
@@ -173,9 +172,6 @@ def test_another_memory_map_is_followed() -> None:
     assert [(joint, reading.position, reading.error, reading.power) for joint, reading in joints] == [
         (joint, *counting(3)[0]) for joint in (1, 4)
     ]
-
-
-def test_the_set_point_of_a_reading_is_the_one_the_controller_used() -> None:
     reader, _, channel = reader_of(MemoryBoard(lambda _: [(2040, 8, 16)] * 6))
     channel.time = 2.5 * PERIOD_S
     joints = reader.read((1,))
@@ -212,16 +208,6 @@ def test_a_block_of_another_length_than_asked_for_is_no_memory() -> None:
         reader.read((1, 2, 3))
 
 
-def test_a_period_s_own_readings_and_the_last_one_s_are_not_torn() -> None:
-    """The memory changes between the readings of one period, not within one: nothing was torn."""
-    reader, link, _ = reader_of_bytes([5, 5, 5, 6, 6, 7, 8, 8])
-    for _ in range(2):
-        assert reader.read((1, 2, 3)) is not None
-    assert (link.counters.torn, reader.disturbed) == (0, True)
-    assert reader.read((1, 2, 3)) is not None
-    assert link.counters.torn == 1, "7 is neither of this period nor of the last"
-
-
 @pytest.mark.parametrize(("addresses", "longest", "found"), [([1, 3], 3, 1), ([1, 4], 3, 2), ([5, 1, 2, 9, 6], 2, 3)])
 def test_a_span_reaches_as_far_as_one_request(addresses: list[int], longest: int, found: int) -> None:
     assert len(spans(addresses, longest)) == found
@@ -234,3 +220,58 @@ def test_a_set_point_beyond_the_range_is_shown_as_its_end(position: int, error: 
     joints = reader.read((1,))
     assert joints is not None
     assert joints[0][1].set_point == set_point
+
+
+# ---- What the host's own memory map leaves out is never asked for, even of a bridge that would carry it out
+
+MOCK = "mock://?lock_step=1&seed=1"
+"""Its bridge works by the map that ships, which has everything."""
+GAINS, SIGNALS = ("gain_p", "gain_i", "gain_d"), ("process_outputs", "gripper")
+
+
+def without(*absent: str) -> MemoryMap:
+    whole = default_memory_map()
+    kept = {name: register for name, register in whole.registers.items() if name not in absent}
+    return MemoryMap.model_validate(dict(whole) | {"registers": kept})
+
+
+@pytest.fixture
+def bridge_with_everything() -> Iterator[Controller]:
+    with Controller.connect(MOCK, without(*GAINS, *SIGNALS)) as controller:
+        yield controller
+
+
+ORDERS: dict[str, Callable[[Controller], object]] = {
+    "SetGains": lambda controller: controller.set_gains(1, 7, 3, 1),
+    "ReadProcess": Controller.process,
+    "WriteOutputs": lambda controller: controller.write_outputs(0xFF, 0xA5),
+    "SetGripper": lambda controller: controller.set_gripper(closed=True),
+}
+
+
+@pytest.mark.parametrize("request_name", ORDERS)
+def test_what_the_map_leaves_out_is_refused_and_nothing_is_sent(
+    bridge_with_everything: Controller, request_name: str
+) -> None:
+    controller = bridge_with_everything
+    control = controller.link.control
+    assert control is not None
+    before, sent = told_by(control, "state"), controller.counters.numbers()
+    with pytest.raises(RequestRefusedError, match=f"{request_name}: the memory map leaves out .* not sent") as refused:
+        ORDERS[request_name](controller)
+    assert refused.value.reason == Refusal.NOT_CAPABLE
+    after = told_by(control, "state")
+    assert (after, controller.counters.numbers()) == (before, sent)
+
+
+def test_gains_that_the_map_leaves_out_are_not_known_and_the_gripper_stays_usable(
+    bridge_with_everything: Controller,
+) -> None:
+    sent = bridge_with_everything.counters.numbers()
+    assert bridge_with_everything.gains() == {}
+    assert bridge_with_everything.counters.numbers() == sent
+    with Controller.connect(MOCK, without(*GAINS)) as controller:
+        controller.set_gripper(closed=True)
+        assert controller.process().gripper == 1
+        with pytest.raises(RequestRefusedError):
+            controller.set_gains(1, 7, 3, 1)

@@ -109,22 +109,16 @@ def controller(line: Line) -> Controller:
     return made
 
 
-def test_connecting_and_looking_write_nothing(line: Line) -> None:
+def test_connecting_writes_nothing_and_set_points_wait_for_drives_that_come_on_still(line: Line) -> None:
     with line.controller() as controller:
         assert controller.identity.simulated
         assert StatusFlag.NO_TORQUE in controller.status().flags
         assert controller.next_snapshot()[1].position == 2000
         assert controller.gains() == {1: (2, 0, 0), 2: (2, 0, 0)}
     assert set(b"".join(line.written).split(b"\r")) == {b"V?", b"P?", b""}
-
-
-def test_set_points_are_refused_until_the_drives_are_on(line: Line) -> None:
     with line.controller() as controller, pytest.raises(RequestRefusedError, match="its drives are off"):
         controller.set_points({1: 2100})
     assert line.goals() == [2000, 2000]
-
-
-def test_nothing_moves_when_the_drives_come_on(line: Line) -> None:
     line.stage.axes[0].place += 0.01  # pushed by hand while the drives were off
     line.sleep_until(0.01)
     with line.controller() as controller:
@@ -133,20 +127,20 @@ def test_nothing_moves_when_the_drives_come_on(line: Line) -> None:
     assert line.stage.axes[0].encoder() == 2200
 
 
-def test_set_points_are_goals_and_are_read_back(controller: Controller, line: Line) -> None:
+def test_set_points_are_goals_and_samples_come_every_twentieth_tick(controller: Controller, line: Line) -> None:
     controller.set_points({1: 2100, 2: 1900})
     assert line.goals() == [2100, 1900]
     assert controller.next_snapshot().set_points == {1: 2100, 2: 1900}
-
-
-def test_a_sample_comes_every_twentieth_tick_of_the_stage(controller: Controller) -> None:
     ticks = [controller.next_snapshot().tick]
     for _ in range(20):
         ticks.append(controller.next_snapshot(ticks[-1] + 19).tick)
     assert {later - earlier for earlier, later in pairwise(ticks)} <= {19, 20, 21}
 
 
-def test_a_stop_holds_and_whoever_comes_next_finds_it(controller: Controller, line: Line) -> None:
+def test_a_stop_holds_for_whoever_comes_next_and_cannot_be_undone_by_a_repeat(
+    controller: Controller, line: Line
+) -> None:
+    # A stop holds and whoever comes next finds it
     controller.set_points({1: 3000})
     line.sleep_until(line.now() + 0.05)
     stopped = controller.stop()
@@ -159,6 +153,13 @@ def test_a_stop_holds_and_whoever_comes_next_finds_it(controller: Controller, li
         assert StatusFlag.FROZEN in other.status().flags
         other.release(other.status().stop)
         assert StatusFlag.FROZEN not in other.status().flags
+    # A repeat of set points cannot undo a stop
+    dialect = DIALECT.LineStageDialect((1, 2))
+    late = FineSetPoints(((1, 2600),), 4096)
+    frame = dialect.encode(7, late)
+    assert dialect.again(late, frame) == frame
+    dialect.encode(8, Stop())
+    assert dialect.again(late, frame) == b"P?\r"
 
 
 def test_a_stop_of_another_host_is_seen_and_its_release_is_not_taken_for_the_own(
@@ -170,15 +171,6 @@ def test_a_stop_of_another_host_is_seen_and_its_release_is_not_taken_for_the_own
     with pytest.raises(RequestRefusedError, match="is newer than the one that was to end"):
         controller.release(before)
     assert line.stage.state == "H"
-
-
-def test_a_repeat_of_set_points_cannot_undo_a_stop() -> None:
-    dialect = DIALECT.LineStageDialect((1, 2))
-    late = FineSetPoints(((1, 2600),), 4096)
-    frame = dialect.encode(7, late)
-    assert dialect.again(late, frame) == frame
-    dialect.encode(8, Stop())
-    assert dialect.again(late, frame) == b"P?\r"
 
 
 def test_commands_that_are_lost_are_made_good(controller: Controller, line: Line) -> None:
@@ -200,7 +192,7 @@ def test_commands_that_are_lost_are_made_good(controller: Controller, line: Line
     assert line.stage.state == "R"
 
 
-def test_what_was_said_before_does_not_make_a_new_connection_a_simulated_one() -> None:
+def test_a_silent_stage_is_told_and_what_was_said_before_does_not_count(line: Line) -> None:
     dialect = DIALECT.LineStageDialect((1, 2))
     dialect.encode(1, Hello(2, 1))
     ((number, reply),) = dialect.feed(b"V STAGE 2 SIM\rP 5 R 1 1 0 2 2 0\r")
@@ -209,9 +201,6 @@ def test_what_was_said_before_does_not_make_a_new_connection_a_simulated_one() -
     assert dialect.feed(b"P 6 R 1 1 0 2 2 0\r") == [], "a late answer to an earlier question"
     ((number, reply),) = dialect.feed(b"V STAGE 2 HW\rP 7 R 1 1 0 2 2 0\r")
     assert (number, Capability.SIMULATED in Capability(reply.capabilities)) == (2, False)
-
-
-def test_a_silent_stage_is_told(line: Line) -> None:
     line.hearing = lambda _: b""
     with pytest.raises(LinkTimeoutError, match="no reply to Hello"):
         line.controller()

@@ -35,24 +35,23 @@ def positions(bench: VirtualBench) -> list[int]:
     return [servo[Table.PRESENT_POSITION] for servo in bench.bench.servos]
 
 
-def test_a_bench_says_what_it_is(controller: Controller) -> None:
+def test_a_bench_says_what_it_is_and_looking_writes_nothing(controller: Controller, bench: VirtualBench) -> None:
     assert controller.identity.simulated
     assert c.Capability.POLLED in controller.identity.capabilities
     assert controller.period_s == 0.001
     assert controller.joints == (1, 2)
     assert controller.gains() == {1: (800, 0, 0), 2: (800, 0, 0)}
-
-
-def test_connecting_and_looking_write_nothing(bench: VirtualBench) -> None:
     written: list[bytes] = []
     bench.hearing = lambda data: written.append(data) or data  # type: ignore[func-returns-value]
-    with bench.controller() as controller:
-        controller.status()
-        controller.next_snapshot()
+    with bench.controller() as looking:
+        looking.status()
+        looking.next_snapshot()
     assert all(packet[7] == ask.Instruction.SYNC_READ for packet in written)
 
 
-def test_set_points_are_goals_and_are_read_back(controller: Controller, bench: VirtualBench) -> None:
+def test_set_points_are_goals_and_a_stop_holds_where_the_servos_are(
+    controller: Controller, bench: VirtualBench
+) -> None:
     controller.set_points({1: 2100, 2: 1600})
     assert goals(bench) == [2100, 1600]
     snapshot = controller.next_snapshot()
@@ -60,17 +59,33 @@ def test_set_points_are_goals_and_are_read_back(controller: Controller, bench: V
     assert not snapshot.set_points_missed
     reading = snapshot[1]
     assert reading.error == 2100 - reading.position
+    controller.set_points({1: 2600})
+    bench.sleep_until(bench.now() + 0.15)
+    stopped = controller.stop()
+    assert stopped.acknowledged
+    assert list(stopped.frozen.values()) == goals(bench)
+    assert all(abs(goal - position) < 40 for goal, position in zip(goals(bench), positions(bench), strict=True))
+    with pytest.raises(RequestRefusedError, match="the bench has been stopped and holds its posture"):
+        controller.set_points({1: 2600})
+    assert goals(bench) == list(stopped.frozen.values())
 
 
-def test_samples_come_every_twentieth_tick_of_the_servos_own_clock(controller: Controller) -> None:
+def test_samples_have_the_tick_of_their_measurement_on_the_servos_own_clock(
+    controller: Controller, bench: VirtualBench
+) -> None:
+    # Samples come every twentieth tick of the servos own clock
     ticks = [controller.next_snapshot().tick]
     for _ in range(50):
         ticks.append(controller.next_snapshot(ticks[-1] + 19).tick)
     assert {later - earlier for earlier, later in pairwise(ticks)} <= {19, 20, 21}
     assert abs(ticks[-1] - ticks[0] - 50 * 20) <= 1  # a sample beside its tick does not move those after it
-
-
-def test_a_sample_has_the_tick_at_which_it_was_measured(controller: Controller, bench: VirtualBench) -> None:
+    # Every tick can be asked for
+    tick = controller.next_snapshot().tick
+    for _ in range(5):
+        later = controller.next_snapshot(tick).tick
+        assert tick < later <= tick + 3
+        tick = later
+    # A sample has the tick at which it was measured
     clocks: list[int] = []
     bench.saying = lambda data: clocks.append(bench.bench.servos[0][Table.REALTIME_TICK]) or data  # type: ignore[func-returns-value]
     seen: list[tuple[int, int]] = []
@@ -82,27 +97,6 @@ def test_a_sample_has_the_tick_at_which_it_was_measured(controller: Controller, 
         assert sample.missing_before == 0
     assert {later - earlier for (earlier, _), (later, _) in pairwise(seen)} >= {20, 24}
     assert len({(tick - clock) % TICKS for tick, clock in seen}) == 1
-
-
-def test_a_sample_that_is_far_too_late_is_told_as_what_it_is(controller: Controller, bench: VirtualBench) -> None:
-    first = controller.next_snapshot()
-    second = controller.next_snapshot(first.tick + 19)
-    bench.sleep_until(bench.now() + 0.05)
-    third = controller.next_snapshot(second.tick + 19)
-    assert 50 <= third.tick - second.tick <= 52
-    assert third.missing_before == 2
-
-
-def test_a_stop_holds_where_the_servos_are_and_they_refuse_goals(controller: Controller, bench: VirtualBench) -> None:
-    controller.set_points({1: 2600})
-    bench.sleep_until(bench.now() + 0.15)
-    stopped = controller.stop()
-    assert stopped.acknowledged
-    assert list(stopped.frozen.values()) == goals(bench)
-    assert all(abs(goal - position) < 40 for goal, position in zip(goals(bench), positions(bench), strict=True))
-    with pytest.raises(RequestRefusedError, match="the bench has been stopped and holds its posture"):
-        controller.set_points({1: 2600})
-    assert goals(bench) == list(stopped.frozen.values())
 
 
 def test_a_repeat_of_set_points_cannot_undo_a_stop(controller: Controller, bench: VirtualBench) -> None:
@@ -132,7 +126,8 @@ def test_set_points_from_before_a_stop_are_not_repeated_after_its_release(bench:
     assert goals(bench)[0] != 2600
 
 
-def test_a_stop_lasts_for_other_hosts_until_it_is_released(bench: VirtualBench) -> None:
+def test_a_stop_is_remembered_by_every_host_until_a_release(bench: VirtualBench) -> None:
+    # A stop lasts for other hosts until it is released
     with bench.controller() as first:
         first.set_points({1: 2300})
         assert first.stop().acknowledged
@@ -145,6 +140,13 @@ def test_a_stop_lasts_for_other_hosts_until_it_is_released(bench: VirtualBench) 
         assert c.StatusFlag.FROZEN not in second.status().flags
         second.set_points({1: 2100})
     assert goals(bench)[0] == 2100
+    # A greeting does not forget a stop under way
+    dialect = DynamixelDialect((1, 2))
+    dialect.encode(1, c.Stop())
+    dialect.feed(bench.bench.receive(dialect.encode(2, c.Hello(2, 1))))
+    late = c.FineSetPoints(((1, 2600),), 4096)
+    bench.bench.receive(dialect.encode(3, late))
+    assert goals(bench)[0] != 2600
 
 
 def test_a_stop_by_another_host_is_remembered_until_a_release(controller: Controller, bench: VirtualBench) -> None:
@@ -160,15 +162,6 @@ def test_a_stop_by_another_host_is_remembered_until_a_release(controller: Contro
     assert goals(bench) == held
     controller.release(controller.status().stop)
     controller.set_points({1: 2600})
-
-
-def test_a_greeting_does_not_forget_a_stop_under_way(bench: VirtualBench) -> None:
-    dialect = DynamixelDialect((1, 2))
-    dialect.encode(1, c.Stop())
-    dialect.feed(bench.bench.receive(dialect.encode(2, c.Hello(2, 1))))
-    late = c.FineSetPoints(((1, 2600),), 4096)
-    bench.bench.receive(dialect.encode(3, late))
-    assert goals(bench)[0] != 2600
 
 
 def test_a_release_that_names_an_older_stop_is_refused(controller: Controller, bench: VirtualBench) -> None:
@@ -297,7 +290,7 @@ def test_no_torque_comes_on_while_a_goal_has_not_arrived() -> None:
         assert not bench.bench.servos[0].torque
 
 
-def test_a_limp_servo_outside_its_own_limits_is_not_given_torque() -> None:
+def test_a_limp_servo_outside_its_limits_gets_no_torque_and_stops_at_the_limit() -> None:
     bench = VirtualBench(Options(torque=False))
     servo = bench.bench.servos[1]
     servo.write(Table.MIN_POSITION_LIMIT.address, (3000).to_bytes(4, "little"))
@@ -305,6 +298,12 @@ def test_a_limp_servo_outside_its_own_limits_is_not_given_torque() -> None:
         with pytest.raises(RequestRefusedError, match=r"joint 2: servo 2 stands at .* outside its position limits"):
             controller.release(controller.status().stop)
         assert not servo.torque
+    bench = VirtualBench(Options(torque=False))
+    bench.bench.servos[1].write(Table.MIN_POSITION_LIMIT.address, (3000).to_bytes(4, "little"))
+    with bench.controller() as controller:
+        stopped = controller.stop()
+    assert stopped.acknowledged
+    assert stopped.frozen[2] == goals(bench)[1] == 3000
 
 
 def test_a_stop_whose_answers_are_all_lost_still_stops(controller: Controller, bench: VirtualBench) -> None:
@@ -318,24 +317,12 @@ def test_a_stop_whose_answers_are_all_lost_still_stops(controller: Controller, b
     assert c.StatusFlag.FROZEN in controller.status().flags
 
 
-def test_a_stop_of_a_limp_servo_outside_its_limits_is_confirmed_at_the_limit() -> None:
-    bench = VirtualBench(Options(torque=False))
-    bench.bench.servos[1].write(Table.MIN_POSITION_LIMIT.address, (3000).to_bytes(4, "little"))
-    with bench.controller() as controller:
-        stopped = controller.stop()
-    assert stopped.acknowledged
-    assert stopped.frozen[2] == goals(bench)[1] == 3000
-
-
-def test_a_stop_that_gave_up_writing_writes_again_when_it_is_repeated(bench: VirtualBench) -> None:
+def test_a_stop_asks_anew_when_it_is_repeated(bench: VirtualBench) -> None:
     with bench.controller() as controller:
         controller.set_points({1: 2600})
         damage = iter(range(10**6))
         bench.hearing = lambda data: without(data, Table.GOAL_POSITION) if next(damage) < 30 else data
         assert controller.stop().acknowledged
-
-
-def test_a_repeat_forgets_what_servos_answered_to_the_question_before(bench: VirtualBench) -> None:
     dialect = DynamixelDialect((1, 2))
     question = c.ReadStatus()
     frame = dialect.encode(1, question)
@@ -356,7 +343,7 @@ def test_servos_stop_by_themselves_when_their_host_is_gone(controller: Controlle
     assert c.StatusFlag.FROZEN in bench.controller().status().flags
 
 
-def test_a_watch_whose_packet_was_damaged_is_begun_with_the_next_set_points(
+def test_a_watch_begins_with_set_points_and_ends_with_the_connection(
     controller: Controller, bench: VirtualBench
 ) -> None:
     bench.hearing = lambda data: without(data, Table.BUS_WATCHDOG)
@@ -364,11 +351,8 @@ def test_a_watch_whose_packet_was_damaged_is_begun_with_the_next_set_points(
     bench.hearing = lambda data: data
     controller.set_points({1: 2105})
     assert [servo[Table.BUS_WATCHDOG] for servo in bench.bench.servos] == [25, 25]
-
-
-def test_a_connection_that_ends_in_good_order_ends_the_watch(bench: VirtualBench) -> None:
-    with bench.controller() as controller:
-        controller.set_points({1: 2100})
+    with bench.controller() as other:
+        other.set_points({1: 2100})
     bench.sleep_until(bench.now() + 5.0)
     assert c.StatusFlag.FROZEN not in bench.controller().status().flags
 
@@ -398,21 +382,15 @@ def test_a_hardware_error_is_one_line_that_names_servo_and_error(controller: Con
         controller.release(controller.status().stop)
 
 
-def test_a_servo_that_loses_its_supply_for_a_moment_counts_as_restarted(
-    controller: Controller, bench: VirtualBench
-) -> None:
+def test_a_hardware_error_and_a_lost_supply_are_one_line(controller: Controller, bench: VirtualBench) -> None:
     controller.set_points({1: 2100})
     bench.bench.reboot(1)
     with pytest.raises(ControllerRestartedError, match="the controller has restarted"):
         controller.next_snapshot()
-
-
-def test_every_tick_can_be_asked_for(controller: Controller) -> None:
-    tick = controller.next_snapshot().tick
-    for _ in range(5):
-        later = controller.next_snapshot(tick).tick
-        assert tick < later <= tick + 3
-        tick = later
+    with pytest.raises(
+        ProtocolError, match="SetGripper: Dynamixel servos are only read, moved, stopped and released from here"
+    ):
+        controller.set_gripper(closed=True)
 
 
 def test_a_clock_that_stands_still_is_not_believed(controller: Controller, bench: VirtualBench) -> None:
@@ -421,6 +399,15 @@ def test_a_clock_that_stands_still_is_not_believed(controller: Controller, bench
     first = controller.next_snapshot()
     with pytest.raises(NoSampleError, match="the controller's clock stands still at"):
         controller.next_snapshot(first.tick + 19)
+
+
+def test_a_sample_that_is_far_too_late_is_told_as_what_it_is(controller: Controller, bench: VirtualBench) -> None:
+    first = controller.next_snapshot()
+    second = controller.next_snapshot(first.tick + 19)
+    bench.sleep_until(bench.now() + 0.05)
+    third = controller.next_snapshot(second.tick + 19)
+    assert 50 <= third.tick - second.tick <= 52
+    assert third.missing_before == 2
 
 
 def test_one_servo_whose_clock_stands_still_is_not_believed(controller: Controller, bench: VirtualBench) -> None:
@@ -472,14 +459,11 @@ def test_a_set_point_beyond_a_servos_own_limits_is_refused_before_it_is_sent(ben
     assert controller.next_snapshot()[2].set_point > 1000
 
 
-def test_a_servo_in_another_mode_is_not_driven() -> None:
+def test_a_servo_that_drives_otherwise_is_not_driven() -> None:
     bench = VirtualBench(Options(torque=False))
     bench.bench.servos[1].write(Table.OPERATING_MODE.address, b"\1")
     with pytest.raises(RequestRefusedError, match=r"servo 2 is in operating mode 1, position control \(3\) is needed"):
         bench.controller()
-
-
-def test_a_servo_whose_torque_comes_on_with_every_goal_is_not_driven() -> None:
     bench = VirtualBench(Options(torque=False))
     servo = bench.bench.servos[1]
     servo.write(Table.DRIVE_MODE.address, b"\x08")
@@ -488,13 +472,6 @@ def test_a_servo_whose_torque_comes_on_with_every_goal_is_not_driven() -> None:
     assert not servo.torque
     servo.write(Table.GOAL_POSITION.address, (2000).to_bytes(4, "little"))
     assert servo.torque
-
-
-def test_what_servos_do_not_have_is_refused_in_one_line(controller: Controller) -> None:
-    with pytest.raises(
-        ProtocolError, match="SetGripper: Dynamixel servos are only read, moved, stopped and released from here"
-    ):
-        controller.set_gripper(closed=True)
 
 
 def test_lost_and_damaged_packets_are_made_good_by_asking_again(controller: Controller, bench: VirtualBench) -> None:

@@ -61,31 +61,18 @@ def test_a_host_that_another_has_replaced_commands_no_more(
     assert endpoint.board.frozen
 
 
-def test_a_reset_takes_the_control_back(controller: Controller, endpoint: InProcess) -> None:
+def test_a_reset_takes_the_control_back_and_passes_over_no_restart(controller: Controller, endpoint: InProcess) -> None:
     greeted_by_another(endpoint)
     assert controller.stop().acknowledged
     controller.release(controller.status().stop)
     assert not endpoint.board.frozen
     controller.set_points({1: 510})
-
-
-def test_no_reset_passes_over_a_restart_of_the_board(controller: Controller, endpoint: InProcess) -> None:
     endpoint.board.brown_out()
     endpoint.bridge.run_until(endpoint.board.time_us + 200_000)
     with pytest.raises(ControllerRestartedError):
         controller.release(controller.status().stop)
     controller.hello()
     controller.release(controller.status().stop)
-
-
-def test_a_stop_between_question_and_release_holds(controller: Controller, endpoint: InProcess) -> None:
-    assert controller.stop().acknowledged
-    endpoint.bridge.before = Release
-    with pytest.raises(RequestRefusedError, match="a newer stop is in force"):
-        controller.release(controller.status().stop)
-    assert endpoint.board.frozen
-    controller.release(controller.status().stop)
-    assert not endpoint.board.frozen
 
 
 def test_a_release_ends_the_stop_that_it_names_and_no_later_one(controller: Controller, endpoint: InProcess) -> None:
@@ -95,6 +82,13 @@ def test_a_release_ends_the_stop_that_it_names_and_no_later_one(controller: Cont
     greeted_by_another(endpoint)
     with pytest.raises(RequestRefusedError, match="a newer stop is in force"):
         controller.release(seen)
+    assert endpoint.board.frozen
+    controller.release(controller.status().stop)
+    assert not endpoint.board.frozen
+    assert controller.stop().acknowledged
+    endpoint.bridge.before = Release
+    with pytest.raises(RequestRefusedError, match="a newer stop is in force"):
+        controller.release(controller.status().stop)
     assert endpoint.board.frozen
     controller.release(controller.status().stop)
     assert not endpoint.board.frozen

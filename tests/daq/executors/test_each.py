@@ -20,13 +20,10 @@ def answers(workers: WorkersByHand, tasks: range) -> dict[int, Any]:
     return found
 
 
-def test_what_a_dead_worker_had_is_computed_again() -> None:
+def test_a_task_that_kills_its_worker_is_computed_again_and_only_then_blamed() -> None:
     workers = WorkersByHand(dies=lambda task, time: task in (3, 4, 20) and time == 1)
     assert answers(workers, range(30)) == {n: n**2 for n in range(30)}
     assert sorted(workers.given) == sorted([*range(30), 3, 4, 20])
-
-
-def test_a_task_that_kills_every_worker_is_blamed_and_no_other() -> None:
     workers = WorkersByHand(dies=lambda task, time: task == 7 or (task == 8 and time == 1))
     assert answers(workers, range(12)) == {n: n**2 for n in range(12)} | {7: BrokenExecutor}
     assert workers.given.count(7) == 3
@@ -43,10 +40,17 @@ class Slow(WorkersByHand):
         return future
 
 
-def test_no_more_is_given_than_workers_can_begin_soon() -> None:
+def test_no_more_is_given_than_can_begin_and_workers_are_given_up_when_the_block_fails() -> None:
     workers, tasks = Slow(count=3), iter(range(1000))
     task, _future = next(done_in_any_order(workers, square, tasks))
     assert (task, len(workers.given), next(tasks)) == (AHEAD * 3 - 1, AHEAD * 3, AHEAD * 3)
+    workers = WorkersByHand()
+    with ending(workers):
+        pass
+    assert workers.ended == "waited"
+    with pytest.raises(KeyboardInterrupt), ending(workers):
+        raise KeyboardInterrupt
+    assert workers.ended == "abandoned"
 
 
 class Refusing(WorkersByHand):
@@ -90,13 +94,3 @@ def test_only_a_task_that_was_computed_alone_is_blamed() -> None:
     workers = Blaming()
     assert answers(workers, range(8)) == {n: n**2 for n in range(7)} | {7: BlamedError}
     assert sorted(workers.given) == [*range(6), 6, 6, 7, 7]
-
-
-def test_workers_are_given_up_when_the_block_fails() -> None:
-    workers = WorkersByHand()
-    with ending(workers):
-        pass
-    assert workers.ended == "waited"
-    with pytest.raises(KeyboardInterrupt), ending(workers):
-        raise KeyboardInterrupt
-    assert workers.ended == "abandoned"

@@ -51,7 +51,7 @@ def test_a_request_gets_its_reply_and_a_lost_reply_is_asked_for_under_the_same_n
     assert seen[2:] == list(range(1, 101))
 
 
-def test_the_budget_of_one_transaction_ends_in_one_clear_line() -> None:
+def test_the_budget_of_a_transaction_ends_in_one_line_and_outlasts_a_bridge_that_starts_anew() -> None:
     link, channel = scripted_link(lambda _sequence, _request: [])
     with pytest.raises(LinkTimeoutError, match=rf"script: no reply to ReadStatus, asked {RETRIES + 1} times") as caught:
         link.request(c.ReadStatus(), c.Status)
@@ -59,9 +59,6 @@ def test_the_budget_of_one_transaction_ends_in_one_clear_line() -> None:
     assert len(channel.asked) == RETRIES + 1
     assert len({sequence for sequence, _ in channel.asked}) == 1
     assert link.state is LinkState.LOST
-
-
-def test_a_greeting_is_asked_for_long_enough_for_a_bridge_that_starts_anew() -> None:
     link, channel = scripted_link(lambda _sequence, _request: [])
     begun = channel.now()
     with pytest.raises(LinkTimeoutError, match="no reply to Hello"):
@@ -97,14 +94,6 @@ def test_a_reply_that_nobody_waits_for_is_dropped_and_counted() -> None:
     assert (link.counters.stale, link.counters.duplicates) == (2, 1)
 
 
-def test_a_refusal_says_which_request_and_why_and_is_not_repeated() -> None:
-    link, channel = scripted_link(says(lambda request: c.Refused(request.OPCODE, c.Refusal.FROZEN)))
-    with pytest.raises(RequestRefusedError, match="refused WriteSetPoints: it has been stopped"):
-        link.request(c.WriteSetPoints(((1, 500),)), c.SetPointsTaken)
-    assert len(channel.asked) == 1
-    assert link.counters.refused == 1
-
-
 def test_damage_is_counted_and_costs_one_repetition() -> None:
     damaged = iter([True])
 
@@ -117,6 +106,22 @@ def test_damage_is_counted_and_costs_one_repetition() -> None:
     link, _ = scripted_link(answer)
     assert link.request(c.ReadStatus(), c.Status) == STATUS
     assert (link.counters.damaged, link.counters.retries) == (1, 1)
+
+
+def test_a_refusal_says_which_request_and_why_and_is_counted_by_itself() -> None:
+    link, channel = scripted_link(says(lambda request: c.Refused(request.OPCODE, c.Refusal.FROZEN)))
+    with pytest.raises(RequestRefusedError, match="refused WriteSetPoints: it has been stopped"):
+        link.request(c.WriteSetPoints(((1, 500),)), c.SetPointsTaken)
+    assert len(channel.asked) == 1
+    assert link.counters.refused == 1
+    refused = c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.FROZEN)
+    link, _ = scripted_link(
+        says(lambda request: refused if isinstance(request, c.WriteSetPoints) else right_reply(request))
+    )
+    assert link.state is LinkState.CONNECTED
+    replies = link.exchange(c.WriteSetPoints(((1, 500),)), c.Sample(7, 1), c.WriteSetPoints(((1, 501),)))
+    assert [type(reply).__name__ for reply in replies] == ["Refused", "Snapshot", "Refused"]
+    assert (link.counters.refused, link.state) == (2, LinkState.CONNECTED)
 
 
 def test_round_trips_are_measured_where_it_is_known_which_copy_was_answered() -> None:
@@ -153,7 +158,8 @@ def test_after_the_channel_has_ended_nothing_is_asked_until_reconnected() -> Non
     assert link.counters.reconnections == 1
 
 
-def test_connecting_again_ends_the_old_channel_even_one_that_still_works() -> None:
+def test_nothing_of_an_ended_channel_reaches_the_next() -> None:
+    # Connecting again ends the old channel even one that still works
     first, second = ScriptedChannel(says(STATUS)), ScriptedChannel(says(STATUS))
     link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
     link.request(c.ReadStatus(), c.Status)
@@ -161,6 +167,21 @@ def test_connecting_again_ends_the_old_channel_even_one_that_still_works() -> No
     assert first.broken == "closed"
     link.request(c.ReadStatus(), c.Status)
     assert (len(first.asked), len(second.asked)) == (1, 1)
+
+    # Half a reply is forgotten with the channel it came over
+    def breaks_off(sequence: int, _request: c.Request) -> list[tuple[float, bytes]]:
+        if len(first.asked) > 1:
+            first.broken = "cable pulled"
+        return [(0.0, frame_of(sequence, STATUS)[:6])]
+
+    first = ScriptedChannel(breaks_off)
+    second = ScriptedChannel(says(STATUS))
+    link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
+    with pytest.raises(LinkLostError, match="cable pulled"):
+        link.request(c.ReadStatus(), c.Status)
+    link.reconnect()
+    assert link.request(c.ReadStatus(), c.Status) == STATUS
+    assert link.counters.damaged == 0
 
 
 class _EndsAtTheWrite(ScriptedChannel):
@@ -185,36 +206,14 @@ def test_a_reply_to_a_request_that_could_not_be_written_is_nobody_s() -> None:
     assert (link.counters.stale, link.counters.duplicates) == (1, 0)
 
 
-def test_half_a_reply_is_forgotten_with_the_channel_it_came_over() -> None:
-    def breaks_off(sequence: int, _request: c.Request) -> list[tuple[float, bytes]]:
-        if len(first.asked) > 1:
-            first.broken = "cable pulled"
-        return [(0.0, frame_of(sequence, STATUS)[:6])]
-
-    first = ScriptedChannel(breaks_off)
-    second = ScriptedChannel(says(STATUS))
-    link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
-    with pytest.raises(LinkLostError, match="cable pulled"):
-        link.request(c.ReadStatus(), c.Status)
-    link.reconnect()
-    assert link.request(c.ReadStatus(), c.Status) == STATUS
-    assert link.counters.damaged == 0
-
-
-def test_when_the_numbers_come_round_one_that_still_waits_is_passed_over() -> None:
+def test_a_second_reply_is_known_for_the_last_256_requests() -> None:
+    pending = PendingReplies(Tally(), first=SEQUENCE_NUMBERS + 0xFFFE)
+    assert [pending.begin(c.ReadStatus()).sequence for _ in range(4)] == [0xFFFE, 0xFFFF, 0, 1]
     pending = PendingReplies(Tally())
     waiting = pending.begin(c.ReadStatus())
     for _ in range(SEQUENCE_NUMBERS - 1):
         pending.forget(pending.begin(c.ReadStatus()))
     assert (waiting.sequence, pending.begin(c.ReadStatus()).sequence) == (0, 1)
-
-
-def test_numbers_follow_each_other_round_the_circle_from_the_first() -> None:
-    pending = PendingReplies(Tally(), first=SEQUENCE_NUMBERS + 0xFFFE)
-    assert [pending.begin(c.ReadStatus()).sequence for _ in range(4)] == [0xFFFE, 0xFFFF, 0, 1]
-
-
-def test_a_second_reply_is_known_for_the_last_256_requests() -> None:
     tally = Tally()
     pending = PendingReplies(tally)
     for _ in range(257):
@@ -248,7 +247,8 @@ def greeted(*replies: c.HelloReply) -> c.HelloReply | None:
     return next((one.reply for one in found if one is not None), None)  # type: ignore[return-value]
 
 
-def test_a_greeting_is_answered_by_its_own_nonce_or_by_another_version() -> None:
+def test_a_greeting_is_answered_by_its_own_nonce_which_is_the_time_in_lock_step() -> None:
+    # A greeting is answered by its own nonce or by another version
     own = c.HelloReply(c.PROTOCOL_VERSION, c.Capability.SAMPLE, 20_000, 8, 3, 5, 7)
     replayed = c.HelloReply(c.PROTOCOL_VERSION, c.Capability.SAMPLE, 20_000, 8, 3, 6, 7)
     short = c.HelloReply(c.PROTOCOL_VERSION, c.Capability.SAMPLE, 20_000, 8, 3)
@@ -257,8 +257,7 @@ def test_a_greeting_is_answered_by_its_own_nonce_or_by_another_version() -> None
     assert greeted(newer) == newer
     assert greeted(replayed, short) is None
 
-
-def test_in_lock_step_the_nonce_is_the_controller_s_time_so_that_a_run_repeats_to_the_bit() -> None:
+    # In lock step the nonce is the controller's time so that a run repeats to the bit
     def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
         if isinstance(request, c.Advance):
             return [(0.0, frame_of(sequence, c.Advanced(3 * 2**32 + 2**32 - 2, 0)))]
@@ -269,9 +268,7 @@ def test_in_lock_step_the_nonce_is_the_controller_s_time_so_that_a_run_repeats_t
     link.greet()
     assert [type(request).__name__ for _, request in channel.asked] == ["Advance", "Hello"]
     assert channel.asked[1][1] == c.Hello(2, 2**32 - 2)
-
-
-def test_a_controller_in_lock_step_that_knows_no_time_is_greeted_all_the_same() -> None:
+    # A controller in lock step that knows no time is greeted all the same
     refused = c.Refused(c.Advance.OPCODE, c.Refusal.NOT_CAPABLE)
     hello = c.HelloReply(1, c.Capability.LOCK_STEP, 20_000, 0, 1)
     link, _ = scripted_link(says(lambda request: refused if isinstance(request, c.Advance) else hello), lock_step=True)
@@ -297,18 +294,7 @@ def test_numbers_and_nonces_are_drawn_from_all_there_are() -> None:
     assert channel.asked == [(0xFFFF, c.Hello(2, 0xFFFFFFFF))]
 
 
-def test_a_refusal_among_several_is_counted_by_itself_and_the_link_stays_as_good_as_it_was() -> None:
-    refused = c.Refused(c.WriteSetPoints.OPCODE, c.Refusal.FROZEN)
-    link, _ = scripted_link(
-        says(lambda request: refused if isinstance(request, c.WriteSetPoints) else right_reply(request))
-    )
-    assert link.state is LinkState.CONNECTED
-    replies = link.exchange(c.WriteSetPoints(((1, 500),)), c.Sample(7, 1), c.WriteSetPoints(((1, 501),)))
-    assert [type(reply).__name__ for reply in replies] == ["Refused", "Snapshot", "Refused"]
-    assert (link.counters.refused, link.state) == (2, LinkState.CONNECTED)
-
-
-def test_a_link_that_answers_again_is_lost_no_longer_and_clean_after_a_hundred() -> None:
+def test_a_link_is_clean_again_after_a_hundred_good_replies() -> None:
     link, _ = scripted_link(once_silent(STATUS, RETRIES + 1))
     with pytest.raises(LinkTimeoutError):
         link.request(c.ReadStatus(), c.Status)
@@ -317,9 +303,6 @@ def test_a_link_that_answers_again_is_lost_no_longer_and_clean_after_a_hundred()
     assert link.state is LinkState.CONNECTED, "nothing had to be repeated since"
     assert link.counters.timeouts == RETRIES + 1
     assert link.counters.retries == RETRIES
-
-
-def test_after_a_reconnection_the_link_is_degraded_until_a_hundred_went_well() -> None:
     first, second = ScriptedChannel(says(STATUS)), ScriptedChannel(says(STATUS))
     link = Link(ScriptedEndpoint([first, second]), now=first.now, chance=Zeros())
     link.reconnect()
@@ -328,14 +311,6 @@ def test_after_a_reconnection_the_link_is_degraded_until_a_hundred_went_well() -
         assert link.state is LinkState.DEGRADED
         link.request(c.ReadStatus(), c.Status)
     assert link.state is LinkState.CONNECTED
-
-
-def test_reconnection_may_be_given_up_before_it_was_tried() -> None:
-    channel = ScriptedChannel(lambda _sequence, _request: [])
-    link = Link(ScriptedEndpoint([channel]), now=channel.now)
-    with pytest.raises(LinkLostError, match=r"^not connected again: not tried$"):
-        link.reconnect(_Waits(0))
-    assert link.counters.reconnections == 0
 
 
 def test_a_link_says_where_it_leads() -> None:
@@ -361,13 +336,18 @@ class _Waits:
         return len(self.delays) > self._attempts
 
 
-def test_reconnection_waits_twice_as_long_each_time_up_to_a_limit() -> None:
+def test_reconnection_waits_twice_as_long_each_time_and_may_be_given_up() -> None:
     channel = ScriptedChannel(lambda _sequence, _request: [])
     link = Link(ScriptedEndpoint([channel]), now=channel.now)
     waits = _Waits(9)
     with pytest.raises(LinkLostError, match="not connected again: nobody there"):
         link.reconnect(waits)
     assert waits.delays == [0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0, 5.0]
+    channel = ScriptedChannel(lambda _sequence, _request: [])
+    link = Link(ScriptedEndpoint([channel]), now=channel.now)
+    with pytest.raises(LinkLostError, match=r"^not connected again: not tried$"):
+        link.reconnect(_Waits(0))
+    assert link.counters.reconnections == 0
 
 
 @given(

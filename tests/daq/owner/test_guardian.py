@@ -1,4 +1,4 @@
-"""Signals, the stop socket, the parent: each request to end is heard, and freezes before anything else."""
+"""Each request to end or to stop is heard, freezes before anything else, and is answered in time."""
 
 from __future__ import annotations
 
@@ -13,12 +13,17 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
+from daq.driver import StopConfirmation
+from daq.owner import freezer as module
 from daq.owner import guardian, stop_socket
+from daq.owner.freezer import Freezer
 from daq.owner.guardian import CANCEL, EndCause, Guardian
 from daq.owner.stop_socket import StopAnswer, StopSocket, request_stop, stop_listener
+from daq.runner.arm_control import ArmControl
 
 CONFIRMED = StopAnswer(robot="arm", delivered=True, confirmed=True, tick=7)
 
@@ -67,10 +72,16 @@ def guarded() -> Iterator[Scene]:
             os.close(writer)
 
 
-def test_as_long_as_nobody_wants_the_end_there_is_no_cause() -> None:
+def test_no_cause_until_somebody_wants_the_end_and_the_loss_of_the_parent_is_told_once() -> None:
     with guarded() as scene:
         assert scene.guardian.cause is None
     assert scene.freezes.causes == []
+    with guarded() as scene:
+        os.close(scene.parent)
+        scene.freezes.wait()
+        request_stop()
+        scene.freezes.wait()
+    assert scene.freezes.causes == [EndCause.ORPHANED.value, EndCause.STOP.value]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -83,15 +94,23 @@ def test_a_signal_is_a_stop_and_the_handlers_are_put_back(number: int) -> None:
     assert signal.getsignal(number) is before
 
 
-def test_a_client_at_the_socket_is_answered_with_what_became_of_the_stop() -> None:
+def test_a_client_is_answered_with_what_became_of_the_stop_also_at_the_end() -> None:
     with guarded() as scene:
         (attempt,) = request_stop()
         assert scene.guardian.cause is EndCause.STOP
     assert attempt.answer == CONFIRMED
     assert attempt.robot == "arm"
+    client = socket.socket(socket.AF_UNIX)
+    client.settimeout(10)
+    with guarded() as scene:
+        scene.guardian._closing = True  # it looks at its socket no more
+        client.connect(str(scene.listener.path))
+    with client:
+        assert StopAnswer.from_json(client.recv(4096)) == CONFIRMED
 
 
-def test_a_word_of_the_parent_is_a_stop_and_its_end_the_loss_of_it() -> None:
+def test_a_word_of_the_parent_is_a_stop_and_a_reset_forgets_only_what_came_before() -> None:
+    # A word of the parent is a stop and its end the loss of it
     with guarded() as scene:
         os.write(scene.parent, b"stop\n")
         scene.freezes.wait()
@@ -100,9 +119,6 @@ def test_a_word_of_the_parent_is_a_stop_and_its_end_the_loss_of_it() -> None:
         scene.freezes.wait()
         assert scene.freezes.causes[-1] == EndCause.ORPHANED.value
         assert scene.guardian.cause is EndCause.PARENT, "the first cause is kept"
-
-
-def test_a_reset_forgets_what_came_before_it_was_asked_for_and_nothing_later() -> None:
     with guarded() as scene:
         before = time.monotonic()
         request_stop()
@@ -110,25 +126,14 @@ def test_a_reset_forgets_what_came_before_it_was_asked_for_and_nothing_later() -
         assert scene.guardian.cause is EndCause.STOP
         assert scene.guardian.clear_cause(time.monotonic())
         assert scene.guardian.cause is None
-
-
-def test_a_cancel_of_the_service_is_called_one_however_often_it_is_said() -> None:
+    # A cancel of the service is called one however often it is said
     with guarded() as scene:
         os.write(scene.parent, 2 * CANCEL)
         scene.freezes.wait()
         assert scene.guardian.cause is EndCause.CANCELLED
 
 
-def test_the_loss_of_the_parent_is_told_once() -> None:
-    with guarded() as scene:
-        os.close(scene.parent)
-        scene.freezes.wait()
-        request_stop()
-        scene.freezes.wait()
-    assert scene.freezes.causes == [EndCause.ORPHANED.value, EndCause.STOP.value]
-
-
-def test_a_client_that_connects_and_says_and_reads_nothing_holds_up_nobody() -> None:
+def test_a_client_that_reads_nothing_or_goes_has_asked_and_holds_up_nobody() -> None:
     with guarded() as scene:
         hanging = [socket.socket(socket.AF_UNIX) for _ in range(3)]
         for client in hanging:
@@ -137,24 +142,11 @@ def test_a_client_that_connects_and_says_and_reads_nothing_holds_up_nobody() -> 
         for client in hanging:
             client.close()
     assert attempt.answer == CONFIRMED
-
-
-def test_a_client_that_goes_at_once_has_asked_all_the_same() -> None:
     with guarded() as scene:
         client = socket.socket(socket.AF_UNIX)
         client.connect(str(scene.listener.path))
         client.close()
         scene.freezes.wait()
-
-
-def test_a_client_that_comes_while_the_run_ends_is_still_answered() -> None:
-    client = socket.socket(socket.AF_UNIX)
-    client.settimeout(10)
-    with guarded() as scene:
-        scene.guardian._closing = True  # it looks at its socket no more
-        client.connect(str(scene.listener.path))
-    with client:
-        assert StopAnswer.from_json(client.recv(4096)) == CONFIRMED
 
 
 def test_a_socket_whose_folder_is_removed_is_made_again_and_who_had_found_it_is_answered(
@@ -206,3 +198,56 @@ def test_a_guardian_that_fails_freezes_the_arm_and_ends_the_run() -> None:
         assert guardian.cause is EndCause.LISTENER_FAILED
     os.close(writer)
     assert freezes.causes == [EndCause.LISTENER_FAILED.value]
+
+
+# ---- Whoever asks for a stop is answered in time, with what is known by then
+
+
+class SlowControl:
+    """An arm whose board confirms when the test says so."""
+
+    def __init__(self) -> None:
+        self.confirm = threading.Event()
+        self.stops = 0
+        self.answer = StopConfirmation(sent=True, acknowledged=True, tick=9, frozen={1: 500})
+
+    def stop(self, _cause: str) -> StopConfirmation:
+        self.stops += 1
+        assert self.confirm.wait(10)
+        return self.answer
+
+
+def controlled(freezer: Freezer) -> SlowControl:
+    control = SlowControl()
+    freezer.control = cast(ArmControl, cast(Any, control))
+    return control
+
+
+def test_what_is_known_of_a_stop_is_answered() -> None:
+    with Freezer("arm", "serial:///dev/x") as freezer:
+        answer = freezer.freeze("now")
+    assert (answer.robot, answer.port, answer.delivered) == ("arm", "serial:///dev/x", False)
+    assert "ends before anything moves" in answer.text
+    with Freezer("arm", "") as freezer:
+        controlled(freezer).confirm.set()
+        answer = freezer.freeze("now")
+    assert (answer.delivered, answer.confirmed, answer.tick, answer.postures) == (True, True, 9, (500,))
+    with Freezer("arm", "") as freezer:
+        control = controlled(freezer)
+        control.answer = StopConfirmation(sent=False, acknowledged=False, problem="no line")
+        control.confirm.set()
+        answer = freezer.freeze("now")
+    assert (answer.delivered, answer.confirmed, answer.text) == (False, False, "no line")
+
+
+def test_a_board_that_does_not_confirm_keeps_nobody_waiting_and_the_stop_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "ANSWER_WITHIN", 0.01)
+    with Freezer("arm", "") as freezer:
+        control = controlled(freezer)
+        first, second = freezer.freeze("now"), freezer.freeze("again")
+        assert control.stops == 1, "the second request waits for the stop that is under way"
+        control.confirm.set()
+    assert (first.delivered, first.confirmed) == (second.delivered, second.confirmed) == (True, False)
+    assert "no confirmation within" in first.text

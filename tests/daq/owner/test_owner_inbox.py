@@ -40,7 +40,7 @@ def _word_to_the_guardian(inbox: Inbox) -> bytes:
     return os.read(inbox.guardian_end, 100)
 
 
-def test_what_waited_behind_another_order_is_halted_like_the_first() -> None:
+def test_what_waited_behind_another_order_ends_with_the_first() -> None:
     with inbox_told(JogBegin(number=1, asked=0.0), LeadBegin(number=2, asked=0.0, joints=(1,))) as (inbox, tell):
         first, second = inbox.take(WITHIN), inbox.take(WITHIN)
         assert first is not None
@@ -48,9 +48,6 @@ def test_what_waited_behind_another_order_is_halted_like_the_first() -> None:
         inbox.done()
         _say(tell, HaltRun())
         assert _word_to_the_guardian(inbox) == CANCEL
-
-
-def test_the_loss_of_the_service_freezes_what_waited_behind_another_order() -> None:
     with inbox_told(JogBegin(number=1, asked=0.0), LeadBegin(number=2, asked=0.0, joints=(1,))) as (inbox, _):
         assert inbox.take(WITHIN) is not None
         assert inbox.take(WITHIN) is not None
@@ -58,7 +55,8 @@ def test_the_loss_of_the_service_freezes_what_waited_behind_another_order() -> N
     assert _word_to_the_guardian(inbox) == b""
 
 
-def test_an_order_that_waits_does_not_take_back_the_end_of_the_one_before() -> None:
+def test_an_order_that_waits_takes_no_end_back_and_an_overtaken_jog_drives_nothing() -> None:
+    # An order that waits does not take back the end of the one before
     drive = JogDrive(velocities={1: 0.1}, said=5.0)
     with inbox_told(JogBegin(number=1, asked=0.0), drive, Finish(), LeadBegin(number=2, asked=0.0, joints=(1,))) as (
         inbox,
@@ -68,9 +66,7 @@ def test_an_order_that_waits_does_not_take_back_the_end_of_the_one_before() -> N
         assert inbox.take(WITHIN) is not None
         assert inbox.finish.is_set()
         assert inbox.drive() == drive
-
-
-def test_a_jog_command_that_was_overtaken_drives_nothing() -> None:
+    # A jog command that was overtaken drives nothing
     hold, late = JogDrive(velocities={}, said=5.0), JogDrive(velocities={1: 0.1}, said=4.9)
     with inbox_told(JogBegin(number=1, asked=0.0), hold, late, LeadBegin(number=2, asked=0.0, joints=(1,))) as (
         inbox,

@@ -14,13 +14,17 @@ import pytest
 from daq.contracts import exit_codes
 from daq.contracts.errors import OrderFailedError
 from daq.contracts.experiment import ExperimentSpec, Pause
+from daq.driver import Controller
+from daq.link import LinkError
 from daq.owner import client
 from daq.owner.client import OwnerOnDemand
+from daq.owner.late_stop import deliver_late_stop
 from daq.owner.messages import Answer, CannotOpen, EventHappened, Finished, HaltRun, Report, RunExperiment
 from daq.owner.stop_socket import request_stop
 from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage_folder
 from tests.daq.owner.jobs import AFTERMATH_PERIODS, ENDLESS, Running, opening, running
+from tests.mock.process.running import RunningMock
 
 QUICK = ExperimentSpec(trajectory=Pause(duration=0.2), settle=0, hold=0)
 
@@ -126,17 +130,15 @@ def test_a_client_that_goes_while_the_robot_is_being_reached_leaves_nothing_behi
     assert not (tmp_path / "traces").exists()
 
 
-def test_a_key_pressed_before_the_run_begins_lets_none_begin(tmp_path: Path) -> None:
+def test_a_key_pressed_early_lets_no_run_begin_and_follows_an_order(tmp_path: Path) -> None:
+    # A key pressed before the run begins lets none begin
     with OwnerOnDemand(opening(tmp_path / "traces")) as owner:
         owner.halt()
         with pytest.raises(OrderFailedError, match="nothing moved") as refused:
             owner.run(QUICK)
     assert refused.value.exit_code == exit_codes.STOPPED
     assert not (tmp_path / "traces").exists()
-
-
-def test_a_key_pressed_while_an_order_is_written_follows_it(tmp_path: Path) -> None:
-    """The signal's handler runs on the thread that writes: it may not wait for it."""
+    # The signal's handler runs on the thread that writes: it may not wait for it
     with OwnerOnDemand(opening(tmp_path / "traces")) as owner:
         write = owner._process._write
 
@@ -247,3 +249,33 @@ threading.Event().wait(100)
     with OwnerOnDemand(opening(tmp_path)):
         pass
     assert threading.active_count() == before
+
+
+# ---- A stop that could not be delivered is delivered when the link comes back
+
+
+def test_the_arm_is_frozen_when_the_link_comes_back_in_time() -> None:
+    with (
+        RunningMock("--tcp", "127.0.0.1:0", "--lock-step") as mock,
+        Controller.connect(f"{mock.url}?lock_step=1") as arm,
+    ):
+        mock.control("disconnect")
+        with pytest.raises(LinkError):
+            arm.status()
+        # The first delay is the moment in which somebody pushes the plug back in.
+        line = deliver_late_stop(arm, 60.0, sleep=lambda _seconds: reconnect(mock))
+        assert "the link came back" in line
+        assert "the board confirmed" in line
+        assert mock.control("state")["frozen"] is True
+    with (
+        RunningMock("--tcp", "127.0.0.1:0", "--lock-step") as mock,
+        Controller.connect(f"{mock.url}?lock_step=1") as arm,
+    ):
+        mock.end()
+        with pytest.raises(LinkError):
+            arm.status()
+        assert deliver_late_stop(arm, 0.0).startswith("the link did not come back within 0 s")
+
+
+def reconnect(mock: RunningMock) -> None:
+    mock.control("reconnect")

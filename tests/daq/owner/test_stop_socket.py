@@ -1,4 +1,4 @@
-"""Where stop sockets lie, who may make them, and what a stop finds there."""
+"""Stops from outside: where stop sockets lie, who may make them; and a run that is killed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from typing import NoReturn
 
 import pytest
 
+from benchmarks.kills import WAYS, Findings, Undisturbed, Way, end_one, undisturbed
 from daq.contracts.errors import ReachError
+from daq.contracts.machine import load_machine
 from daq.owner import stop_socket
 from daq.owner.stop_socket import FOLDER_VARIABLE, request_stop, runtime_folders, stop_listener
 
@@ -30,19 +32,22 @@ def test_the_socket_is_there_while_it_listens_and_its_folder_is_the_users_alone(
     assert not list(folder.iterdir())
 
 
-def test_without_a_session_there_is_a_folder_among_the_temporary_files(
+def test_a_folder_that_others_can_write_to_is_refused(folder: Path) -> None:
+    folder.mkdir()
+    folder.chmod(0o777)
+    with pytest.raises(ReachError, match=r"must belong to this user"), stop_listener("arm"):
+        pass
+    assert request_stop() == [], "and nobody there is believed"
+
+
+def test_a_terminal_without_a_session_finds_the_folder_of_one_with_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv(FOLDER_VARIABLE, raising=False)
     monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     assert runtime_folders()[-1] == tmp_path / f"ma2000-daq-{os.getuid()}"
-
-
-def test_a_terminal_without_the_session_finds_what_one_with_it_has_started(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The other way round: made among the temporary files, looked for with a session."""
+    # The other way round: made among the temporary files, looked for with a session
     monkeypatch.delenv(FOLDER_VARIABLE, raising=False)
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     among_temporary = tmp_path / f"ma2000-daq-{os.getuid()}"
@@ -51,14 +56,6 @@ def test_a_terminal_without_the_session_finds_what_one_with_it_has_started(
     session.mkdir()
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(session))
     assert {session / "ma2000-daq", among_temporary} <= set(runtime_folders())
-
-
-def test_a_folder_that_others_can_write_to_is_refused(folder: Path) -> None:
-    folder.mkdir()
-    folder.chmod(0o777)
-    with pytest.raises(ReachError, match=r"must belong to this user"), stop_listener("arm"):
-        pass
-    assert request_stop() == [], "and nobody there is believed"
 
 
 @pytest.mark.parametrize("where", ["file/run", "x" * 120], ids=["below a file", "too long"])
@@ -144,22 +141,16 @@ def test_a_stop_needs_no_room_on_a_disk(folder: Path, monkeypatch: pytest.Monkey
     assert request_stop() == []
 
 
-def test_a_process_that_was_killed_leaves_a_socket_that_is_cleared_away(folder: Path) -> None:
+def test_a_process_that_was_killed_or_is_silent_is_told_so(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder.mkdir(mode=0o700)
     with socket.socket(socket.AF_UNIX) as gone:
         gone.bind(str(folder / "arm-1.sock"))
     assert request_stop() == []
     assert not list(folder.iterdir())
-
-
-def test_a_process_that_does_not_answer_is_told_so(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stop_socket, "ANSWER_TIMEOUT", 0.01)
     with stop_listener("arm"):
         (attempt,) = request_stop()
     assert (attempt.robot, attempt.answer) == ("arm", None)
-
-
-def test_a_robot_is_found_by_its_whole_name(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stop_socket, "ANSWER_TIMEOUT", 0.01)
     with stop_listener("arm"), stop_listener("arm-2"):
         assert [attempt.robot for attempt in request_stop("arm")] == ["arm"]
@@ -181,3 +172,25 @@ def test_an_answer_that_is_none_counts_as_no_answer(folder: Path) -> None:
         (attempt,) = request_stop()
         thread.join()
     assert attempt.answer is None
+
+
+# ---- Ctrl-C and kill -9 of a run in the middle of its record: an excerpt of `python -m benchmarks kills`
+
+
+@pytest.fixture(scope="module")
+def whole() -> Undisturbed:
+    """The run that the others are held against."""
+    return undisturbed()
+
+
+@pytest.mark.slow
+@pytest.mark.against_the_clock
+@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.name)
+def test_whatever_ends_a_run_leaves_nothing_running_a_free_port_a_still_arm_and_no_wrong_sample(
+    way: Way, whole: Undisturbed
+) -> None:
+    findings = Findings()
+    end_one(way, 0.0, whole, load_machine("ma2000"), findings, recording=True)
+    assert findings.wrong == []
+    assert findings.samples > 50 or not way.freezes  # of a process that is killed, what was synced is left
+    assert "complete" not in next(iter(findings.met))

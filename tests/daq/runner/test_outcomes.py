@@ -192,6 +192,14 @@ def test_a_board_that_restarts_is_a_fault(arm: Rig) -> None:
     assert "restart" in [event.kind for event in trace.events]
 
 
+def test_a_memory_that_is_always_busy_is_a_fault(arm: Rig) -> None:
+    arm.ears.at_event["ramp_start"] = lambda: arm.ask("fault_on", fault="busy_memory")
+    result = arm.run(LONG_RAMP)
+    assert result.outcome == "fault"
+    assert "set points missed in a row" in result.reason
+    assert result.counters["missed_set_points"] >= 10
+
+
 def test_a_fault_on_the_way_to_the_start_is_told_and_nothing_recorded(arm: Rig, tmp_path: Path) -> None:
     far = SHORT.model_copy(update={"start": {1: math.radians(270)}})
     arm.ears.at_event["note"] = lambda: arm.ask("fault_on", fault="stalled_joint:joint=1")
@@ -233,23 +241,12 @@ def test_set_points_wait_while_samples_are_old(arm: Rig, monkeypatch: pytest.Mon
     assert arm.kinds.index("pause") < arm.kinds.index("resume") < arm.kinds.index("ramp_end")
 
 
-def test_samples_that_were_lost_are_counted_and_told(tmp_path: Path) -> None:
+def test_what_is_lost_is_counted_told_and_borne(tmp_path: Path) -> None:
     with rig(tmp_path, "seed=5&no_sample=1&fault=drop:rate=0.06") as arm:
         result = arm.run(LONG_RAMP)
     trace = read_trace(result.trace)
     assert result.missing == trace.missing > 0
     assert result.samples == len(trace)
-
-
-def test_a_memory_that_is_always_busy_is_a_fault(arm: Rig) -> None:
-    arm.ears.at_event["ramp_start"] = lambda: arm.ask("fault_on", fault="busy_memory")
-    result = arm.run(LONG_RAMP)
-    assert result.outcome == "fault"
-    assert "set points missed in a row" in result.reason
-    assert result.counters["missed_set_points"] >= 10
-
-
-def test_single_missed_set_points_are_told_and_borne(tmp_path: Path) -> None:
     with rig(tmp_path, "seed=5&fault=busy_memory:rate=0.2") as arm:
         result = arm.run()
     assert result.outcome == "complete"
@@ -361,13 +358,10 @@ def test_the_trace_says_when_and_by_what_it_was_made(arm: Rig) -> None:
     assert record.trace_id[:6] in result.trace.name
 
 
-def test_an_arm_at_its_start_already_needs_no_move(arm: Rig) -> None:
+def test_an_arm_is_moved_slowly_to_a_start_far_away_and_not_where_it_is_there(arm: Rig) -> None:
     still = ExperimentSpec(trajectory=Pause(duration=0.1), settle=0, hold=0)
     assert arm.run(still).outcome == "complete"
     assert arm.run(still).outcome == "complete"
-
-
-def test_a_start_far_away_is_moved_to_slowly_and_not_recorded(arm: Rig) -> None:
     far = SHORT.model_copy(update={"start": {1: math.radians(230), 3: math.radians(-40)}})
     begun = arm.ask("state")["time_us"]
     result = arm.run(far)

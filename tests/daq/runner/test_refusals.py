@@ -1,4 +1,4 @@
-"""What is refused before anything moves: the board is as it was, and no file is left."""
+"""Before anything moves: what is refused, and the gains of an experiment."""
 
 import math
 from collections.abc import Callable
@@ -10,10 +10,14 @@ import pytest
 
 from daq.contracts.errors import DaqError, SafetyError, SpecError, TraceError
 from daq.contracts.experiment import ExperimentSpec, Pause, Ramp
-from daq.contracts.machine import Machine
-from daq.driver import Controller
+from daq.contracts.limp import GAINS_UNKNOWN
+from daq.contracts.machine import Machine, load_machine
+from daq.driver import Controller, GainsNotTakenError
+from daq.runner.arm_control import ArmControl, StoppedError
 from daq.runner.preparation import Consent, MissingConsentError, recorded_joints
+from daq.traces.reader import read_trace
 from firmware_protocol.scale import LineScale
+from tests.daq.driver.test_double_read import GAINS, MOCK, without
 from tests.daq.runner.rig import SHORT, Rig
 
 OTHER_GAINS = SHORT.model_copy(update={"gains": {1: (9, 9, 9)}})
@@ -42,12 +46,9 @@ def test_a_plan_outside_the_limits_is_refused(arm: Rig, tmp_path: Path, change: 
     assert not list(tmp_path.iterdir())
 
 
-def test_a_real_arm_is_not_moved_without_the_operators_consent(arm: Rig) -> None:
+def test_a_real_arm_moves_only_with_the_operators_consent(arm: Rig) -> None:
     arm.pretend_real()
     refused(arm, MissingConsentError, "is a real arm: it moves only with the operator's consent")
-
-
-def test_a_real_arm_moves_with_consent_and_its_trace_says_real(arm: Rig) -> None:
     arm.pretend_real()
     result = arm.run(consent=Consent(moves_real_arm=True))
     assert arm.trace(result).record.source == "real"
@@ -119,7 +120,13 @@ def test_all_joints_are_recorded_where_they_take_no_more_than_the_lines_share() 
     assert recorded_joints(cast(Controller, Line(1.0)), wanted) == (1, 3, 5)
 
 
-def test_an_arm_that_was_stopped_by_another_host(arm: Rig) -> None:
+def test_what_would_take_a_joints_drive_or_has_no_start_is_refused(arm: Rig) -> None:
+    limp = SHORT.model_copy(update={"gains": {1: (9, 9, 9), 3: (0, 0, 0)}})
+    refused(arm, SafetyError, "joints 3 have gain P = 0", limp)
+    machine = arm.machine
+    arm.machine = machine.model_copy(update={"rest_posture": None})
+    refused(arm, SpecError, "has no rest_posture")
+    arm.machine = machine
     arm.controller.stop()
     refused(arm, SafetyError, r"has been stopped .* `daq reset`")
 
@@ -130,11 +137,6 @@ def test_an_arm_with_a_joint_without_drive_is_refused(arm: Rig, joint: int) -> N
     without = SHORT if joint == 1 else OTHER_GAINS
     line = rf"joints {joint} have gain P = 0 and no drive: support the arm, then `daq gains set` them"
     refused(arm, SafetyError, line, without)
-
-
-def test_an_experiment_that_would_take_a_joints_drive(arm: Rig) -> None:
-    limp = SHORT.model_copy(update={"gains": {1: (9, 9, 9), 3: (0, 0, 0)}})
-    refused(arm, SafetyError, "joints 3 have gain P = 0", limp)
 
 
 def below_a_file(folder: Path) -> Path:
@@ -156,11 +158,6 @@ def test_a_folder_that_can_take_no_trace_is_refused(
     refused(arm, TraceError, "cannot be written there|MB are free")
 
 
-def test_a_machine_without_a_rest_posture_is_refused_where_it_is_the_start(arm: Rig) -> None:
-    arm.machine = arm.machine.model_copy(update={"rest_posture": None})
-    refused(arm, SpecError, "has no rest_posture")
-
-
 @pytest.mark.parametrize("bits", [10, 14])
 def test_a_machine_file_whose_positions_have_other_counts_is_refused(arm: Rig, bits: int) -> None:
     first = arm.machine.joints[0]
@@ -169,3 +166,91 @@ def test_a_machine_file_whose_positions_have_other_counts_is_refused(arm: Rig, b
     machine = arm.machine.model_copy(update={"joints": (other, *arm.machine.joints[1:])})
     with pytest.raises(SafetyError, match=f"in 4096 counts over the range of joint 1, .* has {2**bits}: .* bits"):
         arm.run(machine=machine)
+
+
+# ---- Gains of an experiment
+
+STIFF = SHORT.model_copy(update={"gains": {1: (4, 0, 0), 2: (2, 0, 0)}})
+"""Joint 2 has these gains already."""
+
+
+def test_gains_hold_for_the_run_and_are_put_back_after_it(arm: Rig) -> None:
+    before = arm.ask("state")["gains"]
+    trace = read_trace(arm.run(STIFF).trace)
+    assert trace.record.gains is not None
+    assert trace.record.gains[1] == (4, 0, 0)
+    assert [event.message for event in trace.events if event.kind == "gains"] == [
+        "joint 1: gains 4/0/0 for this run, 2/0/0 before"
+    ]
+    assert arm.ask("state")["gains"] == before
+    assert [(event.time, event.tick) for event in trace.events if event.kind == "gains"] == [(0.0, None)]
+    both = SHORT.model_copy(update={"gains": {3: (5, 1, 0), 1: (4, 0, 0)}})
+    trace = read_trace(arm.run(both).trace)
+    assert [event.message.partition(" for")[0] for event in trace.events if event.kind == "gains"] == [
+        "joint 1: gains 4/0/0",
+        "joint 3: gains 5/1/0",
+    ]
+
+
+def test_gains_that_cannot_be_put_back_are_a_fault(arm: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[int] = []
+
+    def only_once(joint: int, p: int, i: int, d: int) -> None:
+        written.append(joint)
+        if len(written) > 1:
+            raise GainsNotTakenError(f"joint {joint}: gains {(p, i, d)} written, (4, 0, 0) read back")
+        take(joint, p, i, d)
+
+    take = arm.controller.set_gains
+    monkeypatch.setattr(arm.controller, "set_gains", only_once)
+    result = arm.run(STIFF)
+    assert arm.ask("state")["frozen"]
+    assert (result.outcome, read_trace(result.trace).record.outcome) == ("fault", "fault")
+    assert result.reason.startswith("the plan was carried out, but its gains could not be put back: joint 1: gains")
+
+
+def test_a_wish_to_end_before_the_gains_are_written_leaves_them_as_they_are(arm: Rig, tmp_path: Path) -> None:
+    before = arm.ask("state")["gains"]
+    arm.wants_end = "the parent has gone"
+    with pytest.raises(StoppedError, match="the parent has gone"):
+        arm.run(STIFF)
+    state = arm.ask("state")
+    assert (state["gains"], state["frozen"]) == (before, True)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_wish_to_end_before_the_gains_are_put_back_is_a_stop(arm: Rig) -> None:
+    def end(fraction: float) -> None:
+        arm.wants_end = "the parent has gone" if fraction == 1.0 else None
+
+    arm.ears.at_progress = end
+    result = arm.run(STIFF)
+    state = arm.ask("state")
+    assert (result.outcome, result.reason, state["frozen"]) == ("stopped", "the parent has gone", True)
+    assert state["gains"][0] == [4, 0, 0]
+
+
+def test_after_a_stop_the_gains_stay_and_the_trace_says_so(arm: Rig) -> None:
+    arm.ears.at_sample[5] = arm.stop_as_the_guardian_does
+    trace = read_trace(arm.run(STIFF).trace)
+    assert [event.message for event in trace.events if event.kind == "gains"][1:] == [
+        "joint 1: gains stay at 4/0/0, they were 2/0/0 before the run"
+    ]
+    assert arm.ask("state")["gains"][0] == [4, 0, 0]
+
+
+# ---- A run of an arm whose memory map leaves out the gains: its record says that no limp joint can be seen
+
+
+def notes_of(folder: Path, *absent: str) -> list[str]:
+    with Controller.connect(MOCK, without(*absent)) as controller:
+        assert controller.link.control is not None
+        arm = Rig(controller, ArmControl(controller), folder, load_machine("ma2000"), controller.link.control)
+        trace = arm.trace(arm.run())
+    assert (trace.record.gains is None) == bool(absent)
+    return [event.message for event in trace.events if event.kind == "note"]
+
+
+def test_a_run_without_known_gains_says_so_in_its_record(tmp_path: Path) -> None:
+    assert GAINS_UNKNOWN in notes_of(tmp_path, *GAINS)
+    assert GAINS_UNKNOWN not in notes_of(tmp_path)

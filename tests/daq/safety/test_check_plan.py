@@ -23,9 +23,13 @@ from tests.daq.safety.arms import COUNT, LIMITS, MA2000, REST, limits, plan_of
 from tests.daq.sliding_axis import slide_and_turn
 
 
-def test_the_default_ramp_is_allowed() -> None:
+def test_the_default_ramp_is_allowed_and_an_experiment_outside_is_refused() -> None:
     spec = ExperimentSpec()
     assert check_plan(plan(spec, MA2000, start_angles(spec, MA2000)), MA2000, LIMITS) == []
+    with pytest.raises(SafetyError, match=r"joint \d: .*°/s .*allowed are up to"):
+        planned(ExperimentSpec(trajectory=Ramp(amplitude=math.radians(40), duration=0.2)), MA2000)
+    spec = ExperimentSpec()
+    assert np.array_equal(planned(spec, MA2000), plan(spec, MA2000, start_angles(spec, MA2000)).angles)
 
 
 @pytest.mark.parametrize(
@@ -43,45 +47,12 @@ def test_an_angle_outside_a_joints_range_is_a_violation(joint: int, target: floa
     assert (found.joint, found.time, found.value) == (joint, pytest.approx(10.0), pytest.approx(target))
 
 
-def test_range_without_limits_is_still_the_range_of_set_points() -> None:
+def test_range_is_that_of_set_points_from_0_to_999() -> None:
     way = np.linspace(math.pi, math.pi + math.radians(140), 1001)
     (found,) = check_plan(plan_of(1, *way), MA2000, Limits())
     assert str(found) == "joint 1: posture 1019 at 20.00 s: allowed are 0 to 999"
     (found,) = check_plan(plan_of(1, *(2 * math.pi - way)), MA2000, Limits())
     assert str(found) == "joint 1: posture -19 at 20.00 s: allowed are 0 to 999"
-
-
-def test_the_posture_next_to_a_limit_inside_it_is_allowed() -> None:
-    """Rest posture and limits are written in rad; set points are whole postures. Half a unit is not a violation."""
-    high = REST[0] + 0.1
-    inside = limits(joints=(JointLimits(high=high),))
-    assert check_plan(plan_of(1, REST[0], high + 0.002), MA2000, inside) == []
-    assert [v.rule for v in check_plan(plan_of(1, REST[0], high + 0.003), MA2000, inside)] == ["range"]
-
-
-def test_speed_is_that_of_the_planned_angles_not_of_the_rounded_set_points() -> None:
-    """At 0.118 rad/s half of all periods send one unit, which would be 0.236 rad/s, and half none."""
-    own = limits(joints=(JointLimits(speed=0.12),))
-    way = REST[0] + 0.118 * 0.02 * np.arange(100)
-    plan = plan_of(1, *way)
-    assert np.diff(plan.postures[:, 0]).max() * 1.5 * math.pi / 1000 / 0.02 > 0.12
-    assert check_plan(plan, MA2000, own) == []
-
-
-def test_too_fast_names_the_fastest_moment() -> None:
-    (found,) = check_plan(plan_of(1, math.pi, 3.15, 3.2, 3.21), MA2000, LIMITS)
-    assert str(found).startswith("joint 1: 143.2 °/s at 0.02 s: allowed are up to 91.7 °/s")
-
-
-def test_a_step_is_judged_by_its_size_and_not_by_its_speed() -> None:
-    assert check_plan(plan_of(1, math.pi, math.pi + 115 * COUNT, jumps=True), MA2000, LIMITS) == []
-    (found,) = check_plan(plan_of(1, math.pi, math.pi + 116 * COUNT, jumps=True), MA2000, LIMITS)
-    assert str(found) == (
-        "joint 1: step of 7.65° at 0.02 s: allowed are up to 7.58° (following-error limit less 12 counts)"
-    )
-
-
-def test_every_posture_from_0_to_999_may_be_sent() -> None:
     unit = 1.5 * math.pi / 1000
     lowest = MA2000.calibration(1).posture_to_rad(0)
     assert check_plan(plan_of(1, lowest, lowest + 999 * unit), MA2000, Limits()) == []
@@ -94,7 +65,14 @@ def test_every_posture_from_0_to_999_may_be_sent() -> None:
     assert [v.time for v in (below, above)] == [0.02, 0.02]
 
 
-def test_an_angle_may_lie_half_a_posture_unit_and_a_rounding_outside() -> None:
+def test_what_lies_exactly_at_a_limit_is_allowed() -> None:
+    # Rest posture and limits are written in rad; set points are whole postures. Half a unit is not a
+    # violation
+    high = REST[0] + 0.1
+    inside = limits(joints=(JointLimits(high=high),))
+    assert check_plan(plan_of(1, REST[0], high + 0.002), MA2000, inside) == []
+    assert [v.rule for v in check_plan(plan_of(1, REST[0], high + 0.003), MA2000, inside)] == ["range"]
+    # An angle may lie half a posture unit and a rounding outside
     slack = math.pi / 1000 / 2 + 1e-9
     for joint_limits, side in ((JointLimits(high=0.0), 1), (JointLimits(low=0.0), -1)):
         own = Limits(joints=(*[JointLimits()] * 3, joint_limits))
@@ -103,9 +81,7 @@ def test_an_angle_may_lie_half_a_posture_unit_and_a_rounding_outside() -> None:
         assert (found.rule, found.joint, found.time, found.limit) == ("range", 4, 0.0, 0.0)
         side_said = "any to 0.00°" if side > 0 else "0.00° to any"
         assert str(found).endswith(f"allowed are {side_said}")
-
-
-def test_the_largest_speed_and_the_largest_step_are_allowed() -> None:
+    # The largest speed and the largest step are allowed
     own = Limits(joints=(*[JointLimits()] * 3, JointLimits(speed=0.5)), following_error_counts=112)
     change = 0.5 * 0.02 + 1e-9
     assert check_plan(plan_of(4, 0.0, change), MA2000, own) == []
@@ -115,9 +91,36 @@ def test_the_largest_speed_and_the_largest_step_are_allowed() -> None:
     assert check_plan(plan_of(4, 0.0, step, jumps=True), MA2000, own) == []
     (found,) = check_plan(plan_of(4, 0.0, math.nextafter(step, 1), jumps=True), MA2000, own)
     assert (found.rule, found.joint, found.time) == ("step", 4, 0.02)
+    # A link that is exactly the tolerance beyond floor or reach is allowed
+    still = plan_of(2, REST[1], REST[1])
+    ends = link_ends(MA2000, still.angles)
+    lowest, furthest = float(ends[:, :, 2].min()), float(np.linalg.norm(ends, axis=2).max())
+    floor, reach = lowest + TOLERANCE, furthest - TOLERANCE
+    assert (floor - TOLERANCE, reach + TOLERANCE) == (lowest, furthest), "no rounding comes between"
+    assert check_plan(still, MA2000, Limits(floor_height=floor, reach=reach)) == []
+    tighter = Limits(floor_height=floor + 1e-12, reach=reach - 1e-12)
+    assert [violation.rule for violation in check_plan(still, MA2000, tighter)] == ["floor", "reach"]
 
 
-def test_a_step_of_one_count_is_always_allowed() -> None:
+def test_speed_is_that_of_the_planned_angles_and_names_its_fastest_moment() -> None:
+    # At 0.118 rad/s half of all periods send one unit, which would be 0.236 rad/s, and half none
+    own = limits(joints=(JointLimits(speed=0.12),))
+    way = REST[0] + 0.118 * 0.02 * np.arange(100)
+    plan = plan_of(1, *way)
+    assert np.diff(plan.postures[:, 0]).max() * 1.5 * math.pi / 1000 / 0.02 > 0.12
+    assert check_plan(plan, MA2000, own) == []
+    (found,) = check_plan(plan_of(1, math.pi, 3.15, 3.2, 3.21), MA2000, LIMITS)
+    assert str(found).startswith("joint 1: 143.2 °/s at 0.02 s: allowed are up to 91.7 °/s")
+
+
+def test_steps_are_judged_by_their_size() -> None:
+    assert check_plan(plan_of(1, math.pi, math.pi + 115 * COUNT, jumps=True), MA2000, LIMITS) == []
+    (found,) = check_plan(plan_of(1, math.pi, math.pi + 116 * COUNT, jumps=True), MA2000, LIMITS)
+    assert str(found) == (
+        "joint 1: step of 7.65° at 0.02 s: allowed are up to 7.58° (following-error limit less 12 counts)"
+    )
+    assert largest_step(MA2000, LIMITS, 4) == pytest.approx(largest_step(MA2000, LIMITS, 1) / 1.5)  # type: ignore[operator]
+    assert largest_step(MA2000, Limits(), 1) is None
     for limit in (1, 12, 13):
         assert largest_step(MA2000, Limits(following_error_counts=limit), 4) == pytest.approx(math.pi / 4096)
     assert largest_step(MA2000, Limits(following_error_counts=14), 4) == pytest.approx(2 * math.pi / 4096)
@@ -135,38 +138,42 @@ def test_set_points_are_subdivided_where_they_are_more_than_a_degree_apart() -> 
     assert passing(1.01) == ["reach 3 0.01"]
 
 
-def test_an_arm_beyond_its_reach_may_come_back_but_not_go_further() -> None:
+def test_an_arm_outside_its_limits_may_come_back_but_not_go_further() -> None:
     near, far = math.radians(60), math.radians(30)
     reach = Limits(reach=float(np.linalg.norm(link_ends(MA2000, plan_of(3, math.radians(90)).angles), axis=2).max()))
     assert [v.rule for v in check_plan(plan_of(3, near), MA2000, reach)] == ["reach"]
     assert check_move_to_start(plan_of(3, near, math.radians(90)), MA2000, reach) == []
     assert [v.rule for v in check_move_to_start(plan_of(3, near, far), MA2000, reach)] == ["reach"]
+    below = [REST[0], math.radians(-43), *REST[2:]]
+    assert check_move_to_start(plan_move(MA2000, below, REST.tolist()), MA2000, LIMITS) == []
+    deeper = [REST[0], math.radians(-44), *REST[2:]]
+    assert check_move_to_start(plan_move(MA2000, below, deeper), MA2000, LIMITS)[0].rule == "floor"
+    outside = [*REST[:3], math.radians(89.8), *REST[4:]]
+    further = [*REST[:3], math.radians(89.95), *REST[4:]]
+    tight = limits(joints=(*LIMITS.joints[:3], JointLimits(low=-1.5, high=1.5, speed=2.0), *LIMITS.joints[4:]))
+    back = plan_move(MA2000, outside, REST.tolist())
+    assert [v.rule for v in check_plan(back, MA2000, tight)] == ["range"]
+    assert check_move_to_start(back, MA2000, tight) == []
+    away = plan_move(MA2000, REST.tolist(), further)
+    assert [v.rule for v in check_move_to_start(away, MA2000, tight)] == ["range"]
 
 
-def test_a_joint_of_smaller_range_may_make_smaller_steps() -> None:
-    assert largest_step(MA2000, LIMITS, 4) == pytest.approx(largest_step(MA2000, LIMITS, 1) / 1.5)  # type: ignore[operator]
-    assert largest_step(MA2000, Limits(), 1) is None
-
-
-def test_a_link_below_the_floor_is_a_violation() -> None:
+def test_a_link_below_the_floor_or_beyond_the_reach_is_a_violation() -> None:
+    # A link below the floor is a violation
     way = np.linspace(REST[1], math.radians(-44), 501)
     (found,) = check_plan(plan_of(2, *way), MA2000, LIMITS)
     assert str(found) == "end of link 3: height of -315 mm at 10.00 s: allowed are -300 mm and above"
     assert (found.rule, found.joint, found.limit) == ("floor", 3, -0.3)
     assert (found.value, found.time) == (pytest.approx(-0.315, abs=5e-4), pytest.approx(10.0))
-
-
-def test_a_link_beyond_the_reach_is_a_violation() -> None:
+    # A link beyond the reach is a violation
     way = np.linspace(math.radians(90), 0, 501)
     assert check_plan(plan_of(3, *way), MA2000, limits(reach=0.4545)) == []
     (found,) = check_plan(plan_of(3, *way), MA2000, limits(reach=0.45))
     assert str(found) == "end of link 3: 454 mm from the base at 10.00 s: allowed are up to 450 mm"
     assert (found.rule, found.joint, found.limit) == ("reach", 3, 0.45)
     assert (found.value, found.time) == (pytest.approx(0.454, abs=5e-4), pytest.approx(10.0))
-
-
-def test_the_floor_is_watched_between_set_points_too() -> None:
-    """Both ends of this jump are above the floor; in its middle the forearm points straight down, 311 mm deep."""
+    # Both ends of this jump are above the floor; in its middle the forearm points straight down, 311 mm
+    # deep
     ends = np.tile(REST, (2, 1))
     ends[:, 1] = math.radians(-30)
     ends[:, 2] = np.radians([-90, -30])
@@ -203,17 +210,6 @@ def test_limits_that_are_not_set_are_not_checked_and_said_to_be_so() -> None:
     assert unchecked(MA2000, LIMITS) == ["reach not set, not checked"]
 
 
-def test_an_arm_led_outside_its_limits_may_come_back_but_not_go_further() -> None:
-    outside = [*REST[:3], math.radians(89.8), *REST[4:]]
-    further = [*REST[:3], math.radians(89.95), *REST[4:]]
-    tight = limits(joints=(*LIMITS.joints[:3], JointLimits(low=-1.5, high=1.5, speed=2.0), *LIMITS.joints[4:]))
-    back = plan_move(MA2000, outside, REST.tolist())
-    assert [v.rule for v in check_plan(back, MA2000, tight)] == ["range"]
-    assert check_move_to_start(back, MA2000, tight) == []
-    away = plan_move(MA2000, REST.tolist(), further)
-    assert [v.rule for v in check_move_to_start(away, MA2000, tight)] == ["range"]
-
-
 @pytest.mark.parametrize("side", [-1, 1])
 def test_an_arm_outside_its_limits_cannot_creep_further_out_by_roundings(side: int) -> None:
     own = limits(joints=(JointLimits(low=REST[0] - 0.1, high=REST[0] + 0.1, speed=2.0),))
@@ -223,24 +219,6 @@ def test_an_arm_outside_its_limits_cannot_creep_further_out_by_roundings(side: i
     assert check_move_to_start(plan_of(1, here, here - side * slack), MA2000, own) == []
     further = check_move_to_start(plan_of(1, here, here + side * 0.5 * slack), MA2000, own)
     assert [violation.rule for violation in further] == ["range"]
-
-
-def test_a_link_that_is_exactly_the_tolerance_beyond_floor_or_reach_is_allowed() -> None:
-    still = plan_of(2, REST[1], REST[1])
-    ends = link_ends(MA2000, still.angles)
-    lowest, furthest = float(ends[:, :, 2].min()), float(np.linalg.norm(ends, axis=2).max())
-    floor, reach = lowest + TOLERANCE, furthest - TOLERANCE
-    assert (floor - TOLERANCE, reach + TOLERANCE) == (lowest, furthest), "no rounding comes between"
-    assert check_plan(still, MA2000, Limits(floor_height=floor, reach=reach)) == []
-    tighter = Limits(floor_height=floor + 1e-12, reach=reach - 1e-12)
-    assert [violation.rule for violation in check_plan(still, MA2000, tighter)] == ["floor", "reach"]
-
-
-def test_an_arm_below_the_floor_may_come_back_but_not_go_deeper() -> None:
-    below = [REST[0], math.radians(-43), *REST[2:]]
-    assert check_move_to_start(plan_move(MA2000, below, REST.tolist()), MA2000, LIMITS) == []
-    deeper = [REST[0], math.radians(-44), *REST[2:]]
-    assert check_move_to_start(plan_move(MA2000, below, deeper), MA2000, LIMITS)[0].rule == "floor"
 
 
 @given(st.integers(1, 6), st.lists(st.floats(-3, 3), min_size=2, max_size=8))
@@ -266,16 +244,6 @@ def test_what_passes_is_within_every_limit(joint: int, offsets: list[float]) -> 
 # ---- Experiments that are compared before any is run are planned and checked like those that are run.
 
 
-def test_the_set_points_are_those_of_the_plan() -> None:
-    spec = ExperimentSpec()
-    assert np.array_equal(planned(spec, MA2000), plan(spec, MA2000, start_angles(spec, MA2000)).angles)
-
-
-def test_an_experiment_outside_the_limits_is_refused_by_its_first_violation() -> None:
-    with pytest.raises(SafetyError, match=r"joint \d: .*°/s .*allowed are up to"):
-        planned(ExperimentSpec(trajectory=Ramp(amplitude=math.radians(40), duration=0.2)), MA2000)
-
-
 # ---- Joints that slide are checked, moved and shown in metres, never in degrees.
 
 
@@ -293,20 +261,14 @@ def violations(machine: Machine, spec: ExperimentSpec) -> list[str]:
     return [str(one) for one in check_plan(plan(spec, machine, start_angles(spec, machine)), machine, machine.limits)]
 
 
-def test_refusals_are_in_millimetres_of_a_joint_that_slides_and_in_degrees_of_one_that_turns(machine: Machine) -> None:
+def test_refusals_are_in_the_unit_of_the_joint(machine: Machine) -> None:
     found = violations(machine, ramp({1: 0.1, 2: 0.45}, 1.0))
     assert any("joint 1: 200.00 mm" in one and "allowed are 10.00 mm to 190.00 mm" in one for one in found)
     assert any("joint 1: 100.0 mm/s" in one and "up to 40.0 mm/s" in one for one in found)
     assert any("joint 2: 54.43°" in one for one in found)
     assert not any("°" in one for one in found if one.startswith("joint 1"))
-
-
-def test_a_start_outside_the_range_is_told_in_the_joints_unit(machine: Machine) -> None:
     with pytest.raises(SpecError, match=r"joint 1: start of 300\.00 mm is outside its range of 0\.00 mm to 204\.75 mm"):
         plan_move(machine, (0.3, 0.5), (0.1, 0.5))
-
-
-def test_an_amplitude_below_half_a_set_point_is_told_in_the_joints_unit(machine: Machine) -> None:
     with pytest.raises(SpecError, match=r"half a set point \(0\.025 mm\)"):
         plan(ramp({1: 1e-5}), machine, (0.1, 0.5))
 

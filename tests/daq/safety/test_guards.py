@@ -25,11 +25,17 @@ def running(own: Limits = LIMITS, moving: tuple[int, ...] = (1, 2, 3)) -> Runnin
     return RunningGuards(MA2000, own, (1, 2, 3), moving)
 
 
-def test_an_arm_that_follows_is_left_alone() -> None:
+def test_an_arm_that_follows_is_left_alone_and_set_points_go_on_when_it_is_back() -> None:
     guards = running()
     for tick in range(5):
         verdict = guards.check(row(tick, error=(20, 50, 15)), REST_POSTURES)
         assert verdict == type(verdict)()
+    guards = running()
+    assert guards.check(row(0, error=(130, 0, 0)), {}).hold
+    assert guards.check(row(1, error=(128, 0, 0)), {}).findings == ()
+    verdict = guards.check(row(2, error=(127, 0, 0)), {})
+    assert not verdict.hold
+    assert [(f.kind, f.message) for f in verdict.findings] == [("resume", "set points continue after 0.04 s")]
 
 
 @pytest.mark.parametrize(("error", "held"), [(127, False), (128, True), (-127, False), (-128, True)])
@@ -39,25 +45,26 @@ def test_set_points_pause_when_the_error_leaves_127_counts(error: int, held: boo
     assert [finding.kind for finding in verdict.findings] == (["pause"] if held else [])
 
 
-def test_they_go_on_when_it_is_back_inside() -> None:
-    guards = running()
-    assert guards.check(row(0, error=(130, 0, 0)), {}).hold
-    assert guards.check(row(1, error=(128, 0, 0)), {}).findings == ()
-    verdict = guards.check(row(2, error=(127, 0, 0)), {})
-    assert not verdict.hold
-    assert [(f.kind, f.message) for f in verdict.findings] == [("resume", "set points continue after 0.04 s")]
-
-
-def test_a_pause_is_counted_from_the_period_in_which_it_began() -> None:
+def test_a_pause_is_counted_from_its_first_period_and_one_that_lasts_is_a_fault() -> None:
     guards = running()
     assert guards.check(row(100, error=(0, -130, 0)), {}).findings == (
         Finding("pause", "joint 2: positional error of -130 ADC counts, set points pause outside ±127", 2),
     )
     assert guards.check(row(103), {}).findings[-1].message == "set points continue after 0.06 s"
+    guards = running()
+    verdicts = [guards.check(row(tick, error=(0, 0, 130)), {}) for tick in range(27)]
+    assert [bool(verdict.trips) for verdict in verdicts] == [False] * 26 + [True]
+    assert all(verdict.hold for verdict in verdicts)
+    (trip,) = verdicts[-1].trips
+    assert trip.startswith("joint 3: positional error of 130 ADC counts, set points pause outside ±127; ")
+    assert trip.endswith("it lasted 0.52 s, allowed are 0.5 s")
+    guards = running()
+    for tick in range(100):
+        assert not guards.check(row(tick, error=(130 if tick % 20 else 0, 0, 0)), {}).trips
 
 
-def test_a_set_point_may_be_exactly_as_far_from_the_arm_as_the_limit() -> None:
-    """A joint of 4 rad has 1024 counts a rad, so that nothing is rounded here."""
+def test_set_points_keep_the_limit_s_distance_whatever_other_joints_do() -> None:
+    # A joint of 4 rad has 1024 counts a rad, so that nothing is rounded here
     watched = Watched((1,), (JointCalibration(1, 4.0, 0.0),), 0.02, Limits(following_error_counts=127))
     for counts, held in ((127, False), (128, True), (-127, False), (-128, True)):
         at = 2.0 - counts / 1024
@@ -65,9 +72,6 @@ def test_a_set_point_may_be_exactly_as_far_from_the_arm_as_the_limit() -> None:
         verdict = FollowingError(watched).check(sample, {1: 500})
         assert verdict.hold is held
         assert [f.joint for f in verdict.findings] == [1] * held
-
-
-def test_joints_that_are_not_sent_anything_do_not_hide_those_behind_them() -> None:
     verdict = running().check(row(0), {2: REST_POSTURES[2] + 40, 3: 500})
     (finding,) = verdict.findings
     assert verdict.hold
@@ -77,7 +81,7 @@ def test_joints_that_are_not_sent_anything_do_not_hide_those_behind_them() -> No
     assert missed.message == "joint 3: tick 4 took posture 500, sent was 510"
 
 
-def test_a_run_of_missed_set_points_begins_anew_after_one_that_was_taken() -> None:
+def test_a_run_of_missed_set_points_begins_anew_and_is_shorter_on_a_slow_line() -> None:
     guards = running()
     missed = [True] * 10 + [False] + [True] * 11
     trips = [
@@ -86,44 +90,15 @@ def test_a_run_of_missed_set_points_begins_anew_after_one_that_was_taken() -> No
     ]
     assert [tick for tick, trip in enumerate(trips) if trip] == [21]
     assert trips[21] == ("11 set points missed in a row, allowed are 10",)
+    guards = RunningGuards(MA2000, LIMITS, (1, 2, 3), (1, 2, 3), every=5)
+    missed = StatusFlag.SET_POINT_MISSED.value
+    trips = [bool(guards.check(row(tick, status=missed), {}).trips) for tick in range(0, 20, 5)]
+    assert trips == [False, False, True, True]
 
 
-def test_a_missed_set_point_says_in_which_period() -> None:
-    (finding,) = running().check(row(9, status=StatusFlag.SET_POINT_MISSED), {}).findings
-    assert finding.message == "tick 9: the controller could not read its set points: the host had the memory"
-
-
-def test_the_end_of_a_gap_is_judged_by_its_own_tick() -> None:
-    guards = running()
-    guards.check(row(5), {})
-    guards.check(row(15), {})
-    assert guards.check(row(16), {}) == Verdict()
-    (trip,) = guards.check(row(16), {}).trips
-    assert trip == "stale sample: tick 16 came twice"
-
-
-def test_a_pause_that_lasts_is_a_fault() -> None:
-    guards = running()
-    verdicts = [guards.check(row(tick, error=(0, 0, 130)), {}) for tick in range(27)]
-    assert [bool(verdict.trips) for verdict in verdicts] == [False] * 26 + [True]
-    assert all(verdict.hold for verdict in verdicts)
-    (trip,) = verdicts[-1].trips
-    assert trip.startswith("joint 3: positional error of 130 ADC counts, set points pause outside ±127; ")
-    assert trip.endswith("it lasted 0.52 s, allowed are 0.5 s")
-
-
-def test_time_in_a_pause_starts_anew_after_the_arm_was_back() -> None:
-    guards = running()
-    for tick in range(100):
-        assert not guards.check(row(tick, error=(130 if tick % 20 else 0, 0, 0)), {}).trips
-
-
-def test_without_a_time_limit_a_pause_may_last() -> None:
+def test_limits_that_are_not_set_pause_and_end_nothing() -> None:
     guards = running(limits(following_error_time=None))
     assert not any(guards.check(row(tick, error=(130, 0, 0)), {}).trips for tick in range(1000))
-
-
-def test_without_a_following_error_limit_nothing_pauses() -> None:
     assert not running(limits(following_error_counts=None)).check(row(0, error=(2000, 0, 0)), REST_POSTURES).hold
 
 
@@ -168,13 +143,10 @@ def lagging_arm(rate: float) -> tuple[int, bool]:
     return periods, held
 
 
-def test_the_default_ramp_passes_with_fifty_counts_of_following_error() -> None:
+def test_the_default_ramp_passes_and_a_slow_arm_makes_the_plan_wait() -> None:
     periods, held = lagging_arm(rate=0.2)  # settles at (1/0.2) · 10 counts behind
     assert not held
     assert periods == 158
-
-
-def test_a_slow_arm_makes_the_plan_wait_and_still_gets_it_all() -> None:
     periods, held = lagging_arm(rate=0.05)
     assert held
     assert periods > 158
@@ -202,50 +174,51 @@ def test_missing_control_periods_are_reported() -> None:
     guards.check(row(5), {})
     (finding,) = guards.check(row(9), {}).findings
     assert (finding.kind, finding.message) == ("missing", "3 control periods between ticks 5 and 9 have no sample")
+    guards = RunningGuards(MA2000, LIMITS, (1, 2, 3), (1, 2, 3), every=3)
+    assert guards.check(row(10), {}) == guards.check(row(13), {}) == Verdict()
+    (finding,) = guards.check(row(19), {}).findings
+    assert finding.message == "ticks 13 and 19 are 6 control periods apart, 3 were requested"
+    guards = running()
+    guards.check(row(5), {})
+    guards.check(row(15), {})
+    assert guards.check(row(16), {}) == Verdict()
+    (trip,) = guards.check(row(16), {}).trips
+    assert trip == "stale sample: tick 16 came twice"
 
 
-def test_a_restarted_board_is_a_fault_even_if_its_ticks_go_on() -> None:
+def test_a_board_that_restarted_or_was_frozen_stops_the_run() -> None:
     assert running().check(row(7, status=StatusFlag.RESTARTED), {}).trips == ("the board has restarted: tick 7",)
-
-
-def test_a_board_frozen_by_somebody_else_stops_the_run() -> None:
     verdict = running().check(row(7, status=StatusFlag.FROZEN), {})
     assert verdict.stop == "on the board, at tick 7"
     assert not verdict.trips
 
 
-def test_a_joint_that_should_stand_still_must_stay_at_its_set_point() -> None:
+def test_joints_at_rest_must_stay_where_they_are_unless_they_are_led() -> None:
     guards = running(moving=(1,))
     assert not guards.check(row(0, error=(100, 40, 0)), {}).trips
     assert guards.check(row(1, error=(100, -41, 0)), {}).trips == (
         "joint 2: unexpected motion, 41 ADC counts from its set point, allowed are ±40",
     )
-
-
-def test_an_arm_at_rest_must_stay_where_it_was() -> None:
     guards = RestGuards(MA2000, LIMITS, (1, 2, 3))
     assert not guards.check(row(0, position=(300, 0, 0))).trips
     assert not guards.check(row(1, position=(340, 0, 0))).trips
     assert guards.check(row(2, position=(341, 0, 0))).trips == (
         "joint 1: unexpected motion, 41 ADC counts from where it was, allowed are ±40",
     )
-
-
-def test_a_joint_led_by_hand_may_move() -> None:
     guards = RestGuards(MA2000, LIMITS, (1, 2, 3), led=(1,))
     guards.check(row(0))
     assert not guards.check(row(1, position=(500, 0, 0))).trips
+    # The tests above count from the rest posture, which lies on a posture for joints 1 and 3
+    assert MA2000.calibration(1).posture_to_rad(500) == pytest.approx(math.pi)
+    assert np.isfinite(REST).all()
 
 
-def test_what_several_guards_find_in_one_period_is_all_told() -> None:
+def test_what_several_guards_find_is_all_told_once() -> None:
     verdict = running(moving=(1, 2)).check(row(0, error=(130, 0, 50), status=5), {}, expected={1: 600})
     assert verdict.hold
     assert verdict.stop == "on the board, at tick 0"
     assert [finding.kind for finding in verdict.findings] == ["pause", "missed_set_point"]
     assert [trip.partition(",")[0] for trip in verdict.trips] == ["joint 3: unexpected motion"]
-
-
-def test_one_verdict_takes_nothing_from_another() -> None:
     one = Verdict(hold=True, stop="first", trips=("a",), findings=(Finding("note", "x"),))
     other = Verdict(stop="second", trips=("b",), findings=(Finding("note", "y"),))
     assert one | other == Verdict(True, "first", ("a", "b"), (Finding("note", "x"), Finding("note", "y")))
@@ -262,14 +235,13 @@ def test_missed_set_points_are_counted_and_a_run_of_them_is_a_fault() -> None:
         assert not verdict.trips
     assert guards.check(row(10, status=missed), {}).trips == ("11 set points missed in a row, allowed are 10",)
     assert guards.missed_set_points.missed == 11
-
-
-def test_a_set_point_other_than_sent_was_missed_too() -> None:
     start = {1: 500}
     guards = running()
     assert not guards.check(row(0), start, expected=start).findings
     (finding,) = guards.check(row(1), start, expected={1: 502}).findings
     assert finding.message == "joint 1: tick 1 took posture 500, sent was 502"
+    (finding,) = running().check(row(9, status=StatusFlag.SET_POINT_MISSED), {}).findings
+    assert finding.message == "tick 9: the controller could not read its set points: the host had the memory"
 
 
 @given(st.lists(st.tuples(st.integers(-300, 300), st.integers(400, 600)), max_size=60))
@@ -281,28 +253,8 @@ def test_guards_never_raise_and_never_release_what_they_should_hold(seen: list[t
         assert verdict.hold is (abs(error) > 127 or abs(ahead) > 127 + 1e-9)
 
 
-def test_rest_is_a_posture_up_to_rounding() -> None:
-    """The tests above count from the rest posture, which lies on a posture for joints 1 and 3."""
-    assert MA2000.calibration(1).posture_to_rad(500) == pytest.approx(math.pi)
-    assert np.isfinite(REST).all()
-
-
-def test_on_a_slow_line_every_nth_period_is_what_was_asked_for() -> None:
-    guards = RunningGuards(MA2000, LIMITS, (1, 2, 3), (1, 2, 3), every=3)
-    assert guards.check(row(10), {}) == guards.check(row(13), {}) == Verdict()
-    (finding,) = guards.check(row(19), {}).findings
-    assert finding.message == "ticks 13 and 19 are 6 control periods apart, 3 were requested"
-
-
 @pytest.mark.parametrize(("every", "gap", "trips"), [(1, 10, False), (1, 11, True), (5, 15, False), (5, 16, True)])
 def test_silence_is_ten_periods_or_three_samples_on_a_slow_line(every: int, gap: int, trips: bool) -> None:
     guards = RunningGuards(MA2000, LIMITS, (1, 2, 3), (1, 2, 3), every)
     guards.check(row(1), {})
     assert bool(guards.check(row(1 + gap), {}).trips) is trips
-
-
-def test_on_a_slow_line_fewer_samples_make_a_run_of_missed_set_points() -> None:
-    guards = RunningGuards(MA2000, LIMITS, (1, 2, 3), (1, 2, 3), every=5)
-    missed = StatusFlag.SET_POINT_MISSED.value
-    trips = [bool(guards.check(row(tick, status=missed), {}).trips) for tick in range(0, 20, 5)]
-    assert trips == [False, False, True, True]

@@ -60,57 +60,44 @@ def test_an_arm_whose_link_was_lost_is_reset_as_one_that_is_not_there(before: St
     assert (back, actions) == (Arm(State.FAULT, connected=True, cause="link lost"), (Action.FREEZE,))
 
 
-def test_a_stop_without_a_reason_was_on_request() -> None:
-    assert advance(UP[State.IDLE], Event.STOP)[0].cause == "on request"
-    assert advance(UP[State.IDLE], Event.TRIP)[0].cause == "guard tripped"
-
-
-def test_a_refusal_says_what_to_do() -> None:
+def test_faults_and_stops_outlive_a_lost_link_and_a_reset_that_is_not_theirs() -> None:
+    # A fault is latched when the link comes back and the arm is frozen again
+    lost, _ = advance(UP[State.RUNNING], Event.LINK_LOST)
+    back, actions = advance(lost, Event.CONNECTED)
+    assert (back.state, back.connected, actions) == (State.FAULT, True, (Action.FREEZE,))
+    # A stop outlives a lost link and is sent again when it is back
+    stopped, _ = advance(UP[State.RUNNING], Event.STOP, "somebody")
+    lost, _ = advance(stopped, Event.LINK_LOST)
+    back, actions = advance(lost, Event.CONNECTED)
+    assert (back.state, back.cause, actions) == (State.STOPPED, "somebody", (Action.FREEZE,))
+    # Arming releases nobodys stop
+    with pytest.raises(IllegalEventError, match="cannot arm while stopped"):
+        advance(UP[State.STOPPED], Event.ARM)
+    # A reset without a link cannot end the boards freeze so the arm comes back stopped
+    lost, _ = advance(UP[State.RUNNING], Event.LINK_LOST, "cable")
+    arm, actions = advance(lost, Event.RESET)
+    assert (arm, actions) == (Arm(State.DISCONNECTED, connected=False, cause="cable"), ())
+    arm, actions = advance(arm, Event.CONNECTED)
+    assert (arm.state, actions) == (State.STOPPED, (Action.FREEZE,))
+    # A refusal says what to do
     with pytest.raises(IllegalEventError, match=r"^cannot start while idle: arm first$"):
         advance(UP[State.IDLE], Event.START)
     with pytest.raises(IllegalEventError, match=r"cannot arm while fault: .*reset a stop or a fault first"):
         advance(UP[State.FAULT], Event.ARM)
 
 
-def test_a_fault_is_latched_when_the_link_comes_back_and_the_arm_is_frozen_again() -> None:
-    lost, _ = advance(UP[State.RUNNING], Event.LINK_LOST)
-    back, actions = advance(lost, Event.CONNECTED)
-    assert (back.state, back.connected, actions) == (State.FAULT, True, (Action.FREEZE,))
-
-
-def test_a_stop_outlives_a_lost_link_and_is_sent_again_when_it_is_back() -> None:
-    stopped, _ = advance(UP[State.RUNNING], Event.STOP, "somebody")
-    lost, _ = advance(stopped, Event.LINK_LOST)
-    back, actions = advance(lost, Event.CONNECTED)
-    assert (back.state, back.cause, actions) == (State.STOPPED, "somebody", (Action.FREEZE,))
-
-
-def test_arming_releases_nobodys_stop() -> None:
-    with pytest.raises(IllegalEventError, match="cannot arm while stopped"):
-        advance(UP[State.STOPPED], Event.ARM)
-
-
-def test_a_reset_without_a_link_cannot_end_the_boards_freeze_so_the_arm_comes_back_stopped() -> None:
-    lost, _ = advance(UP[State.RUNNING], Event.LINK_LOST, "cable")
-    arm, actions = advance(lost, Event.RESET)
-    assert (arm, actions) == (Arm(State.DISCONNECTED, connected=False, cause="cable"), ())
-    arm, actions = advance(arm, Event.CONNECTED)
-    assert (arm.state, actions) == (State.STOPPED, (Action.FREEZE,))
-
-
-def test_the_first_cause_of_a_fault_is_kept_until_the_reset() -> None:
+def test_the_first_cause_of_a_fault_is_kept_and_replaces_that_of_a_stop() -> None:
     arm, _ = advance(UP[State.RUNNING], Event.TRIP, "joint 2 stuck")
     arm, _ = advance(arm, Event.TRIP, "stale sample")
     arm, _ = advance(arm, Event.STOP, "operator")
     assert arm.cause == "joint 2 stuck"
     arm, _ = advance(arm, Event.RESET)
     assert arm.cause is None
-
-
-def test_a_fault_replaces_the_cause_of_a_stop() -> None:
     arm, _ = advance(UP[State.RUNNING], Event.STOP, "operator")
     assert arm.cause == "operator"
     assert advance(arm, Event.TRIP, "unexpected motion")[0].cause == "unexpected motion"
+    assert advance(UP[State.IDLE], Event.STOP)[0].cause == "on request"
+    assert advance(UP[State.IDLE], Event.TRIP)[0].cause == "guard tripped"
 
 
 class ArmUnderAnyEvents(RuleBasedStateMachine):

@@ -47,16 +47,6 @@ def test_a_joint_has_its_speed_however_far_samples_are_apart(every: int) -> None
     assert arm.position[2] - REST[2] == pytest.approx(-0.1 * time, abs=0.02)
 
 
-def test_after_a_gap_a_joint_goes_on_where_it_was() -> None:
-    arm = StandIn(every=2)
-    jogger = Jogger(MA2000, LIMITS, arm.joints, every=2)
-    before = jogger.step(arm.next_sample(), JogCommand({1: 0.2}, arm.tick * PERIOD))
-    jogger.accept(before)
-    arm.tick += 50
-    after = jogger.step(arm.next_sample(), JogCommand({1: 0.2}, arm.tick * PERIOD))
-    assert after.angles[1] - before.angles[1] == pytest.approx(0.2 * 2 * PERIOD)
-
-
 @pytest.mark.parametrize("every", [2, 8])
 def test_a_jog_with_samples_far_apart_goes_to_the_limit_and_no_further(every: int) -> None:
     arm = StandIn(every=every)
@@ -65,38 +55,56 @@ def test_a_jog_with_samples_far_apart_goes_to_the_limit_and_no_further(every: in
     assert len(told) == 1
 
 
-def test_it_stops_when_the_key_is_no_longer_refreshed() -> None:
+def test_it_stops_with_its_key_and_by_a_stop_from_elsewhere() -> None:
     arm = StandIn()
     driven(arm, {1: 0.2}, held_until=50, periods=200)
     assert arm.position[0] - REST[0] <= 0.2 * (50 * PERIOD + DEAD_MAN) + 0.01
     assert arm.position[0] - REST[0] >= 0.2 * 50 * PERIOD
+    arm = StandIn()
+    arm.frozen = True
+    with pytest.raises(StoppedError, match="stopped: on the board, at tick 1"):
+        driven(arm, {1: 0.1}, held_until=10, periods=10)
+    assert arm.log == ["stop"]
+    with pytest.raises(SpecError, match="all of 1 to 6 are needed"):
+        Jogger(MA2000, LIMITS, (1, 2, 3))
 
 
-def test_slow_jogging_adds_up_across_posture_units() -> None:
-    """At 0.02 rad/s a period is a twelfth of a posture unit: what is not yet a unit is not lost."""
+def test_a_speed_is_kept_across_gaps_and_never_runs_ahead_of_the_arm() -> None:
+    # At 0.02 rad/s a period is a twelfth of a posture unit: what is not yet a unit is not lost
     arm = StandIn()
     driven(arm, {1: 0.02}, held_until=500, periods=500)
     assert arm.position[0] - REST[0] == pytest.approx(0.02 * 500 * PERIOD, abs=0.01)
+    # After a gap a joint goes on where it was
+    arm = StandIn(every=2)
+    jogger = Jogger(MA2000, LIMITS, arm.joints, every=2)
+    before = jogger.step(arm.next_sample(), JogCommand({1: 0.2}, arm.tick * PERIOD))
+    jogger.accept(before)
+    arm.tick += 50
+    after = jogger.step(arm.next_sample(), JogCommand({1: 0.2}, arm.tick * PERIOD))
+    assert after.angles[1] - before.angles[1] == pytest.approx(0.2 * 2 * PERIOD)
+    # Set points never run further ahead than the following error limit
+    arm = StandIn()
+    arm.push = {1: 0.0}
+    arm.gain[1] = (0, 0, 0)  # joint 1 does not follow
+    with pytest.raises(TeachingError, match="joint 1: next set point is"):
+        driven(arm, {1: JOG_SPEED}, held_until=300, periods=300)
+    ahead = CALIBRATIONS[0].posture_to_rad(arm.postures[0]) - arm.position[0]
+    assert ahead / CALIBRATIONS[0].rad_per_count <= 127
+    assert arm.log[-1] == "stop"
 
 
-def test_it_goes_to_the_limit_and_no_further_and_says_so_once() -> None:
+def test_it_goes_to_the_limit_or_the_floor_and_no_further_and_says_so_once() -> None:
     arm = StandIn()
     told = driven(arm, {4: JOG_SPEED}, held_until=500, periods=500)
     assert arm.position[3] == pytest.approx(1.56, abs=0.01)
     assert len(told) == 1
     assert told[0].startswith("joint 4: 89.")
     assert "allowed are -89.38° to 89.38°" in told[0]
-
-
-def test_a_slow_jog_does_not_creep_past_the_limit() -> None:
-    """Limits give way to rounding by half a posture unit; not by half a unit again and again."""
+    # Limits give way to rounding by half a posture unit; not by half a unit again and again
     arm = StandIn()
     arm.place(4, CALIBRATIONS[3].posture_to_rad(990))
     driven(arm, {4: 0.02}, held_until=400, periods=400)
     assert arm.postures[3] == round((1.56 - CALIBRATIONS[3].angle_at_zero_rad) / CALIBRATIONS[3].rad_per_posture_unit)
-
-
-def test_the_floor_ends_a_jog_too() -> None:
     arm = StandIn()
     told = driven(arm, {2: -JOG_SPEED}, held_until=400, periods=400)
     assert "height of -30" in told[0]
@@ -149,31 +157,7 @@ def test_a_command_that_cannot_be_is_refused(velocities: dict[int, float], line:
         jogger.step(arm.next_sample(), JogCommand(velocities, PERIOD))
 
 
-def test_jogging_needs_to_see_all_joints() -> None:
-    with pytest.raises(SpecError, match="all of 1 to 6 are needed"):
-        Jogger(MA2000, LIMITS, (1, 2, 3))
-
-
-def test_set_points_never_run_further_ahead_than_the_following_error_limit() -> None:
-    arm = StandIn()
-    arm.push = {1: 0.0}
-    arm.gain[1] = (0, 0, 0)  # joint 1 does not follow
-    with pytest.raises(TeachingError, match="joint 1: next set point is"):
-        driven(arm, {1: JOG_SPEED}, held_until=300, periods=300)
-    ahead = CALIBRATIONS[0].posture_to_rad(arm.postures[0]) - arm.position[0]
-    assert ahead / CALIBRATIONS[0].rad_per_count <= 127
-    assert arm.log[-1] == "stop"
-
-
-def test_a_stop_from_elsewhere_ends_it() -> None:
-    arm = StandIn()
-    arm.frozen = True
-    with pytest.raises(StoppedError, match="stopped: on the board, at tick 1"):
-        driven(arm, {1: 0.1}, held_until=10, periods=10)
-    assert arm.log == ["stop"]
-
-
-def test_keys_wait_while_samples_come_late_and_drive_again_afterwards() -> None:
+def test_keys_wait_while_samples_come_late_and_the_jog_ends_if_they_stay_so() -> None:
     arm = StandIn()
     sent_late = []
 
@@ -186,9 +170,6 @@ def test_keys_wait_while_samples_come_late_and_drive_again_afterwards() -> None:
     counts = {count for count in sent_late[21:40] if count is not None}
     assert len(counts) == 1
     assert arm.log.count("set points") == 40
-
-
-def test_samples_that_stay_late_end_the_jog() -> None:
     arm = StandIn()
     arm.lateness = 0.1
     with pytest.raises(TeachingError, match="the line too slow"):
@@ -204,17 +185,11 @@ def test_a_joint_that_slides_has_a_speed_of_its_own() -> None:
     row = SampleRow(0, 0.0, 0.0, (0.1, 0.5), (0.1, 0.5), (0.0, 0.0), (0.0, 0.0), (0, 0))
     with pytest.raises(SpecError, match=r"joint 1: velocity of 0\.35 m/s: allowed are up to ±0\.07 m/s"):
         Jogger(machine, free, (1, 2)).step(row, JogCommand({1: JOG_SPEED}, 0.0))
-
-
-def test_a_step_takes_no_speed_of_turning_joints_for_one_that_slides() -> None:
     machine = slide_and_turn()
     require_step_speed(machine, (2,), 0.25)
     require_step_speed(machine, (1, 2), SLIDE_JOG_SPEED)
     with pytest.raises(SpecError, match=r"speed = 0\.25 m/s: joint 1 is prismatic: allowed are up to 0\.07 m/s"):
         require_step_speed(machine, (2, 1), 0.25)
-
-
-def test_the_keys_drive_a_joint_that_slides_at_the_same_share_of_its_highest_speed() -> None:
     machine = slide_and_turn()
     pendant = Pendant(machine, JOG_SPEED / 2)
     pendant.command("1", 0.0)

@@ -1,4 +1,4 @@
-"""Teaching through a real driver, on the mock in lock-step."""
+"""Teaching through a real driver, on the mock in lock-step, also over a slow line."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -70,23 +70,17 @@ def test_a_limp_joint_is_recorded_and_held_again_where_it_is(arm: WatchedArm, co
     assert abs(row.error[2] / MA2000.calibration(3).rad_per_count) <= 10
 
 
-def test_set_points_are_sent_only_while_driven(arm: WatchedArm, controller: Controller) -> None:
-    before = controller.next_snapshot().set_points
-    with pytest.raises(TeachingError, match="only while the arm is driven: it is idle"):
-        arm.set_points({1: 600})
-    assert controller.next_snapshot().set_points == before
-
-
-def test_a_controller_with_another_period_than_the_machine_file_says(controller: Controller) -> None:
+def test_a_machine_file_of_another_controller_is_refused(controller: Controller, arm: WatchedArm) -> None:
     period = MA2000.controller.period.model_copy(update={"value": 0.03})
     other = MA2000.model_copy(update={"controller": MA2000.controller.model_copy(update={"period": period})})
     with pytest.raises(SafetyError, match="control period of 20 ms, the machine file ma2000 says 30 ms"):
         ControllerArm(controller, ArmControl(controller), other, lambda: None)
-
-
-def test_a_machine_file_of_another_machine(controller: Controller) -> None:
     with pytest.raises(SafetyError, match="has 6 joints, the machine file pan_tilt describes 2"):
         ControllerArm(controller, ArmControl(controller), pan_tilt(), lambda: None)
+    before = controller.next_snapshot().set_points
+    with pytest.raises(TeachingError, match="only while the arm is driven: it is idle"):
+        arm.set_points({1: 600})
+    assert controller.next_snapshot().set_points == before
 
 
 def carried_out(controller: Controller, ended: Callable[[], str | None], *instructions: dict[str, object]) -> None:
@@ -146,3 +140,60 @@ def test_a_stop_in_the_moment_of_the_end_is_not_taken_for_a_good_end(arm: Watche
     with pytest.raises(StoppedError):
         arm.set_points({1: 600})
     controller.release(controller.status().stop)
+
+
+# ---- Teaching over a slow line, on the mock in lock-step: the guards know how far samples are apart
+
+
+@pytest.fixture(scope="module", params=[38400, 9600])
+def slow(request: pytest.FixtureRequest) -> Iterator[Controller]:
+    with Controller.connect(f"mock://?lock_step=1&baud={request.param}") as slow:
+        yield slow
+
+
+@pytest.fixture
+def slow_arm(slow: Controller) -> ControllerArm:
+    return ControllerArm(slow, ArmControl(slow), MA2000, lambda: None)
+
+
+def test_a_program_and_a_wait_take_the_time_that_was_planned(slow: Controller, slow_arm: ControllerArm) -> None:
+    program = Program.model_validate(
+        {"name": "test", "machine": "ma2000", "instructions": [{"kind": "relative", "angles": {1: 0.2}}]}
+    )
+    (planned,) = plan_program(program, MA2000, slow_arm.next_sample().set_point)
+    (plan,) = planned.plans
+    every = slow.line_rate(range(1, 7), range(1, 7)).every
+    assert every > 1
+    performer = FollowingPerformer(slow, ArmControl(slow), MA2000, MA2000.limits, lambda: None, lambda _line: None)
+    before = slow.next_snapshot()
+    performer.follow(plan)
+    took = slow.next_snapshot().tick - before.tick
+    assert len(plan) - every <= took < 1.1 * len(plan) + 4 * every
+    control = ArmControl(slow)
+    performer = FollowingPerformer(slow, control, MA2000, MA2000.limits, lambda: None, lambda _line: None)
+    before = slow.next_snapshot().tick
+    performer.observe(50)
+    assert 50 <= slow.next_snapshot().tick - before < 70
+
+
+def test_a_jog_moves_the_arm_at_the_speed_asked_for(slow: Controller, slow_arm: ControllerArm) -> None:
+    begun = slow_arm.next_sample()
+    last = begun.tick + 160
+    seen = [begun]
+
+    def commands(row: SampleRow) -> JogCommand:
+        seen.append(row)
+        return JogCommand({1: 0.2}, row.host_time)
+
+    jog(slow_arm, MA2000, MA2000.limits, commands, lambda: seen[-1].tick >= last, print)
+    settled = [slow_arm.next_sample() for _ in range(10)][-1]
+    time = (seen[-1].tick - begun.tick) * slow.period_s
+    assert settled.position[0] - begun.position[0] == pytest.approx(0.2 * time, abs=0.02)
+
+
+def test_a_led_joint_is_held_again(slow: Controller, slow_arm: ControllerArm) -> None:
+    before, asked = slow.gains(), iter(range(100))
+    kept: list[RecordedPath] = []
+    lead_by_nose(slow_arm, MA2000, MA2000.limits, (3,), lambda: next(asked) >= 30, kept.append)
+    assert slow.gains() == before
+    assert kept[0].times[1] == pytest.approx(0.02 * slow_arm.every)

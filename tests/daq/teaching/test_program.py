@@ -63,7 +63,7 @@ class Diary:
         self.entries.append(f"gripper {closed}")
 
 
-def test_absolute_steps_arrive_at_their_angles_all_joints_together() -> None:
+def test_steps_arrive_together_and_go_on_from_where_the_one_before_ended() -> None:
     (item,) = planned({"kind": "absolute", "angles": {1: 3.4, 3: -0.2}, "speed": 0.2})
     (made,) = item.plans
     assert made.moving == (1, 3)
@@ -72,16 +72,10 @@ def test_absolute_steps_arrive_at_their_angles_all_joints_together() -> None:
     way = made.angles[-1] - made.angles[0]
     fraction = (made.angles[:, [0, 2]] - made.angles[0, [0, 2]]) / way[[0, 2]]
     assert fraction[:, 0] == pytest.approx(fraction[:, 1])
-
-
-def test_relative_steps_go_on_from_where_the_one_before_ended() -> None:
     step = {"kind": "relative", "angles": {1: 0.1}}
     items = planned(step, step, step)
     assert [item.plans[0].angles[0, 0] for item in items[1:]] == [item.plans[0].angles[-1, 0] for item in items[:-1]]
     assert items[-1].plans[0].angles[-1, 0] == pytest.approx(REST[0] + 0.3, abs=0.01)
-
-
-def test_a_path_is_approached_slowly_first() -> None:
     (item,) = planned({"kind": "path", "path": PATH})
     approach, path = item.plans
     assert approach.angles[-1] == pytest.approx(path.angles[0])
@@ -108,32 +102,20 @@ def test_a_whole_program_is_carried_out_in_order() -> None:
     assert told[0] == "instruction 1 of 7: absolute"
 
 
-def test_an_input_that_does_not_come_ends_the_program() -> None:
+def test_what_cannot_be_carried_out_ends_the_program_or_lets_it_not_begin() -> None:
     items = planned({"kind": "input", "line": 2, "on": True, "longest": 0.1}, {"kind": "gripper", "closed": True})
     diary = Diary(input_on_after=1000)
     with pytest.raises(TeachingError, match=r"instruction 1: input 2 was not on within 0\.1 s"):
         run_program(items, MA2000, diary, print)
     assert diary.periods == 5
     assert "gripper True" not in diary.entries
-
-
-def test_what_is_outside_the_limits_is_said_with_its_instruction_before_anything_moves() -> None:
     items = planned({"kind": "relative", "angles": {1: 0.1}}, {"kind": "absolute", "angles": {2: -0.75}})
     (line,) = check_program(items, MA2000, MA2000.limits)
     assert line.startswith("instruction 2: end of link 3: height of -3")
-
-
-def test_too_fast_a_step_is_outside_the_limits() -> None:
     items = planned({"kind": "relative", "angles": {2: 0.5}, "speed": 2.5})
     assert check_program(items, MA2000, MA2000.limits)[0].startswith("instruction 1: joint 2: ")
-
-
-def test_what_cannot_be_planned_names_its_instruction() -> None:
     with pytest.raises(SpecError, match=r"program p: instruction 2: joint 4: start of 114\.59° is outside"):
         planned({"kind": "wait", "duration": 1}, {"kind": "absolute", "angles": {4: 2.0}})
-
-
-def test_a_program_for_another_machine_is_refused() -> None:
     other = Program.model_validate(EVERYTHING | {"machine": "bench"})
     with pytest.raises(SpecError, match="it is for machine 'bench', this is 'ma2000'"):
         plan_program(other, MA2000, REST.tolist())
@@ -155,24 +137,19 @@ def test_a_program_comes_back_from_its_file_to_the_bit(parts: list[dict[str, obj
     assert parse_program(program_text(made)) == made
 
 
-def test_a_saved_program_loads_as_it_was(tmp_path: Path) -> None:
+def test_a_saved_program_loads_as_it_was_and_toml_is_read_too(tmp_path: Path) -> None:
     made = Program.model_validate(EVERYTHING)
     save_program(made, tmp_path / "pick.json")
     assert load_program(tmp_path / "pick.json") == made
     assert [file.name for file in tmp_path.iterdir()] == ["pick.json"]
-
-
-def test_toml_is_read_too(tmp_path: Path) -> None:
     file = tmp_path / "lift.toml"
     file.write_text('name = "lift"\n[[instructions]]\nkind = "relative"\nangles = { 2 = 0.2 }\n', "utf-8")
     assert load_program(file) == program({"kind": "relative", "angles": {2: 0.2}}).model_copy(update={"name": "lift"})
-
-
-def test_a_folder_that_is_not_there_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match=r"pick\.json: cannot be written: "):
         save_program(Program.model_validate(EVERYTHING), tmp_path / "no" / "pick.json")
     with pytest.raises(SpecError, match=r"pick\.json: cannot be read: "):
-        load_program(tmp_path / "pick.json")
+        load_program(tmp_path / "no" / "pick.json")
+    assert all(math.isfinite(angle) for angle in REST)
 
 
 @pytest.mark.parametrize(
@@ -212,7 +189,3 @@ def test_a_wrong_file_is_one_line_that_says_where(text: str, line: str) -> None:
     with pytest.raises(SpecError, match=f"^{line}") as caught:
         parse_program(text, "p.json")
     assert "\n" not in str(caught.value)
-
-
-def test_rest_is_finite() -> None:
-    assert all(math.isfinite(angle) for angle in REST)

@@ -1,4 +1,4 @@
-"""CSV out and in again, to the bit; and one line with row and column for what is wrong in a file."""
+"""CSV out and in again, to the bit; one line for what is wrong in a file; and what opens a file of any kind."""
 
 import dataclasses
 import os
@@ -12,8 +12,13 @@ from hypothesis import strategies as st
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import EARLIEST, Trace
+from daq.contracts.trace_limits import TraceLimits
 from daq.traces.csv_table import FILE_TIME, export_csv, import_csv
+from daq.traces.files import open_trace
+from daq.traces.kinds import kind_of
 from daq.traces.reader import read_trace
+from daq.traces.store import write_trace
+from daq.traces.verify import verify
 from tests.daq.traces.samples import CREATED, record, write
 
 number = st.floats(-1e6, 1e6)
@@ -64,7 +69,7 @@ def test_a_file_has_the_same_identity_wherever_it_lies_and_another_when_it_says_
     assert import_csv(here).record.trace_id != identity
 
 
-def test_the_same_trace_gives_the_same_bytes_and_plain_columns(tmp_path: Path) -> None:
+def test_the_same_trace_gives_the_same_bytes_and_names_only_a_machine_that_ships(tmp_path: Path) -> None:
     trace = read_trace(write(tmp_path / "a.mcap", 3))
     first, second = export_csv(trace, tmp_path / "b.csv"), export_csv(trace, tmp_path / "c.csv")
     assert first.read_bytes() == second.read_bytes()
@@ -81,6 +86,12 @@ def test_the_same_trace_gives_the_same_bytes_and_plain_columns(tmp_path: Path) -
         "created": CREATED,
         "outcome": "complete",
     }
+    # A name alone would not be found again
+    assert trace.record.machine is not None
+    own = trace.record.machine.model_copy(update={"name": "crane"})
+    made = dataclasses.replace(trace, record=trace.record.model_copy(update={"machine": own}))
+    export_csv(made, tmp_path / "b.csv")
+    assert "machine" not in tomllib.loads((tmp_path / "b.toml").read_text())
 
 
 def test_times_in_ms_are_asked_about_and_taken_where_they_are_stated(tmp_path: Path) -> None:
@@ -103,16 +114,6 @@ def test_times_since_1970_count_from_the_first_row_and_keep_their_digits(
     trace = import_csv(path)
     np.testing.assert_allclose(trace.time, [0.0, 2e-6 if unit == "s" else 2e-9], rtol=1e-9)
     assert f"which is at {begins}.000001 {unit}." in trace.record.notes
-
-
-def test_a_machine_that_is_not_shipped_is_not_named_beside_the_table(tmp_path: Path) -> None:
-    """A name alone would not be found again."""
-    trace = read_trace(write(tmp_path / "a.mcap", 3))
-    assert trace.record.machine is not None
-    own = trace.record.machine.model_copy(update={"name": "crane"})
-    made = dataclasses.replace(trace, record=trace.record.model_copy(update={"machine": own}))
-    export_csv(made, tmp_path / "b.csv")
-    assert "machine" not in tomllib.loads((tmp_path / "b.toml").read_text())
 
 
 def test_a_file_of_another_tool_needs_no_toml(tmp_path: Path) -> None:
@@ -184,7 +185,7 @@ def test_one_line_names_what_is_wrong_beside_the_file(tmp_path: Path, toml: str,
     assert str(caught.value).startswith(f"{tmp_path}/{complaint}")
 
 
-def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_or_whose_period_does_not_fit_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TraceError, match=r"absent\.csv: cannot be read: No such file"):
         import_csv(tmp_path / "absent.csv")
     (tmp_path / "a.csv").write_bytes(b"time,position_1\n0,\xff\n")
@@ -193,3 +194,76 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     trace = read_trace(write(tmp_path / "a.mcap", 3))
     with pytest.raises(TraceError, match="cannot be written: No such file"):
         export_csv(trace, tmp_path / "absent" / "a.csv")
+    path = csv(tmp_path / "b.csv", *(f"{0.01 * k:.2f},1" for k in range(10)))
+    (tmp_path / "b.toml").write_text("\ufeffperiod = 10\n", "utf-8")  # with a byte-order mark, as some editors write
+    with pytest.raises(TraceError, match=r"period = 10 s, and its rows are 0\.01 s apart; write it in s"):
+        import_csv(path)
+    (tmp_path / "b.toml").write_text("period = 0.01\n")
+    assert import_csv(path).record.period == 0.01
+
+
+# ---- What opens a file of any kind: its content decides, whatever it is called, and every joint comes along
+
+SEVEN = ",".join(["time", *(f"position_{joint}" for joint in range(1, 8))])
+
+
+def csv(path: Path, *rows: str, head: str = "time,position_1") -> Path:
+    path.write_text("".join(f"{row}\n" for row in (head, *rows)))
+    return path
+
+
+def test_a_files_content_says_what_it_is_and_errors_are_short(tmp_path: Path) -> None:
+    table, trace = csv(tmp_path / "RIG.CSV", "0,1", "0.1,2"), write(tmp_path / "a.mcap", 3)
+    renamed = trace.rename(tmp_path / "TRACE.dat")
+    assert [kind_of(path) for path in (table, renamed)] == ["csv", "trace"]
+    assert (len(open_trace(table)), len(open_trace(renamed))) == (2, 3)
+    found = verify(table)
+    assert found.trustworthy
+    assert [finding.message[:6] for finding in found.findings] == ["is CSV", "sample"]
+    (tmp_path / "a.csv").write_bytes(b"time,position_1\n0," + bytes(100_000) + b"1\n")
+    with pytest.raises(TraceError, match="is not a finite number") as told:
+        import_csv(tmp_path / "a.csv")
+    assert len(str(told.value)) < 300 + len(str(tmp_path))
+
+
+def test_an_arm_of_seven_joints_is_written_and_read(tmp_path: Path) -> None:
+    row = "1,2,3,4,5,6,7"
+    trace = import_csv(csv(tmp_path / "panda.csv", f"0,{row}", f"0.1,{row}", head=SEVEN))
+    path = write_trace(trace, tmp_path / "panda.mcap")
+    assert read_trace(path).joints == tuple(range(1, 8))
+    with pytest.raises(TraceError, match=r"not 1 to 6 different numbers of joints \(traces\.limits\.joints\)"):
+        write_trace(trace, tmp_path / "b.mcap", TraceLimits(joints=6))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["panda.csv", "panda.mcap"]  # nothing unreadable is kept
+
+
+def test_traces_are_equal_when_they_say_the_same_and_miss_nothing_without_ticks(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mcap", 5)
+    one, other = read_trace(path), read_trace(path)
+    assert one == other
+    assert len({one, other}) == 1
+    moved = Trace(one.record, one.joints, one.time, one.position + 1e-9)
+    assert one != moved
+    assert one != "trace"
+    table = import_csv(csv(tmp_path / "a.csv", "0,1", "0.01,1", "0.02,1", "20.02,1"))
+    line = "usually 0.01 s apart, at most 20 s (after 0.02 s)"
+    assert table.missing_text.startswith(line)
+    assert line in table._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("data", "rows", "said"),
+    [
+        (b"0,1.25\n0.1,1.2", 1, "its last row has no line end"),
+        (b"0,1.25\n0.1,1.25\n" + bytes(100_000), 2, "its last 100000 bytes are zeros"),
+        (b"0,1.25\r\n0.1,1.25\r\n", 2, ""),
+    ],
+)
+def test_the_end_of_a_table_that_was_cut_off_is_told(tmp_path: Path, data: bytes, rows: int, said: str) -> None:
+    (tmp_path / "a.csv").write_bytes(b"time,position_1\n" + data)
+    trace = import_csv(tmp_path / "a.csv")
+    assert (len(trace), said in trace.record.notes, "INCOMPLETE" in trace.record.notes) == (rows, True, bool(said))
+    assert trace.record.outcome == ("interrupted" if said else None)
+    for stated in ("complete", "stopped"):
+        (tmp_path / "a.toml").write_text(f'outcome = "{stated}"\n')
+        cut = said and stated == "complete"
+        assert import_csv(tmp_path / "a.csv").record.outcome == ("interrupted" if cut else stated)

@@ -21,9 +21,10 @@ from daq.traces.inflate import inflate
 from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage_folder
 from daq.traces.verify import verify
+from tests.daq.traces import file_fuzz
 from tests.daq.traces.damaged_traces import Original, originals, recompressed, records
 from tests.daq.traces.samples import write
-from tests.daq.traces.test_files_that_are_no_trace import foreign, ours
+from tests.daq.traces.test_scan import foreign, ours
 from tests.daq.traces.trace_damage import CASES, campaign
 
 HEAD = 9
@@ -101,7 +102,9 @@ def test_a_chunk_of_nothing_is_nothing(packed: bytes) -> None:
     assert inflate(CompressedChunk(0, 0, "zstd", memoryview(packed))) == b""
 
 
-def test_definitions_in_chunks_count_as_records(tmp_path: Path, sound: dict[str, Original]) -> None:
+def test_a_chunk_of_nothing_is_nothing_and_definitions_count_as_records(
+    tmp_path: Path, sound: dict[str, Original]
+) -> None:
     schema = struct.pack("<BQHIII", Opcode.SCHEMA, 14, 9, 0, 0, 0)
     many = recompressed(sound["finished"].data, "zstd", lambda chunk: schema * 1000 + chunk)
     (tmp_path / "b.mcap").write_bytes(many)
@@ -210,18 +213,15 @@ def test_a_record_of_a_slow_line_that_does_not_tell_each_sample_s_set_points_is_
     assert "the topics do not have the same ticks" in line
 
 
-def test_a_trace_with_messages_outside_of_chunks_is_not_read_as_an_empty_one(tmp_path: Path) -> None:
+def test_a_trace_that_would_be_read_as_less_than_it_is_is_refused(tmp_path: Path, sound: dict[str, Original]) -> None:
     data = foreign(ours())
     begin = first_of(data, Opcode.METADATA)
     message = struct.pack("<BQHIQQ", Opcode.MESSAGE, 22, 1, 0, 0, 0)
     assert "messages outside of chunks" in refused(tmp_path / "a.mcap", data[:begin] + message + data[begin:])
-
-
-def test_a_trace_with_less_samples_than_its_end_tells_is_refused(tmp_path: Path, sound: dict[str, Original]) -> None:
-    data = sound["finished"].data
-    spans = [(begin, end) for opcode, begin, end in records(data) if opcode == Opcode.CHUNK]
+    whole = sound["finished"].data
+    spans = [(begin, end) for opcode, begin, end in records(whole) if opcode == Opcode.CHUNK]
     (begin, end) = spans[-1]
-    line = refused(tmp_path / "a.mcap", recompressed(data[:begin] + data[end:], "zstd"))
+    line = refused(tmp_path / "a.mcap", recompressed(whole[:begin] + whole[end:], "zstd"))
     assert "has 45 samples, but its metadata states 60" in line
 
 
@@ -254,15 +254,7 @@ def test_a_damaged_part_file_keeps_no_other_from_being_salvaged(
     assert salvage_folder(tmp_path) == ()
 
 
-def test_what_was_put_aside_is_never_written_over(tmp_path: Path) -> None:
-    for content in (b"first", b"second", b"third"):
-        (tmp_path / "a.mcap.part").write_bytes(content)
-        salvage_folder(tmp_path)
-    names = ("a.mcap.part.unreadable", "a.mcap.part.unreadable.2", "a.mcap.part.unreadable.3")
-    assert [(tmp_path / name).read_bytes() for name in names] == [b"first", b"second", b"third"]
-
-
-def test_a_pipe_of_the_name_of_a_part_file_is_told_and_not_waited_for(tmp_path: Path) -> None:
+def test_what_is_put_aside_is_never_written_over_and_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.mcap.part")
     os.mkfifo(tmp_path / "b.mcap")
     (found,) = salvage_folder(tmp_path)
@@ -270,6 +262,12 @@ def test_a_pipe_of_the_name_of_a_part_file_is_told_and_not_waited_for(tmp_path: 
     assert [one.state for one in list_traces(tmp_path)] == ["unreadable", "unreadable"]
     with pytest.raises(TraceError, match="it is no file"):
         read_trace(tmp_path / "b.mcap")
+    (tmp_path / "a.mcap.part").unlink()
+    for content in (b"first", b"second", b"third"):
+        (tmp_path / "a.mcap.part").write_bytes(content)
+        salvage_folder(tmp_path)
+    names = ("a.mcap.part.unreadable", "a.mcap.part.unreadable.2", "a.mcap.part.unreadable.3")
+    assert [(tmp_path / name).read_bytes() for name in names] == [b"first", b"second", b"third"]
 
 
 @pytest.mark.parametrize(
@@ -282,3 +280,15 @@ def test_damaged_traces_give_one_line_or_their_own_samples(tmp_path: Path, cases
     assert (tally.examples, sum(tally.faults.values())) == ([], 0)
     assert tally.ends["salvaged"] > 10
     assert tally.ends["put aside"] > 5
+
+
+# ---- Every reader of files takes damaged ones in one line, or says what is missing of them (`file_fuzz`)
+
+
+@pytest.mark.parametrize(
+    "cases", [700, pytest.param(file_fuzz.CASES, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])]
+)
+def test_damaged_files_of_every_kind_are_refused_in_one_line_or_read_as_a_whole(tmp_path: Path, cases: int) -> None:
+    tally = file_fuzz.campaign(cases, 2, file_fuzz.kinds(tmp_path))
+    assert not tally.faults, "\n".join(tally.examples)
+    assert tally.ends["read"] > cases // 20  # of texts few are read once they are damaged

@@ -45,7 +45,8 @@ def moving(trace: Trace, *joints: int) -> Trace:
     return dataclasses.replace(trace, record=trace.record.model_copy(update={"spec": ExperimentSpec(joints=joints)}))
 
 
-def test_a_figure_shows_every_signal_with_its_unit_and_every_joint(trace: Trace) -> None:
+def test_a_figure_shows_every_signal_of_the_joints_that_move_or_are_asked_for(trace: Trace) -> None:
+    # A figure shows every signal with its unit and every joint
     axes = figure_of(trace).axes
     assert [axis.get_ylabel() for axis in axes if axis.get_ylabel()] == ["position / °", "error / °", "drive / V"]
     assert [axis.get_title("left") for axis in axes[:3]] == ["joint 1, waist", "joint 2, shoulder", "joint 3, elbow"]
@@ -55,9 +56,7 @@ def test_a_figure_shows_every_signal_with_its_unit_and_every_joint(trace: Trace)
     np.testing.assert_allclose(values[np.isfinite(values)], np.degrees(trace.position[:, 1]))
     assert np.flatnonzero(np.isnan(values)).tolist() == [30], "behind the last sample before the gap"
     assert np.asarray(measured.get_xdata())[30] == trace.time[29]
-
-
-def test_only_the_joints_that_the_experiment_moves_are_drawn_unless_others_are_asked_for(trace: Trace) -> None:
+    # Only the joints that the experiment moves are drawn unless others are asked for
     held = moving(trace, 1, 3)
 
     def drawn(joints: tuple[int, ...] | None) -> list[str]:
@@ -105,7 +104,8 @@ def test_missing_samples_are_shaded_and_explained(trace: Trace, tmp_path: Path) 
     assert explained(figure_of(whole, (1,)).axes[0]) == ["set point", "position"]
 
 
-def test_panels_of_one_signal_span_as_much_so_that_joints_can_be_compared(trace: Trace) -> None:
+def test_panels_span_as_much_with_a_twentieth_above_and_below(trace: Trace) -> None:
+    # Panels of one signal span as much so that joints can be compared
     axes = figure_of(trace).axes
     position, error = [axis.get_ylim() for axis in axes[:3]], [axis.get_ylim() for axis in axes[3:6]]
     assert [high - low for low, high in position] == pytest.approx([position[0][1] - position[0][0]] * 3)
@@ -117,6 +117,19 @@ def test_panels_of_one_signal_span_as_much_so_that_joints_can_be_compared(trace:
     assert len(set(error)) == 1, "about zero, the same for all"
     assert error[0][0] < 0.0
     assert error[0][1] > np.degrees(0.03)
+    # Limits leave a twentieth above and below and zero is among them
+    lasting = figure_of(trace).axes
+    span = np.degrees(
+        np.ptp(np.stack([trace.position, trace.position + np.array([0.01, 0.02, 0.03])]), axis=(0, 1)).max()
+    )
+    for axes in lasting[:3]:
+        low, high = axes.get_ylim()
+        assert high - low == pytest.approx(1.12 * span)
+    low, high = lasting[3].get_ylim()
+    assert (low, high) == pytest.approx((np.degrees(0.015) * (1 - 1.12), np.degrees(0.015) * (1 + 1.12)))
+    still = dataclasses.replace(trace, position=0 * trace.position, set_point=None)
+    low, high = figure_of(still, (1,)).axes[0].get_ylim()
+    assert (low, high) == pytest.approx((-1e-6, 1e-6))
 
 
 def test_more_joints_than_fit_abreast_go_into_another_band(tmp_path: Path) -> None:
@@ -132,11 +145,19 @@ def test_more_joints_than_fit_abreast_go_into_another_band(tmp_path: Path) -> No
     assert [axis.get_ylabel() for axis in shown if axis.get_ylabel()] == ["position / °", "error / °", "drive / V"] * 2
 
 
-def test_the_same_trace_gives_the_same_picture(small: Trace, tmp_path: Path) -> None:
+def test_the_same_trace_gives_the_same_picture_and_what_cannot_be_plotted_is_one_line(
+    small: Trace, tmp_path: Path
+) -> None:
     first, second = plot_trace(small, tmp_path / "a.svg"), plot_trace(small, tmp_path / "b.svg")
     assert first.read_bytes() == second.read_bytes()
     assert ET.parse(first).getroot().tag.endswith("svg")
     assert plot_trace(small, tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(TraceError, match=r"a\.jpg: plots are made as \.png, \.svg, \.pdf, \.html"):
+        plot_trace(small, tmp_path / "a.jpg")
+    with pytest.raises(TraceError, match="cannot be written"):
+        plot_trace(small, tmp_path / "absent" / "a.png")
+    with pytest.raises(TraceError, match="has no samples to plot"):
+        plot_trace(Trace(record(), (1,), np.zeros(0), np.zeros((0, 1))), tmp_path / "a.png")
 
 
 def test_a_page_needs_nothing_else_and_escapes_what_people_wrote(small: Trace, tmp_path: Path) -> None:
@@ -149,15 +170,6 @@ def test_a_page_needs_nothing_else_and_escapes_what_people_wrote(small: Trace, t
     assert "url(http" not in page
 
 
-def test_what_cannot_be_plotted_is_one_line(small: Trace, tmp_path: Path) -> None:
-    with pytest.raises(TraceError, match=r"a\.jpg: plots are made as \.png, \.svg, \.pdf, \.html"):
-        plot_trace(small, tmp_path / "a.jpg")
-    with pytest.raises(TraceError, match="cannot be written"):
-        plot_trace(small, tmp_path / "absent" / "a.png")
-    with pytest.raises(TraceError, match="has no samples to plot"):
-        plot_trace(Trace(record(), (1,), np.zeros(0), np.zeros((0, 1))), tmp_path / "a.png")
-
-
 # ---- What a figure and its page say of their trace, and where its labels and limits lie.
 
 
@@ -166,19 +178,13 @@ def figure(trace: Trace) -> Figure:
     return figure_of(trace)
 
 
-def test_a_figure_says_which_trace_it_shows_and_with_which_gains(figure: Figure) -> None:
+def test_a_figure_says_which_trace_it_shows(figure: Figure, trace: Trace) -> None:
     title, foot = figure.texts
     assert title.get_text() == "ramp, ma2000, mock controller: stopped"
     assert foot.get_text() == ("2026-11-21 05:14:42 UTC   trace ab12cd34ef56   60 samples, 3 missing   ma2000-daq/test")
     assert figure.axes[0].get_title("right") == "P 2 · I 0 · D 0"
     assert [axes.get_legend() for axes in figure.axes[1:]] == [None] * 8
-
-
-def test_time_is_named_below_the_last_row_alone(figure: Figure) -> None:
     assert [axes.get_xlabel() for axes in figure.axes] == [""] * 6 + ["time / s"] * 3
-
-
-def test_joints_that_are_not_drawn_are_named_below(trace: Trace) -> None:
     assert figure_of(trace, (2,)).texts[1].get_text().endswith("ma2000-daq/test   recorded too: joint 1, 3")
 
 
@@ -225,21 +231,6 @@ def test_labels_of_events_keep_a_fifth_of_the_time_apart(trace: Trace) -> None:
     panel = figure_of(made, (1,)).axes[0]
     shown = [(text.get_text(), getattr(text, "xy")[0]) for text in panel.texts]  # noqa: B009 - unknown to the stubs
     assert shown == [("link lost", 0.9), ("pause", 0.1), ("pause", 0.336)]
-
-
-def test_limits_leave_a_twentieth_above_and_below_and_zero_is_among_them(trace: Trace) -> None:
-    lasting = figure_of(trace).axes
-    span = np.degrees(
-        np.ptp(np.stack([trace.position, trace.position + np.array([0.01, 0.02, 0.03])]), axis=(0, 1)).max()
-    )
-    for axes in lasting[:3]:
-        low, high = axes.get_ylim()
-        assert high - low == pytest.approx(1.12 * span)
-    low, high = lasting[3].get_ylim()
-    assert (low, high) == pytest.approx((np.degrees(0.015) * (1 - 1.12), np.degrees(0.015) * (1 + 1.12)))
-    still = dataclasses.replace(trace, position=0 * trace.position, set_point=None)
-    low, high = figure_of(still, (1,)).axes[0].get_ylim()
-    assert (low, high) == pytest.approx((-1e-6, 1e-6))
 
 
 def test_the_page_lists_what_the_trace_says_of_itself(trace: Trace) -> None:

@@ -115,16 +115,17 @@ def test_a_recording_of_a_slow_line_keeps_the_periods_in_which_set_points_were_t
     np.testing.assert_array_equal(read_trace(finished_path(part)).taken, np.arange(80) // 2)  # type: ignore[arg-type]
 
 
-def test_a_run_that_was_killed_between_its_end_and_its_name_is_not_complete(tmp_path: Path) -> None:
+def test_a_run_or_a_salvage_that_was_cut_short_is_done_again_and_never_complete(
+    tmp_path: Path, synced: tuple[bytes, list[int]]
+) -> None:
     part = tmp_path / "b.mcap.part"
     shutil.copy(write(tmp_path / "a.mcap"), part)
     salvage(part)
     trace = read_trace(tmp_path / "b.mcap")
     assert (trace.record.outcome, len(trace)) == ("interrupted", 100)
     assert trace.record.counters == {"missing_samples": 0, "retries": 3}
-
-
-def test_a_salvage_that_was_cut_short_is_done_again(tmp_path: Path, synced: tuple[bytes, list[int]]) -> None:
+    for entry in tmp_path.iterdir():
+        entry.unlink()
     part = tmp_path / "a.mcap.part"
     part.write_bytes(synced[0])
     (tmp_path / "a.mcap.salvage").write_bytes(b"half a copy")
@@ -136,7 +137,7 @@ def test_a_salvage_that_was_cut_short_is_done_again(tmp_path: Path, synced: tupl
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.mcap"]
 
 
-def test_another_trace_of_the_same_name_is_never_replaced(tmp_path: Path, synced: tuple[bytes, list[int]]) -> None:
+def test_what_is_finished_newer_or_another_s_is_never_replaced(tmp_path: Path, synced: tuple[bytes, list[int]]) -> None:
     before = write(tmp_path / "a.mcap").read_bytes()
     part = tmp_path / "a.mcap.part"
     part.write_bytes(synced[0])
@@ -144,6 +145,12 @@ def test_another_trace_of_the_same_name_is_never_replaced(tmp_path: Path, synced
         salvage(part)
     assert (tmp_path / "a.mcap").read_bytes() == before
     assert part.read_bytes() == synced[0]
+    part = tmp_path / "a.mcap.part"
+    newer = synced[0].replace(b'{"format":2,', b'{"format":9,')
+    part.write_bytes(newer)
+    with pytest.raises(TraceError, match="format 9 of a newer version"):
+        salvage(part)
+    assert part.read_bytes() == newer
 
 
 def test_what_is_being_written_is_left_alone(tmp_path: Path) -> None:
@@ -170,15 +177,6 @@ def test_a_folder_is_salvaged_though_one_file_of_it_cannot_be(tmp_path: Path, sy
     put_aside = {"b.mcap.part.unreadable", "c.mcap.part.unreadable"}
     assert {entry.name for entry in tmp_path.iterdir()} == {"a.mcap", "d.mcap.part"} | put_aside
     assert (tmp_path / "c.mcap.part.unreadable").read_bytes() == synced[0][:60]
-
-
-def test_a_part_file_of_a_newer_version_stays_as_it_is(tmp_path: Path, synced: tuple[bytes, list[int]]) -> None:
-    part = tmp_path / "a.mcap.part"
-    newer = synced[0].replace(b'{"format":2,', b'{"format":9,')
-    part.write_bytes(newer)
-    with pytest.raises(TraceError, match="format 9 of a newer version"):
-        salvage(part)
-    assert part.read_bytes() == newer
 
 
 @contextmanager
@@ -283,29 +281,21 @@ def profile(path: Path) -> str:
         return make_reader(stream).get_header().profile
 
 
-def test_a_trace_of_format_1_is_read_with_its_events() -> None:
+def test_a_trace_of_format_1_is_read_shown_and_written_again_in_the_format_of_today(tmp_path: Path) -> None:
     trace = read_trace(FORMAT_1)
     assert (trace.record.format, trace.record.outcome, trace.record.counters["retries"]) == (1, "complete", 3)
     np.testing.assert_array_equal(trace.position, [row(tick).position for tick in range(40)])
     assert trace.events == EVENTS
     assert verify(FORMAT_1).trustworthy
-
-
-def test_a_trace_of_format_1_is_drawn_listed_and_shown_in_a_notebook(tmp_path: Path) -> None:
     shutil.copy(FORMAT_1, tmp_path / "old.mcap")
-    trace = read_trace(tmp_path / "old.mcap")
     assert plot_trace(trace, tmp_path / "old.svg").stat().st_size > 10_000
     (listed,) = list_traces(tmp_path)
     assert (listed.state, listed.samples, listed.outcome) == ("finished", 40, "complete")
     assert "40 samples, 0 missing, complete" in trace._repr_html_()
-
-
-def test_a_trace_of_format_1_is_written_again_in_the_format_of_today(tmp_path: Path) -> None:
-    old = read_trace(FORMAT_1)
-    new = read_trace(write_trace(old, tmp_path / "new.mcap"))
-    assert new.record == old.record.model_copy(update={"format": TRACE_FORMAT})
-    assert new.events == old.events
-    np.testing.assert_array_equal(new.position, old.position)
+    new = read_trace(write_trace(trace, tmp_path / "new.mcap"))
+    assert new.record == trace.record.model_copy(update={"format": TRACE_FORMAT})
+    assert new.events == trace.events
+    np.testing.assert_array_equal(new.position, trace.position)
 
 
 @pytest.mark.parametrize(("old", "expected"), [(True, ""), (False, "ros2")])

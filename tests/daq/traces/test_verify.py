@@ -1,4 +1,4 @@
-"""What verify finds in traces that are right, and in traces with one thing wrong."""
+"""What verify finds in traces that are right and in traces with one thing wrong, and what is missing from a record."""
 
 from dataclasses import replace
 from functools import partial
@@ -6,16 +6,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from daq.contracts.errors import TraceError
 from daq.contracts.labels import Outcome
 from daq.contracts.trace import TraceEvent
+from daq.runner.recorder import Recorder
+from daq.traces import set_points_taken
 from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage
 from daq.traces.store import write_trace
 from daq.traces.verify import verify
 from daq.traces.writer import TraceWriter
+from tests.daq.quiet import Quiet
 from tests.daq.traces.samples import JOINTS, record, row, write
 
 
@@ -42,10 +46,14 @@ def recorded(
         return writer.close(outcome, counters)
 
 
-def test_a_good_trace_has_no_findings_but_notes(tmp_path: Path) -> None:
+def test_what_is_right_has_no_findings_but_notes(tmp_path: Path) -> None:
     verification = verify(write(tmp_path / "a.mcap"))
     assert verification.trustworthy
     assert [(f.level, f.check) for f in verification.findings] == [("note", "arrival")]
+    made = recorded(tmp_path / "c.mcap", [0, 1, 4], counters={"missing_samples": 2})
+    assert set(findings(made)) == {("warning", "gaps")}
+    more = recorded(tmp_path / "b.mcap", [0, 1, 4], counters={"missing_samples": 3})
+    assert set(findings(more)) == {("warning", "gaps")}, "it may have lost some before the first and after the last"
 
 
 @pytest.mark.parametrize(
@@ -79,44 +87,31 @@ def test_what_is_wrong_is_found(tmp_path: Path, made: dict[str, object], expecte
     assert found[expected].startswith(words)
 
 
-def test_an_error_of_one_rounding_is_no_finding_and_of_two_counts_is(tmp_path: Path) -> None:
+def test_a_deviation_within_rounding_is_no_finding_and_a_little_more_is(tmp_path: Path) -> None:
     count = 4.71238898038469 / 4096
     good = row(1).error
     near = (good[0] + 0.9 * count, *good[1:])
     assert findings(recorded(tmp_path / "a.mcap", [0, 1], error=near)) == {}
     far = (good[0] + 2 * count, *good[1:])
     assert "worst 2.0 counts at 0.020 s" in findings(recorded(tmp_path / "b.mcap", [0, 1], error=far))["error", "error"]
-
-
-def test_time_that_is_a_hundredth_of_a_period_off_its_tick_is_no_finding_and_a_little_more_is(tmp_path: Path) -> None:
-    assert findings(recorded(tmp_path / "a.mcap", [0, 1, 2], time=0.04 + 0.009 * 0.02)) == {}
-    found = findings(recorded(tmp_path / "b.mcap", [0, 1, 2], time=0.04 + 0.011 * 0.02))
+    assert findings(recorded(tmp_path / "c.mcap", [0, 1, 2], time=0.04 + 0.009 * 0.02)) == {}
+    found = findings(recorded(tmp_path / "d.mcap", [0, 1, 2], time=0.04 + 0.011 * 0.02))
     assert found["error", "time"].startswith("time is 0.011 periods off the tick at sample 2")
 
 
-def test_an_event_beyond_the_record_is_noted(tmp_path: Path) -> None:
+def test_a_tick_that_comes_twice_and_an_event_beyond_the_record_are_named(tmp_path: Path) -> None:
+    # Another program may write such a file; ours refuses the sample
+    trace = read_trace(write(tmp_path / "a.mcap", 4))
+    path = write_trace(replace(trace, tick=np.array([0, 1, 1, 2])), tmp_path / "b.mcap")
+    assert findings(path)["error", "ticks"] == "tick 1 follows 1"
     late = TraceEvent(time=1.0, kind="note", message="")
-    notes = [f for f in verify(recorded(tmp_path / "a.mcap", [0, 1], event=late)).findings if f.check == "events"]
+    notes = [f for f in verify(recorded(tmp_path / "c.mcap", [0, 1], event=late)).findings if f.check == "events"]
     assert [(f.level, f.message) for f in notes] == [
         ("note", "1 events lie outside the record, the first 'note' at 1.000 s")
     ]
 
 
-def test_a_tick_that_comes_twice_is_named(tmp_path: Path) -> None:
-    """Another program may write such a file; ours refuses the sample."""
-    trace = read_trace(write(tmp_path / "a.mcap", 4))
-    path = write_trace(replace(trace, tick=np.array([0, 1, 1, 2])), tmp_path / "b.mcap")
-    assert findings(path)["error", "ticks"] == "tick 1 follows 1"
-
-
-def test_a_file_without_an_index_can_be_trusted_and_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("daq.traces.recording.Writer", partial(Writer, use_statistics=False))
-    assert findings(recorded(tmp_path / "a.mcap", [0, 1])) == {
-        ("warning", "index"): "has no index: other tools open it slowly"
-    }
-
-
-def test_an_index_of_other_chunks_than_the_file_has_is_an_error(
+def test_an_index_that_is_missing_is_told_and_one_of_other_chunks_is_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     finish = Writer.finish
@@ -128,6 +123,10 @@ def test_an_index_of_other_chunks_than_the_file_has_is_an_error(
     monkeypatch.setattr(Writer, "finish", with_one_more)
     found = findings(recorded(tmp_path / "a.mcap", [0, 1]))
     assert found["error", "index"] == "the index names 2 chunks, the file has 1"
+    monkeypatch.setattr("daq.traces.recording.Writer", partial(Writer, use_statistics=False))
+    assert findings(recorded(tmp_path / "b.mcap", [0, 1])) == {
+        ("warning", "index"): "has no index: other tools open it slowly"
+    }
 
 
 def test_damage_is_an_error_and_an_unfinished_trace_a_warning(tmp_path: Path) -> None:
@@ -143,11 +142,8 @@ def test_damage_is_an_error_and_an_unfinished_trace_a_warning(tmp_path: Path) ->
     assert {("warning", "file"), ("warning", "outcome")} <= set(findings(part))
     salvage(part)
     assert set(findings(path)) == {("warning", "outcome")}
-
-
-def test_an_empty_or_absent_trace_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "a.mcap").write_bytes(b"")
-    assert findings(tmp_path / "a.mcap")["error", "trace"].endswith("is empty")
+    (tmp_path / "c.mcap").write_bytes(b"")
+    assert findings(tmp_path / "c.mcap")["error", "trace"].endswith("is empty")
     with pytest.raises(TraceError, match="cannot be read"):
         verify(tmp_path / "absent.mcap")
 
@@ -156,28 +152,14 @@ def noted(path: Path, check: str) -> list[str]:
     return [f.message for f in verify(path).findings if (f.level, f.check) == ("note", check)]
 
 
-def test_arrival_is_told_between_percentiles_so_that_one_late_sample_does_not_count(tmp_path: Path) -> None:
-    """Samples arrive 0, 0.3 or 0.6 ms after their ticks; one in 201 comes half a second late."""
-    path = recorded(tmp_path / "a.mcap", list(range(201)), host_time=5000.0 + 4.0 + 0.5)
+def test_what_is_noted_of_events_sensors_and_arrival(tmp_path: Path) -> None:
+    for number, (time, outside) in enumerate([(0.0, 0), (0.04, 0), (0.0401, 1), (-0.001, 1)]):
+        event = TraceEvent(time=time, kind="note", message="")
+        path = recorded(tmp_path / f"event{number}.mcap", [0, 1], event=event)
+        assert len(noted(path, "events")) == outside, "the record lasts until the end of its last period"
+    # Samples arrive 0, 0.3 or 0.6 ms after their ticks; one in 201 comes half a second late, and does not count.
+    path = recorded(tmp_path / "late.mcap", list(range(201)), host_time=5000.0 + 4.0 + 0.5)
     assert noted(path, "arrival") == ["arrival jitter: 0.60 ms (1st to 99th percentile)"]
-
-
-@pytest.mark.parametrize(("time", "outside"), [(0.0, 0), (0.04, 0), (0.0401, 1), (-0.001, 1)])
-def test_an_event_belongs_to_the_record_until_the_end_of_its_last_period(
-    tmp_path: Path, time: float, outside: int
-) -> None:
-    event = TraceEvent(time=time, kind="note", message="")
-    assert len(noted(recorded(tmp_path / "a.mcap", [0, 1], event=event), "events")) == outside
-
-
-def test_a_link_that_counted_as_many_as_are_missing_counted_right(tmp_path: Path) -> None:
-    made = recorded(tmp_path / "a.mcap", [0, 1, 4], counters={"missing_samples": 2})
-    assert set(findings(made)) == {("warning", "gaps")}
-    more = recorded(tmp_path / "b.mcap", [0, 1, 4], counters={"missing_samples": 3})
-    assert set(findings(more)) == {("warning", "gaps")}, "it may have lost some before the first and after the last"
-
-
-def test_a_joint_without_a_sensor_that_is_known_is_noted(tmp_path: Path) -> None:
     with TraceWriter(tmp_path / "a.mcap", record(machine=None), JOINTS) as writer:
         writer.sample(row(0, error=(9.0, 9.0, 9.0)))
         path = writer.close("complete")
@@ -185,3 +167,60 @@ def test_a_joint_without_a_sensor_that_is_known_is_noted(tmp_path: Path) -> None
         f"joint {joint}: its sensor is unknown, so error = set point − position was not checked" for joint in JOINTS
     ]
     assert verify(path).trustworthy
+
+
+# ---- A record of a slow line tells from which control period on the set points of each sample were used
+
+TAKEN = (0, *range(2, 38, 4))
+
+
+@pytest.fixture
+def slow(tmp_path: Path) -> Path:
+    """A record of every fourth period; of the first sample nothing is known."""
+    path = tmp_path / "slow.mcap"
+    with TraceWriter(path, record(every=4), JOINTS) as writer:
+        for tick, taken in zip(range(0, 40, 4), TAKEN, strict=True):
+            writer.sample(row(tick, taken=taken))
+        writer.close("complete")
+    return path
+
+
+def test_set_points_taken_read_back_and_a_fast_line_shows_them_itself(slow: Path, tmp_path: Path) -> None:
+    trace = read_trace(slow)
+    again = read_trace(write_trace(trace, tmp_path / "again.mcap"))
+    for each in (trace, again):
+        np.testing.assert_array_equal(each.taken, TAKEN)  # type: ignore[arg-type]
+    path = write(tmp_path / "fast.mcap")
+    assert read_trace(path).taken is None
+    with path.open("rb") as stream:
+        assert set_points_taken.TOPIC not in {channel.topic for _, channel, _ in make_reader(stream).iter_messages()}
+
+
+# ---- What is missing from a trace is counted in samples, by the trace as by the recorder that makes it.
+
+
+@pytest.mark.parametrize(
+    ("every", "ticks", "missing"),
+    [
+        (1, [7], 0),
+        (1, [0, 1, 4], 2),
+        (3, [0, 3, 6], 0),
+        (3, [0, 3, 7, 10], 0),
+        (3, [0, 3, 8, 11], 1),
+        (3, [0, 3, 9, 12], 1),
+        (3, [0, 4, 8, 12], 1),
+        (20, [0, 22, 41, 69, 81], 0),
+        (20, list(range(0, 2900, 29)), 45),
+        (20, [0, 10, 50], 1),
+        (20, [0, 30, 50, 99], 2),
+        (3, [0, 3, 4, 7, 10, 16], 1),
+    ],
+    ids=str,
+)
+def test_missing_samples(tmp_path: Path, every: int, ticks: list[int], missing: int) -> None:
+    with TraceWriter(tmp_path / "a.mcap", record(every=every), JOINTS, patience=10) as writer:
+        recorder = Recorder(writer, JOINTS, Quiet(), every)
+        for tick in ticks:
+            recorder.row(row(tick))
+        path = writer.close("complete", {})
+    assert (recorder.missing, read_trace(path).missing) == (missing, missing)

@@ -1,14 +1,57 @@
-"""Every other kind of trajectory: its shape, its ends, its marks."""
+"""Every kind of trajectory: its shape, its ends, its marks; and the named experiments made of them."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from daq.contracts.errors import SpecError
-from daq.contracts.experiment import Path
+from daq.contracts.experiment import (
+    Cubic,
+    ExperimentSpec,
+    Multisine,
+    Path,
+    Ramp,
+    Sine,
+    SlowRamp,
+    Staircase,
+    Step,
+    Trajectory,
+)
+from daq.safety import check_plan
+from daq.trajectories.planner import plan, start_angles
+from daq.trajectories.presets import PRESETS, preset
 from daq.trajectories.set_points import Plan
-from tests.daq.trajectories.machines import PERIOD, UNIT, motion
+from tests.daq.trajectories.machines import MA2000, PERIOD, UNIT, motion, planned
+
+
+def test_a_ramp_has_equal_increments_and_ends_together_at_rest() -> None:
+    # Increments are equal but the last which is the rest of the line
+    plan = motion(joints=(1,))
+    increments = np.diff(plan.angles[:, 0])
+    assert len(increments) == 33
+    assert increments[:-1] == pytest.approx(80 * UNIT * PERIOD / 0.65)
+    assert increments[-1] == pytest.approx(80 * UNIT * PERIOD / 0.65 / 2)
+    # All joints arrive together whatever their amplitudes
+    plan = motion(trajectory={"kind": "ramp", "amplitude": {1: 0.3, 2: -0.1, 3: 0.02}, "duration": 0.5})
+    fraction = (plan.angles[:, :3] - plan.angles[0, :3]) / [0.3, -0.1, 0.02]
+    assert fraction == pytest.approx(np.repeat(np.linspace(0, 1, 26)[:, None], 3, axis=1))
+    # A ramp of one period is one set point and a shorter one is none
+    assert len(motion(trajectory={"kind": "ramp", "duration": PERIOD, "amplitude": 0.01})) == 2
+    with pytest.raises(SpecError, match=r"ramp: duration: 0.019 s is too short"):
+        motion(trajectory={"kind": "ramp", "duration": 0.019, "amplitude": 0.01})
+    # Settle and hold stand still on both sides
+    plan = planned(settle=0.5, hold=2.0)
+    kinds = {mark.kind: mark.index for mark in plan.marks}
+    assert kinds == {"start": 0, "ramp_start": 25, "ramp_end": 58, "end": 158}
+    assert (plan.postures[:26] == plan.postures[0]).all()
+    assert (plan.postures[26, :3] > plan.postures[0, :3]).all()
+    assert (plan.postures[58:] == plan.postures[-1]).all()
+    assert plan.duration == pytest.approx(3.16)
+
+
+# ---- Every other kind of trajectory: its shape, its ends, its marks
 
 
 def offsets(planned: Plan, joint: int = 1) -> np.ndarray:
@@ -20,20 +63,14 @@ def marked(planned: Plan, kind: str) -> list[int]:
     return [mark.index for mark in planned.marks if mark.kind == kind]
 
 
-def test_step_is_one_jump() -> None:
+def test_a_step_is_one_jump_and_a_staircase_dwells_on_each_of_equal_steps() -> None:
     planned = motion(joints=(1,), trajectory={"kind": "step", "amplitude": 0.05})
     assert offsets(planned) == pytest.approx([0, 0.05])
     assert planned.jumps.tolist() == [False, True]
-
-
-def test_staircase_goes_up_and_down_in_equal_steps_and_dwells_on_each() -> None:
     planned = motion(joints=(1,), trajectory={"kind": "staircase", "amplitude": 0.3, "steps": 3, "dwell": 0.04})
     assert offsets(planned) == pytest.approx([0, 0.1, 0.1, 0.2, 0.2, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0, 0])
     assert planned.jumps.tolist() == [False] + [True, False] * 6
     assert marked(planned, "reversal") == [6]
-
-
-def test_staircase_that_does_not_come_back_ends_at_the_amplitude() -> None:
     move = {"kind": "staircase", "amplitude": -0.3, "steps": 3, "dwell": 0.02, "back": False}
     planned = motion(joints=(1,), trajectory=move)
     assert offsets(planned) == pytest.approx([0, -0.1, -0.2, -0.3])
@@ -51,29 +88,28 @@ def test_slow_ramp_has_constant_speed_and_turns_as_often_as_asked(reversals: int
     assert marked(planned, "reversal") == [100 * turn for turn in range(1, reversals + 1)]
 
 
-def test_slow_ramp_turns_all_joints_at_once_the_widest_at_the_speed_asked_for() -> None:
+def test_a_slow_ramp_turns_all_joints_at_once_and_marks_it() -> None:
     planned = motion(joints=(1, 2), trajectory={"kind": "slow_ramp", "amplitude": {1: 0.05, 2: -0.1}, "speed": 0.05})
     assert offsets(planned, 1) == pytest.approx(-offsets(planned, 2) / 2)
     assert np.abs(np.diff(offsets(planned, 2))).max() == pytest.approx(0.05 * PERIOD)
-
-
-def test_a_mark_of_a_reversal_lies_on_the_first_set_point_after_it() -> None:
     planned = motion(joints=(1,), trajectory={"kind": "slow_ramp", "amplitude": 0.1, "speed": 0.07, "reversals": 1})
     (index,) = marked(planned, "reversal")
     around = offsets(planned)[index - 2 : index + 2]
     assert around[0] < around[1]
     assert around[2] > around[3]
-
-
-def test_slow_ramp_of_no_amplitude_stands_still() -> None:
     planned = motion(joints=(1,), trajectory={"kind": "slow_ramp", "amplitude": 0.0})
     assert not offsets(planned).any()
 
 
-def test_sine_is_about_the_start_and_ends_where_it_began() -> None:
+def test_a_sine_and_a_cubic_begin_and_end_at_rest() -> None:
     planned = motion(joints=(1,), trajectory={"kind": "sine", "amplitude": 0.2, "period": 2.0, "cycles": 3})
     time = np.arange(301) * PERIOD
     assert offsets(planned) == pytest.approx(0.2 * np.sin(math.pi * time), abs=1e-12)
+    rise = offsets(motion(joints=(1,), trajectory={"kind": "cubic", "amplitude": 0.4, "duration": 1.0}))
+    assert rise[25] == pytest.approx(0.2)
+    assert rise[-1] == pytest.approx(0.4)
+    assert np.diff(rise)[[0, -1]] == pytest.approx(3 * 0.4 * PERIOD**2, rel=0.02)
+    assert np.diff(rise).max() / PERIOD == pytest.approx(1.5 * 0.4, rel=1e-3)
 
 
 @pytest.mark.parametrize("phase", [math.pi / 2, -math.pi / 2])
@@ -85,64 +121,43 @@ def test_a_lag_starts_later_and_never_jumps(phase: float) -> None:
     assert np.abs(np.diff(planned.angles, axis=0)).max() <= 0.2 * math.pi * PERIOD
 
 
-def test_multisine_stays_within_its_amplitude_and_reaches_it() -> None:
+def test_a_multisine_reaches_its_amplitude_is_faded_and_repeats_to_the_bit() -> None:
+    # Multisine stays within its amplitude and reaches it
     planned = motion(joints=(1, 2), trajectory={"kind": "multisine", "amplitude": {1: 0.2, 2: 0.1}})
     assert np.abs(offsets(planned, 1)).max() == pytest.approx(0.2)
     assert np.abs(offsets(planned, 2)).max() == pytest.approx(0.1)
-
-
-def test_multisine_is_faded_in_and_out() -> None:
+    # Multisine is faded in and out
     edge = offsets(motion(joints=(1,), trajectory={"kind": "multisine", "amplitude": 0.2}))
     assert np.abs(edge[:5]).max() < 0.2 * 0.01
     assert np.abs(edge[-5:]).max() < 0.2 * 0.01
-
-
-def test_multisine_has_only_the_frequencies_asked_for() -> None:
+    # Multisine has only the frequencies asked for
     move = {"kind": "multisine", "duration": 40.0, "lowest": 0.5, "highest": 2.0, "tones": 4}
     signal = offsets(motion(joints=(1,), trajectory=move))[:-1]
     power = np.abs(np.fft.rfft(signal)) ** 2
     frequency = np.fft.rfftfreq(len(signal), PERIOD)
     inside = (frequency > 0.4) & (frequency < 2.1)
     assert power[inside].sum() > 0.99 * power.sum()
-
-
-def test_multisine_repeats_to_the_bit_and_changes_with_the_seed() -> None:
+    # Multisine repeats to the bit and changes with the seed
     first, again, other = (
         motion(joints=(1,), trajectory={"kind": "multisine", "seed": seed}).angles for seed in (7, 7, 8)
     )
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
-
-
-def test_leaving_a_joint_out_of_a_multisine_does_not_change_the_others() -> None:
+    # Leaving a joint out of a multisine does not change the others
     both = motion(joints=(1, 2), trajectory={"kind": "multisine"})
     alone = motion(joints=(2,), trajectory={"kind": "multisine"})
     assert np.array_equal(both.angles[:, 1], alone.angles[:, 1])
 
 
-def test_cubic_is_at_rest_at_both_ends_and_half_way_at_half_time() -> None:
-    rise = offsets(motion(joints=(1,), trajectory={"kind": "cubic", "amplitude": 0.4, "duration": 1.0}))
-    assert rise[25] == pytest.approx(0.2)
-    assert rise[-1] == pytest.approx(0.4)
-    assert np.diff(rise)[[0, -1]] == pytest.approx(3 * 0.4 * PERIOD**2, rel=0.02)
-    assert np.diff(rise).max() / PERIOD == pytest.approx(1.5 * 0.4, rel=1e-3)
-
-
-def test_path_is_absolute_and_linear_between_its_points() -> None:
+def test_a_path_is_absolute_and_refused_from_elsewhere() -> None:
     path = Path(times=(0.0, 0.1, 0.2), positions=((3.0, 1.0), (3.1, 0.9), (3.0, 1.0)))
     planned = motion(joints=(1, 2), trajectory=path)
     assert planned.angles[1:, 0] == pytest.approx(3.0 + 0.1 * (1 - np.abs(1 - np.arange(1, 11) / 5)))
     assert planned.angles[0, :2] == pytest.approx([3.0, 1.0], abs=UNIT / 2)
-
-
-def test_path_from_elsewhere_is_refused_with_both_places() -> None:
     path = Path(times=(0.0, 0.1), positions=((3.0,), (3.1,)))
     spec = {"joints": (1,), "trajectory": path, "start": {1: 2.0}}
     with pytest.raises(SpecError, match=r"joint 1: the path starts at 171\.89°, the arm stands at 114\.\d+°"):
         motion(**spec)
-
-
-def test_ragged_path_is_refused() -> None:
     path = Path(times=(0.0, 0.1), positions=((3.0, 1.0), (3.1, 1.0)))
     ragged = path.model_copy(update={"positions": ((3.0, 1.0), (3.1,))})
     with pytest.raises(SpecError, match="path: row 2 has 1 angles, the experiment has 2 joints"):
@@ -167,3 +182,74 @@ def test_sequence_goes_on_from_where_each_piece_ended_on_its_own_joints() -> Non
         ("ramp_end", 15, None),
         ("end", 15, None),
     ]
+
+
+# ---- Named experiments: they are allowed on the machine that ships, and take the time they say
+
+
+def made(name: str) -> Plan:
+    spec = preset(name).spec
+    return plan(spec, MA2000, start_angles(spec, MA2000))
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_preset_is_allowed_on_the_ma2000(name: str) -> None:
+    assert check_plan(made(name), MA2000, MA2000.limits) == []
+
+
+@pytest.mark.parametrize("kind", [Ramp, Step, Staircase, SlowRamp, Sine, Multisine, Cubic])
+def test_what_is_moved_when_nothing_is_said_of_it_is_allowed_on_the_ma2000(kind: Callable[[], Trajectory]) -> None:
+    spec = ExperimentSpec(trajectory=kind(), joints=(1, 2, 3))
+    assert check_plan(plan(spec, MA2000, start_angles(spec, MA2000)), MA2000, MA2000.limits) == []
+
+
+@pytest.mark.parametrize("name", [name for name in PRESETS if name != "ramp"])
+def test_all_but_the_ramp_end_where_they_began(name: str) -> None:
+    plan = made(name)
+    assert (plan.postures[-1] == plan.postures[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "reach"),
+    [
+        ("ramp", ((0.0, 21.6), (0.0, 21.6), (0.0, 21.6))),
+        ("diagnostic-a", ((0.0, 21.6), (0.0, 21.6), (0.0, 21.6))),
+        ("diagnostic-b", ((-2.0, 5.0), (-2.0, 5.0), (-2.0, 5.0))),
+        ("diagnostic-c", ((0.0, 9.0), (-9.0, 0.0), (0.0, 9.0))),
+        ("diagnostic-d", ((-7.5, 30.0), (-7.5, 30.0), (-7.5, 30.0))),
+        ("diagnostic-e", ((0.0, 61.6), (0.0, 56.6), (-50.0, 0.0))),
+        ("pseudo-random", ((-2.0, 2.0), (-2.0, 2.0), (-2.0, 2.0))),
+        ("sweep", ((-120.0, 120.0), (-60.0, 150.0), (-120.0, 120.0))),
+        ("held-out", ((-25.0, 9.73), (-8.0, 25.0), (-12.0, 35.0))),
+    ],
+)
+def test_joints_1_to_3_move_as_far_from_the_start_as_chosen(name: str, reach: tuple[tuple[float, float], ...]) -> None:
+    """Least and largest angle of each joint, in degrees from the start, as designed."""
+    moved = np.degrees(made(name).angles[:, :3] - made(name).angles[0, :3])
+    found = np.stack([moved.min(axis=0), moved.max(axis=0)], axis=1)
+    np.testing.assert_allclose(found, reach, atol=0.005)
+
+
+def test_presets_are_what_their_names_say() -> None:
+    assert made("diagnostic").duration == pytest.approx(55, abs=2.5)
+    assert preset("ramp").spec == ExperimentSpec(name="ramp")
+    speeds = np.diff(made("diagnostic-a").angles, axis=0) != 0
+    assert speeds.any(axis=0)[:3].all()
+    assert speeds.sum(axis=1).max() == 1
+    speeds = np.abs(np.diff(made("diagnostic-b").angles, axis=0)) / 0.02
+    assert math.degrees(speeds.max()) == pytest.approx(5)
+    counts = MA2000.calibration(1).rad_per_count
+    plan = made("diagnostic-d")
+    steps = np.abs(np.diff(plan.angles, axis=0)[plan.jumps[1:]]).max(axis=0)[:3] / counts
+    assert (steps * 2 > 127).all()
+    with pytest.raises(SpecError, match=r"preset 'dance': .* ramp, diagnostic, diagnostic-a"):
+        preset("dance")
+
+
+def test_pseudo_random_steps_are_fast_and_differ_from_joint_to_joint() -> None:
+    motion = made("pseudo-random").angles[25:-50, :3] - made("pseudo-random").angles[0, :3]
+    signs = np.sign(motion)
+    assert np.abs(np.corrcoef(signs.T) - np.eye(3)).max() < 0.1
+    changes = np.flatnonzero(np.diff(signs[:, 0]) != 0)
+    assert np.diff(changes).min() == 4, "80 ms of 20 ms each"
+    assert made("pseudo-random").duration == pytest.approx(22, abs=0.5)

@@ -123,17 +123,6 @@ def test_a_posture_is_where_it_is_snapped_to(joint: int, posture: int) -> None:
     assert made.postures[0, joint - 1] == posture
 
 
-def test_a_set_point_outside_the_range_is_planned_as_it_is_and_not_clipped() -> None:
-    made = motion(joints=(1,), trajectory={"kind": "step", "amplitude": math.radians(200)})
-    assert made.postures[-1, 0] == 500 + 741
-
-
-def test_a_reading_in_the_last_fraction_of_the_range_is_posture_999() -> None:
-    angles = REST.tolist()
-    angles[0] = MA2000.calibration(1).counts_to_rad(4095)
-    assert make_plan(MA2000, (), representable_angles(MA2000, angles)[None, :]).postures[0, 0] == 999
-
-
 @pytest.mark.parametrize(
     ("angles", "line"),
     [
@@ -161,47 +150,40 @@ def test_what_would_take_longer_than_four_hours_is_refused_before_it_fills_the_m
         planned(**spec)
 
 
-def test_a_joint_that_the_machine_has_not_is_refused() -> None:
+def test_what_cannot_be_planned_is_refused_and_what_lies_outside_planned_as_it_is() -> None:
     small = MA2000.model_copy(update={"joints": MA2000.joints[:2], "rest_posture": (3.1, 0.8)})
     with pytest.raises(SpecError, match="joint 3: ma2000 has joints 1 to 2"):
         plan(ExperimentSpec(), small, (3.1, 0.8))
-
-
-def test_a_machine_without_a_controller_cannot_be_given_set_points() -> None:
     bench = MA2000.model_copy(update={"controller": NoController(kind="none")})
     with pytest.raises(SpecError, match="no controller"):
         control_period(bench)
+    angles = np.tile(REST, (3, 1))
+    angles[2, 3] = math.inf
+    with pytest.raises(SpecError, match="joint 4, set point 2: inf rad: must be finite"):
+        make_plan(MA2000, (4,), angles)
+    made = motion(joints=(1,), trajectory={"kind": "step", "amplitude": math.radians(200)})
+    assert made.postures[-1, 0] == 500 + 741
+    angles = REST.tolist()
+    angles[0] = MA2000.calibration(1).counts_to_rad(4095)
+    assert make_plan(MA2000, (), representable_angles(MA2000, angles)[None, :]).postures[0, 0] == 999
 
 
 def test_start_is_the_spec_then_the_path_then_the_rest_posture() -> None:
     path = {"kind": "path", "times": (0, 1), "positions": ((3.0, 1.0), (3.1, 1.1))}
     spec = ExperimentSpec.model_validate({"trajectory": path, "joints": (1, 2), "start": {1: 2.0}})
     assert start_angles(spec, MA2000) == (2.0, 1.0, *REST[2:])
-
-
-def test_without_a_rest_posture_every_start_must_be_given() -> None:
     homeless = MA2000.model_copy(update={"rest_posture": None})
     with pytest.raises(SpecError, match=r"start: joints \[1, 3, 4, 5, 6\] have none"):
         start_angles(ExperimentSpec(start={2: 1.0}), homeless)
 
 
-def test_angles_that_are_not_finite_are_no_plan() -> None:
-    angles = np.tile(REST, (3, 1))
-    angles[2, 3] = math.inf
-    with pytest.raises(SpecError, match="joint 4, set point 2: inf rad: must be finite"):
-        make_plan(MA2000, (4,), angles)
-
-
-def test_preview_tells_what_will_move_and_how_fast() -> None:
+def test_preview_tells_what_will_move_how_fast_and_in_which_steps() -> None:
     preview = planned().preview()
     assert [joint.joint for joint in preview.joints if joint.moves] == [1, 2, 3]
     assert preview.joints[0].top_speed == pytest.approx(math.radians(21.6) / 0.65)
     assert preview.joints[3].top_speed == 0
     assert preview.duration == pytest.approx(3.16)
     assert preview.as_data()["set_points"] == 159
-
-
-def test_preview_keeps_steps_apart_from_speed() -> None:
     joint = motion(joints=(1,), trajectory={"kind": "step", "amplitude": 0.1}).preview().joints[0]
     assert (joint.top_speed, joint.largest_step) == (0, pytest.approx(0.1))
 

@@ -1,4 +1,4 @@
-"""Via points and 4-3-4 trajectories (section 3.7 of the source), against conditions solved on their own."""
+"""Via points and 4-3-4 trajectories (section 3.7 of the source), and the forward kinematics that they need."""
 
 import math
 
@@ -61,7 +61,7 @@ def test_via_points_are_the_segments_of_the_source(points: list[tuple[float, flo
     assert made.angles[-1, 0] - made.angles[0, 0] == pytest.approx(angles[-1], abs=1e-12)
 
 
-def test_every_joint_passes_its_points_at_their_times_and_the_marks_say_so() -> None:
+def test_via_points_pass_their_times_and_are_checked_like_all_motions() -> None:
     points = [{1: 0.2, 2: 0.1}, {1: 0.3, 2: -0.1}, {1: 0.1, 2: 0.0}]
     made = motion(joints=(1, 2), trajectory={"kind": "via", "points": points, "times": [1.0, 1.6, 3.0]})
     moved = made.angles - made.angles[0]
@@ -71,15 +71,14 @@ def test_every_joint_passes_its_points_at_their_times_and_the_marks_say_so() -> 
         (50, "via point 1 of 2"),
         (80, "via point 2 of 2"),
     ]
-
-
-def test_via_points_go_into_sequences_and_are_checked_like_all_motions() -> None:
     move = {"kind": "via", "points": [0.2, 0.1], "times": [1.0, 2.0]}
     sequence = {"kind": "sequence", "segments": [{"move": move, "joints": [2]}, {"move": move, "joints": [2]}]}
     made = motion(joints=(1, 2), trajectory=sequence)
     assert made.angles[-1, :2] - made.angles[0, :2] == pytest.approx([0, 0.2])
     quick = motion(joints=(1,), trajectory={"kind": "via", "points": [1.0], "times": [0.3]})
     assert [one.rule for one in check_plan(quick, MA2000, MA2000.limits)] == ["speed"]
+    with pytest.raises(SpecError, match=r"via: time to point 2: .* is too short"):
+        planned(joints=(1,), trajectory={"kind": "via", "points": [0.1, 0.2], "times": [1, 1.001]})
 
 
 @pytest.mark.parametrize(
@@ -93,11 +92,6 @@ def test_via_points_go_into_sequences_and_are_checked_like_all_motions() -> None
 def test_via_points_that_do_not_fit(trajectory: dict[str, object], expected: str) -> None:
     with pytest.raises(ValueError, match=expected):
         planned(joints=(1,), trajectory={"kind": "via"} | trajectory)
-
-
-def test_via_points_nearer_than_a_control_period_are_refused() -> None:
-    with pytest.raises(SpecError, match=r"via: time to point 2: .* is too short"):
-        planned(joints=(1,), trajectory={"kind": "via", "points": [0.1, 0.2], "times": [1, 1.001]})
 
 
 @settings(max_examples=40, deadline=None)
@@ -139,7 +133,8 @@ def pick_and_place(**own: object) -> dict[str, object]:
     return {"kind": "pick_and_place", "amplitude": OVER, "pick": 1.0, "travel": 2.0, "place": 1.0} | own
 
 
-def test_the_arms_end_passes_straight_above_both_places() -> None:
+def test_a_pick_and_place_passes_above_both_places_and_is_at_rest_at_its_ends() -> None:
+    # The arms end passes straight above both places
     made = motion(start=BENT, trajectory=pick_and_place(lift=0.05))
     ends = link_ends(MA2000, made.angles)[:, -1]
     for lifted, place in ((50, 0), (150, -1)):
@@ -151,17 +146,13 @@ def test_the_arms_end_passes_straight_above_both_places() -> None:
         (50, "lift-off point"),
         (150, "set-down point"),
     ]
-
-
-def test_it_begins_and_ends_at_rest_without_a_jerk() -> None:
+    # It begins and ends at rest without a jerk
     made = motion(start=BENT, trajectory=pick_and_place())
     speed = np.diff(made.angles, axis=0) / PERIOD
     acceleration = np.diff(speed, axis=0) / PERIOD
     assert np.abs(speed[[0, -1]]).max() < 0.01 * np.abs(speed).max()
     assert np.abs(np.diff(acceleration, axis=0)).max() < 0.2 * np.abs(acceleration).max()
-
-
-def test_a_lift_of_less_than_a_quarter_of_the_last_link_is_refused() -> None:
+    # A lift of less than a quarter of the last link is refused
     assert last_link(MA2000) == pytest.approx(0.16841)
     with pytest.raises(SpecError, match=r"lift of 0.042 m: allowed are 0.0421 m and more"):
         motion(start=BENT, trajectory=pick_and_place(lift=0.042))
@@ -181,3 +172,34 @@ def test_repeats_go_back_slowly_and_lift_again() -> None:
     lifted = [mark.index for mark in made.marks if mark.message == "lift-off point"]
     assert len(lifted) == 2
     assert ends[lifted[1]] == pytest.approx(ends[lifted[0]], abs=1e-4)
+
+
+# ---- Forward kinematics of the chain in machine files
+
+A2, A3 = 0.285755, 0.16841
+angle = st.floats(-math.pi, math.pi)
+
+
+def ends(*angles: float) -> np.ndarray:
+    return link_ends(MA2000, np.array([angles + (0.0,) * (6 - len(angles))]))[0]
+
+
+@given(angle, angle, angle)
+def test_major_axes_agree_with_plane_geometry(waist: float, shoulder: float, elbow: float) -> None:
+    radius = A2 * math.cos(shoulder) + A3 * math.cos(shoulder + elbow)
+    height = A2 * math.sin(shoulder) + A3 * math.sin(shoulder + elbow)
+    expected = [radius * math.cos(waist), radius * math.sin(waist), height]
+    assert ends(waist, shoulder, elbow)[2] == pytest.approx(expected, abs=1e-12)
+
+
+@given(st.lists(angle, min_size=6, max_size=6))
+def test_no_link_changes_its_length(angles: list[float]) -> None:
+    origins = np.concatenate([np.zeros((1, 3)), ends(*angles)])
+    lengths = np.linalg.norm(np.diff(origins, axis=0), axis=1)
+    assert lengths == pytest.approx([0, A2, A3, 0, 0, 0], abs=1e-12)
+
+
+def test_a_prismatic_joint_moves_along_its_axis() -> None:
+    first = MA2000.joints[0].model_copy(update={"kind": "prismatic"})
+    slide = MA2000.model_copy(update={"joints": (first,)})
+    assert link_ends(slide, np.array([[0.25]]))[0, 0] == pytest.approx([0, 0, 0.25])

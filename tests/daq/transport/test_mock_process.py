@@ -40,10 +40,19 @@ def test_the_mock_ends_with_an_owner_that_is_killed() -> None:
         owner.stdout.close()
 
 
-def test_a_mock_that_cannot_start_says_why_in_one_line() -> None:
+def test_a_mock_that_cannot_start_says_why_and_one_without_processor_is_given_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     with pytest.raises(TransportError, match=r"the mock controller did not start: .*nonsense") as caught:
         open_endpoint("mock://?fault=nonsense")
     assert "\n" not in str(caught.value)
+    endpoint = open_endpoint("mock://?pty=1")
+    endpoint.close()
+    endpoint.close()
+    monkeypatch.setattr(mock_process, "processor_time", lambda _process: ProcessorTime(0.0, 1e9))
+    monkeypatch.setattr(mock_process, "STARVED_TIMEOUT_S", 0.0)
+    with pytest.raises(TransportError, match=r"was not ready after .* s; see what keeps this computer busy"):
+        start_mock(MockPort())
 
 
 @pytest.mark.parametrize(
@@ -55,13 +64,6 @@ def test_a_mock_that_ends_without_a_word_has_its_end_named(
     start = subprocess.Popen
     monkeypatch.setattr(subprocess, "Popen", lambda command, **given: start([command[0], "-c", process], **given))
     with pytest.raises(TransportError, match=f"did not start: .*{says}"):
-        start_mock(MockPort())
-
-
-def test_a_mock_that_gets_no_processor_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mock_process, "processor_time", lambda _process: ProcessorTime(0.0, 1e9))
-    monkeypatch.setattr(mock_process, "STARVED_TIMEOUT_S", 0.0)
-    with pytest.raises(TransportError, match=r"was not ready after .* s; see what keeps this computer busy"):
         start_mock(MockPort())
 
 
@@ -88,9 +90,3 @@ def test_a_mock_can_be_left_and_come_back_to_and_is_missed_when_it_has_ended() -
         endpoint.close()
         with pytest.raises(TransportError, match="the mock controller has ended"):
             endpoint.connect()
-
-
-def test_an_endpoint_may_be_closed_twice() -> None:
-    endpoint = open_endpoint("mock://?pty=1")
-    endpoint.close()
-    endpoint.close()

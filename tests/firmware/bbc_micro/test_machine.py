@@ -51,12 +51,9 @@ def working_time(bbc: BbcMicro, request: c.Request, stamp: c.Stamp = c.UNSTAMPED
     return took - len(encode_frame(reply)) * bbc.serial.byte_cycles // 2
 
 
-def test_it_says_what_it_is(bbc: BbcMicro) -> None:
+def test_it_says_what_it_is_and_starts_frozen(bbc: BbcMicro) -> None:
     assert bbc.screen.startswith("\x16\x07MA2000 bridge, protocol 2, 19200 baud")
     assert bbc.serial.baud == 19200
-
-
-def test_it_starts_frozen(bbc: BbcMicro) -> None:
     (reply,), _ = asked(bbc, encode_frame(c.to_frame(1, c.ReadStatus())))
     status = c.parse_reply(reply)
     assert isinstance(status, c.Status)

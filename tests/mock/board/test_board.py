@@ -32,7 +32,9 @@ def newest(board: Board) -> PeriodSnapshot:
     return snapshot
 
 
-def test_powering_up_holds_the_posture_it_finds(board: Board) -> None:
+def test_powering_up_holds_the_posture_it_finds_with_the_gains_in_eprom(board: Board) -> None:
+    assert board.memory.values("gain_p") == [2] * 6
+    assert board.memory.values("gain_i") == board.memory.values("gain_d") == [0] * 6
     before = board.plant.joint_angles
     board.run_until(2_000_000)
     sag = [abs(a - b) for a, b in zip(board.plant.joint_angles, before, strict=True)]
@@ -40,11 +42,9 @@ def test_powering_up_holds_the_posture_it_finds(board: Board) -> None:
     taken = newest(board).set_points
     assert all(abs(posture - 500) < 3 for i, posture in enumerate(taken) if i != 1)
     assert taken[1] == pytest.approx(333, abs=3)
-
-
-def test_power_up_gains_are_those_in_eprom(board: Board) -> None:
-    assert board.memory.values("gain_p") == [2] * 6
-    assert board.memory.values("gain_i") == board.memory.values("gain_d") == [0] * 6
+    board.run_until(10 * PERIOD - 1000)
+    low, high = board.read(0xFC21, 1)[0], board.read(0xFC29, 1)[0]
+    assert low | high << 8 == newest(board).positions[1]
 
 
 def test_ticks_count_periods_of_twenty_milliseconds_from_one(board: Board) -> None:
@@ -67,12 +67,6 @@ def test_drive_changes_only_after_the_computing_delay(board: Board) -> None:
     board.run_until(2 * PERIOD)
     assert board.plant.motor_volts[0] == pytest.approx(newest(board).powers[0] * 36 / 127)
     assert newest(board).powers[0] > 100
-
-
-def test_documented_addresses_hold_the_position_of_joint_two(board: Board) -> None:
-    board.run_until(10 * PERIOD - 1000)
-    low, high = board.read(0xFC21, 1)[0], board.read(0xFC29, 1)[0]
-    assert low | high << 8 == newest(board).positions[1]
 
 
 def test_gains_from_the_memory_are_used_from_the_next_period_on(board: Board) -> None:
@@ -110,12 +104,6 @@ def test_set_point_is_missed_when_the_host_holds_the_memory_at_the_wrong_moment(
     assert board.counters.set_points_missed == 1
 
 
-def test_reading_too_makes_the_controller_miss(board: Board) -> None:
-    board.run_until(10 * PERIOD - 5)
-    board.read(POSITION_LOW, 3)
-    assert board.counters.set_points_missed == 1
-
-
 def test_access_that_ends_in_time_costs_nothing(board: Board) -> None:
     board.run_until(10 * PERIOD - 20)
     board.write_set_points({1: 510})
@@ -123,6 +111,12 @@ def test_access_that_ends_in_time_costs_nothing(board: Board) -> None:
     board.run_until(11 * PERIOD - 1)
     assert newest(board).set_points[0] == 510
     assert board.counters.set_points_missed == 0
+
+
+def test_reading_too_makes_the_controller_miss(board: Board) -> None:
+    board.run_until(10 * PERIOD - 5)
+    board.read(POSITION_LOW, 3)
+    assert board.counters.set_points_missed == 1
 
 
 def test_host_waits_while_the_controller_fetches(board: Board) -> None:
@@ -283,11 +277,13 @@ def test_access_outside_the_memory_is_refused(board: Board, address: int, count:
         board.read(address, count)
 
 
-def test_impossible_set_point_is_refused_before_anything_is_written(board: Board) -> None:
+def test_an_impossible_set_point_is_refused_and_a_step_must_divide_the_delay(board: Board) -> None:
     before = board.memory.values("set_point")
     with pytest.raises(BoardError, match="joint 2"):
         board.write_set_points({1: 400, 2: 1000})
     assert board.memory.values("set_point") == before
+    with pytest.raises(BoardError, match="computing_delay of 6000"):
+        Board(default_board(), default_memory_map(), Plant(default_plant(), step_us=4000), 1)
 
 
 def test_time_asked_for_in_pieces_or_at_once_gives_the_same_bits() -> None:
@@ -300,11 +296,6 @@ def test_time_asked_for_in_pieces_or_at_once_gives_the_same_bits() -> None:
         return [snapshot for snapshot in snapshots if snapshot is not None]
 
     assert run(250) == run(30 * PERIOD)
-
-
-def test_step_that_does_not_divide_the_delay_is_refused() -> None:
-    with pytest.raises(BoardError, match="computing_delay of 6000"):
-        Board(default_board(), default_memory_map(), Plant(default_plant(), step_us=4000), 1)
 
 
 @pytest.mark.parametrize(

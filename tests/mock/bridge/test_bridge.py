@@ -1,16 +1,19 @@
-"""What each request does, and what is refused."""
+"""What each request does, what is refused, when the bridge meets the controller; how the board follows the clock."""
 
 from pathlib import Path
+from random import Random
 
 import pytest
 
 from firmware_protocol import commands as c
+from firmware_protocol.commands import AFTER_NEWEST, Sample, Snapshot, Stop, Stopped
 from firmware_protocol.framing import Frame, encode_frame
 from firmware_protocol.units import counts_to_posture
 from mock_controller.board.parameters import default_board_text
 from mock_controller.bridge.bridge import WAIT_LIMIT_PERIODS, Bridge
+from mock_controller.real_time import LATE_US
 from mock_controller.timeline import Timeline
-from tests.mock.host import LockStepHost
+from tests.mock.host import LockStepHost, RealTimeHost
 
 
 @pytest.fixture
@@ -23,7 +26,7 @@ def refusal(reply: object) -> c.Refusal:
     return c.Refusal(reply.reason)
 
 
-def test_hello_tells_what_the_bridge_can_do(host: LockStepHost) -> None:
+def test_hello_tells_what_the_bridge_can_do_until_the_connection_ends(host: LockStepHost) -> None:
     everything = c.Capability.SAMPLE | c.Capability.COMPACT | c.Capability.LOCK_STEP | c.Capability.SIMULATED
     reply = host.ask(c.Hello(2, 77))
     assert isinstance(reply, c.HelloReply)
@@ -34,9 +37,6 @@ def test_hello_tells_what_the_bridge_can_do(host: LockStepHost) -> None:
     assert without == c.HelloReply(
         2, c.Capability.LOCK_STEP | c.Capability.SIMULATED, 20_000, 0, 1, 78, without.session
     )
-
-
-def test_the_session_ends_with_the_connection(host: LockStepHost) -> None:
     assert host.ask(c.SetGripper(1)) == c.GripperSet()
     host.pace.hang_up()
     assert refusal(host.ask(c.SetGripper(0))) is c.Refusal.BAD_SESSION
@@ -57,7 +57,18 @@ def test_no_session_and_no_stop_has_the_number_0(host: LockStepHost, first_numbe
     assert 0 not in numbers
 
 
-def test_set_points_are_in_the_memory_and_taken_by_the_next_period(host: LockStepHost) -> None:
+@pytest.mark.parametrize("request_", [c.ReadBlock(0xFBFF, 1), c.ReadBlock(0xFC7F, 2), c.WriteBlock(0xFC7F, b"ab")])
+def test_memory_ends_where_the_map_says(host: LockStepHost, request_: c.Request) -> None:
+    before = host.board.time_us
+    assert refusal(host.ask(request_)) is c.Refusal.BAD_ADDRESS
+    assert host.board.time_us == before
+
+
+def test_set_points_gains_and_bytes_are_in_the_memory(host: LockStepHost) -> None:
+    assert host.ask(c.SetGains(2, 5, 1, 3)) == c.GainsSet()
+    assert host.ask(c.ReportGains()) == c.Gains(((2, 0, 0), (5, 1, 3), *(((2, 0, 0),) * 4)))
+    assert host.ask(c.WriteBlock(0xFC78, b"\x01\x02\x03")) == c.BlockWritten()
+    assert host.ask(c.ReadBlock(0xFC77, 5)) == c.Block(b"\x00\x01\x02\x03\x00")
     taken = host.ask(c.WriteSetPoints(((1, 520), (3, 480))))
     assert isinstance(taken, c.SetPointsTaken)
     assert host.board.memory.values("set_point")[0:3:2] == [520, 480]
@@ -67,23 +78,6 @@ def test_set_points_are_in_the_memory_and_taken_by_the_next_period(host: LockSte
     assert snapshot.tick == taken.tick + 1
     assert (readings[1].set_point, readings[3].set_point) == (520, 480)
     assert readings[2].set_point == host.board.memory.values("set_point")[1]
-
-
-def test_bytes_that_are_poked_can_be_peeked(host: LockStepHost) -> None:
-    assert host.ask(c.WriteBlock(0xFC78, b"\x01\x02\x03")) == c.BlockWritten()
-    assert host.ask(c.ReadBlock(0xFC77, 5)) == c.Block(b"\x00\x01\x02\x03\x00")
-
-
-@pytest.mark.parametrize("request_", [c.ReadBlock(0xFBFF, 1), c.ReadBlock(0xFC7F, 2), c.WriteBlock(0xFC7F, b"ab")])
-def test_memory_ends_where_the_map_says(host: LockStepHost, request_: c.Request) -> None:
-    before = host.board.time_us
-    assert refusal(host.ask(request_)) is c.Refusal.BAD_ADDRESS
-    assert host.board.time_us == before
-
-
-def test_gains_are_written_and_reported(host: LockStepHost) -> None:
-    assert host.ask(c.SetGains(2, 5, 1, 3)) == c.GainsSet()
-    assert host.ask(c.ReportGains()) == c.Gains(((2, 0, 0), (5, 1, 3), *(((2, 0, 0),) * 4)))
 
 
 def test_process_outputs_change_only_in_the_mask_and_inputs_are_read(host: LockStepHost) -> None:
@@ -162,3 +156,113 @@ def test_an_advance_lets_time_pass_once(host: LockStepHost) -> None:
     assert host.ask(c.Advance(0), sequence=6) == c.Advanced(123_456, 7)
     assert host.ask(c.Advance(0), sequence=4) == c.Advanced(123_456, 7), "the time may always be asked for"
     assert refusal(host.ask(c.Advance(1), sequence=4)) is c.Refusal.STALE
+
+
+# ---- A bridge that sees the period keeps clear of the controller's fetch
+
+SIX = tuple((joint, 500) for joint in range(1, 7))
+
+
+def busy(sample: bool, seed: int) -> LockStepHost:
+    """A host that has accessed the memory at 400 random moments."""
+    host, dice = LockStepHost(sample=sample, seed=seed), Random(seed)
+    for _ in range(400):
+        host.ask(c.Advance(dice.randrange(3000)))
+        accesses: list[c.Request] = [
+            c.WriteSetPoints(SIX),
+            c.ReadBlock(0xFC00, 48),
+            c.WriteBlock(0xFC74, b"12345678"),
+            c.ReportErrorsPositionsPowers(63),
+            c.SetGains(1, 2, 0, 0),
+            c.Stop(),
+        ]
+        request = dice.choice(accesses)
+        host.ask(request)
+        if isinstance(request, c.Stop):
+            host.release()
+    return host
+
+
+def test_only_a_blind_bridge_makes_the_controller_miss_set_points() -> None:
+    host = busy(sample=True, seed=1)
+    assert host.board.counters.periods > 30
+    assert host.board.counters.set_points_missed == 0
+    assert busy(sample=False, seed=1).board.counters.set_points_missed > 0
+
+
+# ---- The board follows the clock, is never ahead for long, catches up, and listens meanwhile
+
+
+def test_board_time_is_the_clock_and_the_loop_never_sleeps_past_what_is_due() -> None:
+    host = RealTimeHost()
+    for step in (1, 999, 12_345, 20_000, 3):
+        host.wait(step)
+    assert host.board.time_us == 33_348
+    assert host.pace.lateness.late_ticks == 0
+    host = RealTimeHost()
+    host.wait(7_000)
+    assert host.board.time_us + host.pace.timeout_s() * 1e6 == host.board.next_event_us
+    host.send(1, Sample(AFTER_NEWEST, 1))
+    ticks = []
+    for number in range(2, 52):
+        ((_, _, reply),) = host.wait(20_000)
+        assert isinstance(reply, Snapshot)
+        ticks.append(reply.tick)
+        host.send(number, Sample(reply.tick, 1))
+    assert ticks == list(range(2, 52))
+
+
+def test_a_starved_process_catches_up_and_counts_what_was_late() -> None:
+    host = RealTimeHost()
+    host.wait(1_000)
+    host.clock.now_us += 1_000_000
+    host.wait(0)
+    assert host.board.time_us == 1_001_000
+    assert host.board.counters.periods == 51
+    assert host.pace.lateness.late_ticks == 49  # the last began 1 ms ago
+    assert host.pace.lateness.worst_us == 981_000
+
+
+def test_one_that_waits_lets_the_board_stand_still_and_says_for_how_long() -> None:
+    host = RealTimeHost(waits=True)
+    host.wait(1_000)
+    due = host.board.next_event_us
+    host.clock.now_us += 1_000_000
+    host.wait(0)
+    assert host.board.time_us == due, "what was due is done, and nothing after it"
+    waited = 1_001_000 - due
+    assert host.pace.lateness.waited_us == waited
+    host.wait(20_000)
+    assert host.board.time_us == due + 20_000, "it goes on at its own pace"
+    host.clock.now_us = host.pace.zero_us + host.board.next_event_us + LATE_US
+    host.wait(0)
+    assert host.pace.lateness.waited_us == waited, "what every process must expect is no wait"
+
+
+def test_a_stop_does_not_wait_until_a_starved_process_has_caught_up() -> None:
+    host = RealTimeHost()
+    host.wait(1_000)
+    host.clock.now_us += 10_000_000
+    host.send(1, Stop())
+    answered = [type(reply) for _, reply in host.dialect.feed(host.pace.work())]
+    assert host.board.frozen
+    assert host.board.time_us < 200_000
+    answered += [type(reply) for _, _, reply in host.wait(0)]
+    assert answered == [Stopped]
+
+
+def test_the_moments_of_a_stop_are_recorded_and_a_missed_period_has_not_used_it() -> None:
+    host = RealTimeHost()
+    host.wait(30_000)
+    assert host.device.bridge.stops.frozen_us is None
+    host.send(1, Stop())
+    host.wait(20_000)
+    stops = host.device.bridge.stops
+    assert (stops.count, stops.received_us, stops.frozen_us, stops.frozen_tick) == (1, 30_000, 30_120, 2)
+    assert (stops.first_used_us, stops.first_used_tick) == (40_000, 3)
+    host = RealTimeHost(fault=("busy_memory:start=0.035,duration=0.01",))
+    host.wait(30_000)
+    host.send(1, Stop())
+    host.wait(60_000)
+    stops = host.device.bridge.stops
+    assert (stops.first_used_us, stops.first_used_tick) == (60_000, 4)

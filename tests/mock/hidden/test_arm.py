@@ -25,10 +25,16 @@ def arms(kind: Kind, count: int = 60) -> list[HiddenArm]:
     return [draw_arm(compose_seed(number, kind, Load.NOMINAL)) for number in range(count)]
 
 
-def test_every_effect_of_the_library_can_be_drawn() -> None:
+def test_every_effect_and_every_arm_can_be_drawn() -> None:
     assert {size.effect for size in SHARED_SIZES + LATER_SIZES} == {kind.name for kind in SHARED}
     assert {size.effect for size in OPEN_SIZES} == {kind.name for kind in OPEN_SET}
     assert len(SIZES) == len({size.effect for size in SIZES})
+    for kind in Kind:
+        for load in Load:
+            for number in range(12):
+                arm = draw_arm(compose_seed(number, kind, load))
+                parts = arm.parts(default_plant(), default_board())
+                Plant(parts.plant, parts.modifications)
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: size.effect)
@@ -74,7 +80,7 @@ def test_kinds_are_what_they_say() -> None:
     assert len(Counter(arm.kind for arm in arms(Kind.ANY, 100))) == 6
 
 
-def test_singles_spread_over_effects_joints_and_strengths() -> None:
+def test_singles_spread_and_shared_effects_have_one_strength_and_sign() -> None:
     drawn = [draw_arm(compose_seed(number, Kind.SINGLE, Load.NOMINAL)).effects[0] for number in range(600)]
     assert len({effect.name for effect in drawn}) == len(SHARED_SIZES)
     joints = Counter(effect.joints for effect in drawn)
@@ -82,9 +88,6 @@ def test_singles_spread_over_effects_joints_and_strengths() -> None:
     strengths = sorted(effect.strength for effect in drawn)
     assert strengths[150] == pytest.approx(0.25, abs=0.06)
     assert strengths[450] == pytest.approx(0.75, abs=0.06)
-
-
-def test_effects_shared_by_joints_have_one_strength_and_sign() -> None:
     for arm in arms(Kind.SHARED_BY_JOINTS):
         (effect,) = arm.effects
         assert [values["joint"] for values in effect.parameters] == list(effect.joints)
@@ -98,15 +101,6 @@ def test_the_load_is_in_the_last_digit(load: Load) -> None:
     nominal = LOAD_KG[load] or default_plant().rigid_body.m_load
     carried = arm.plant_parameters(default_plant()).rigid_body.m_load
     assert carried == pytest.approx(nominal * (1 + arm.deviations["m_load"]))
-
-
-def test_every_arm_can_be_built() -> None:
-    for kind in Kind:
-        for load in Load:
-            for number in range(12):
-                arm = draw_arm(compose_seed(number, kind, load))
-                parts = arm.parts(default_plant(), default_board())
-                Plant(parts.plant, parts.modifications)
 
 
 @pytest.mark.parametrize("seed", [-1, 80, 3, 189, 2**63])

@@ -94,13 +94,10 @@ def test_current_with_inductance_converges_with_the_step(inductance: float) -> N
     assert angle(1000) == pytest.approx(angle(100), abs=2e-4)
 
 
-def test_amplifier_saturates_at_the_supply() -> None:
+def test_a_motor_balances_gravity_and_the_amplifier_saturates() -> None:
     plant = Plant(default_plant(), angles=UP)
     plant.advance([5.0, -5.0, 0.5, 0, 0, 0], 1000)
     assert plant.motor_volts[:3] == (36.0, -36.0, 14.0)
-
-
-def test_motor_balances_gravity_at_the_computed_voltage() -> None:
     parameters = frictionless(gravity=9.81)
     body, joint = parameters.rigid_body, parameters.joints[2]
     gravity = 9.81 * (body.m3 / 2 + body.m_load) * body.a3
@@ -129,8 +126,8 @@ def test_coulomb_friction_holds_what_lies_below_its_level_without_creeping() -> 
     assert plant.joint_angles[2] == pytest.approx(after_settling, abs=1e-6)
 
 
-def test_moving_joint_is_slowed_by_exactly_its_coulomb_level() -> None:
-    """Wrist roll: constant friction, no gravity; steady speed loses level / damping."""
+def test_friction_slows_by_its_level_and_follows_the_published_projections() -> None:
+    # Wrist roll: constant friction, no gravity; steady speed loses level / damping
     parameters = default_plant()
     joint = parameters.joints[5]
     n, k = joint.gear_ratio, joint.torque_constant / joint.resistance
@@ -139,9 +136,6 @@ def test_moving_joint_is_slowed_by_exactly_its_coulomb_level() -> None:
     plant.advance([0, 0, 0, 0, 0, 0.4], 500_000)
     expected = (n * k * 0.4 * 28 - joint.constant_friction) / damping
     assert plant.joint_rates[5] == pytest.approx(expected, rel=1e-6)
-
-
-def test_friction_levels_follow_the_published_projections() -> None:
     parameters = default_plant()
     level = CoulombLevel(parameters)
     body, mu = parameters.rigid_body, parameters.friction.effective_arm
@@ -163,15 +157,14 @@ def test_bristle_never_exceeds_its_level_and_ignores_how_motion_is_cut_in_steps(
         assert halves == pytest.approx(z, abs=1e-9)
 
 
-def test_end_stops_hold_against_full_drive() -> None:
+def test_end_stops_hold_and_a_stalled_joint_moves_again_when_released() -> None:
+    # End stops hold against full drive
     plant = Plant(default_plant(), angles=UP)
     plant.advance([1.0, 0, 1.0, 0.5, 0.5, 0.5], 6_000_000)
     overshoot = [a - j.upper_stop for a, j in zip(plant.joint_angles, plant.parameters.joints, strict=True)]
     assert max(overshoot) < math.radians(0.5)
     assert overshoot[0] > -math.radians(1)
-
-
-def test_stalled_joint_stays_and_moves_again_when_released() -> None:
+    # Stalled joint stays and moves again when released
     plant = Plant(default_plant(), angles=UP)
     plant.advance([0.5, 0, 0, 0, 0, 0], 100_000)
     plant.stall(1)
@@ -181,12 +174,13 @@ def test_stalled_joint_stays_and_moves_again_when_released() -> None:
     plant.release(1)
     plant.advance([1.0, 0, 0, 0, 0, 0], 100_000)
     assert plant.joint_angles[0] > jammed_at + 0.05
-
-
-def test_held_wrist_does_not_move_while_the_arm_does() -> None:
+    # Held wrist does not move while the arm does
     plant = Plant(default_plant(), angles=(math.pi, 0.8, 0.3, 0.0, 0.0, 0.0))
     plant.advance([0.8, 0.9, 0.6, 0, 0, 0], 500_000)
     assert max(map(abs, plant.joint_angles[3:])) < 1e-4
+    # Start outside the end stops is refused
+    with pytest.raises(PlantError, match="joint 2"):
+        Plant(default_plant(), angles=(math.pi, 7.0, 0, 0, 0, 0))
 
 
 def test_default_step_is_converged_far_below_an_adc_count() -> None:
@@ -226,8 +220,3 @@ def test_reset_forgets_everything() -> None:
 def test_impossible_requests_are_refused_in_one_line(volts: list[float], duration: int, says: str) -> None:
     with pytest.raises(PlantError, match=says):
         Plant(default_plant()).advance(volts, duration)
-
-
-def test_start_outside_the_end_stops_is_refused() -> None:
-    with pytest.raises(PlantError, match="joint 2"):
-        Plant(default_plant(), angles=(math.pi, 7.0, 0, 0, 0, 0))

@@ -56,15 +56,12 @@ def test_hosts_come_and_go(where: tuple[str, ...]) -> None:
                 host.port.write(b"\0\x05half a frame" if where[0] == "--tcp" else b"")
 
 
-def test_a_second_host_is_turned_away_from_the_tcp_port() -> None:
+def test_one_host_at_a_time_is_served() -> None:
     with RunningMock("--tcp", "127.0.0.1:0", "--lock-step") as mock, SerialHost(mock.url) as host:
         host.ask(c.Hello(2, 1))
         with SerialHost(mock.url) as second, pytest.raises(serial.SerialException):
             second.port.read(1)
         assert isinstance(host.ask(c.Hello(2, 1)), c.HelloReply)
-
-
-def test_a_pseudo_terminal_takes_one_host_at_a_time() -> None:
     with RunningMock("--pty") as mock, SerialHost(mock.url), pytest.raises(serial.SerialException):
         SerialHost(mock.url)
 
@@ -104,12 +101,9 @@ def test_it_ends_with_its_owner_and_leaves_nothing(tmp_path: Path) -> None:
     assert not control.exists()
 
 
-def test_sigterm_is_a_good_end() -> None:
+def test_sigterm_is_a_good_end_and_kill_a_bad_one() -> None:
     with RunningMock("--pty") as mock:
         assert mock.interrupt() == 0
-
-
-def test_kill_is_a_bad_end() -> None:
     with RunningMock("--pty") as mock:
         with pytest.raises(AssertionError):
             mock.control("kill")

@@ -1,4 +1,4 @@
-"""The generated closed form is that of its sources, and describes the same arm as the recursions."""
+"""The generated closed form is that of its sources and describes the arm of the recursions."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +10,7 @@ import pytest
 from model.dynamics import effective_inertia, recursive, three_joint, three_joint_motion
 from model.dynamics.dual import DUAL_STEP
 from model.dynamics.effective_inertia import effective_parameters, has_closed_form
+from model.dynamics.linear_solve import solve_symmetric
 from model.dynamics.rod_arm import LENGTH_2, PUBLISHED_INERTIA, SIZE, RodArm, effective_from_rods
 from model.generation.printing import source_hash, text_hash
 from model.kinematics.chain import Chain, ChainError, FloatArray, Joint
@@ -88,11 +89,15 @@ def test_published_inertia_exceeds_the_exact_one(mass: float, load: float, lengt
     assert published / exact - 1 == pytest.approx(excess, abs=0.005)
 
 
-def test_published_inertia_changes_nothing_but_the_inertia_of_link_3() -> None:
+def test_published_inertia_changes_link_3_alone_and_another_shape_has_no_closed_form() -> None:
     exact = effective_from_rods(OFFSET_ARM.vector())
     published = effective_from_rods(replace(OFFSET_ARM, published_inertia=True).vector())
     changed = {effective_inertia.NAMES[i] for i in np.flatnonzero(exact != published)}
     assert changed == {"I3_ZZ", "I3_YY_XX"}
+    assert has_closed_form(TABLE_7_9.chain())
+    assert not has_closed_form(random_chain(1, 3))
+    with pytest.raises(ChainError, match="closed form needs three revolute joints"):
+        effective_parameters(random_chain(1, 2))
 
 
 def test_sensitivities_to_physical_parameters_are_exact() -> None:
@@ -147,14 +152,14 @@ def test_recursion_gives_the_same_sensitivity_to_a_mass() -> None:
     np.testing.assert_allclose(exact, (sides[0] - sides[1]) / 2e-5, rtol=1e-6, atol=1e-7)
 
 
-def test_generated_module_belongs_to_its_sources() -> None:
+def test_the_generated_module_is_that_of_its_sources_unedited() -> None:
     assert source_hash() == three_joint.SOURCE_HASH, REGENERATE
-
-
-def test_generated_module_was_not_edited() -> None:
     text = Path(three_joint.__file__).read_text(encoding="utf-8")
     _, body = text.split(f'TEXT_HASH = "{three_joint.TEXT_HASH}"\n\n\n')
     assert text_hash(body) == three_joint.TEXT_HASH, REGENERATE
+    assert len(effective_inertia.NAMES) == effective_inertia.SIZE
+    for index, name in enumerate(effective_inertia.NAMES):
+        assert getattr(effective_inertia, name) == index
 
 
 @pytest.mark.slow
@@ -167,14 +172,27 @@ def test_generating_again_gives_the_committed_module() -> None:
     assert python_module(generated) == Path(three_joint.__file__).read_text(encoding="utf-8")
 
 
-def test_layout_names_are_the_index_constants() -> None:
-    assert len(effective_inertia.NAMES) == effective_inertia.SIZE
-    for index, name in enumerate(effective_inertia.NAMES):
-        assert getattr(effective_inertia, name) == index
+# ---- What other engines do not show: the inertia is symmetric to the bit, and a solution carries derivatives
+
+CHAINS = [*(random_chain(11, n) for n in range(1, 7)), TABLE_7_9.chain(), OFFSET_ARM.chain()]
 
 
-def test_a_chain_of_another_shape_has_no_closed_form() -> None:
-    assert has_closed_form(TABLE_7_9.chain())
-    assert not has_closed_form(random_chain(1, 3))
-    with pytest.raises(ChainError, match="closed form needs three revolute joints"):
-        effective_parameters(random_chain(1, 2))
+@pytest.mark.parametrize("chain", CHAINS)
+def test_inertia_is_symmetric_and_positive(chain: Chain) -> None:
+    for seed in range(5):
+        q, _, _ = random_state(seed, chain.joint_count)
+        matrix = recursive.mass_matrix(chain.arrays(), q)
+        np.testing.assert_array_equal(matrix, matrix.T)
+        assert np.linalg.eigvalsh(matrix)[0] > 0
+
+
+@pytest.mark.parametrize("size", range(1, 7))
+def test_symmetric_solve_carries_derivatives(size: int) -> None:
+    rng = np.random.default_rng(size)
+    factor, slope = rng.normal(size=(2, size, size))
+    matrix, change = factor @ factor.T + np.eye(size), slope + slope.T
+    right = rng.normal(size=size)
+    solution = solve_symmetric(matrix + 1j * DUAL_STEP * change, right.astype(complex))
+    expected = np.linalg.solve(matrix, right)
+    np.testing.assert_allclose(solution.real, expected, rtol=1e-10)
+    np.testing.assert_allclose(solution.imag / DUAL_STEP, -np.linalg.solve(matrix, change @ expected), rtol=1e-8)

@@ -55,20 +55,13 @@ def root(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_kernel_depends_on_what_it_imports_wherever_it_does_so(root: Path) -> None:
+def test_a_key_is_that_of_all_that_a_kernel_imports(root: Path) -> None:
     found = dependencies("model.simulation.kernel", root)
     assert {path.relative_to(root).as_posix() for path in found.values()} == REACHED
-
-
-@pytest.mark.parametrize("name", sorted(SOURCES))
-def test_an_edit_of_what_is_compiled_gives_another_key_and_an_edit_elsewhere_does_not(root: Path, name: str) -> None:
-    before = source_hash("model.simulation.kernel", root)
-    path = root / name
-    path.write_text(path.read_text() + "\nMORE = 1\n")
-    assert (source_hash("model.simulation.kernel", root) != before) == (name in REACHED)
-
-
-def test_a_module_that_becomes_a_package_gives_another_key(root: Path) -> None:
+    before = source_hash("drag_of_my_arm", root)
+    report = root / "model/reports/page.py"
+    report.write_text(report.read_text() + "\nMORE = 1\n")
+    assert source_hash("drag_of_my_arm", root) != before
     before = source_hash("model.simulation.kernel", root)
     module = root / "model/dynamics/arm.py"
     text = module.read_text()
@@ -79,23 +72,21 @@ def test_a_module_that_becomes_a_package_gives_another_key(root: Path) -> None:
     assert "model.reports.page" in dependencies("model.simulation.kernel", root)
 
 
-def test_a_module_of_the_users_own_depends_on_the_whole_model(root: Path) -> None:
-    before = source_hash("drag_of_my_arm", root)
-    report = root / "model/reports/page.py"
-    report.write_text(report.read_text() + "\nMORE = 1\n")
-    assert source_hash("drag_of_my_arm", root) != before
+@pytest.mark.parametrize("name", sorted(SOURCES))
+def test_an_edit_of_what_is_compiled_gives_another_key_and_an_edit_elsewhere_does_not(root: Path, name: str) -> None:
+    before = source_hash("model.simulation.kernel", root)
+    path = root / name
+    path.write_text(path.read_text() + "\nMORE = 1\n")
+    assert (source_hash("model.simulation.kernel", root) != before) == (name in REACHED)
 
 
-def test_every_global_that_the_kernels_reach_comes_from_a_module_of_the_key() -> None:
-    """What compiled code refers to is followed at run time and compared with what the imports say."""
+def test_kernels_reach_only_modules_of_the_key_by_their_own_names() -> None:
+    # What compiled code refers to is followed at run time and compared with what the imports say
     reached = dependencies("model.simulation.kernel")
     for name in (m for m in reached if m.startswith("model.")):
         namespace = vars(__import__(name, fromlist=["_"]))
         of_ours = {getattr(value, "__module__", None) or "" for value in namespace.values()}
         assert {m for m in of_ours if m.startswith("model.")} <= set(reached), name
-
-
-def test_compiled_modules_take_nothing_by_name_at_run_time() -> None:
     folder = Path(model.__file__).parent
     for path in dependencies("model.simulation.kernel").values():
         if path.is_relative_to(folder) and path.name != "compilation.py":
@@ -103,22 +94,21 @@ def test_compiled_modules_take_nothing_by_name_at_run_time() -> None:
                 ast.unparse(node.func) for node in ast.walk(ast.parse(path.read_bytes())) if isinstance(node, ast.Call)
             }
             assert not called & {"import_module", "importlib.import_module", "__import__", "setattr", "globals"}, path
-
-
-def test_the_simulation_does_not_depend_on_reports_and_fits() -> None:
     reached = dependencies("model.simulation.kernel")
     assert {"model.dynamics.recursive", "model.drives.amplifier", "model.layout"} <= set(reached)
     others = [m for m in reached if m.startswith(("model.reports", "model.fitting", "extras.thesis", "daq."))]
     assert set(others) == {"daq.contracts", "daq.contracts.file_lock"}, "the lock of the cache alone"
 
 
-def test_numba_caches_into_the_folder_of_these_sources() -> None:
+def test_machine_code_lies_in_the_folder_of_these_sources_and_no_path_decides() -> None:
     for function, module in ((kernel.run_closed_form, "kernel"), (recursive.forward_dynamics, "recursive")):
         assert function.py_func.__module__.endswith(module)
         assert Path(function.stats.cache_path).parent == cache_folder(function.py_func.__module__)
     assert cache_folder(kernel.__name__).name == source_hash(kernel.__name__)
     assert cache_folder(kernel.__name__) != cache_folder(recursive.__name__)
     assert cache_folder(kernel.__name__).parent == compilation._PARENT
+    assert Path(kernel.run_closed_form.stats.cache_path).name == "model.simulation"
+    assert SharedCacheLocator.get_suitable_cache_subpath("/a/user/s/own/effect.py").startswith("own_")
 
 
 USES_ONE = """
@@ -144,16 +134,18 @@ def test_another_clone_of_the_same_sources_compiles_nothing_again(tmp_path: Path
     assert told == [["0", "1"], ["1", "0"]]
 
 
-def test_machine_code_does_not_lie_by_where_the_sources_do() -> None:
-    assert Path(kernel.run_closed_form.stats.cache_path).name == "model.simulation"
-    assert SharedCacheLocator.get_suitable_cache_subpath("/a/user/s/own/effect.py").startswith("own_")
-
-
-def test_one_process_compiles_while_others_wait() -> None:
+def test_one_process_compiles_while_others_wait_where_locks_work(monkeypatch: pytest.MonkeyPatch) -> None:
     with (cache_folder(recursive.__name__) / "lock").open("a") as another:
         with one_process_at_a_time(recursive.__name__), pytest.raises(BlockingIOError):
             fcntl.flock(another, fcntl.LOCK_EX | fcntl.LOCK_NB)
         fcntl.flock(another, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    def refused(_file: object, _how: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", refused)
+    with one_process_at_a_time(recursive.__name__), pytest.raises(ValueError, match="own"):
+        raise ValueError("its own errors pass")
 
 
 FULL = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"
@@ -170,15 +162,6 @@ def test_without_room_for_a_cache_it_computes_and_says_so_once(tmp_path: Path, f
     (line,) = run.stderr.splitlines()
     assert line.startswith(f"Compiled code cannot be kept in {tmp_path / folder} (")
     assert "NUMBA_CACHE_DIR" in line
-
-
-def test_a_lock_that_the_file_system_refuses_is_done_without(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(_file: object, _how: int) -> None:
-        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
-
-    monkeypatch.setattr(fcntl, "flock", refused)
-    with one_process_at_a_time(recursive.__name__), pytest.raises(ValueError, match="own"):
-        raise ValueError("its own errors pass")
 
 
 def test_only_old_caches_are_removed(tmp_path: Path) -> None:

@@ -27,14 +27,30 @@ def test_by_default_every_number_with_an_expected_deviation_is_found_but_what_fi
     assert held == {name for name in chosen if not name.startswith("joint2.")}
 
 
-def test_a_parameter_that_is_named_is_found_between_its_own_bounds_about_its_expected_value() -> None:
+def test_a_named_parameter_is_found_between_its_bounds_unless_it_is_held() -> None:
+    # A parameter that is named is found between its own bounds about its expected value
     (mass,) = chosen_unknowns(arm(), MASS)
     own = arm().parameter("load.mass")
     assert (mass.start, mass.low, mass.high) == (own.value, own.low, own.high)
     assert (mass.expected, mass.deviation, mass.nuisance) == (own.value, own.deviation, False)
+    # What is held is held even where it is named
+    both = FitOptions(parameters=("load.mass", "joint2.motor.*"), held=("joint2.motor.resistance",))
+    names = {u.name for u in chosen_unknowns(arm(), both)}
+    assert "load.mass" in names
+    assert "joint2.motor.resistance" not in names
+    assert "joint2.motor.torque_constant" in names, "named, it is found though it fixes the scale of torque"
+    # Its expected deviation is zero
+    load = machine().load
+    assert load is not None
+    model = base_model(machine().model_copy(update={"load": load.model_copy(update={"deviation": 0.0})}))
+    assert model.parameter("load.mass").deviation == 0.0
+    assert "load.mass" in {u.name for u in chosen_unknowns(arm(), FitOptions())}
+    assert "load.mass" not in {u.name for u in chosen_unknowns(model, FitOptions())}
+    (mass,) = chosen_unknowns(model, MASS)
+    assert mass.deviation is None, "nothing is expected of it"
 
 
-def test_bounds_and_priors_may_be_given_or_left_out() -> None:
+def test_bounds_and_priors_may_be_left_out_or_be_all_that_is_possible() -> None:
     value = arm().parameter("load.mass").value
     bounded = MASS.model_copy(update={"bounds": {"load.mass": (value - 0.1, None)}})
     (mass,) = chosen_unknowns(arm(), bounded)
@@ -46,44 +62,21 @@ def test_bounds_and_priors_may_be_given_or_left_out() -> None:
     assert mass.deviation is None
     with pytest.raises(SpecError, match="nothing to fit"):
         chosen_unknowns(arm(), FitOptions(held=("*",)))
-
-
-def test_a_number_that_is_exactly_known_is_not_found_unless_it_is_named() -> None:
-    """Its expected deviation is zero."""
-    load = machine().load
-    assert load is not None
-    model = base_model(machine().model_copy(update={"load": load.model_copy(update={"deviation": 0.0})}))
-    assert model.parameter("load.mass").deviation == 0.0
-    assert "load.mass" in {u.name for u in chosen_unknowns(arm(), FitOptions())}
-    assert "load.mass" not in {u.name for u in chosen_unknowns(model, FitOptions())}
-    (mass,) = chosen_unknowns(model, MASS)
-    assert mass.deviation is None, "nothing is expected of it"
-
-
-def test_what_is_held_is_held_even_where_it_is_named() -> None:
-    both = FitOptions(parameters=("load.mass", "joint2.motor.*"), held=("joint2.motor.resistance",))
-    names = {u.name for u in chosen_unknowns(arm(), both)}
-    assert "load.mass" in names
-    assert "joint2.motor.resistance" not in names
-    assert "joint2.motor.torque_constant" in names, "named, it is found though it fixes the scale of torque"
+    (mass,) = chosen_unknowns(arm(), MASS.model_copy(update={"bounds": {"load.mass": (0.0, None)}}))
+    assert (mass.low, mass.high) == (0.0, math.inf)
 
 
 @pytest.mark.parametrize(
     ("bounds", "says"),
     [
         ((1.0, 1.0), "lower bound 1 kg is not below the upper bound 1 kg"),
-        ((-0.001, 2.0), "bounds -0.001 to 2 kg leave what is possible, 0 to inf"),
-        ((None, 2.0), "bounds -inf to 2 kg leave what is possible, 0 to inf"),
+        ((-0.001, 2.0), "bounds -0.001 to 2 kg exceed the physical limits, 0 to inf"),
+        ((None, 2.0), "bounds -inf to 2 kg exceed the physical limits, 0 to inf"),
     ],
 )
 def test_bounds_are_in_order_and_within_what_is_possible(bounds: tuple[float | None, float], says: str) -> None:
     with pytest.raises(SpecError, match=says):
         chosen_unknowns(arm(), MASS.model_copy(update={"bounds": {"load.mass": bounds}}))
-
-
-def test_bounds_may_be_all_that_is_possible() -> None:
-    (mass,) = chosen_unknowns(arm(), MASS.model_copy(update={"bounds": {"load.mass": (0.0, None)}}))
-    assert (mass.low, mass.high) == (0.0, math.inf)
 
 
 def test_a_prior_may_be_taken_away_and_expectations_are_the_machine_s_and_not_the_model_s() -> None:

@@ -1,9 +1,13 @@
-"""Coordinates of bodies that can exist: which numbers they take, what they refuse, and a fit of motion in them."""
+"""Coordinates of bodies that can exist: log-Cholesky parameters, what they refuse, and a fit of motion in them."""
 
 from dataclasses import replace
 
 import numpy as np
+import pinocchio
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import parse_machine
@@ -12,7 +16,7 @@ from model.arrays import Floats
 from model.fitting.choice import chosen_unknowns
 from model.fitting.consistent_bodies import ConsistentBodies, coordinates_of
 from model.fitting.fit import fit
-from model.fitting.log_cholesky import second_moments
+from model.fitting.log_cholesky import ENTRIES, body_of, log_cholesky, matrix_of, second_moments
 from model.fitting.options import FitOptions
 from model.fitting.profile import profile
 from model.machine_model.model import Model, base_model
@@ -22,7 +26,7 @@ from tests.model.simulation.machines import PENDULUM, SLIDE
 from tests.model.simulation.records import trace_of
 
 ALL = ("link1.mass", "link1.centre_*", "link1.inertia_*")
-ENTRIES = ("xx", "yy", "zz", "xy", "xz", "yz")
+INERTIAS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
 def of_body(*moments: float, mass: float = 1.2, text: str = PENDULUM, zz: str = "") -> Model:
@@ -55,7 +59,7 @@ def refused(model: Model, *parameters: str, **options: object) -> str:
 
 
 def least_share(model: Model) -> float:
-    second = second_moments(np.array([model.parameter(f"link1.inertia_{e}").value for e in ENTRIES]))
+    second = second_moments(np.array([model.parameter(f"link1.inertia_{e}").value for e in INERTIAS]))
     return float(np.linalg.eigvalsh(second)[0] / np.trace(second))
 
 
@@ -142,17 +146,14 @@ def test_what_cannot_be_is_refused_in_one_line() -> None:
     assert "link1.round: sets several parameters at once" in refused(tied, "link1.round", "link1.inertia_zz")
 
 
-def test_a_plate_and_a_point_may_be_stated() -> None:
-    """They are on the edge of what can exist. A fit of the plate's moments starts a millionth inside."""
+def test_what_cannot_be_is_refused_a_plate_may_be_stated_and_without_a_body_nothing_changes() -> None:
+    # They are on the edge of what can exist. A fit of the plate's moments starts a millionth inside
     plate = of(of_body(0.01, 0.02, 0.03, 0, 0, 0), *ALL)
     begun = plate.values(np.zeros(10))
     np.testing.assert_allclose(begun[4:7], [0.01, 0.02, 0.03], rtol=1e-5)
     assert np.linalg.eigvalsh(second_moments(begun[4:]))[0] > 0
     point = of(of_body(0, 0, 0, 0, 0, 0), "link1.mass", "link1.centre_*")
     np.testing.assert_allclose(point.values(np.zeros(4)), [1.2, -0.25, 0.02, 0.01])
-
-
-def test_without_a_body_nothing_changes() -> None:
     rod = base_model(parse_machine(PENDULUM))
     chosen = FitOptions(parameters=("link1.*",))
     unknowns = chosen_unknowns(rod, chosen)
@@ -206,3 +207,98 @@ def test_searches_from_drawn_beginnings_stay_among_bodies_that_can_exist() -> No
     short = FitOptions(parameters=names, sensor_bend=False, start_posture=False, replicas=0, rounds=1, starts=4)
     options = short.model_copy(update={"consistent_inertias": True})
     assert least_share(fit(model, [trace], options).model) > 0
+
+
+# ---- Log-Cholesky parameters
+
+FREE = np.zeros(3, dtype=bool)
+SEVEN = arrays(float, 7, elements=st.floats(-3, 3))
+
+
+def published(seven: Floats, centre: Floats) -> Floats:
+    """J = U Uᵀ as Rucker and Wensing print U."""
+    a, d1, d2, d3, s12, s13, s23 = seven
+    rows = [
+        [np.exp(d1), s12, s13, centre[0]],
+        [0.0, np.exp(d2), s23, centre[1]],
+        [0.0, 0.0, np.exp(d3), centre[2]],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+    upper = np.exp(a) * np.array(rows)
+    return np.asarray(upper @ upper.T)
+
+
+def in_pinocchio(seven: Floats) -> pinocchio.LogCholeskyParameters:
+    """The same body there, which has s23 before s13; its centre is at the origin."""
+    a, d1, d2, d3, s12, s13, s23 = seven
+    return pinocchio.LogCholeskyParameters(np.array([a, d1, d2, d3, s12, s23, s13, 0.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_mass_centre_and_moments_are_those_of_the_published_matrix(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    seven, centre = rng.normal(size=7), rng.normal(size=3)
+    pseudo = published(seven, centre)
+    mass = pseudo[3, 3]
+    assert np.exp(2 * seven[0]) == pytest.approx(mass)
+    np.testing.assert_allclose(pseudo[:3, 3] / mass, centre)
+    about_origin = np.trace(pseudo[:3, :3]) * np.eye(3) - pseudo[:3, :3]
+    about_centre = about_origin - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    found, _ = body_of(seven, FREE, np.zeros(6))
+    np.testing.assert_allclose(matrix_of(found), about_centre, atol=1e-11 * np.abs(about_origin).max())
+    np.testing.assert_allclose(log_cholesky(mass, found), seven, atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_pinocchio_has_the_same_body_and_the_same_derivatives(seed: int) -> None:
+    seven = np.random.default_rng(seed).normal(size=7)
+    other = in_pinocchio(seven)
+    found, slopes = body_of(seven, FREE, np.zeros(6))
+    np.testing.assert_allclose(matrix_of(found), other.toInertia().inertia, rtol=1e-12, atol=1e-12)
+    # Pinocchio: m, mc (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz about the origin, by α, d (3), s12, s23, s13, t (3)
+    theirs = np.array(other.calculateJacobian())[np.ix_([4, 6, 9, 5, 7, 8], [0, 1, 2, 3, 4, 6, 5])]
+    np.testing.assert_allclose(slopes, theirs, rtol=1e-12, atol=1e-12 * np.abs(theirs).max())
+
+
+@pytest.mark.parametrize("held", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 1, 1)])
+def test_derivatives_are_those_of_differences_and_held_products_stay(held: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(3)
+    products, seven = np.array(held, dtype=bool), 0.5 * rng.normal(size=7)
+    stated = np.array([0.0, 0.0, 0.0, 0.3, -0.2, 0.1])
+    found, slopes = body_of(seven, products, stated)
+    np.testing.assert_array_equal(found[3:][products], stated[3:][products])
+    step = 1e-6 * np.eye(7)
+    differences = [
+        (body_of(seven + s, products, stated)[0] - body_of(seven - s, products, stated)[0]) / 2e-6 for s in step
+    ]
+    np.testing.assert_allclose(slopes, np.array(differences).T, atol=1e-7 * np.abs(slopes).max())
+    np.testing.assert_array_equal(slopes[:, 4:][:, products], 0.0)
+    again, _ = body_of(log_cholesky(np.exp(2 * seven[0]), found), products, stated)
+    np.testing.assert_allclose(again, found, rtol=1e-9)
+
+
+@given(SEVEN, arrays(bool, 3), arrays(float, 3, elements=st.floats(-1, 1)))
+def test_whatever_the_numbers_the_body_can_exist(seven: Floats, held: Floats, products: Floats) -> None:
+    moments, _ = body_of(seven, held, np.concatenate([np.zeros(3), products]))
+    assert np.exp(2 * seven[0]) > 0
+    least, middle, most = np.linalg.eigvalsh(matrix_of(moments))
+    assert least > 0
+    assert least + middle >= most * (1 - 1e-9), "but for rounding: a plate may be thinner than the digits show"
+    assert np.linalg.eigvalsh(second_moments(moments))[0] >= -1e-9 * most
+
+
+@given(SEVEN.filter(lambda seven: float(np.abs(seven).max()) < 1.5))
+def test_a_body_of_ordinary_shape_satisfies_the_inequality_strictly(seven: Floats) -> None:
+    moments, _ = body_of(seven, FREE, np.zeros(6))
+    least, middle, most = np.linalg.eigvalsh(matrix_of(moments))
+    assert least + middle > most
+    np.testing.assert_allclose(log_cholesky(float(np.exp(2 * seven[0])), moments), seven, atol=1e-6)
+
+
+def test_moments_of_no_body_have_no_parameters_and_entries_keep_the_file_s_order() -> None:
+    with pytest.raises(np.linalg.LinAlgError):
+        log_cholesky(1.0, np.array([1.0, 1.0, 2.1, 0.0, 0.0, 0.0]))
+    with pytest.raises(np.linalg.LinAlgError):
+        log_cholesky(0.0, np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+    assert ENTRIES == ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    np.testing.assert_array_equal(matrix_of(np.arange(6.0)), [[0, 3, 4], [3, 1, 5], [4, 5, 2]])

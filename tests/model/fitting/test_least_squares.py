@@ -1,19 +1,23 @@
-"""The search itself, on problems whose answer is known without it."""
+"""The search on problems whose answer is known: bounded steps, whitening, directions without information."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.optimize import least_squares, lsq_linear
+from scipy.signal import lfilter
 
 from daq.contracts.progress import Never
 from model.arrays import Floats
+from model.fitting.bounded_step import bounded_step
+from model.fitting.directions import sparse_basis, torque_scale, undetermined
 from model.fitting.fit import _settled
 from model.fitting.least_squares import Search, solve
 from model.fitting.problem import Evaluation
 from model.fitting.unknowns import Unknown
-from model.fitting.whitening import white
+from model.fitting.whitening import Whitener, autocovariance, fitted_whitener, white
 from model.machine_model.parameter import Kind, Parameter
 
 
@@ -77,22 +81,37 @@ def found_elsewhere(problem: Curve, robust: bool = False) -> Floats:
     )
 
 
-def test_finds_the_least_squares_with_few_jacobians() -> None:
+def test_finds_the_least_squares_with_few_jacobians_and_says_when_it_had_too_few() -> None:
+    # Finds the least squares with few jacobians
     problem = curve()
     solution = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-9))
     np.testing.assert_allclose(solution.values, found_elsewhere(problem), rtol=1e-5)
     assert solution.converged
     assert problem.jacobians < solution.evaluations
+    # Says when it was not given enough evaluations
+    solution = solve(curve(), [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-9, 2))
+    assert not solution.converged
+    assert solution.evaluations == 2
+
+    class Line(Curve):
+        def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
+            J = np.stack([np.ones(200), self.time, self.time**2])
+            self.jacobians += derivatives
+            return [Evaluation((values @ J - self.measured)[:, None], J[:, :, None] if derivatives else None)]
+
+    time = np.linspace(0.0, 3.0, 200)
+    problem = Line(1.0 - time + 0.3 * time**2 + 0.01 * np.random.default_rng(4).standard_normal(200))
+    solution = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-9))
+    J = np.stack([np.ones(200), time, time**2], axis=1)
+    np.testing.assert_allclose(solution.values, lsq_linear(J, problem.measured).x, atol=1e-4)
+    assert solution.evaluations <= 5
 
 
-def test_outliers_weigh_as_huber_says() -> None:
+def test_outliers_weigh_as_huber_says_also_when_the_search_is_cut_short() -> None:
     problem = curve()
     problem.measured[50:60] += 5.0
     solution = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(True, 1e-10, 200))
     np.testing.assert_allclose(solution.values, found_elsewhere(problem, robust=True), rtol=1e-3)
-
-
-def test_outliers_weigh_in_the_information_as_in_the_steps_when_the_search_is_cut_short() -> None:
     problem = curve()
     problem.measured[50:60] += 5.0
     found = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(True, 1e-12, 7))
@@ -112,28 +131,6 @@ def test_bounds_hold_and_the_others_are_best_under_them(bounds: tuple[tuple[floa
     assert (solution.values >= low).all()
     assert (solution.values <= high).all()
     np.testing.assert_allclose(solution.values, found_elsewhere(problem), rtol=2e-3)
-
-
-def test_a_straight_problem_takes_one_step() -> None:
-    @dataclass
-    class Line(Curve):
-        def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
-            J = np.stack([np.ones(200), self.time, self.time**2])
-            self.jacobians += derivatives
-            return [Evaluation((values @ J - self.measured)[:, None], J[:, :, None] if derivatives else None)]
-
-    time = np.linspace(0.0, 3.0, 200)
-    problem = Line(1.0 - time + 0.3 * time**2 + 0.01 * np.random.default_rng(4).standard_normal(200))
-    solution = solve(problem, [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-9))
-    J = np.stack([np.ones(200), time, time**2], axis=1)
-    np.testing.assert_allclose(solution.values, lsq_linear(J, problem.measured).x, atol=1e-4)
-    assert solution.evaluations <= 5
-
-
-def test_says_when_it_was_not_given_enough_evaluations() -> None:
-    solution = solve(curve(), [white(0.01)], np.array([1.0, 0.5, 0.0]), Never(), Search(False, 1e-9, 2))
-    assert not solution.converged
-    assert solution.evaluations == 2
 
 
 @dataclass
@@ -231,3 +228,115 @@ def test_values_have_settled_where_a_search_takes_no_step_because_none_promises_
     assert first.steps > 0
     assert again.converged
     assert _settled(first.values, again)
+
+
+# ---- The step within bounds: free where nothing is in the way, and best for the others where a bound is met
+
+CURVATURE = np.array([[4.0, 1.0, 0.5], [1.0, 3.0, 0.2], [0.5, 0.2, 2.0]])
+DESCENT = np.array([2.0, -3.0, 1.0])
+FAR = np.full(3, 100.0)
+
+
+@pytest.mark.parametrize(("held", "bound"), [(0, 0.2), (1, -0.4), (2, 0.1)])
+def test_one_that_meets_its_bound_stays_there_and_the_others_take_it_into_account(held: int, bound: float) -> None:
+    low, high = -FAR, FAR.copy()
+    (low if bound < 0 else high)[held] = bound
+    step = bounded_step(CURVATURE, DESCENT, low, high)
+    others = [k for k in range(3) if k != held]
+    assert step[held] == bound
+    np.testing.assert_allclose((CURVATURE @ step)[others], DESCENT[others])
+
+
+def test_a_step_at_its_bounds_is_the_corner_and_one_that_just_reaches_is_not_shortened() -> None:
+    small = np.array([1e-3, 2e-3, 3e-3])
+    np.testing.assert_array_equal(bounded_step(CURVATURE, DESCENT, -small, small), small * [1, -1, 1])
+    whole = np.linalg.solve(CURVATURE, DESCENT)
+    np.testing.assert_array_equal(bounded_step(CURVATURE, DESCENT, np.minimum(whole, 0), np.maximum(whole, 0)), whole)
+
+
+# ---- Whitening: the filter undoes a known correlation, and never claims less noise than the sensor has
+
+
+def autoregressive(seed: int, count: int, weights: tuple[float, ...], deviation: float) -> NDArray[np.float64]:
+    """Samples of x_k = Σ w_i x_{k−i} + e_k, started long before."""
+    noise = deviation * np.random.default_rng(seed).normal(size=count + 500)
+    return np.asarray(lfilter([1.0], np.append(1.0, -np.array(weights)), noise))[500:]
+
+
+def test_the_weights_of_a_known_process_whiten_it_from_the_first_sample_on() -> None:
+    runs = [autoregressive(seed, 4000, (0.9, -0.5), 2.0) for seed in range(3)]
+    whitener = fitted_whitener(runs, 8, floor=1e-6)
+    found = whitener.predictors[-1]
+    assert found[:2] == pytest.approx([0.9, -0.5], abs=0.05)
+    assert np.abs(found[2:]).max(initial=0.0) < 0.05
+    assert whitener.deviations[-1] == pytest.approx(2.0, rel=0.03)
+    whitener = fitted_whitener([autoregressive(1, 20_000, (0.95,), 1.0)], 4, floor=1e-6)
+    fresh = np.array([whitener.whitened(autoregressive(100 + s, 30, (0.95,), 1.0)) for s in range(2000)])
+    assert fresh[:, 0].std() == pytest.approx(1.0, abs=0.08)
+    assert fresh[:, 5:].std() == pytest.approx(1.0, abs=0.03)
+    assert np.mean(fresh[:, 1:] * fresh[:, :-1]) == pytest.approx(0.0, abs=0.03)
+    whitener = fitted_whitener([autoregressive(2, 4000, (0.7,), 1.0)], 4, floor=1e-6)
+    columns = np.random.default_rng(0).normal(size=(40, 3))
+    one_by_one = np.stack([whitener.whitened(c) for c in columns.T], axis=1)
+    np.testing.assert_allclose(whitener.whitened(columns), one_by_one, atol=1e-12)
+
+
+def test_coloured_undoes_whitened_and_noise_follows_its_own_past() -> None:
+    whitener = fitted_whitener([autoregressive(3, 20_000, (0.9, -0.5), 2.0)], 4, floor=1e-6)
+    made = whitener.coloured(np.random.default_rng(5).normal(size=20_000))
+    np.testing.assert_allclose(whitener.coloured(whitener.whitened(made)[4:])[200:], made[204:], rtol=1e-6, atol=1e-6)
+    assert made.std() == pytest.approx(autoregressive(4, 20_000, (0.9, -0.5), 2.0).std(), rel=0.05)
+    whitener = Whitener((np.zeros(0), np.array([0.5]), np.array([0.6, -0.2])), np.array([4.0, 2.0, 3.0]))
+    found = whitener.coloured(np.array([1.0, 0.0, 0.0, 0.0]))
+    np.testing.assert_allclose(found, [3.0, 1.8, 0.6 * 1.8 - 0.2 * 3, 0.6 * 0.48 - 0.2 * 1.8])
+    runs = [np.ones(10), -np.ones(10)]
+    assert autocovariance(runs, 1)[1] == pytest.approx(18 / 20)
+    assert fitted_whitener([np.zeros(500)], 8, floor=0.3).deviations[-1] == 0.3
+    drift = np.linspace(-1e-3, 1e-3, 500)
+    assert fitted_whitener([100 * drift], 8, floor=0.3).deviations[-1] >= 0.3
+
+
+def test_each_sample_is_less_what_those_before_it_predict_in_units_of_the_prediction_s_error() -> None:
+    whitener = Whitener((np.zeros(0), np.array([0.5]), np.array([0.6, -0.2])), np.array([4.0, 2.0, 1.0]))
+    found = whitener.whitened(np.array([8.0, 3.0, 1.0, 2.0]))
+    np.testing.assert_allclose(found, [8 / 4, (3 - 4) / 2, 1 - 0.6 * 3 + 0.2 * 8, 2 - 0.6 * 1 + 0.2 * 3])
+    np.testing.assert_allclose(whitener.whitened(np.array([8.0, 3.0])), [2.0, -0.5])
+    assert whitener.order == 2
+
+
+# ---- Directions without information: their size, their deviation, and the scale of torque among them
+
+
+def test_the_scale_of_torque_changes_each_by_its_power_and_comes_first_once() -> None:
+    values, natural = np.array([2.0, 4.0, 0.3, 5.0]), np.array([1.0, 0.5, 0.1, 1.0])
+    direction = torque_scale(values, natural, (1, -1, 0, 0))
+    assert direction is not None
+    np.testing.assert_allclose(direction, [0.25, -1.0, 0.0, 0.0])
+    jacobian = np.array([[10.0, -10.0, 0.0], [0.0, 0.0, 0.0]])
+    scale, other = undetermined(jacobian, np.ones(3), np.ones(3), (1, 1, 0))
+    assert (scale.torque_scale, other.torque_scale) == (True, False)
+    np.testing.assert_allclose(scale.members, [1.0, 1.0, 0.0])
+    np.testing.assert_allclose(np.abs(other.members), [0.0, 0.0, 1.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("torque", [(0, 0), (1, 0)])
+def test_fewer_than_two_with_torque_in_their_unit_have_no_scale(torque: tuple[int, ...]) -> None:
+    assert torque_scale(np.ones(2), np.ones(2), torque) is None
+    assert torque_scale(np.array([1.0, 0.0]), np.ones(2), (1, 1)) is None
+
+
+def test_a_direction_counts_in_natural_sizes_with_a_member_of_its_own() -> None:
+    assert undetermined(np.diag([0.5]), np.ones(1), np.array([2.1]), (0,)) == []
+    (only,) = undetermined(np.diag([0.5]), np.ones(1), np.array([1.9]), (0,))
+    assert only.deviation == pytest.approx(1.0 / 0.95)
+    found = undetermined(np.diag([100.0, 0.5, 0.0]), np.ones(3), np.array([1.0, 1.0, 2.0]), (0, 0, 0))
+    assert [list(np.abs(each.members)) for each in found] == [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    assert [each.deviation for each in found] == [2.0, float("inf")]
+    assert not any(each.torque_scale for each in found)
+    rows = np.linalg.qr(np.array([[1.0, 2.0, 0.0, 0.0], [0.0, 1.0, 1.0, 3.0]]).T)[0].T
+    basis = np.array(sparse_basis(rows))
+    assert np.linalg.matrix_rank(np.vstack([rows, basis])) == 2
+    assert basis.max(axis=1) == pytest.approx([1.0, 1.0])
+    own = [any(abs(row[k]) > 0.1 and abs(other[k]) < 1e-9 for k in range(4)) for row, other in (basis, basis[::-1])]
+    assert own == [True, True]
+    assert sparse_basis(np.zeros((0, 4))) == []

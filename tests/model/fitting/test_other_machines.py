@@ -55,7 +55,7 @@ def sliding() -> FitResult:
     return fit(rubbing(SLIDE), [record_of(rubbing(SLIDE, 3.0))], ONE)
 
 
-def test_a_carriage_is_fitted_in_metres_and_newtons(sliding: FitResult) -> None:
+def test_a_shaft_is_fitted_by_its_speed_and_a_carriage_in_metres_and_newtons(sliding: FitResult) -> None:
     (error,) = sliding.errors
     assert (error.joint, error.unit) == (1, "m")
     assert error.floor == pytest.approx(np.sqrt(1 / 12) / 2**16)
@@ -64,9 +64,6 @@ def test_a_carriage_is_fitted_in_metres_and_newtons(sliding: FitResult) -> None:
     assert sliding.model.lineage.fit["rmse"] == [error.after]
     assert (sliding.model.lineage.fit["fitted"], sliding.model.lineage.fit["known"]) == ([NAME], [NAME])
     assert sliding.model.lineage.fit["converged"] is sliding.converged
-
-
-def test_a_shaft_with_a_tachometer_is_fitted_by_its_speed() -> None:
     text = PENDULUM + TACHOMETER
     found = fit(rubbing(text), [record_of(rubbing(text, 0.05))], ONE)
     (error,) = found.errors
@@ -151,15 +148,14 @@ def test_a_model_that_does_not_stay_finite_is_told_with_its_record() -> None:
 # ---- the file
 
 
-def test_a_result_is_asked_for_its_parameters_by_name(sliding: FitResult) -> None:
+def test_a_result_is_asked_for_parameters_by_name_and_told_from_a_model(sliding: FitResult, tmp_path: Path) -> None:
+    # A result is asked for its parameters by name
     assert sliding.parameter(NAME).unit == "N·s/m"
     with pytest.raises(SpecError, match=rf"parameter 'mass': was not fitted; fitted were {NAME}"):
         sliding.parameter("mass")
     assert sliding.covariance_matrix.shape == (1, 1)
     assert sliding.names == (NAME,)
-
-
-def test_a_result_is_told_from_a_model(sliding: FitResult, tmp_path: Path) -> None:
+    # A result is told from a model
     sliding.save(tmp_path / "fit.json")
     save_model(sliding.model, tmp_path / "model.json")
     (tmp_path / "list.json").write_text("[]")
@@ -170,6 +166,10 @@ def test_a_result_is_told_from_a_model(sliding: FitResult, tmp_path: Path) -> No
     assert (tmp_path / "fit.json").read_text("utf-8").endswith("}\n")
     with pytest.raises(SpecError, match=r"absent/fit\.json: cannot be written: No such file or directory"):
         sliding.save(tmp_path / "absent" / "fit.json")
+    # A result of a newer version
+    (tmp_path / "new.json").write_text(json.dumps({"format": 99}), "utf-8")
+    with pytest.raises(SpecError, match="format 99 is newer"):
+        load_result(tmp_path / "new.json")
 
 
 # ---- Wrong input to a fit: one clear error, never a number that looks like a result.
@@ -190,24 +190,17 @@ def refused(given: list[Trace], options: FitOptions = SOME) -> str:
     return text
 
 
-def test_no_trace() -> None:
+def test_what_no_fit_can_take_is_refused(good: Trace) -> None:
     assert "at least one" in refused([])
-
-
-def test_the_same_trace_twice(good: Trace) -> None:
     assert "more than once" in refused([good, good])
-
-
-def test_a_value_that_is_not_finite_is_refused(good: Trace) -> None:
     position = good.position.copy()
     position[17, 1] = np.nan
     with pytest.raises(TraceError, match="not finite at sample 17"):
         fit(arm(), [changed(good, position=position)], SOME)
-
-
-def test_a_trace_without_one_joint_is_refused(good: Trace) -> None:
     columns = {n: getattr(good, n)[:, :2] for n in ("position", "set_point", "error", "drive")}
     assert "joint 3 is not in it" in refused([changed(good, joints=(1, 2), **columns)])
+    assert "set points" in refused([changed(good, set_point=None)])
+    assert "nothing to fit" in refused([good], FitOptions(held=("*",)))
 
 
 @pytest.mark.parametrize("signals", [("position", "set_point"), ("position",), ("set_point",)])
@@ -215,10 +208,6 @@ def test_degrees_for_radians(good: Trace, signals: tuple[str, ...]) -> None:
     text = refused([changed(good, **{n: np.degrees(getattr(good, n)) for n in signals})])
     assert "rad" in text
     assert "degrees" in text or "apart throughout" in text
-
-
-def test_no_set_points(good: Trace) -> None:
-    assert "set points" in refused([changed(good, set_point=None)])
 
 
 @pytest.mark.parametrize(
@@ -232,16 +221,6 @@ def test_no_set_points(good: Trace) -> None:
 )
 def test_an_unknown_parameter_name_is_refused(good: Trace, options: FitOptions) -> None:
     assert "not in this model" in refused([good], options)
-
-
-def test_nothing_left_to_fit(good: Trace) -> None:
-    assert "nothing to fit" in refused([good], FitOptions(held=("*",)))
-
-
-def test_a_result_of_a_newer_version(tmp_path: Path) -> None:
-    (tmp_path / "new.json").write_text(json.dumps({"format": 99}), "utf-8")
-    with pytest.raises(SpecError, match="format 99 is newer"):
-        load_result(tmp_path / "new.json")
 
 
 @pytest.mark.parametrize("text", ["", "[1, 2]", "{}", '{"format": 1, "model": 3}'])

@@ -1,4 +1,4 @@
-"""The arithmetic between simulation and result, on numbers small enough to be done by hand."""
+"""The arithmetic between simulation and result, small enough to be done by hand; and what a fit may change."""
 
 import math
 
@@ -17,7 +17,7 @@ from model.fitting.nelder_mead import climb
 from model.fitting.options import FitOptions
 from model.fitting.problem import Evaluation, whitened
 from model.fitting.robust import huber, influence
-from model.fitting.unknowns import Unknown
+from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.fitting.imagined import arm
@@ -37,16 +37,22 @@ def named(value: float, deviation: float, verdict: str, **fields: float) -> dict
     return dict(fitted_parameter(own, value, deviation, report.verdict("load.mass")))
 
 
-def test_a_known_parameter_has_the_interval_that_holds_95_percent() -> None:
+def test_what_a_fit_knows_has_an_interval_within_bounds_and_what_it_does_not_the_model_s_number() -> None:
     found = named(2.0, 0.1, "known")
     assert (found["value"], found["deviation"], found["model_value"], found["before"]) == (2.0, 0.1, 2.0, 1.0)
     assert (found["low"], found["high"]) == (pytest.approx(2.0 - 0.1959964), pytest.approx(2.0 + 0.1959964))
     assert (found["expected"], found["expected_deviation"], found["at_bound"]) == (1.1, 0.2, None)
-
-
-def test_an_interval_ends_at_the_bounds() -> None:
     assert named(0.55, 0.1, "known")["low"] == 0.5
     assert named(2.95, 0.1, "known")["high"] == 3.0
+    found = named(2.0, 0.1, "unknown")
+    assert [found[name] for name in ("value", "deviation", "low", "high")] == [None] * 4
+    assert found["model_value"] == 2.0
+    mass = Parameter(name="load.mass", kind=Kind.INERTIA, part="mass", unit="kg", value=1.0)
+    own = Unknown(mass, 1.0, expected=1.1)
+    verdict = judged(np.array([[100.0]]), np.ones(1), [own]).verdict("load.mass")
+    assert fitted_parameter(own, 1.0, 0.1, verdict).expected is None
+    assert verdict.reason == "the data alone determine it to 0.01 of its value"
+    assert verdict.expected_deviation is None
 
 
 @pytest.mark.parametrize(
@@ -56,34 +62,16 @@ def test_a_value_within_a_millionth_of_its_size_of_a_bound_lies_at_it(value: flo
     assert named(value, 0.1, "known")["at_bound"] == at
 
 
-def test_what_is_not_known_has_no_number_but_the_model_s() -> None:
-    found = named(2.0, 0.1, "unknown")
-    assert [found[name] for name in ("value", "deviation", "low", "high")] == [None] * 4
-    assert found["model_value"] == 2.0
-
-
-def test_nothing_is_expected_where_no_deviation_is_claimed() -> None:
-    mass = Parameter(name="load.mass", kind=Kind.INERTIA, part="mass", unit="kg", value=1.0)
-    own = Unknown(mass, 1.0, expected=1.1)
-    verdict = judged(np.array([[100.0]]), np.ones(1), [own]).verdict("load.mass")
-    assert fitted_parameter(own, 1.0, 0.1, verdict).expected is None
-    assert verdict.reason == "the data alone determine it to 0.01 of its value"
-    assert verdict.expected_deviation is None
-
-
 # ---- verdicts
 
 
-def test_a_parameter_is_known_where_the_data_leave_half_of_its_size_at_most() -> None:
+def test_a_parameter_is_known_where_the_data_leave_half_of_its_size_unless_others_stand_in() -> None:
     for slope, verdict in ((2.01, "known"), (1.99, "unknown")):
         report = judged(np.array([[slope]]), np.ones(1), [unknown("a", "m", 1.0, 1.0)])
         assert report.verdict("a").verdict == verdict
     told = judged(np.array([[20.0]]), np.ones(1), [unknown("a", "m", 1.0, 0.5)]).verdict("a")
     assert told.reason == "the data alone determine it to 0.1 of its expected deviation"
     assert (told.data_deviation, told.alone, told.expected_deviation) == (pytest.approx(0.05), pytest.approx(0.05), 0.5)
-
-
-def test_a_parameter_that_others_can_stand_in_for_is_part_of_a_combination() -> None:
     jacobian = np.array([[10.0, 10.0]])
     told = judged(jacobian, np.ones(2), [unknown("a", "m", 1.0, 0.5), unknown("b", "m", 1.0, 0.5)]).verdict("a")
     assert told.verdict == "combination"
@@ -99,15 +87,6 @@ def test_a_deviation_of_more_than_thirty_sizes_is_not_told(slope: float, told: f
     assert found.reason.startswith(f"its expected deviation changes these records by {slope:.2g} standard deviations")
 
 
-def test_a_change_of_what_is_zero_is_told_in_its_own_unit() -> None:
-    jacobian = np.array([[10.0, 10.0]])
-    unknowns = [unknown("a", "V", 0.0, 2.0), unknown("b", "V", 0.0, 2.0)]
-    (only,) = judged(jacobian, np.zeros(2), unknowns).undetermined
-    assert only.text in ("together a +0.02 V, b −0.02 V", "together a −0.02 V, b +0.02 V")
-    assert not any(member.relative for member in only.members)
-    assert only.deviation is None
-
-
 @pytest.mark.parametrize(("correlation", "together"), [(0.949, False), (0.951, True)])
 def test_estimates_correlated_by_more_than_19_in_20_belong_together(correlation: float, together: bool) -> None:
     covariance = 1e-6 * np.array([[1.0, correlation], [correlation, 1.0]])
@@ -116,12 +95,18 @@ def test_estimates_correlated_by_more_than_19_in_20_belong_together(correlation:
     assert report.correlated == ((("a", "b"),) if together else ())
 
 
-def test_a_chain_of_correlated_estimates_is_one_group() -> None:
+def test_estimates_in_a_chain_are_one_group_and_a_change_of_zero_is_in_its_own_unit() -> None:
     steps = np.cumsum(np.eye(3), axis=0)  # each next one is the one before and a little more
     covariance = 1e-6 * (steps * [1.0, 0.05, 0.05]) @ steps.T
     jacobian = np.linalg.cholesky(np.linalg.inv(covariance)).T
     report = judged(jacobian, np.ones(3), [unknown(name, "V", 1.0, 1.0) for name in "cab"])
     assert report.correlated == (("c", "a", "b"),)
+    jacobian = np.array([[10.0, 10.0]])
+    unknowns = [unknown("a", "V", 0.0, 2.0), unknown("b", "V", 0.0, 2.0)]
+    (only,) = judged(jacobian, np.zeros(2), unknowns).undetermined
+    assert only.text in ("together a +0.02 V, b −0.02 V", "together a −0.02 V, b +0.02 V")
+    assert not any(member.relative for member in only.members)
+    assert only.deviation is None
 
 
 # ---- losses, whitening, covariance
@@ -159,20 +144,17 @@ def test_stretches_are_whitened_signal_by_signal_and_stand_one_behind_the_other(
     np.testing.assert_allclose(np.concatenate(ones)[:, 0], [-a - b for a, b in rows])
 
 
-def test_the_memory_of_a_filter_is_a_twentieth_of_the_samples_at_most() -> None:
-    wave = [np.sin(0.3 * np.arange(count)) for count in (19, 39, 40, 60)]
-    assert [fitted_whitener([one], 8, floor=1e-9).order for one in wave] == [0, 1, 2, 3]
-    assert fitted_whitener([wave[3]], 2, floor=1e-9).order == 2
-
-
-def test_a_plain_sandwich_is_done_by_hand() -> None:
-    """Four samples of one parameter: scores 1, −1, 2, 0 of its own, no neighbours counted."""
+def test_a_plain_sandwich_is_done_by_hand_and_a_filter_s_memory_is_a_twentieth() -> None:
+    # Four samples of one parameter: scores 1, −1, 2, 0 of its own, no neighbours counted
     scores = [np.array([[1.0], [-1.0], [2.0], [0.0]])]
     middle = 6.0 * 4 / 3 + 0.5
     found = sandwich(np.array([[2.0]]), scores, np.array([0.5]), bandwidth=0)
     np.testing.assert_allclose(found, [[middle / 2.5**2]])
     least = sandwich(np.array([[20.0]]), scores, np.array([0.5]), bandwidth=0)
     np.testing.assert_allclose(least, [[1 / 20.5]])
+    wave = [np.sin(0.3 * np.arange(count)) for count in (19, 39, 40, 60)]
+    assert [fitted_whitener([one], 8, floor=1e-9).order for one in wave] == [0, 1, 2, 3]
+    assert fitted_whitener([wave[3]], 2, floor=1e-9).order == 2
 
 
 # ---- searches
@@ -218,15 +200,12 @@ def test_the_simplex_finds_the_lowest_point_and_says_what_it_costs() -> None:
     np.testing.assert_allclose(problem.tried[:3], [(-0.5, -0.5), (0.0, -0.5), (-0.5, 0.0)])
 
 
-def test_the_simplex_begins_towards_the_side_with_more_room_and_stays_within_the_bounds() -> None:
+def test_the_simplex_starts_towards_more_room_and_ends_at_its_goal() -> None:
     problem = Rosenbrock(high=0.9)
     found = climb(problem, np.array([0.5, 0.6]), Never(), 2000, 1e-9)
     np.testing.assert_allclose(problem.tried[:3], [[0.5, 0.6], [0.0, 0.6], [0.5, 0.1]])
     assert max(values.max() for values in problem.tried) <= 0.9
     np.testing.assert_allclose(found.values, [0.9, 0.81], atol=1e-3)
-
-
-def test_the_simplex_ends_at_its_goal_or_after_as_many_evaluations_as_allowed() -> None:
     found = climb(Rosenbrock(), START, Never(), 2000, 1e-9, goal=0.5)
     assert (found.converged, found.message) == (True, "the requested error is reached")
     assert found.cost <= 0.5
@@ -234,16 +213,21 @@ def test_the_simplex_ends_at_its_goal_or_after_as_many_evaluations_as_allowed() 
     assert (short.converged, short.evaluations) == (False, 10)
 
 
-def test_where_the_simulation_diverges_the_searches_turn_back() -> None:
+def test_searches_turn_back_where_the_simulation_diverges_and_say_when_they_cannot_begin() -> None:
     assert climb(Rosenbrock(fails_beyond=0.5), START, Never(), 2000, 1e-9).values[0] <= 0.5
     found = solve(Rosenbrock(fails_beyond=0.5), [white(1.0)], START, Never(), Search(False, 1e-9, 200))
     assert found.values[0] <= 0.5
     assert found.cost < 0.5 * rosen(START)
-
-
-def test_a_search_that_cannot_begin_says_so() -> None:
     with pytest.raises(SpecError, match="does not stay finite"):
         solve(Rosenbrock(fails_beyond=-1.0), [white(1.0)], START, Never())
+    problem = Rosenbrock(high=0.5)
+    solve(problem, [white(1.0)], np.array([-2.0, 0.5]), Never(), Search(False, 1e-9, 1))
+    np.testing.assert_allclose(problem.tried[0], [-2.0 + 0.5e-3, 0.5 - 0.5e-3])
+    ten = [record_of(list(range(10)), still=0)]
+    names = tuple(p.name for p in arm().parameters)
+    assert len(fit_problem(arm(), ten, FitOptions(parameters=names[:9])).unknowns) > 9, "nuisances do not count"
+    with pytest.raises(TraceError, match="10 samples for 10 parameters: there must be more samples than parameters"):
+        fit_problem(arm(), ten, FitOptions(parameters=names[:10]))
 
 
 def test_a_search_tells_its_evaluations_and_gives_the_information_at_its_end() -> None:
@@ -257,12 +241,6 @@ def test_a_search_tells_its_evaluations_and_gives_the_information_at_its_end() -
     J = np.array([[-20.0, -1.0], [10.0, 0.0]]).T / 2
     assert found.information is not None
     np.testing.assert_allclose(found.information, J.T @ J, rtol=1e-4)
-
-
-def test_a_search_that_begins_at_a_bound_is_moved_inside_by_a_thousandth() -> None:
-    problem = Rosenbrock(high=0.5)
-    solve(problem, [white(1.0)], np.array([-2.0, 0.5]), Never(), Search(False, 1e-9, 1))
-    np.testing.assert_allclose(problem.tried[0], [-2.0 + 0.5e-3, 0.5 - 0.5e-3])
 
 
 def test_what_is_expected_pulls_as_its_deviation_says() -> None:
@@ -289,14 +267,6 @@ def test_what_is_expected_pulls_as_its_deviation_says() -> None:
 # ---- what is fitted
 
 
-def test_a_fit_needs_more_samples_than_parameters() -> None:
-    ten = [record_of(list(range(10)), still=0)]
-    names = tuple(p.name for p in arm().parameters)
-    assert len(fit_problem(arm(), ten, FitOptions(parameters=names[:9])).unknowns) > 9, "nuisances do not count"
-    with pytest.raises(TraceError, match="10 samples for 10 parameters: there must be more samples than parameters"):
-        fit_problem(arm(), ten, FitOptions(parameters=names[:10]))
-
-
 def test_nuisances_are_fitted_as_the_options_say() -> None:
     given = [record_of(list(range(100)))]
 
@@ -314,3 +284,42 @@ def test_nuisances_are_fitted_as_the_options_say() -> None:
     assert kinds(sensor_bend=False, start_posture=False) == (0, 6, 0)
     assert kinds(sensor_bend=True, method="nelder_mead") == (0, 0, 0)
     assert kinds(sensor_bend=False, loop="open") == (0, 6, 3)
+
+
+# ---- What a fit may change: impossible searches are refused, and every unknown has a natural size
+
+MASS = Parameter(name="load.mass", kind=Kind.INERTIA, part="mass", unit="kg", value=0.5)
+
+
+def one_unknown(start: float = 0.5, **fields: float | None) -> Unknown:
+    return Unknown(MASS, start, **fields)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        ({"low": 1.0, "high": 1.0}, "load.mass: lower bound 1 kg is not below the upper 1"),
+        ({"start": 0.4, "low": 0.5}, "starting value 0.4 kg is outside 0.5 to inf"),
+        ({"start": 0.6, "high": 0.5}, "starting value 0.6 kg is outside -inf to 0.5"),
+        ({"deviation": 0.0}, "expected deviation 0 kg must be above 0"),
+        ({"deviation": -1.0}, "expected deviation -1 kg must be above 0"),
+        ({"deviation": math.inf}, "expected deviation inf kg must be above 0"),
+    ],
+)
+def test_an_impossible_search_is_refused(fields: dict[str, float], says: str) -> None:
+    with pytest.raises(SpecError, match=says):
+        one_unknown(**fields)
+
+
+def test_a_search_may_begin_at_a_bound_and_a_size_is_the_expected_deviation_or_the_next_best() -> None:
+    assert one_unknown(0.5, low=0.5, high=1.0).start == 0.5
+    assert one_unknown(1.0, low=0.5, high=1.0).start == 1.0
+    every = (
+        one_unknown(-0.5, deviation=0.1, size=3.0),
+        one_unknown(-0.5, size=3.0),
+        one_unknown(-0.5, low=-1.0),
+        one_unknown(0.0, low=-1.0, high=4.0),
+        one_unknown(0.0, low=-1.0),
+    )
+    np.testing.assert_array_equal(scales(every), [0.1, 3.0, 0.5, 5.0, 1.0])
+    np.testing.assert_allclose(prior_precision(every), [100.0, 0.0, 0.0, 0.0, 0.0])

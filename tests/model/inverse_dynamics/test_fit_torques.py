@@ -67,7 +67,7 @@ OPTIONS = FitOptions(
 )
 
 
-def test_the_parameters_of_the_motion_are_found() -> None:
+def test_the_parameters_of_the_motion_are_found_in_newton_metres() -> None:
     found = fit_torques(rod(), [swinging(1)], [swinging(5)], OPTIONS)
     assert found.model.parameter("link1.mass").value == pytest.approx(MASS, rel=0.01)
     assert found.model.parameter("joint1.viscous_friction.coefficient").value == pytest.approx(VISCOUS, rel=0.05)
@@ -75,6 +75,16 @@ def test_the_parameters_of_the_motion_are_found() -> None:
     assert found.held_out is not None
     assert found.held_out < 0.002
     assert "link1.mass" in found.identifiability.known
+    # The rig's drive gives half a newton metre a volt
+    found = fit_torques(rod(), [swinging(1)], [], OPTIONS)
+    drive = swinging(1).drive
+    assert drive is not None
+    assert found.errors[0].torque[0] == pytest.approx(0.5 * float(np.sqrt((drive**2).mean())), rel=0.1)
+    model = rod().without_effect("viscous_friction").without_effect("coulomb_friction")
+    options = FitOptions(parameters=("link1.mass",), use_priors=False)
+    assert fit_torques(model, [swinging(1)], [], options).in_sample > 0.05
+    with pytest.raises(TraceError, match="no recorded drive"):
+        fit_torques(rod(), [swinging(1, torque=False)], [], OPTIONS)
 
 
 def test_what_is_known_has_an_interval_and_the_report_shows_it(tmp_path: Path) -> None:
@@ -113,14 +123,6 @@ def test_a_drive_that_is_0_throughout_is_refused_before_the_search(held: bool) -
     assert said == ["low-passing the records"]
 
 
-def test_the_torque_of_the_drive_is_in_newton_metres() -> None:
-    """The rig's drive gives half a newton metre a volt."""
-    found = fit_torques(rod(), [swinging(1)], [], OPTIONS)
-    drive = swinging(1).drive
-    assert drive is not None
-    assert found.errors[0].torque[0] == pytest.approx(0.5 * float(np.sqrt((drive**2).mean())), rel=0.1)
-
-
 @pytest.mark.parametrize("name", sorted(NOT_IN_TORQUES))
 def test_effects_that_torques_cannot_show_are_refused_by_name(name: str) -> None:
     with pytest.raises(SpecError, match=f"effect {name}: cannot be fitted to torques: .*; leave it out"):
@@ -148,17 +150,6 @@ def test_every_other_effect_changes_the_torque_that_is_needed(name: str) -> None
     )
     before, after = (torque_curves(m, swinging(1)).left for m in (wider, changed))
     assert np.abs(after - before).max() > 1e-6
-
-
-def test_without_friction_in_the_model_friction_is_left() -> None:
-    model = rod().without_effect("viscous_friction").without_effect("coulomb_friction")
-    options = FitOptions(parameters=("link1.mass",), use_priors=False)
-    assert fit_torques(model, [swinging(1)], [], options).in_sample > 0.05
-
-
-def test_a_trace_without_drive_is_refused() -> None:
-    with pytest.raises(TraceError, match="no recorded drive"):
-        fit_torques(rod(), [swinging(1, torque=False)], [], OPTIONS)
 
 
 @pytest.mark.parametrize("cutoff", [0.0, 200.0])

@@ -1,4 +1,4 @@
-"""Friction of a joint that hardly moves takes whatever holds it, up to its level."""
+"""Joints that friction holds, and joints that shake faster than torques are compared."""
 
 from dataclasses import replace
 
@@ -7,16 +7,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
+from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
+from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics import friction_at_rest
 from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.friction_at_rest import RestingFriction, subtract_held
 from model.inverse_dynamics.link_motion import LinkMotion
+from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.recorded_motion import RecordedMotion, low_pass
+from model.inverse_dynamics.shaking import Shaking, find_shaking
 from model.machine_model.model import base_model
 from model.simulation.own_table import own_table
 from tests.model.discrepancy.inverse_dynamics import rigs
+from tests.model.discrepancy.inverse_dynamics.rigs import slide_machine, slide_trace
 from tests.model.inverse_dynamics.driven_slide import TIME, motion_of
 
 
@@ -52,8 +58,15 @@ def noise(seed: int) -> Floats:
     return np.random.default_rng(seed).standard_normal(SHAPE)
 
 
-def test_the_record_has_passages() -> None:
+def test_the_record_has_passages_and_what_noise_leaves_at_them_is_taken_up(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 0.1 < TURNS.mean() < 0.5
+
+    def left_on_average() -> float:
+        return float(np.mean([below_cutoff(held(noise(seed), 2.0)) for seed in range(8)]))
+
+    taken = left_on_average()
+    monkeypatch.setattr(friction_at_rest, "HOLDING_ROUNDS", 0)
+    assert taken < 0.8 * left_on_average()
 
 
 @given(seed=st.integers(0, 10_000), level=st.floats(0.0, 5.0), size=st.floats(0.01, 10.0))
@@ -67,34 +80,16 @@ def test_friction_takes_its_level_beside_the_mean_and_no_more_and_acts_at_passag
     assert np.abs(found - asked)[TURNS].max() <= level + 1e-9
 
 
-def test_what_noise_leaves_at_passages_is_taken_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    def left_on_average() -> float:
-        return float(np.mean([below_cutoff(held(noise(seed), 2.0)) for seed in range(8)]))
-
-    taken = left_on_average()
-    monkeypatch.setattr(friction_at_rest, "HOLDING_ROUNDS", 0)
-    assert taken < 0.8 * left_on_average()
-
-
-def test_a_joint_that_friction_holds_leaves_nothing_at_all() -> None:
-    """A torque within the level at passages, and none elsewhere."""
+def test_friction_takes_no_more_than_it_could_have_held() -> None:
+    # A torque within the level at passages, and none elsewhere
     left = np.where(RECORD.turns, 1.5 + 2.0 * RECORD.contact, 0.0)
     assert below_cutoff(held(left, 2.0)) < 1e-9
     assert below_cutoff(left) > 1.0
-
-
-def test_a_torque_beyond_the_level_is_left_less_the_level() -> None:
     level, torque = 2.0, 9.0
     found = held(np.full(SHAPE, torque) + level * RECORD.contact, level)
     assert found[TURNS] == pytest.approx(torque - level)
-
-
-def test_friction_of_no_level_takes_nothing_of_the_mean() -> None:
     left = np.sin(3.0 * RECORD.time)[:, None] + 0.1 * noise(4)
     np.testing.assert_allclose(held(left, 0.0), np.where(RECORD.turns, RECORD.mean_in_turn(left), left))
-
-
-def test_a_joint_that_never_turns_leaves_what_it_left() -> None:
     fast = replace(RECORD, speed=np.full(SHAPE, 1.0))
     left = noise(5)
     assert subtract_held(left, coulomb(2.0), fast) is left
@@ -142,3 +137,54 @@ def test_sliding_friction_is_what_the_balance_counts(difference: float) -> None:
     kernel.supplied_torque(driven, numbers, motor, other, rise)
     assert np.abs(other).max() > 2.5
     np.testing.assert_allclose(friction_at_rest.friction_at_rest(level, motion, joints).sliding, other, atol=1e-12)
+
+
+# ---- Joints that shake faster than torques are compared are told, and what is slow or noise is not
+
+
+def shaken(trace: Trace, hertz: float, size: float) -> Trace:
+    """The trace of a slide that shakes by `size` (m)."""
+    return replace(trace, position=trace.position + size * np.sin(2 * np.pi * hertz * trace.time)[:, None])
+
+
+def shaking(*traces: Trace) -> tuple[Shaking, ...]:
+    machine = slide_machine()
+    return find_shaking(traces, machine, choose_cutoff(traces[:1], machine))
+
+
+@pytest.mark.parametrize("hertz", [25.0, 40.0, 80.0])
+def test_the_frequency_of_a_limit_cycle_is_told(hertz: float) -> None:
+    sound = slide_trace(1, {})
+    (found,) = shaking(shaken(sound, hertz, 100.0 / (2 * np.pi * hertz) ** 2))
+    assert found.joint == 1
+    assert found.frequency == pytest.approx(hertz, abs=1.0)
+    assert found.factor > 10.0
+
+
+def test_the_trace_that_shakes_most_is_told_and_nothing_slow_noisy_or_commanded() -> None:
+    sound = slide_trace(1, {})
+    weak, strong = shaken(sound, 25.0, 0.002), shaken(sound, 40.0, 0.004)
+    (found,) = shaking(sound, weak, strong)
+    assert found.frequency == pytest.approx(40.0, abs=1.0)
+    sound = slide_trace(1, {})
+    noise = np.random.default_rng(5).normal(0.0, 1e-4, sound.position.shape)
+    assert shaking(sound) == ()
+    assert shaking(shaken(sound, 2.0, 0.01)) == ()
+    assert find_shaking([replace(sound, position=sound.position + noise)], slide_machine(), 12.0) == ()
+    # What can be compared counts, and not what the user asked to compare
+    fitted, held = (shaken(slide_trace(seed, {}, 8.0), 7.0, 0.02) for seed in (1, 2))
+    found = diagnose_torques(base_model(slide_machine()), [fitted], [held], TorqueOptions(cutoff=2.0))
+    assert not [note for note in found.notes_data if note.kind == "shakes-above-cutoff"]
+    fitted, held = (shaken(slide_trace(seed, {}, 8.0), 40.0, 1e-3) for seed in (1, 2))
+    found = diagnose_torques(base_model(slide_machine()), [fitted], [held])
+    assert [note.kind for note in found.notes_data if note.warning] == ["shakes-above-cutoff"]
+    assert "joint 1 at 40 Hz" in " ".join(found.notes)
+
+
+@pytest.mark.parametrize("rate", [25.0, 40.0, 40.03])
+def test_a_record_without_frequencies_above_the_cutoff_says_nothing(rate: float) -> None:
+    sound = slide_trace(1, {})
+    time = np.arange(0.0, 16.0, 1.0 / rate)
+    assert sound.drive is not None
+    position, drive = (np.interp(time, sound.time, s[:, 0])[:, None] for s in (sound.position, sound.drive))
+    assert find_shaking([replace(sound, time=time, position=position, drive=drive)], slide_machine(), 12.0) == ()

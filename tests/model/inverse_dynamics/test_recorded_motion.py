@@ -57,13 +57,19 @@ def test_a_short_record_that_drifts_keeps_its_drift(count: int) -> None:
     np.testing.assert_allclose(low_pass(drift, 12.0, PERIOD), drift, atol=1e-3 * np.ptp(drift))
 
 
-def test_a_signal_that_is_sampled_below_the_cutoff_is_left_as_it_is() -> None:
+def test_what_is_sampled_below_the_cutoff_stays_and_what_turns_many_times_is_no_other() -> None:
     signal = np.random.default_rng(1).standard_normal(50)
     assert np.array_equal(low_pass(signal, 0.46 / PERIOD, PERIOD), signal)
     assert not np.allclose(low_pass(signal, 0.44 / PERIOD, PERIOD), signal)
+    # What is continued at one end must not reach the other: 100 rad of travel were 12 % of an acceleration
+    time = np.arange(0.0, 25.0, 0.004)
+    wave = 0.1 * np.sin(2 * np.pi * 0.7 * time)
+    inside = slice(100, -100)
+    turning = low_pass(wave + 4.0 * time, 36.0, 0.004) - 4.0 * time
+    assert np.abs(turning - low_pass(wave, 36.0, 0.004))[inside].max() < 1e-9
 
 
-def test_a_derivative_of_what_moves_fast_is_right_where_central_differences_are_not() -> None:
+def test_derivatives_and_thresholds_are_right_where_the_simple_ones_are_not() -> None:
     angular = 2 * np.pi * 12.0
     slope, inside = angular * np.cos(angular * TIME), slice(20, -20)
     wave = np.stack([np.sin(angular * TIME), 2 * np.sin(angular * TIME)], axis=1)
@@ -71,6 +77,10 @@ def test_a_derivative_of_what_moves_fast_is_right_where_central_differences_are_
     by_differences = np.abs(np.gradient(wave[:, 0], PERIOD) - slope)[inside].max()
     assert wrong < 1e-3 * angular
     assert by_differences == pytest.approx(0.015 * angular, rel=0.05)
+    small, large = 0.5 * np.sin(7.0 * TIME), jumping(5.0)
+    record, without = motion_of(np.where(large == 0.0, small, large)), motion_of(large)
+    np.testing.assert_allclose(record.driven(NONE, ALL, np.array([0.6])), without.drive, atol=1e-9)
+    np.testing.assert_array_equal(record.driven(NONE, ALL, NONE), record.drive)
 
 
 @pytest.mark.parametrize("hertz", [3.0, 10.0, 25.0])
@@ -110,13 +120,6 @@ def test_a_limit_below_the_samples_makes_smaller_jumps_of_them(held: bool) -> No
     np.testing.assert_allclose(record.driven(NONE, np.array([3.0]), NONE), smaller.drive, atol=1e-9)
 
 
-def test_a_threshold_takes_the_samples_within_it_whole_and_leaves_the_others() -> None:
-    small, large = 0.5 * np.sin(7.0 * TIME), jumping(5.0)
-    record, without = motion_of(np.where(large == 0.0, small, large)), motion_of(large)
-    np.testing.assert_allclose(record.driven(NONE, ALL, np.array([0.6])), without.drive, atol=1e-9)
-    np.testing.assert_array_equal(record.driven(NONE, ALL, NONE), record.drive)
-
-
 @pytest.mark.parametrize("late", [0.004, 0.011])
 def test_a_limit_acts_on_a_drive_that_acts_late_as_well(late: float) -> None:
     wave = 4.0 * np.sin(3.0 * TIME)
@@ -142,7 +145,8 @@ def share_left(record: RecordedMotion, missing: Floats) -> float:
     return float((left[moving] ** 2).sum() / (whole[moving] ** 2).sum())
 
 
-def test_a_torque_that_is_missing_only_while_a_drive_stands_at_its_largest_value_leaves_next_to_nothing() -> None:
+def test_torque_missing_only_at_a_limit_leaves_little_and_elsewhere_all() -> None:
+    # A torque that is missing only while a drive stands at its largest value leaves next to nothing
     record = motion_of(standing(0.12, 0.8))
     at_limit = record.at_limit[:, 0]
     assert 0.1 < at_limit.mean() < 0.2
@@ -151,18 +155,14 @@ def test_a_torque_that_is_missing_only_while_a_drive_stands_at_its_largest_value
     slowly = np.where(at_limit, 1.0 + 0.8 * np.sin(11.0 * TIME[: len(at_limit)]), 0.0)
     assert share_left(record, constant) < 1e-3
     assert share_left(record, slowly) < 1e-2
-
-
-def test_a_torque_that_is_missing_elsewhere_is_kept() -> None:
+    # A torque that is missing elsewhere is kept
     record = motion_of(standing(0.12, 0.8))
     time = TIME[: len(record.at_limit)]
     far = np.abs(((time - 0.56) % 0.8) - 0.4) < 0.15
     assert not (far & record.at_limit[:, 0]).any()
     assert share_left(record, np.where(far, np.sin(9.0 * time), 0.0)) > 0.9
     assert share_left(record, 0.3 + np.sin(2.0 * time)) > 0.6, "what acts all the time is kept between"
-
-
-def test_a_joint_with_too_many_pieces_is_not_known_at_all() -> None:
+    # A joint with too many pieces is not known at all
     record = motion_of(standing(0.16, 0.32))
     assert 0.4 < record.at_limit.mean() < 0.6
     assert share_left(record, np.sin(2.0 * TIME)) < 1e-20
@@ -182,15 +182,6 @@ def test_dimensions_that_are_projected_away_count_as_no_samples() -> None:
     assert float(own.mean_squares([record.subtract_unknown(white)])[0]) == pytest.approx(1.0, abs=0.25)
     assert every.counts[0] == every.samples == sum(r.stop - r.start for _, r in every.by_joint[0])
     assert np.isnan(stretches_of([lost]).mean_squares([lost.subtract_unknown(white)])[0])
-
-
-def test_a_wheel_that_turns_many_times_is_low_passed_like_one_that_does_not() -> None:
-    """What is continued at one end must not reach the other: 100 rad of travel were 12 % of an acceleration."""
-    time = np.arange(0.0, 25.0, 0.004)
-    wave = 0.1 * np.sin(2 * np.pi * 0.7 * time)
-    inside = slice(100, -100)
-    turning = low_pass(wave + 4.0 * time, 36.0, 0.004) - 4.0 * time
-    assert np.abs(turning - low_pass(wave, 36.0, 0.004))[inside].max() < 1e-9
 
 
 @pytest.mark.parametrize(

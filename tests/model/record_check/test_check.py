@@ -179,7 +179,11 @@ def test_the_rows_by_which_a_drive_has_slipped_are_told(rows: int, tmp_path: Pat
     assert f"Move the drive {'up' if rows > 0 else 'down'} by {abs(rows)} row" in one.advice
 
 
-def test_without_a_controller_only_a_delay_that_can_be_estimated_is_told(tmp_path: Path) -> None:
+def test_late_stamps_are_no_jump_and_a_delay_is_told_where_it_can_be_estimated(tmp_path: Path) -> None:
+    turned = rigs.geared_trace(3, {}, 8.0)
+    time = turned.time.copy()
+    time[50:-50:100] += 0.4 * (time[1] - time[0])
+    assert kinds(rigs.geared_machine(), replace(turned, time=time)) == []
     machine, trace = example("motor_bench")(tmp_path)
     assert trace.drive is not None
     for rows in (1, 2, 3):
@@ -187,13 +191,6 @@ def test_without_a_controller_only_a_delay_that_can_be_estimated_is_told(tmp_pat
         assert (one.kind, f"by {rows} row" in one.advice) == ("drive-late", True)
     for other in (np.roll(trace.drive, 12, axis=0), trace.drive / 4.448):
         assert "drive-late" not in kinds(machine, replace(trace, drive=other))
-
-
-def test_a_reading_that_is_stamped_late_is_no_jump() -> None:
-    turned = rigs.geared_trace(3, {}, 8.0)
-    time = turned.time.copy()
-    time[50:-50:100] += 0.4 * (time[1] - time[0])
-    assert kinds(rigs.geared_machine(), replace(turned, time=time)) == []
 
 
 @pytest.mark.parametrize("deviation", [0.0, 0.4, 1.2])
@@ -259,13 +256,6 @@ def test_stamps_of_arrival_are_the_one_doubt(latency: float, tmp_path: Path) -> 
     assert "latency timer" in one.advice
 
 
-def test_a_record_of_one_row_is_no_sound_one(tmp_path: Path) -> None:
-    path = tmp_path / "rig.csv"
-    path.write_text("time,position_1,drive_1\n0,0.1,0.2\n")
-    (one,) = doubts_in(check_records(base_model(rigs.slide_machine()), [import_csv(path)]))
-    assert (one.kind, one.says) == ("short", "1 sample; at least 3 are needed.")
-
-
 def test_spikes_are_a_doubt_beside_a_fit() -> None:
     position = SLIDE.position.copy()
     position[[300, 700, 1100]] += 0.05
@@ -298,16 +288,17 @@ def test_a_record_of_every_second_period_without_a_sensor_has_a_noise(tmp_path: 
         noise_floor(torn, unstated, "position")
 
 
-def test_set_points_in_another_unit_end_a_fit(tmp_path: Path) -> None:
+def test_set_points_of_another_unit_or_joint_end_a_fit(tmp_path: Path) -> None:
     machine, trace = example("single_axis")(tmp_path)
     assert trace.set_point is not None
     with pytest.raises(TraceError, match="apart throughout"):
         fit(base_model(machine), [replace(trace, set_point=5.0 + trace.set_point)])
-
-
-def test_a_trace_of_more_joints_than_the_machine_has_is_refused() -> None:
     with pytest.raises(TraceError, match="has a joint 2"):
         diagnose_torques(base_model(rigs.slide_machine()), [SLIDE], [replace(SLIDE, joints=(2,))])
+    path = tmp_path / "rig.csv"
+    path.write_text("time,position_1,drive_1\n0,0.1,0.2\n")
+    (one,) = doubts_in(check_records(base_model(rigs.slide_machine()), [import_csv(path)]))
+    assert (one.kind, one.says) == ("short", "1 sample; at least 3 are needed.")
 
 
 @pytest.mark.lab_data

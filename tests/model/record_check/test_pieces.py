@@ -1,19 +1,23 @@
-"""Records cut at their gaps, and what is computed of the pieces."""
+"""Records cut at their gaps; the table of what records hold."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from daq.contracts.machine import load_machine
 from daq.contracts.trace import Trace
 from model.discrepancy.workflow import diagnose
 from model.inverse_dynamics.fit import torque_curves
 from model.machine_model.model import base_model
 from model.record_check.check import check_records
+from model.record_check.fields import FieldReport, field_reports
 from model.record_check.finding import doubts_in
 from model.record_check.pieces import SHORTEST, in_pieces
+from tests.daq.traces.samples import record
 from tests.model.discrepancy.inverse_dynamics.rigs import bench_machine, bench_trace
 
 
@@ -51,3 +55,42 @@ def test_an_effect_is_named_and_a_torque_drawn_across_a_gap() -> None:
     curves = torque_curves(model, trace, 5.0)
     assert not ((curves.time > 12.0) & (curves.time < 14.0)).any()
     assert curves.time.max() > 25.0
+
+
+# ---- The table of what records hold
+
+SINGLE_AXIS = Path(__file__).parents[3] / "examples" / "single_axis.toml"
+AXIS = base_model(load_machine(str(SINGLE_AXIS)))
+TIME = np.arange(400) * 0.005
+SWING = np.sin(4 * TIME)[:, None]
+
+
+def reports(**signals: object) -> dict[str, FieldReport]:
+    given: dict[str, object] = {"time": TIME, "position": SWING, "set_point": SWING, "drive": SWING} | signals
+    time = given.pop("time")
+    about = record(machine=None, source="imported", drive_unit="V")
+    trace = Trace(about, (1,), time, **given)  # type: ignore[arg-type]
+    return {report.field: report for report in field_reports(AXIS, [trace])}
+
+
+def test_what_an_answer_needs_is_named_with_its_joint_and_a_whole_record_lacks_nothing() -> None:
+    found = reports()
+    assert {report.weight for report in found.values()} == {"fine"}
+    assert found["position"].there == "-1 to 1 rad, steps of 1.59e-05 rad, 3 reversals"
+    assert (found["drive"].place, found["time"].place) == ("1 axis", "")
+    found = reports(drive=None, set_point=None)
+    assert (found["drive"].weight, found["set point"].weight) == ("lacking", "lacking")
+    assert found["drive"].means == "Without it nothing can be computed: record it, in V."
+    assert reports(drive=None)["drive"].weight == "known"
+    assert reports(set_point=None)["set point"].means == "The controller cannot be simulated; torques are compared."
+
+
+def test_motions_and_readings_that_tell_little_are_said() -> None:
+    assert "hardly moves" in reports(position=1e-9 * np.round(SWING))["position"].means
+    assert "one way only" in reports(position=TIME[:, None] ** 2)["position"].means
+    assert reports(drive=np.round(2 * SWING))["drive"].there == "-2 to 2 V, only 5 different values"
+    assert reports(drive=0 * SWING)["drive"].there == "0 to 0 V, constant"
+    held = np.repeat(SWING[::4], 4, axis=0)
+    assert reports(position=held, drive=held)["rows"].there == "75% of the rows repeat the previous row"
+    uneven = np.sort(np.random.default_rng(1).uniform(0, 2, 400))
+    assert "Uneven times" in reports(time=uneven)["time"].means

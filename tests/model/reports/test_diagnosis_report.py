@@ -107,7 +107,12 @@ def test_the_page_calls_traces_by_their_files_where_these_are_known(answer: tupl
     assert "bench_1.csv, joint 2" in said
 
 
-def test_a_step_that_was_not_taken_says_why(found: Diagnosis) -> None:
+def test_a_group_cannot_be_told_apart_and_a_step_that_was_not_taken_says_why(found: Diagnosis) -> None:
+    step = found.steps[0]
+    grouped = step.model_copy(update={"effect": None, "group": step.candidates[:2]})
+    text = words(diagnosis_page(found.model_copy(update={"verdict": "ambiguous", "steps": (grouped,)})))
+    assert "These traces cannot tell apart: Coulomb friction, joint 2; stiction, joint 2." in text
+    assert "What adding it did" not in text
     step = found.steps[0].model_copy(update={"adopted": False, "rejected_because": "the held-out error rises"})
     report = diagnosis_report(found.model_copy(update={"verdict": "unknown-effect", "steps": (step,)}))
     text = words(html(report))
@@ -115,24 +120,6 @@ def test_a_step_that_was_not_taken_says_why(found: Diagnosis) -> None:
     assert "What adding it would have done" in [s.title for s in report.sections]
     assert "Not in the model: what the fit with this effect came to." in text
     assert "Σλ²" not in text
-
-
-def test_a_group_is_named_as_one_that_cannot_be_told_apart(found: Diagnosis) -> None:
-    step = found.steps[0]
-    grouped = step.model_copy(update={"effect": None, "group": step.candidates[:2]})
-    text = words(diagnosis_page(found.model_copy(update={"verdict": "ambiguous", "steps": (grouped,)})))
-    assert "These traces cannot tell apart: Coulomb friction, joint 2; stiction, joint 2." in text
-    assert "What adding it did" not in text
-
-
-def test_an_answer_without_steps_has_a_page(found: Diagnosis) -> None:
-    bare = found.model_copy(
-        update={"verdict": "nothing-significant", "steps": (), "remaining": (), "next_experiment": None, "holdout": ()}
-    )
-    text = words(diagnosis_page(bare))
-    assert text.split()[:3] == ["The", "model", "explains"]
-    assert "none: nothing below was judged on other data" in text
-    assert EFFECT not in text.split("model after")[0]
 
 
 def test_that_nothing_is_significant_is_proved(answer: tuple[Diagnosis, Comparison]) -> None:
@@ -163,16 +150,13 @@ def test_that_nothing_is_significant_is_proved(answer: tuple[Diagnosis, Comparis
     assert "tables above" not in text
 
 
-def test_what_is_left_after_the_steps_has_a_map(found: Diagnosis) -> None:
+def test_a_map_of_what_is_left_is_shown_once_and_a_shape_only_where_it_is_clear(found: Diagnosis) -> None:
     left = found.steps[0].where.model_copy(update={"joint": None, "phase": None, "summary": "No joint is off."})
     report = diagnosis_report(found.model_copy(update={"where": left, "remaining": ()}))
     blocks = next(s for s in report.sections if s.title == "What remains").blocks
     assert blocks[1] == Text("No joint is off.", "good")
     assert isinstance(blocks[2], Picture)
     assert "What was tried" not in [s.title for s in report.sections]
-
-
-def test_the_same_map_is_shown_once(found: Diagnosis) -> None:
     step = found.steps[0].model_copy(update={"adopted": False})
     page = words(diagnosis_page(found.model_copy(update={"steps": (step, step), "verdict": "unknown-effect"})))
     assert page.count("in windows of 0.3 s") == 1
@@ -215,15 +199,12 @@ def test_what_the_controllers_numbers_prove_has_no_candidates_and_no_errors(foun
     assert "noise floor" not in text
 
 
-def test_experiments_that_were_run_are_listed(found: Diagnosis) -> None:
+def test_experiments_are_listed_and_promise_no_separation_that_they_lack(found: Diagnosis) -> None:
     run = Acquired(experiment="ramp", trace="abc", file="f", outcome="stopped", duration=8.25, reason="tells most")
     report = diagnosis_report(found.model_copy(update={"acquired": (run,)}))
     table = next(s for s in report.sections if s.title == "What was run").blocks[0]
     assert isinstance(table, Table)
     assert [c.text for c in table.rows[0]] == ["ramp", "8.2 s", "stopped", "abc", "tells most"]
-
-
-def test_an_experiment_that_separates_nothing_promises_no_separation(found: Diagnosis) -> None:
     assert found.next_experiment is not None
     asked = found.next_experiment.model_copy(update={"separates": (), "predicted_separation": 0.0})
     text = words(diagnosis_page(found.model_copy(update={"next_experiment": asked})))
@@ -307,31 +288,32 @@ def test_what_has_no_clear_shape_is_not_told_as_one(found: Diagnosis) -> None:
     assert "What is left has no shape that these traces show" in words(diagnosis_page(nothing))
 
 
-def test_never_more_than_all_of_it_is_gone(found: Diagnosis) -> None:
-    step = found.steps[0].model_copy(update={"excess_removed_holdout": 1.002})
-    assert gap(step).endswith("all of the held-out variance beyond noise is gone.")
-
-
-def test_several_steps_are_numbered(found: Diagnosis) -> None:
-    titles = [s.title for s in diagnosis_report(found.model_copy(update={"steps": found.steps * 2})).sections]
-    assert "Step 1: where they disagree" in titles
-    assert "Step 2: what adding it did" in titles
-
-
-def test_the_answer_survives_json(found: Diagnosis) -> None:
+def test_an_answer_survives_json_and_one_without_steps_has_a_page(found: Diagnosis) -> None:
     again = Diagnosis.model_validate_json(found.model_dump_json())
     assert again.steps == found.steps
     assert again.model_after.identity == found.model_after.identity
     assert diagnosis_page(again) == diagnosis_page(found)
+    bare = found.model_copy(
+        update={"verdict": "nothing-significant", "steps": (), "remaining": (), "next_experiment": None, "holdout": ()}
+    )
+    text = words(diagnosis_page(bare))
+    assert text.split()[:3] == ["The", "model", "explains"]
+    assert "none: nothing below was judged on other data" in text
+    assert EFFECT not in text.split("model after")[0]
 
 
-def test_warnings_come_first_and_are_not_told_again(found: Diagnosis) -> None:
+def test_warnings_come_first_once_and_steps_are_numbered(found: Diagnosis) -> None:
     notes = (Note(kind="cutoff", values={"cutoff": 12.0}), Note(kind="resting-left-out", warning=True))
     doubted = found.model_copy(update={"notes_data": notes, "notes": ("Below 12 Hz.", "Rest is left out.")})
     sections = {s.title: s.blocks for s in diagnosis_report(doubted).sections}
     assert next(iter(sections)) == "Warnings"
     assert sections["Warnings"] == (Text("Rest is left out.", "warning"),)
     assert sections["What to know about this answer"] == (Points(("Below 12 Hz.",)),)
+    titles = [s.title for s in diagnosis_report(found.model_copy(update={"steps": found.steps * 2})).sections]
+    assert "Step 1: where they disagree" in titles
+    assert "Step 2: what adding it did" in titles
+    step = found.steps[0].model_copy(update={"excess_removed_holdout": 1.002})
+    assert gap(step).endswith("all of the held-out variance beyond noise is gone.")
 
 
 def test_efforts_are_recorded_and_predicted(answer: tuple[Diagnosis, Comparison]) -> None:

@@ -1,16 +1,30 @@
-"""A report is one file that needs nothing else, says what it was given, and is the same every time."""
+"""A report is one file that needs nothing else; pictures of a diagnosis; what the guides show is there."""
 
 import re
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
+import typer.main
+from matplotlib.figure import Figure
 
+from daq.contracts.effects import effect_names
 from daq.contracts.errors import SpecError
+from daq.contracts.machine import load_machine, parse_machine
+from daq_cli.app.subcommands import subcommands
+from docs.extensions.machine_file import PARTS
 from model.blocks import Report, Section, Table, Text, cells
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
 from model.comparison.compare import Comparison, TraceSignals
+from model.discrepancy.diagnosis import Candidate, PhaseCell, Where
+from model.reports import diagnosis_map, diagnosis_pictures
 from model.reports.comparison_report import comparison_report
+from model.reports.diagnosis_map import by_shade, map_picture, shade_limits
+from model.reports.diagnosis_pictures import evidence_picture, shown_candidates
+from model.reports.figures import band
+from model.reports.motion import _reach
+from model.reports.motion_closer import stretch_of_most
 from model.reports.page import html, write_report
 
 
@@ -43,25 +57,16 @@ def page() -> str:
     return html(comparison_report(a_comparison()))
 
 
-def test_a_page_loads_nothing_and_runs_nothing(page: str) -> None:
+def test_a_page_needs_nothing_runs_nothing_and_shows_text_as_text(page: str) -> None:
     assert "<script" not in page
     assert "@import" not in page
     assert not re.search(r"""(?:src|href)\s*=\s*["'](?!#)""", page)
     assert not re.search(r"url\((?!#)", page)
     assert page.count("<svg") == 2
-
-
-def test_what_a_user_wrote_is_text_on_the_page(page: str) -> None:
     assert "<arm>" not in page
     assert "&lt;arm&gt; &amp; model" in page
-
-
-def test_errors_are_shown_in_degrees_and_counts_beside_the_noise_floor(page: str) -> None:
     for text in ("0.2292°", "2.00", "0.0573°", "0.50", "held out"):
         assert text in page
-
-
-def test_the_colours_of_a_figure_follow_the_page(page: str) -> None:
     figure = page[page.index("<svg") : page.index("</svg>")]
     assert "var(--ink)" in figure
     assert "#222222" not in figure
@@ -93,3 +98,155 @@ def test_pooled_traces_count_by_their_samples() -> None:
     assert both[0].rmse ** 2 == pytest.approx(1.3)
     assert both[0].largest == 2.0
     assert pooled([]) is None
+
+
+# ---- What the guides about models show is what the repository has
+
+ROOT = Path(__file__).parents[3]
+PAGES = [ROOT / "docs" / name for name in ("modelling.md", "own-machine.md")]
+
+
+def shown_commands(page: Path) -> list[list[str]]:
+    """Words of every `daq` command in the code of a page."""
+    blocks = re.findall(r"^```\w*\n(.*?)^```", page.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+    lines = [line for block in blocks for line in block.replace("\\\n", " ").splitlines()]
+    commands = [re.sub(r"\s+#.*", "", line.removeprefix("$ ")) for line in lines]
+    return [command.split()[1:] for command in commands if command.startswith("daq ")]
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "docs" / "own-effect.md"], ids=lambda page: page.name)
+def test_every_option_of_a_shown_command_exists(page: Path) -> None:
+    commands = shown_commands(page)
+    assert commands
+    for name, *words in commands:
+        if name not in subcommands() and not (ROOT / "extras").exists():
+            continue
+        command = typer.main.get_command(import_module(subcommands()[name].module).app)
+        if (inner := getattr(command, "commands", None)) is not None:
+            command = inner[words[0]]
+        known = {option for parameter in command.params for option in parameter.opts}
+        assert {word for word in words if re.match(r"--?[a-z]", word)} <= known, name
+
+
+def test_the_machine_file_of_the_guide_is_the_example() -> None:
+    shown = re.findall(r"```toml\n(.*?)```", (ROOT / "docs" / "own-machine.md").read_text("utf-8"), re.DOTALL)
+    assert shown == [(ROOT / "examples" / "single_axis.toml").read_text("utf-8")]
+    assert len([line for line in shown[0].splitlines() if line]) <= 20
+    assert parse_machine(shown[0]).modelled_joints == (1,)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.toml")), ids=lambda path: path.name)
+def test_every_example_is_a_machine(path: Path) -> None:
+    assert load_machine(str(path)).joints
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_effect_that_a_page_names_is_in_the_library(page: Path) -> None:
+    text = page.read_text("utf-8")
+    named = set(re.findall(r"`([a-z]+_[a-z_]+)`", text)) - {
+        "dc_motor",
+        "board_pid",
+        "velocity_gains",
+        "lab_data",
+        "pwm_limit",
+    }
+    named -= {name for name in named if re.match(r"(set_point|position|drive|velocity)", name)}
+    named -= {field for part in PARTS for field in part.model_fields}
+    assert named <= set(effect_names())
+
+
+# ---- What the figures of a diagnosis show, and in which order: without drawing them
+
+
+def tried(effect: str, evidence: float, *, refitted: bool = True) -> Candidate:
+    return Candidate(effect=effect, joints=(2,), evidence=evidence, refitted=refitted)
+
+
+def cell(times: float, start: float = 0.0, joint: int = 1, window: float = 0.3) -> PhaseCell:
+    return PhaseCell(
+        joint=joint, start=start, end=start + window, phase="creep", mean_square=times**2, significance=0.0
+    )
+
+
+@pytest.fixture
+def figure(monkeypatch: pytest.MonkeyPatch) -> Figure:
+    """The figure that the next picture draws on, which is not written as SVG."""
+    found = Figure()
+
+    def drawn(draw, *_: float) -> str:  # type: ignore[no-untyped-def]
+        draw(found)
+        return "<svg></svg>"
+
+    for module in (diagnosis_map, diagnosis_pictures):
+        monkeypatch.setattr(module, "drawn", drawn)
+    return found
+
+
+def test_probes_are_few_and_stand_below_the_fits_and_the_named_one_is_shown() -> None:
+    probes = [tried(f"probe_{k}", 9000.0 - k, refitted=False) for k in range(20)]
+    fitted, probed = shown_candidates([*probes, tried("coulomb_friction", 1714.0), tried("gear_loss", 143.0)])
+    assert [c.effect for c in fitted] == ["coulomb_friction", "gear_loss"]
+    assert [c.effect for c in probed] == ["probe_0", "probe_1", "probe_2", "probe_3"]
+    every = [tried(f"effect_{k}", 100.0 - k) for k in range(30)]
+    fitted, _ = shown_candidates(every, {("effect_29", (2,))})
+    assert [c.effect for c in fitted][-2:] == ["effect_9", "effect_29"]
+
+
+def test_what_a_probe_promises_beyond_the_fits_is_cut_off_and_told(figure: Figure) -> None:
+    named = tried("air_drag", 2064.0)
+    evidence_picture([tried("stiction", 10070.0, refitted=False), named], [named])
+    axes = figure.axes[0]
+    assert max(patch.get_width() for patch in axes.patches) == 2064.0  # type: ignore[attr-defined]
+    texts = [t.get_text() for t in axes.texts]
+    assert "10070, beyond the scale" in texts
+    assert "promised by probes alone, not fitted" in texts
+    assert [t.get_text() for t in axes.get_yticklabels()] == ["air drag, joint 2", "stiction, joint 2"]
+
+
+def test_the_line_that_an_effect_has_to_reach_is_drawn(figure: Figure) -> None:
+    picture = evidence_picture([tried("coulomb_friction", 3.0)], needed=10.0)
+    assert [t.get_text() for t in figure.axes[0].texts if "needed" in t.get_text()] == ["needed: 10"]
+    assert figure.axes[0].get_xlim()[1] > 10.0
+    assert "In full colour" not in picture.caption
+
+
+def test_a_map_keeps_its_structure_and_a_residual_its_most_telling_stretch() -> None:
+    weak, strong = [cell(1.0), cell(3.0)], [cell(90.0), cell(350.0), cell(720.0)]
+    assert shade_limits(weak) == (1.25, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+    assert shade_limits(strong)[-1] == 1024.0
+    assert [len(group) for group in by_shade(strong, shade_limits(strong))] == [0, 0, 0, 1, 0, 1, 1]
+    axes = Figure().subplots()
+    time = np.linspace(0.0, 50.0, 5000)
+    band(axes, time, np.where(np.arange(5000) % 2 == 0, 1.0, -1.0), "#0072b2")
+    assert np.abs(axes.lines[0].get_ydata()).max() < 0.1
+    assert axes.collections[0].get_datalim(axes.transData).height == pytest.approx(2.0)
+    residual = np.zeros((1000, 2))
+    residual[600:620, 1] = 1.0
+    window, column = stretch_of_most(residual, 0.02)
+    assert column == 1
+    assert window.stop - window.start == 200
+    assert window.start <= 600
+    assert window.stop >= 620
+
+
+def test_the_map_reaches_over_all_joints_and_tells_its_windows(figure: Figure) -> None:
+    cells = (cell(1.0, 0.5, 1, 0.5), cell(2.0, 6.0, 1, 0.5), cell(1.0, 2.0, 2, 0.5))
+    where = Where(joint=1, phase="creep", summary="joint 1", cells=cells, dependences=())
+    picture = map_picture(where, "measured − simulated")
+    assert "windows of 0.5 s" in picture.caption
+    assert all(axes.get_xlim() == (0.5, 6.5) for axes in figure.axes)
+    assert "creep" in [t.get_text() for t in figure.axes[0].get_yticklabels()]
+
+
+def test_a_moment_does_not_hide_the_rest_of_a_residual() -> None:
+    time = np.linspace(0.0, 50.0, 2500)
+    measured = np.sin(40.0 * time)[:, None]
+    zero = np.zeros_like(measured)
+    usual = TraceSignals("a", None, (1,), ("rad",), time, measured, (zero,), None)
+    reach, widest = _reach(usual)
+    assert reach == widest
+    measured = measured.copy()
+    measured[0] = 50.0
+    reach, widest = _reach(TraceSignals("a", None, (1,), ("rad",), time, measured, (zero,), None))
+    assert widest == 50.0
+    assert 2.0 < reach < 3.0

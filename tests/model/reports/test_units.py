@@ -1,4 +1,4 @@
-"""Reports name the units of the joints that they are about: a sliding joint has no radians."""
+"""Numbers in reports: the units of the joints that they are about, and their decimals."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +16,7 @@ from model.comparison.compare import Comparison
 from model.discrepancy.diagnosis import Gap, GapStage
 from model.reports.comparison_report import comparison_report
 from model.reports.gap import gap_section
+from model.reports.numbers import column, estimate, whole
 from model.reports.validation_report import validation_report
 from model.units import joint_unit, squared, with_unit
 from model.validation.criterion import Fidelity, ParameterDistortion
@@ -64,17 +65,14 @@ def agreement(*units: str) -> ModelAgreement:
     return ModelAgreement(label="a", model="abc", effects=(), traces=traces, in_sample=pooled(traces), held_out=None)
 
 
-def test_a_square_of_unlike_joints_says_so() -> None:
+def test_the_unit_of_a_joint_is_that_of_its_kind(axis: Machine) -> None:
+    assert joint_unit(axis, 1) == "m"
+    assert joint_unit(load_machine("ma2000"), 1) == "rad"
     assert squared(["rad", "rad"]) == "rad²"
     assert squared(["m/s"]) == "(m/s)²"
     assert squared(["rad", "m", "rad"]) == "rad² + m²"
     assert with_unit("3", "°") == "3°"
     assert with_unit("3", "mm/s") == "3 mm/s"
-
-
-def test_the_unit_of_a_joint_is_that_of_its_kind(axis: Machine) -> None:
-    assert joint_unit(axis, 1) == "m"
-    assert joint_unit(load_machine("ma2000"), 1) == "rad"
 
 
 @pytest.mark.parametrize(("units", "said"), [(("m",), "0.01 m²"), (("rad", "m"), "0.02 rad² + m²")])
@@ -172,3 +170,28 @@ def test_the_gap_of_joints_that_turn_and_slide_is_shown_in_their_own_units(label
         ["noise", "0.57", "10.0"],
     ]
     assert len({len(line) for line in gap_lines(gap) if not line.startswith("on")}) == 1
+
+
+# ---- Numbers in a column have the same decimals; an interval has the digits that it knows
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ((0.0478, 0.0289), ["0.0478", "0.0289"]),
+        ((5.91215, 0.00818), ["5.9121", "0.0082"]),
+        ((2000.0, 310.0), ["2000", "310"]),
+        ((0.0, 1.5), ["0.00", "1.50"]),
+        ((), []),
+    ],
+)
+def test_a_column_has_the_same_decimals_throughout(values: tuple[float, ...], told: list[str]) -> None:
+    assert column(values) == told
+
+
+def test_an_estimate_has_the_digits_of_its_interval_and_the_minus_of_print() -> None:
+    assert estimate(9.0731, 8.672, 9.475, digits=1) == ("9.1", "8.7 to 9.5")
+    assert estimate(9.0731, 8.672, 9.475) == ("9.07", "8.67 to 9.47")
+    assert estimate(-0.12345, None, None) == ("−0.123", None)
+    assert estimate(-0.2, -16.0, 16.0, digits=1) == ("0", "−16 to 16")
+    assert [whole(v) for v in (-7.4, -0.2, 0.4, 1714.2)] == ["−7", "0", "0", "1714"]

@@ -1,5 +1,6 @@
-"""Many runs at once: the same whatever the number of cores, in their order, and announced where they are compiled."""
+"""Many runs at once, the same whatever the number of cores; and models as data: names, files, lineage."""
 
+import json
 import os
 import subprocess
 import sys
@@ -10,9 +11,12 @@ import numba
 import numpy as np
 import pytest
 
+from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
+from model import layout as at
 from model.arrays import Array
-from model.machine_model.model import Model, base_model
+from model.machine_model.model import Lineage, Model, base_model
+from model.machine_model.model_file import load_model, save_model
 from model.simulation import batch, kernel
 from model.simulation.batch import BatchRun, available_cores
 from model.simulation.period import OUTPUTS
@@ -35,27 +39,18 @@ def runs(count: int, general: bool = False) -> BatchRun:
 
 
 def test_runs_are_the_same_on_any_number_of_cores() -> None:
+    assert available_cores() >= 1
     alone = runs(7).run(cores=1)
     assert alone.shape == (7, OUTPUTS, 25, 3)
     for cores in (2, 3, 16):
         np.testing.assert_array_equal(runs(7).run(cores=cores), alone)
     np.testing.assert_array_equal(runs(7).run(), alone)
     assert all(not np.array_equal(one, other) for one, other in zip(alone, alone[2:], strict=False))
-
-
-def test_what_lies_beyond_the_end_of_a_shorter_record_is_zero() -> None:
+    np.testing.assert_array_equal(runs(1).run(cores=4)[0], runs(5).run(cores=4)[0])
     found = runs(4).run(cores=2)
     assert not found[1::2, :, 15:].any()
     assert found[1::2, 0, :15].any(axis=2).all()
     assert found[::2, 0].any(axis=2).all()
-
-
-def test_a_single_run_is_the_first_of_many() -> None:
-    np.testing.assert_array_equal(runs(1).run(cores=4)[0], runs(5).run(cores=4)[0])
-
-
-def test_there_is_a_core_to_run_on() -> None:
-    assert available_cores() >= 1
 
 
 def test_a_run_that_has_to_be_compiled_is_announced_once(
@@ -109,10 +104,6 @@ def test_closed_form_and_recursive_runs_agree_with_every_effect(model: Model) ->
     general = simulate(loaded(model), inputs, Options(quantise=False, general=True))
     assert np.abs(fast.position - general.position).max() < 1e-10
     assert np.ptp(fast.position, axis=0).min() > 0.3
-
-
-def test_flexible_closed_form_and_recursive_runs_agree(model: Model) -> None:
-    inputs = ramp_inputs(model.machine, back=True)
     flexible = model.with_effect("backlash", (3,), {"gap": 0.02}).with_effect(
         "joint_compliance", (1,), {"compliance": 1e-3}
     )
@@ -139,9 +130,6 @@ def test_runs_repeat_to_the_bit_and_do_not_depend_on_their_neighbours(model: Mod
     assert np.array_equal(many[4, 0], once.position)
     assert np.array_equal(simulate(model, inputs).power, once.power)
     assert not np.array_equal(many[0, 0], many[8, 0])
-
-
-def test_traces_of_different_length_run_together(model: Model) -> None:
     short, long = ramp_inputs(model.machine, duration=1.0), ramp_inputs(model.machine, back=True)
     first, second = simulate_many(model, [short, long], model.vector[None])
     assert np.array_equal(first[0, 0], simulate(model, short).position)
@@ -186,3 +174,80 @@ def test_a_run_in_python_is_the_compiled_run() -> None:
         compiled = simulate(model, inputs, Options(general=general)).position
         np.testing.assert_allclose(np.array(line.split(), dtype=float), compiled.ravel(), rtol=1e-9)
         assert np.ptp(compiled, axis=0).max() > 0.01, "it moves"
+
+
+# ---- Models as data: named parameters, files, lineage
+
+
+def _with(**changes: Any) -> str:
+    """A model's file with other fields."""
+    data = json.loads(base_model(load_machine("ma2000")).model_dump_json())
+    return json.dumps(data | changes)
+
+
+def test_a_model_file_gives_the_same_model_back_and_a_newer_one_is_refused(model: Model, tmp_path: Path) -> None:
+    changed = (
+        model.with_effect("backlash", (2,), {"gap": 0.01})
+        .tied("motor.back_emf_constant", ("joint1.motor.back_emf_constant", "joint3.motor.back_emf_constant"))
+        .with_values({"load.mass": 1.1})
+        .with_lineage(Lineage(parent=model.identity, traces=("a", "b"), fit={"rmse": 1e-3}))
+    )
+    save_model(changed, tmp_path / "m.json")
+    again = load_model(tmp_path / "m.json")
+    assert again == changed
+    assert again.identity == changed.identity != model.identity
+    assert changed.with_lineage(Lineage()).identity not in (changed.identity, model.identity)
+    assert (again.vector == changed.vector).all()
+    save_model(model, tmp_path / "m.json")
+    data = json.loads((tmp_path / "m.json").read_text("utf-8"))
+    (tmp_path / "m.json").write_text(json.dumps({**data, "format": 99}), "utf-8")
+    with pytest.raises(SpecError, match="has format 99, this version of the program reads up to"):
+        load_model(tmp_path / "m.json")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("{", "not JSON"),
+        ("[]", "neither a model nor"),
+        ('{"machine": {}}', "says no version"),
+        ('{"machine": {}, "format": 1}', "machine.version"),
+        (_with(values={"link1.mass": -1e9}), "link1.mass = -1000000000.0 kg: allowed are 0.0 to inf"),
+        (_with(effects=[{"name": "backlash", "joints": [1, 2]}, {"name": "backlash", "joints": [2]}]), "twice for the"),
+        (_with(effects=[{"name": "backlash", "joints": [1, 1]}]), "backlash: in the model twice for the same joint"),
+        (_with(ties={"load.mass": ["link1.mass", "link2.mass"]}), "tie 'load.mass': the model has a parameter of this"),
+        (_with(ties={"x": ["link1.mass"]}), "ties.x: has 1 entries, must have at least 2"),
+        (_with(ties={"x": ["link1.mass", "link1.mass"]}), "names a parameter twice"),
+        (_with(ties={"x": ["link1.mass", "link9.mass"]}), "are not parameters of the model"),
+    ],
+)
+def test_what_is_not_a_model_is_refused(text: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "m.json").write_text(text, "utf-8")
+    with pytest.raises(SpecError, match=says):
+        load_model(tmp_path / "m.json")
+
+
+def test_parameters_have_places_of_their_own_and_ties_share_one_value(model: Model) -> None:
+    # Every parameter is within its bounds and lies in its own place
+    slots = [s for p in model.parameters for s in p.slots]
+    assert len(slots) == len(set(slots))
+    for p in model.parameters:
+        assert p.low <= p.value <= p.high
+        assert model.vector[list(p.slots)] == pytest.approx(p.value)
+    # Changing values leaves the first model as it was
+    before = model.vector.copy()
+    heavier = model.with_values({"load.mass": 2.0})
+    assert heavier.vector[at.LOAD] == 2.0
+    assert (model.vector == before).all()
+    with pytest.raises(SpecError, match="allowed are"):
+        model.with_values({"load.mass": -1.0})
+    with pytest.raises(SpecError, match="not in this model"):
+        model.with_values({"load.masses": 1.0})
+    # Ties share one value
+    tied = model.tied("motor.back_emf_constant", ("joint1.motor.back_emf_constant", "joint3.motor.back_emf_constant"))
+    changed = tied.with_values({"motor.back_emf_constant": 0.04})
+    assert [changed.vector[at.slot(j, at.BACK_EMF)] for j in (1, 2, 3)] == [
+        0.04,
+        model.vector[at.slot(2, at.BACK_EMF)],
+        0.04,
+    ]

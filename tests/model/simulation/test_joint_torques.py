@@ -1,21 +1,32 @@
-"""Torques of a joint beside the rigid-body ones, held against integrals and closed forms.
+"""Torques of a joint beside the rigid-body ones, and of a user's own effects, against integrals and closed forms."""
 
-Functions of compiled code are tried here as Python (`py_func`) where they call no other compiled one: the source is the
-same, and nothing has to be compiled.
-"""
-
+import ctypes
+from collections.abc import Callable, Iterator
 from functools import partial
 from math import factorial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
+from daq.contracts.errors import SpecError
+from daq.contracts.machine import load_machine
 from model import layout as at
 from model.arrays import Floats
+from model.dynamics.dual import DUAL_STEP
+from model.effects.effect_files import load_effect_file
+from model.effects.library import own_effects, remove_own
+from model.machine_model.model import Model, base_model
 from model.simulation import joint_torques, period
+from model.simulation.own_table import own_table
 from model.simulation.period import QUEUE
+from model.simulation.simulate import simulate
+from tests.model.simulation.records import ramp_inputs
+
+# ---- Functions of compiled code are tried here as Python (`py_func`) where they call no other compiled one:
+# the source is the same, and nothing has to be compiled
 
 
 def plain(function: Any) -> Any:
@@ -80,12 +91,18 @@ def test_the_current_of_the_stages_has_the_impulse_and_the_way_of_the_exact_one(
     assert (stages[0] + stages[1] + stages[2]) / 6 == pytest.approx(way, rel=1e-3)
 
 
-def test_a_settled_current_is_what_the_back_emf_leaves_of_the_volts() -> None:
+def test_a_settled_current_is_what_the_back_emf_leaves_and_a_winding_that_warms_steps_of_its_own() -> None:
     assert joint_torques.steady_current(WINDING, WARM, 12.0, 0.5) == pytest.approx((12.0 - 0.04 * 50 * 0.5) / 1.8)
     weak = WINDING.copy()
     weak[at.FLUX_LOSS], weak[at.VISCOUS] = 0.1, 2e-4
     assert joint_torques.motor_gain(weak, WARM) == pytest.approx(50 * 0.036 / 1.8)
     assert joint_torques.motor_damping(weak, WARM) == pytest.approx(2500 * (0.036**2 / 1.8 + 2e-4))
+    cold, warm = joint(), joint(HEATING=0.1)
+    assert [plain(period.warms)(np.array(rows)) for rows in ([cold, cold], [cold, warm], [warm, cold])] == [
+        False,
+        True,
+        True,
+    ]
 
 
 # ---- contacts
@@ -129,20 +146,11 @@ def test_drives_change_in_the_order_of_their_delays_within_a_period() -> None:
     periods, order, times = changes(0.005, 0.0, 0.013)
     assert (periods, order) == ([0, 0, 1], [2, 1, 0])
     np.testing.assert_allclose(times, [0.017, 0.012, 0.005])
-
-
-def test_equal_delays_keep_the_order_of_the_joints() -> None:
     assert changes(0.001, 0.001, 0.0, 0.001)[1] == [2, 0, 1, 3]
     assert changes(0.0, 0.0, 0.0)[1] == [0, 1, 2]
-
-
-def test_a_delay_of_whole_periods_is_of_whole_periods() -> None:
     periods, _, times = changes(0.0, 0.02, 0.06, delay=0.0)
     assert periods == [0, 1, 3]
     np.testing.assert_allclose(times, 0.0, atol=1e-15)
-
-
-def test_a_drive_acts_up_to_fourteen_periods_late_and_never_early() -> None:
     periods, _, times = changes(0.279, 0.281, 0.5, -0.005, delay=0.0)
     assert periods == [13, 14, 14, 0]
     np.testing.assert_allclose(times, [0.019, 0.001, 0.22, -0.005], atol=1e-12)
@@ -157,15 +165,6 @@ def test_a_stretch_has_as_few_equal_steps_as_its_longest_allows(duration: float,
     assert plain(period.step_count)(duration, step) == count
 
 
-def test_any_winding_that_warms_makes_the_steps_of_a_run_its_own() -> None:
-    cold, warm = joint(), joint(HEATING=0.1)
-    assert [plain(period.warms)(np.array(rows)) for rows in ([cold, cold], [cold, warm], [warm, cold])] == [
-        False,
-        True,
-        True,
-    ]
-
-
 @pytest.mark.parametrize("column", period.EXTRA_TORQUES)
 def test_every_torque_that_is_added_is_one_that_the_run_computes(column: int) -> None:
     joints = np.zeros((2, at.PER_JOINT))
@@ -174,3 +173,120 @@ def test_every_torque_that_is_added_is_one_that_the_run_computes(column: int) ->
     found = plain(period.extra_flags)(joints, flags)
     assert found.tolist() == [at.HAS_STICTION, at.HAS_INDUCTANCE | at.HAS_EXTRA_TORQUE]
     assert flags.tolist() == [at.HAS_STICTION, at.HAS_INDUCTANCE]
+
+
+# ---- Effects of the user's own as a run has them
+
+ARM = load_machine("ma2000")
+BEYOND_COLUMNS = (0, 2)
+"""Effect `pull` has two parameters, so those of the effect after it begin at the third column."""
+
+
+@pytest.fixture(autouse=True)
+def own_library() -> Iterator[None]:
+    """Whatever a test loads is taken out again."""
+    yield
+    for name in own_effects():
+        remove_own(name)
+
+
+def loaded(folder: Path, name: str, arguments: str, torque: str, *parameters: str) -> None:
+    """An effect file whose torque is one line."""
+    stated = ", ".join(f'OwnParameter("{p}", unit="N·m", deviation=0.1)' for p in parameters)
+    path = folder / f"{name}.py"
+    path.write_text(
+        "from model.effects.own import OwnEffect, OwnParameter\n"
+        "from model.effects.own_math import magnitude\n\n\n"
+        f"def torque({arguments}):\n    return {torque}\n\n\n"
+        f'EFFECT = OwnEffect(name="{name}", physics="τ", source="a test", parameters=({stated},), torque=torque)\n'
+    )
+    load_effect_file(path)
+
+
+def called(address: int, motion: list[Any], parameters: list[Any], dtype: type) -> Any:
+    """The torque at an address, for position, speed, drive, load, time and the parameters."""
+    arrays = [np.array(motion, dtype=dtype), np.array(parameters, dtype=dtype), np.zeros(1, dtype=dtype)]
+    torque = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(int(address))
+    torque(*[array.ctypes.data for array in arrays])
+    return arrays[2][0]
+
+
+EVERY = "k * (position + 2 * speed + 3 * drive + 5 * load + 7 * time) + 11 * c * speed"
+
+
+def test_a_torque_is_found_at_its_address_whatever_the_order_of_its_arguments(tmp_path: Path) -> None:
+    loaded(tmp_path, "pull", "c, time, speed, k, load, drive, position", EVERY, "k", "c")
+    model = base_model(ARM).with_effect("pull", (2,))
+    real, dual = (own_table(model, dtype)[1, 0, 0] for dtype in (np.float64, np.complex128))
+    motion, parameters = [0.1, 0.2, 0.4, 0.8, 1.6], [3.0, 0.5]
+    value = 3.0 * (0.1 + 0.4 + 1.2 + 4.0 + 11.2) + 11 * 0.5 * 0.2
+    assert called(real, motion, parameters, np.float64) == pytest.approx(value)
+    seeded: list[Any] = [*motion]
+    seeded[1] += 1j * DUAL_STEP
+    found = called(dual, seeded, parameters, np.complex128)
+    assert found.real == pytest.approx(value)
+    assert found.imag / DUAL_STEP == pytest.approx(2 * 3.0 + 11 * 0.5)
+
+
+def test_the_table_has_a_torque_for_each_joint_and_effect_also_in_dual_numbers(tmp_path: Path) -> None:
+    loaded(tmp_path, "pull", "k, c", "k + c", "k", "c")
+    loaded(tmp_path, "push", "speed, k", "k * speed", "k")
+    model = base_model(ARM).with_effect("pull", (1, 3)).with_effect("push", (3,))
+    table = own_table(model, np.float64)
+    assert table.shape == (3, 2, 2)
+    assert (table[:, :, 0] != 0).tolist() == [[True, False], [False, False], [True, True]]
+    assert table[0, 0, 0] == table[2, 0, 0] != table[2, 1, 0]
+    assert table[2, :, 1].tolist() == list(BEYOND_COLUMNS)
+    assert own_table(base_model(ARM), np.float64).shape == (3, 0, 2)
+    loaded(tmp_path, "pull", "k, speed", "k * speed", "k")
+    model = base_model(ARM).with_effect("pull", (1,))
+    assert own_table(model, np.float64)[0, 0, 0] != own_table(model, np.complex128)[0, 0, 0]
+    assert own_table(model, np.float64)[0, 0, 0] == own_table(model, np.float64)[0, 0, 0], "it is compiled once"
+
+
+def arm_with(folder: Path, arguments: str, torque: str) -> Callable[[], Model]:
+    loaded(folder, "pull", arguments, torque, "k")
+    return lambda: base_model(ARM).with_effect("pull", (1,))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "torque", "says"),
+    [
+        ("k, speed", "-k * abs(speed) * speed", "derivative of its torque by speed is wrong"),
+        ("k, drive", "k * (drive if drive.real > 0 else drive.real)", "torque by drive is wrong"),
+        ("k, speed", "k if speed > 0 else -k", "pull: its torque cannot be compiled in dual numbers: "),
+        ("k, speed", "k * speed.nothing", "pull: its torque cannot be compiled in real numbers: "),
+        ("k", "k + 1.0", "pull: its torque is 1 N·m where its parameters are at null; it must be 0"),
+        ("k, time", "k * time.imag * 1e30 + k * time", "its torque differs in real and in dual numbers"),
+    ],
+)
+def test_a_torque_that_is_not_one_function_with_exact_derivatives_is_refused_in_one_line(
+    tmp_path: Path, arguments: str, torque: str, says: str
+) -> None:
+    model = arm_with(tmp_path, arguments, torque)()
+    with pytest.raises(SpecError, match=says) as raised:
+        own_table(model, np.float64)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("torque", ["k * magnitude(speed) * speed", "k * magnitude(speed)"])
+def test_a_torque_may_have_a_corner(tmp_path: Path, torque: str) -> None:
+    assert own_table(arm_with(tmp_path, "k, speed", torque)(), np.float64)[0, 0, 0] != 0
+
+
+def test_the_arm_with_a_gear_that_gives_moves_to_the_bit_as_the_general_steps_move_it(tmp_path: Path) -> None:
+    """A user's effect takes the general steps. Of no size, it changes nothing else."""
+    loaded(tmp_path, "pull", "k", "k", "k")
+    inputs = ramp_inputs(ARM, back=True)
+    model = (
+        base_model(ARM)
+        .with_effect("joint_compliance", (1,), {"compliance": 1e-3})
+        .with_effect("backlash", (3,), {"gap": 0.02})
+        .with_effect("stiction", (2,), {"breakaway": 0.6})
+        .with_effect("gravity_torque_friction", (2,), {"share": 0.1})
+        .with_effect("base_tilt", values={"about_x": 0.05})
+    )
+    own = simulate(model, inputs)
+    general = simulate(model.with_effect("pull", (2,)), inputs)
+    assert np.array_equal(own.position, general.position)
+    assert np.array_equal(own.drive, general.drive)

@@ -1,4 +1,4 @@
-"""A record in the units of compiled code: rounding of set points, gains of the controller, and where a run begins."""
+"""A record in the units of compiled code, and exact derivatives against wide finite differences."""
 
 from dataclasses import replace
 
@@ -17,9 +17,9 @@ from model.machine_model.parameter import initial_position
 from model.simulation.batch import seed
 from model.simulation.inputs import inputs_of
 from model.simulation.prepared import Options, Prepared, prepare
-from model.simulation.simulate import parameter_vectors
+from model.simulation.simulate import parameter_vectors, sensitivities, simulate
 from tests.model.simulation.machines import SLIDE, pendulum, slide
-from tests.model.simulation.records import trace_of
+from tests.model.simulation.records import ramp_inputs, trace_of
 
 MA2000 = load_machine("ma2000")
 START = np.array([3.1, 0.7, 0.0])
@@ -37,7 +37,8 @@ def prepared(machine: Machine, trace: Trace, **options: object) -> Prepared:
 # ---- set points and settings
 
 
-def test_the_board_takes_set_points_in_whole_posture_units_and_those_in_whole_counts() -> None:
+def test_set_points_are_whole_posture_units_or_counts_of_the_sensor() -> None:
+    # The board takes set points in whole posture units and those in whole counts
     unit = 1.5 * np.pi / 1000
     low = MA2000.calibration(1).posture_to_rad(0)
     wanted = np.tile(START, (4, 1))
@@ -48,9 +49,7 @@ def test_the_board_takes_set_points_in_whole_posture_units_and_those_in_whole_co
     assert found.settings[at.PUBLISHED_LOADS] == 1
     assert found.settings[at.DRIVE_RECORDED] == 0
     assert found.period == 0.02
-
-
-def test_a_board_with_a_finer_sensor_counts_in_its_own_counts() -> None:
+    # A board with a finer sensor counts in its own counts
     first = MA2000.joints[0]
     assert first.sensor is not None
     finer = first.model_copy(update={"sensor": first.sensor.model_copy(update={"bits": 14})})
@@ -114,16 +113,11 @@ def test_options_reach_the_record(quantise: bool) -> None:
     assert (plain.following, plain.noise.any(), plain.settings[at.QUANTISE]) == (0.0, False, 1)
 
 
-def test_inputs_of_other_joints_are_refused() -> None:
-    inputs = replace(inputs_of(still(), MA2000), joints=(1, 2))
-    with pytest.raises(SpecError, match=r"inputs are for joints \(1, 2\), but the model moves joints \(1, 2, 3\)"):
-        prepare(base_model(MA2000), inputs, Options())
-
-
 # ---- gains
 
 
-def test_gains_are_the_record_s_own_else_the_machine_s() -> None:
+def test_gains_and_period_are_the_record_s_else_the_machine_s() -> None:
+    # Gains are the record's own else the machine s
     controller = MA2000.controller
     record = still().record.model_copy(update={"gains": {2: (7, 3, 1)}})
     found = inputs_of(replace(still(), record=record), MA2000).gains
@@ -133,6 +127,16 @@ def test_gains_are_the_record_s_own_else_the_machine_s() -> None:
         assert found[row, [pid.P, pid.I, pid.D]].tolist() == list(controller.gains[row])  # type: ignore[union-attr]
     assert (found[:, pid.SCALE] == controller.dac_counts_per_adc_count.value).all()  # type: ignore[union-attr]
     assert not found[:, [pid.INNER_P, pid.INNER_I, pid.INNER_D, pid.RESOLUTION]].any()
+
+    # The period is the record's else the controller's else that of the samples
+    def period(machine: Machine, joints: int, **signals: Floats) -> float:
+        made = trace_of(np.zeros((60, joints)), 0.03, **signals)
+        record = made.record.model_copy(update={"period": None})
+        return inputs_of(replace(made, record=record, tick=None), machine).period
+
+    assert inputs_of(trace_of(np.zeros((60, 1)), 0.03), slide()).period == 0.03
+    assert period(slide(), 1) == 0.01
+    assert period(pendulum(), 1, drive=np.ones((60, 1))) == pytest.approx(0.03)
 
 
 def test_a_cascade_has_gains_of_its_inner_loop_and_a_step_of_its_drive() -> None:
@@ -151,17 +155,6 @@ def test_a_cascade_has_gains_of_its_inner_loop_and_a_step_of_its_drive() -> None
 
 
 # ---- the grid of periods, and the start
-
-
-def test_the_period_is_the_record_s_else_the_controller_s_else_that_of_the_samples() -> None:
-    def period(machine: Machine, joints: int, **signals: Floats) -> float:
-        made = trace_of(np.zeros((60, joints)), 0.03, **signals)
-        record = made.record.model_copy(update={"period": None})
-        return inputs_of(replace(made, record=record, tick=None), machine).period
-
-    assert inputs_of(trace_of(np.zeros((60, 1)), 0.03), slide()).period == 0.03
-    assert period(slide(), 1) == 0.01
-    assert period(pendulum(), 1, drive=np.ones((60, 1))) == pytest.approx(0.03)
 
 
 @pytest.mark.parametrize(("off", "whole"), [(0.049, True), (0.051, False)])
@@ -186,15 +179,15 @@ def test_angles_of_more_than_20_rad_are_taken_for_degrees(angle: float, allowed:
             inputs_of(still(position=position), MA2000)
 
 
-def test_a_carriage_and_a_shaft_without_a_sensor_may_go_further() -> None:
+def test_a_carriage_and_a_shaft_may_go_further_and_nothing_moves_without_drive() -> None:
     far = np.full((60, 1), 25.0)
     assert len(inputs_of(trace_of(np.zeros((60, 1)), 0.01, position=far), slide())) == 60
     assert len(inputs_of(trace_of(np.zeros((60, 1)), 0.01, position=far, drive=far), pendulum())) == 60
-
-
-def test_without_drive_a_machine_without_a_controller_cannot_move() -> None:
     with pytest.raises(TraceError, match="has no drive, and pendulum has no controller that could compute it"):
         inputs_of(trace_of(np.zeros((60, 1)), 0.01), pendulum())
+    inputs = replace(inputs_of(still(), MA2000), joints=(1, 2))
+    with pytest.raises(SpecError, match=r"inputs are for joints \(1, 2\), but the model moves joints \(1, 2, 3\)"):
+        prepare(base_model(MA2000), inputs, Options())
 
 
 COUNT = 1.5 * np.pi / 4096
@@ -250,3 +243,56 @@ def test_vectors_of_parameters_have_their_values_in_place() -> None:
     assert parameter_vectors(model, ("load.mass",), np.array([1.5])).shape == (1, len(model.vector))
     rest = [k for k in range(len(model.vector)) if all(k not in model.parameter(name).slots for name in names)]
     np.testing.assert_array_equal(found[1, rest], model.vector[rest])
+
+
+# ---- Exact derivatives against wide finite differences of the same loop without rounding
+
+SMOOTH = Options(quantise=False, step=2.5e-4)
+
+CASES = {
+    "load.mass": 1e-3,
+    "link3.length": 1e-4,
+    "joint2.motor.back_emf_constant": 1e-5,
+    "joint2.viscous_friction.coefficient": 1e-6,
+    "joint3.load_dependent_friction.arm": 1e-4,
+    "controller.delay": 2e-4,
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_dual_numbers_give_the_slope_of_finite_differences(name: str) -> None:
+    model = base_model(load_machine("ma2000"))
+    inputs = ramp_inputs(model.machine)
+    exact = sensitivities(model, inputs, [model.parameter(name)], SMOOTH).reading[0]
+    value, width = model.parameter(name).value, CASES[name]
+    ends = [simulate(model.with_values({name: value + w}), inputs, SMOOTH).reading for w in (-width, width)]
+    difference = (ends[1] - ends[0]) / (2 * width)
+    assert np.abs(exact).max() > 0
+    assert np.abs(exact - difference).max() < 0.01 * np.abs(exact).max()
+
+
+def test_effects_at_their_null_value_have_derivatives_too() -> None:
+    model = base_model(load_machine("ma2000")).with_effect("spring_torque", (2,)).with_effect("input_delay", (3,))
+    spring, delay = model.parameter("joint2.spring_torque.stiffness"), model.parameter("joint3.input_delay.time")
+    inputs = ramp_inputs(model.machine)
+    found = sensitivities(model, inputs, [spring, delay, initial_position(1)], SMOOTH)
+    stiffer = simulate(model.with_values({spring.name: 0.05}), inputs, SMOOTH).reading
+    slope = (stiffer - found.simulation.reading) / 0.05
+    assert np.abs(found.reading[0] - slope).max() < 0.02 * np.abs(slope).max()
+    assert np.abs(found.reading[1][:, 2]).max() > 10 * np.abs(found.reading[1][:, 0]).max()
+    assert found.reading[2][0] == pytest.approx([1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("general", [False, True], ids=["closed form", "recursive"])
+def test_friction_under_gravity_has_its_derivative_where_there_is_none_yet(general: bool) -> None:
+    """The term is left out at a share of zero; a dual part alone is enough to have it."""
+    options = Options(quantise=False, step=2.5e-4, general=general)
+    model = base_model(load_machine("ma2000")).with_effect("gravity_torque_friction", (2, 3))
+    shares = [model.parameter(f"joint{j}.gravity_torque_friction.share") for j in (2, 3)]
+    inputs = ramp_inputs(model.machine)
+    found = sensitivities(model, inputs, shares, options)
+    for share, slope in zip(shares, found.reading, strict=True):
+        more = simulate(model.with_values({share.name: 1e-4}), inputs, options).reading
+        difference = (more - found.simulation.reading) / 1e-4
+        assert np.abs(slope).max() > 1e-3
+        assert np.abs(slope - difference).max() < 0.02 * np.abs(slope).max()

@@ -47,40 +47,28 @@ def run(machine: Machine, quantise: bool = True, **more: Any) -> Simulation:
     return simulate(base_model(machine), record(steps()), Options(quantise=quantise, **more))
 
 
-def test_the_drive_is_rounded_to_its_resolution() -> None:
+def test_drive_and_error_keep_to_resolution_dead_band_and_limits() -> None:
     drive = run(slide(drive_resolution=quantity(0.14, "V"))).drive / 0.14
     assert np.allclose(drive, np.round(drive), atol=1e-9)
     assert np.ptp(drive) > 10
-
-
-def test_an_error_within_the_dead_band_moves_nothing() -> None:
     still, moved = (run(slide(dead_band=quantity(band, "m"))).drive for band in (0.21, 0.19))
     assert not still.any()
     assert np.abs(moved).max() > 8.0
     assert run(slide(dead_band=quantity(0.21, "m")), quantise=False).drive.any()
-
-
-def test_the_drive_stays_within_the_limit_of_the_output() -> None:
     free, held = run(slide()).drive, run(slide(output_limit=quantity(5.0, "V"))).drive
     assert np.abs(free).max() > 8.0
     assert np.abs(held).max() == 5.0
+    limit = {"output_limit": quantity(2.0, "V"), "gains": ((60.0, 400.0, 8.0),)}
+    assert run(slide(**limit)).position.max() < 0.24, "a sum that grows at the limit would take the slide far beyond"
 
 
-def test_set_points_are_rounded_to_what_the_controller_takes() -> None:
+def test_set_points_are_rounded_and_an_error_of_the_gains_is_one_of_the_output() -> None:
     coarse = simulate(base_model(slide(set_point_resolution=quantity(0.3, "m"))), record(steps(0.2)))
     full = simulate(base_model(slide()), record(steps(0.3)))
     assert np.array_equal(coarse.position, full.position)
-
-
-def test_an_error_of_the_gains_is_one_of_the_output() -> None:
     stated = run(slide(gain_error=quantity(0.25, "1")), quantise=False)
     higher = run(slide(gains=((75.0, 0.0, 10.0),)), quantise=False)
     assert np.allclose(stated.position, higher.position, rtol=1e-12)
-
-
-def test_the_limit_stops_the_integral() -> None:
-    limit = {"output_limit": quantity(2.0, "V"), "gains": ((60.0, 400.0, 8.0),)}
-    assert run(slide(**limit)).position.max() < 0.24, "a sum that grows at the limit would take the slide far beyond"
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.9])
@@ -120,16 +108,13 @@ def test_a_zero_that_may_be_off_turns_the_link() -> None:
     assert zero.low == pytest.approx(-0.1)
 
 
-def test_a_deviation_that_no_method_uses_is_refused() -> None:
+def test_numbers_that_no_method_uses_or_of_other_joints_are_refused() -> None:
     text = machines.PENDULUM.replace(
         'd = { value = 0.0, unit = "m",', 'd = { value = 0.0, deviation = 0.1, unit = "m",'
     )
     with pytest.raises(SpecError, match=r"joints.1.geometry.d: no method can use a deviation here") as error:
         parse_machine(text)
     assert "\n" not in str(error.value)
-
-
-def test_numbers_of_another_count_of_joints_are_refused() -> None:
     with pytest.raises(ValueError, match=r"controller.output_limit has 2 numbers for 1 joints"):
         slide(output_limit=(quantity(5.0, "V"), quantity(5.0, "V")))
 
@@ -147,7 +132,7 @@ def test_a_current_gives_torque_through_the_gear() -> None:
     assert np.ptp(moved[0]) > 0.1
 
 
-def test_seven_joints_are_simulated() -> None:
+def test_seven_joints_are_simulated_and_a_simulation_shows_itself() -> None:
     head, _, joint = machines.PENDULUM.partition("[[joints]]")
     text = head.replace("modelled_joints = [1]", f"modelled_joints = {list(range(1, 8))}") + ("[[joints]]" + joint) * 7
     model = base_model(parse_machine(text))
@@ -155,6 +140,13 @@ def test_seven_joints_are_simulated() -> None:
     still = np.zeros((20, 7))
     seven = Trace(made.record, tuple(range(1, 8)), made.time, still, drive=still)
     assert np.isfinite(simulate(model, seven, Options(loop="open")).position).all()
+    found = run(slide())
+    assert repr(found) == "<Simulation: 150 periods to 1.5 s, joints 1>"
+    np.testing.assert_array_equal(found.at_samples(found.position), found.position)
+    made = record(steps())
+    between = replace(made, time=made.time + 0.3 * PERIOD * (np.arange(150) % 2))
+    odd = simulate(base_model(slide()), between)
+    np.testing.assert_allclose(odd.at_samples(odd.time), between.time, atol=1e-9)
 
 
 @pytest.mark.parametrize("inner", [None, ((40.0, 30.0, 0.2),)], ids=["one loop", "cascade"])
@@ -193,13 +185,3 @@ def test_lost_set_points_leave_a_share_of_each_step_to_the_next_period() -> None
     before = np.vstack([steps()[:1], steps()[:-1]])
     wanted = steps() - 0.25 * (steps() - before)
     np.testing.assert_allclose(found.error, wanted - found.reading, atol=1e-12)
-
-
-def test_a_simulation_shows_itself_in_one_line_and_gives_its_signals_at_the_samples() -> None:
-    found = run(slide())
-    assert repr(found) == "<Simulation: 150 periods to 1.5 s, joints 1>"
-    np.testing.assert_array_equal(found.at_samples(found.position), found.position)
-    made = record(steps())
-    between = replace(made, time=made.time + 0.3 * PERIOD * (np.arange(150) % 2))
-    odd = simulate(base_model(slide()), between)
-    np.testing.assert_allclose(odd.at_samples(odd.time), between.time, atol=1e-9)

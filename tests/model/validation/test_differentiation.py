@@ -2,7 +2,9 @@
 
 import math
 import threading
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,19 +31,13 @@ def averaged(function: np.ufunc, time: float) -> float:
     return float(np.trapezoid(TRIANGLE * function(time + FINE), FINE))
 
 
-def test_second_differences_are_triangular_averages_of_the_acceleration() -> None:
+def test_speeds_and_accelerations_are_triangular_averages_and_smoothing_keeps_a_slope() -> None:
     rate = 20.0
     found = d.accelerations(np.sin(rate * TIME)[:, None], PERIOD)[50, 0]
     assert found == pytest.approx(averaged(lambda t: -(rate**2) * np.sin(rate * t), TIME[50]), rel=1e-6)
-
-
-def test_speeds_are_triangular_averages_too() -> None:
     rate = 20.0
     found = d.speeds(np.sin(rate * TIME)[:, None], PERIOD)[50, 0]
     assert found == pytest.approx(averaged(lambda t: rate * np.cos(rate * t), TIME[50]), rel=2e-3)
-
-
-def test_smoothing_keeps_a_constant_and_a_slope() -> None:
     ramp = np.stack([np.full(100, 3.0), np.arange(100.0)], axis=1)
     smooth = d.smoothed(ramp, 2.0)
     np.testing.assert_allclose(smooth[:, 0], 3.0)
@@ -57,13 +53,10 @@ def test_noise_of_speeds_and_accelerations_is_as_predicted(width: float) -> None
     assert d.speeds(smooth, PERIOD)[50:-50].std() == pytest.approx(gain.speed, rel=0.05)
 
 
-def test_more_noise_asks_for_more_smoothing() -> None:
+def test_more_noise_asks_for_more_smoothing_and_an_arm_at_rest_for_none() -> None:
     motion = np.sin(4 * TIME)[:, None]
     quiet, noisy = (d.chosen_width(motion, np.array([s]), PERIOD, 0.05) for s in (1e-5, 3e-4))
     assert quiet < noisy
-
-
-def test_an_arm_at_rest_has_nothing_to_explain() -> None:
     with pytest.raises(SpecError, match="nothing to explain"):
         d.chosen_width(np.zeros((100, 2)), np.array([1e-4, 1e-4]), PERIOD, 0.05)
 
@@ -95,10 +88,6 @@ def test_the_derivative_of_averaged_volts_by_the_delay_is_exact() -> None:
 # ---- σ from a doubling change, τ′ from a parameter, λ² from both.
 
 
-def test_required_variance_is_one_and_a_half_squares_at_half_damping() -> None:
-    assert required_deviation(0.4) ** 2 == pytest.approx(1.5 * 0.4**2)
-
-
 @pytest.mark.parametrize(("damping", "factor"), [(0.25, 4 * 0.25 * 1.25 / 1.5), (1.0, 8 / 3)])
 def test_required_variance_at_other_dampings(damping: float, factor: float) -> None:
     assert required_deviation(1.0, damping) ** 2 == pytest.approx(factor)
@@ -110,14 +99,16 @@ def test_a_damping_ratio_that_is_not_positive_is_refused(damping: float) -> None
         required_deviation(1.0, damping)
 
 
-def test_an_insensitive_parameter_contributes_nothing() -> None:
+def test_insensitive_parameters_contribute_nothing_and_deviations_are_stated_or_refused() -> None:
     assert contribution(None, 0.3) == 0.0
     assert contribution(0.6, 0.3) == pytest.approx(0.25)
-
-
-def test_both_conventions_differ_by_the_root_of_two() -> None:
     assert gaussian_share("three_sigma") / gaussian_share("source") == pytest.approx(math.sqrt(2))
     assert gaussian_share("three_sigma") == pytest.approx(1 / 3)
+    assert required_deviation(0.4) ** 2 == pytest.approx(1.5 * 0.4**2)
+    offset = arm().with_effect("potentiometer_offset", (1,)).parameter("joint1.potentiometer_offset.offset")
+    assert expected_deviation(offset, "source") == (offset.deviation, "stated")
+    with pytest.raises(SpecError, match="no expected deviation"):
+        expected_deviation(replace(offset, deviation=None), "source")
 
 
 @pytest.mark.parametrize(
@@ -136,13 +127,6 @@ def test_expected_deviations_follow_the_source(name: str, share: float, basis: s
     parameter = arm().parameter(name)
     deviation, found = expected_deviation(parameter, "source")
     assert (deviation / parameter.value, found) == (pytest.approx(share), basis)
-
-
-def test_a_parameter_around_zero_takes_its_stated_deviation_or_is_refused() -> None:
-    offset = arm().with_effect("potentiometer_offset", (1,)).parameter("joint1.potentiometer_offset.offset")
-    assert expected_deviation(offset, "source") == (offset.deviation, "stated")
-    with pytest.raises(SpecError, match="no expected deviation"):
-        expected_deviation(replace(offset, deviation=None), "source")
 
 
 # ---- The changes that double an error, found on functions whose answer is known.
@@ -166,34 +150,18 @@ def test_a_lopsided_parabola_is_doubled_where_it_should_be(down: float, up: floa
     assert (other.down, other.up, other.mean) == (None, None, None)
 
 
-def test_a_bound_on_one_side_leaves_the_other_side_alone() -> None:
-    def errors(points: np.ndarray) -> np.ndarray:
-        return 1 + ((points[:, 0] - BEST[0]) / 30) ** 2 + 0 * points[:, 1]
+def test_a_doubling_is_found_at_a_divergence_a_step_and_not_below_the_minimum() -> None:
+    def change(errors: Callable[[np.ndarray], np.ndarray]) -> Any:
+        return doubling_changes(errors, BEST, LOW, HIGH, FIRST)[1][0]
 
-    found = doubling_changes(errors, BEST, LOW, HIGH, FIRST)[1][0]
-    assert found.down is None
-    assert found.mean == found.up == pytest.approx(30, rel=2 * TOLERANCE)
-
-
-def test_a_run_that_diverges_counts_as_doubled() -> None:
-    def errors(points: np.ndarray) -> np.ndarray:
-        return np.where(points[:, 0] > 2.7, np.nan, 1.0)
-
-    assert doubling_changes(errors, BEST, LOW, HIGH, FIRST)[1][0].up == pytest.approx(0.7, rel=2 * TOLERANCE)
-
-
-def test_an_error_with_a_step_is_doubled_at_the_step() -> None:
-    def errors(points: np.ndarray) -> np.ndarray:
-        return np.where(points[:, 0] > 3.0, 1e9, 1.0)
-
-    assert doubling_changes(errors, BEST, LOW, HIGH, FIRST)[1][0].up == pytest.approx(1.0, rel=2 * TOLERANCE)
-
-
-def test_an_error_that_falls_shows_that_the_point_was_no_minimum() -> None:
-    def errors(points: np.ndarray) -> np.ndarray:
-        return 1 + (points[:, 0] - 2.5) ** 2
-
-    assert doubling_changes(errors, BEST, LOW, HIGH, FIRST)[1][0].lowest < 0.9
+    diverges = change(lambda points: np.where(points[:, 0] > 2.7, np.nan, 1.0))
+    assert diverges.up == pytest.approx(0.7, rel=2 * TOLERANCE)
+    steps = change(lambda points: np.where(points[:, 0] > 3.0, 1e9, 1.0))
+    assert steps.up == pytest.approx(1.0, rel=2 * TOLERANCE)
+    assert change(lambda points: 1 + (points[:, 0] - 2.5) ** 2).lowest < 0.9, "the point was no minimum"
+    bounded = change(lambda points: 1 + ((points[:, 0] - BEST[0]) / 30) ** 2 + 0 * points[:, 1])
+    assert bounded.down is None
+    assert bounded.mean == bounded.up == pytest.approx(30, rel=2 * TOLERANCE)
 
 
 def test_searches_run_together_in_few_rounds() -> None:
@@ -208,17 +176,11 @@ def test_searches_run_together_in_few_rounds() -> None:
     assert len(sizes) < 15
 
 
-def test_an_exact_fit_cannot_be_doubled() -> None:
+def test_what_cannot_be_doubled_is_refused_and_a_search_can_be_cancelled() -> None:
     with pytest.raises(SpecError, match="mean squared error is 0"):
         doubling_changes(lambda points: np.zeros(len(points)), BEST, LOW, HIGH, FIRST)
-
-
-def test_parameters_outside_their_bounds_are_refused() -> None:
     with pytest.raises(SpecError, match="within finite bounds"):
         doubling_changes(lambda points: np.ones(len(points)), BEST, BEST + 1, HIGH, FIRST)
-
-
-def test_a_search_can_be_cancelled() -> None:
     now = threading.Event()
     now.set()
     with pytest.raises(CancelledError):

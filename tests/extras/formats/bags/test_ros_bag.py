@@ -26,7 +26,7 @@ from extras.formats.bags import PLUGIN
 from extras.formats.bags.joint_messages import JOINT_STATE
 from extras.formats.bags.ros_bag import import_bag
 from tests.daq.traces.samples import record, write
-from tests.daq.traces.test_files import csv
+from tests.daq.traces.test_csv_table import csv
 
 NS = 10**9
 START = 1_700_000_000 * NS
