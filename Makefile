@@ -83,8 +83,8 @@ format: $(FOR_DEVELOPMENT) ## format the sources and mend what ruff can mend
 types: $(FOR_DEVELOPMENT) ## make the page's types of the API anew, after a change of the API
 	@$(BIN)/python hatch_build.py types format
 
-bench: $(FOR_DEVELOPMENT) ## measure the figures about recording of docs/benchmarks.md, shorter than there
-	@$(BIN)/python -m benchmarks main-job --quick
+bench: $(FOR_DEVELOPMENT) ## measure what docs/benchmarks.md claims, each figure beside its floor and what was measured before (5 minutes)
+	@$(BIN)/python -m benchmarks ledger
 
 golden: $(FOR_DEVELOPMENT) ## compare answers of every command with those recorded before, to the digit (20 minutes)
 	@$(BIN)/python -m benchmarks.golden

@@ -2,7 +2,6 @@
 
 python -m benchmarks                      the list
 python -m benchmarks NAME [options]       one of them, with its own options
-python -m benchmarks main-job [--quick]   every figure of the way from the command to the trace
 """
 
 from __future__ import annotations
@@ -15,16 +14,6 @@ from pathlib import Path
 from typing import Any
 
 FOLDER = Path(__file__).parent
-
-MAIN_JOB = (
-    "startup",
-    "line_rate",
-    "stop_latency",
-    "lock_step",
-    "trace_open",
-    "long_run",
-)
-"""Benchmarks of `main-job`, in this order."""
 
 
 def benchmarks() -> dict[str, str]:
@@ -48,11 +37,6 @@ def run(name: str, options: list[str], run_process: Callable[..., Any] = subproc
     return max(code, 1) if code else 0
 
 
-def _quicker(name: str) -> list[str]:
-    """Returns the option for a shorter run, if a benchmark has one."""
-    return ["--quick"] if '"--quick"' in (FOLDER / f"{name}.py").read_text("utf-8") else []
-
-
 def main(arguments: list[str], run_process: Callable[..., Any] = subprocess.run) -> int:
     """Returns 0 if every target was met, 1 if one was missed, 2 for an unknown name."""
     known = benchmarks()
@@ -62,12 +46,9 @@ def main(arguments: list[str], run_process: Callable[..., Any] = subprocess.run)
             print(f"  {name:<18} {line}")
         return 0
     name, *options = arguments
-    if name == "main-job":
-        quick = "--quick" in options
-        return max(run(each, _quicker(each) if quick else [], run_process) for each in MAIN_JOB if each in known)
     name = name.replace("-", "_")
     if name not in known:
-        print(f"benchmark {name!r}: not known; available: {', '.join(known)} and main-job", file=sys.stderr)
+        print(f"benchmark {name!r}: not known; available: {', '.join(known)}", file=sys.stderr)
         return 2
     return run(name, options, run_process)
 

@@ -9,17 +9,20 @@ from typing import Any
 import pytest
 
 import benchmarks.__main__ as listing
+from benchmarks.ledger import Entry, compared
 from benchmarks.stop_latency import stop_command
 from tests.repository.tracked import ROOT
 
 
-@pytest.mark.parametrize("name", ["startup", "main-job"])
 @pytest.mark.parametrize(("ended", "code"), [(0, 0), (1, 1), (-9, 1)])
-def test_a_benchmark_that_a_signal_ended_has_met_no_target(name: str, ended: int, code: int) -> None:
-    def run(command: list[str], **_: object) -> Any:
-        return subprocess.CompletedProcess(command, ended if "benchmarks.startup" in command else 0)
+def test_a_benchmark_that_a_signal_ended_has_met_no_target(ended: int, code: int) -> None:
+    assert listing.main(["ledger"], lambda command, **_: subprocess.CompletedProcess(command, ended)) == code
 
-    assert listing.main([name], run) == code
+
+@pytest.mark.parametrize(("took", "met"), [(2.1, True), (2.3, False)])
+def test_a_figure_that_has_become_a_tenth_worse_is_named(took: float, met: bool) -> None:
+    lines = [{"commit": "", "a figure": text} for text in ("9", "2", "", "2", "2")]
+    assert compared(Entry("a figure", took, "its floor", 1.0), lines).met is met
 
 
 def test_the_stop_that_is_measured_knows_no_robot_of_the_caller(
