@@ -82,6 +82,8 @@ class Follower:
         self._rows = RowMaker(machine, joints, controller.period_s)
         self._lag = Lag(controller.period_s, every)
         self._retries = controller.counters.retries
+        self._postures: list[dict[int, int]] = []
+        """Set points of the plan that is followed, by joint, one for each period."""
         self.last: SampleRow | None = None
         known = every == 1 and Capability.SAMPLE in controller.identity.capabilities
         self.late_set_points: int | None = 0 if known else None
@@ -138,6 +140,8 @@ class Follower:
         observer's errors.
         """
         guards = RunningGuards(self._machine, self._limits, self._joints, plan.moving, self._every)
+        moving = [joint - 1 for joint in plan.moving]
+        self._postures = [dict(zip(plan.moving, row, strict=True)) for row in plan.postures[:, moving].tolist()]
         try:
             return self._play(plan, guards, progress)
         except (LinkError, NoSampleError) as error:
@@ -162,20 +166,20 @@ class Follower:
             if outside is not None:
                 return self._stopped(outside)
             try:
-                row, snapshot = self._next(self._set_points(plan, following) if go_on else {})
+                row, snapshot = self._next(self._postures[following] if go_on else {})
             except RequestRefusedError as error:
                 return self._stopped(self._ended() or str(error))
             self._observer.row(row)
             if go_on:
-                self._count_late(snapshot, before, self._set_points(plan, following))
+                self._count_late(snapshot, before, self._postures[following])
                 for passed in range(index + 1, following + 1):
                     for mark in plan.marks_at(passed):
                         self._observer.event(row.time, mark.kind, mark.message, row.tick, mark.joint)
                 index = following
                 progress(index)
-            expected = self._set_points(plan, index) if snapshot.set_points_missed else None
+            expected = self._postures[index] if snapshot.set_points_missed else None
             following = min(index + self._step(before, row), last)
-            verdict = guards.check(row, self._set_points(plan, following), expected)
+            verdict = guards.check(row, self._postures[following], expected)
             verdict |= self._lag.check(row.tick, snapshot.jitter)
             ending = self._judge(verdict, row)
             if ending is not None:
@@ -198,10 +202,6 @@ class Follower:
         """Periods by which the plan advances: as many as lie between the last two samples, at most `every`. Before the
         first set point the arm has already waited long enough."""
         return self._every if before is None else max(0, min(self._every, row.tick - before.tick))
-
-    def _set_points(self, plan: Plan, index: int) -> dict[int, int]:
-        postures: list[int] = plan.postures[min(index, len(plan) - 1)].tolist()
-        return {joint: postures[joint - 1] for joint in plan.moving}
 
     def _next(self, sending: dict[int, int]) -> tuple[SampleRow, BoardSnapshot]:
         after = self.last.tick + self._every - 1 if self._every_period and self.last is not None else None

@@ -410,10 +410,14 @@ class Board:
     def _write_pairs(self, pairs: Sequence[tuple[int, int]], by_freeze: bool = False) -> None:
         self._take_memory(len(pairs))
         end_us = self._host_until_us
+        self.written.update([address for address, _ in pairs] if not by_freeze else ())
+        if self._stored == len(self._published) and end_us < self._next_us and self._powered and not self._frozen:
+            self.run_until(end_us)  # nothing else happens meanwhile
+            self.memory.put_all(pairs)
+            return
         for left, (address, value) in zip(range(len(pairs) - 1, -1, -1), pairs, strict=True):
             self.run_until(end_us - left * self._timing.host_byte)
             self._store_published()
-            self.written[address] += not by_freeze
             if self._frozen and not by_freeze and address in self._set_point_addresses:
                 self.counters.writes_while_frozen += 1
             elif self._powered:
