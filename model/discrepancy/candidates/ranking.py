@@ -67,7 +67,8 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     chosen = [p for p in probes if _is_hopeful(current, p, case.thresholds)][: case.options.fitted]
     fits = _fit_all(current, chosen, case.thresholds.close, progress, cancel)
     if current.point.strain >= FAR_OFF:
-        fits += _fits_from_expected(current, probes, case.options.polished)
+        if not any(f.explains for f in fits):
+            fits += _fits_from_expected(current, probes, case.options.polished)
         fits += _fits_of_strained_numbers(current, case)
     progress(0.9, "fitting effects of several joints")
     fits += fit_several_joints(current, fits, probes, case.thresholds, cancel)
@@ -139,12 +140,12 @@ def _fit_all(
             break
         names = " and ".join(effect_on(one.hypothesis.name, one.hypothesis.joints) for one in now)
         progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
-        explaining = (f for f in fits if f.misfit < LARGER)
-        reach = min((f.fit.point.cost + price_of(observation, f.hypothesis) for f in explaining), default=None)
+        explained = any(f.misfit < LARGER for f in fits)
+        reach = min((f.fit.point.cost + f.price for f in fits), default=math.inf)
 
-        def fit(probed: Probe, reach: float | None = reach) -> CandidateFit | None:
-            goal = None if reach is None else reach + close - price_of(observation, probed.hypothesis)
-            return refit(current, probed, goal)
+        def fit(probed: Probe, reach: float = reach, explained: bool = explained) -> CandidateFit | None:
+            goal = reach + close - price_of(observation, probed.hypothesis)
+            return refit(current, probed, goal, explained=explained)
 
         fits += [f for f in side_by_side(fit, now) if f is not None]
     return fits
