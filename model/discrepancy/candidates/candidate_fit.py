@@ -22,8 +22,8 @@ from model.discrepancy.candidates.tones import tones_tried
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.noise_model import LARGER, AutoregressiveNoise, fit_noise_model
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.search import LAST_STEPS, STEPS, Point, converge, descend, point_at
-from model.discrepancy.thresholds import Thresholds
+from model.discrepancy.output_error.search import FEW_STEPS, STEPS, Point, converge, descend, point_at
+from model.discrepancy.thresholds import LARGER_PART, Thresholds
 from model.fitting.unknowns import Unknown
 from model.machine_model.record_verdict import FAR_OFF
 
@@ -186,13 +186,13 @@ def polish(before: Fit, found: CandidateFit) -> CandidateFit:
     free = _indices(point.unknowns, [p.name for p in found.hypothesis.free])
     known = set(free) <= set(near)
     return _improved(
-        before, found, lambda: descend(point.with_new_tangents(near), LAST_STEPS, free, changing_known=known)
+        before, found, lambda: descend(point.with_new_tangents(near), FEW_STEPS, free, changing_known=known)
     )
 
 
 def finish(before: Fit, found: CandidateFit) -> CandidateFit:
     """The fit, run to convergence, with all derivatives computed anew."""
-    return _improved(before, found, lambda: converge(found.fit.point, LAST_STEPS))
+    return _improved(before, found, lambda: converge(found.fit.point, FEW_STEPS))
 
 
 def _improved(before: Fit, found: CandidateFit, work: Callable[[], Point | None], least: float = 0.0) -> CandidateFit:
@@ -315,10 +315,6 @@ def _indices(unknowns: Sequence[Unknown], names: Sequence[str]) -> list[int]:
     return [k for k, u in enumerate(unknowns) if u.name in names]
 
 
-WORTH_A_FIT = 0.7
-"""A set of joints is fitted where the evidence of its single fits adds up to this share of the best so far."""
-
-
 def fit_several_joints(
     current: Fit,
     singles: Sequence[CandidateFit],
@@ -342,7 +338,7 @@ def fit_several_joints(
     found: list[tuple[CandidateFit, list[CandidateFit]]] = []
     best = max((r.evidence for r in singles), default=0.0)
     for alike in _alike(singles, thresholds):
-        if sum(r.evidence for r in alike) >= WORTH_A_FIT * best:
+        if sum(r.evidence for r in alike) >= LARGER_PART * best:
             stop_if(cancel)
             fit = _better(current, alike[:2], thresholds)
             if fit is not None:

@@ -31,7 +31,7 @@ from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.noise_model import LARGER
 from model.discrepancy.output_error.observation import AT_ONCE, side_by_side
 from model.discrepancy.output_error.search import Point
-from model.discrepancy.thresholds import Thresholds
+from model.discrepancy.thresholds import LARGER_PART, Thresholds
 from model.effects.library import effect
 from model.effects.names import effect_on
 from model.machine_model.record_verdict import FAR_OFF
@@ -40,10 +40,6 @@ FLAGGED_SHARE = 0.1
 """A joint is flagged where its best probe promises this share of the best of all."""
 ALWAYS_FITTED, HOPELESS = 4, 0.2
 """After so many fits, no candidate is fitted whose probe promises less than this share of the best evidence so far."""
-PROMISING = 0.6
-"""Least gain of a probe that is fitted, as a share of the fall of the cost that would make its effect significant."""
-WORTH_POLISHING = 0.5
-"""Least evidence of a fit that is polished, as a share of the best: a fit with less cannot catch up."""
 REMEMBERED = 0.3
 """A hypothesis is probed again where its earlier response promises this share of an interesting gain."""
 
@@ -123,7 +119,7 @@ def _flagged_joints(probes: Sequence[Probe], joints: Sequence[int], interesting:
 def _is_hopeful(current: Fit, probed: Probe, thresholds: Thresholds) -> bool:
     """Whether a probe promises enough of what its effect would need."""
     needed = thresholds.significant + price_of(current.point.observation, probed.hypothesis)
-    return probed.gain >= max(thresholds.interesting, PROMISING * needed)
+    return probed.gain >= max(thresholds.interesting, LARGER_PART * needed)
 
 
 def _fit_all(
@@ -205,7 +201,7 @@ def _most_promising(fits: Sequence[CandidateFit], besides: Sequence[CandidateFit
 
 def _polish_best(current: Fit, answers: Sequence[CandidateFit]) -> list[CandidateFit]:
     """The answers; those that polishing could make the best are polished."""
-    least = WORTH_POLISHING * max((r.evidence for r in answers), default=0.0)
+    least = LARGER_PART * max((r.evidence for r in answers), default=0.0)
 
     def work(found: CandidateFit) -> CandidateFit:
         return polish(current, found) if found.evidence >= least else found

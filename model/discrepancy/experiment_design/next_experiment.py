@@ -38,7 +38,7 @@ from model.discrepancy.explanation.effect_words import LAWS, MEASUREMENTS
 from model.discrepancy.grounds import Measurement, Note, SharedLaw
 from model.discrepancy.localisation.phases import PHASES, AskedMotion
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.search import Point, converge
+from model.discrepancy.output_error.search import FEW_STEPS, Point, converge
 from model.effects.names import effect_on
 
 
@@ -121,8 +121,6 @@ SURE = 20.0
 """Margin of evidence below which an experiment is asked for although one effect was named."""
 MOST_RIVALS = 4
 """Most rivals among which an experiment is to decide: each of them is simulated on every experiment."""
-SETTLING = 5
-"""Steps of each search that runs a rival's fit to convergence."""
 LONGEST_DESIGN = 20.0
 """Longest designed motion, s of robot time."""
 DURATIONS = (0.1, 0.2, 0.4, 0.8)
@@ -193,7 +191,7 @@ def converge_rivals(rivals: Sequence[CandidateFit]) -> list[CandidateFit]:
     separates nothing. A rival on the verge of instability has no derivatives and is left out."""
     found = []
     for rival in rivals[:MOST_RIVALS]:
-        point = converge(rival.fit.point, SETTLING)
+        point = converge(rival.fit.point, FEW_STEPS)
         with suppress(SpecError):
             found.append(replace(rival, fit=judge(point.with_new_tangents())))
     return found

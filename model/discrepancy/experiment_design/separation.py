@@ -24,6 +24,7 @@ from model.discrepancy.candidates.candidate_fit import CandidateFit
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point
+from model.discrepancy.thresholds import MOST_ROUNDS
 from model.drives.sensor import sensed_angle
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
@@ -32,8 +33,6 @@ NOISE_SEED = 2
 """Seed of the readings' noise in an imagined run: without noise, friction would hold where the real arm creeps."""
 LOOSE = 1e-9
 """Relative precision that stands for none, so that matrices can be inverted."""
-ROUNDS = 20
-"""Rounds in which the angle to a reading is found; each leaves the share by which the potentiometer's scale is off."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +153,7 @@ def starts_at_rest(observation: Observation, shared: Calibration, starts: Sequen
         (joint,) = start.joints
         first = at.slot(joint, 0)
         angle = wanted = read[joint - 1]
-        for _ in range(ROUNDS):
+        for _ in range(MOST_ROUNDS):
             angle += wanted - sensed_angle(angle, vector[first : first + at.PER_JOINT])
         found.append(float(np.clip(angle - wanted, start.low, start.high)))
     return np.array(found)

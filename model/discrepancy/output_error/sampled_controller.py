@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from daq.contracts.machine import DcMotor, Machine, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model.arrays import Floats
+from model.discrepancy.thresholds import MOST_ROUNDS
 from model.inverse_dynamics.drive_limits import AT_LIMIT, SEVERAL
 
 CLEAR = 4.0
@@ -134,8 +135,6 @@ near one of them makes it wrong."""
 SHOWN_LIMIT = 3
 """Samples at the largest size of a drive that show a limit. A drive in steps comes there without one, too; then samples
 count as hidden that are none, for as long as it stands there."""
-REWEIGHTED = 20
-"""Rounds of weights for a line of least absolute deviations."""
 
 
 @dataclass(frozen=True)
@@ -296,7 +295,7 @@ def _line(drive: Floats, formed: Floats, resolution: float, *, offset: bool) -> 
     columns = np.column_stack([formed, np.full(len(formed), float(offset))])
     line: Floats = np.zeros(2)
     weight: Floats = np.ones(len(formed))
-    for _ in range(REWEIGHTED):
+    for _ in range(MOST_ROUNDS):
         line = np.asarray(np.linalg.lstsq(columns * weight[:, None], drive * weight, rcond=None)[0])
         weight = 1 / np.sqrt(np.maximum(np.abs(drive - columns @ line), resolution))
     near = np.abs(drive - columns @ line) <= _farthest(drive, resolution)

@@ -26,18 +26,15 @@ ATTEMPTS = ((1.0, 0.0), (1.0, 0.0), (0.4, 0.0), (1.0, 0.3), (0.12, 0.0), (1.0, 3
 1963), each from derivatives that the attempts before have corrected. A short step helps where the cost is strongly
 curved, a damped one where the record says little."""
 CONVERGED = 1.0
-"""Fall of the cost that is still to be had, below which a search ends: one unit is one standard deviation of one parameter."""
+"""Fall of the cost that is still to be had, below which a search ends: one unit is one standard deviation of one
+parameter."""
 FORETOLD = 0.1
 """Share of the readings' change that derivatives may have missed and still hold where a search ends: what they miss of
 a further step is a tenth of it."""
 STEPS = 8
 """Steps of a search that has to find its way: with play in a gear, that is not a smooth problem."""
-FEW_STEPS = 6
+FEW_STEPS = 4
 """Steps of a search that begins near its end, or is followed by another."""
-LAST_STEPS = 4
-"""Steps of each search that takes a fit to its end."""
-MOST_SEARCHES = 8
-"""Searches with new derivatives: two are enough, except from a start that is far away."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +171,7 @@ def _left_to_gain(before: float, gained: float) -> float:
     return gained**2 / (before - gained) if gained < before < math.inf else math.inf
 
 
-def converge(point: Point, steps: int, most: int = MOST_SEARCHES, goal: float = math.inf) -> Point:
+def converge(point: Point, steps: int, most: int = STEPS, goal: float = math.inf) -> Point:
     """The point to which repeated searches lead, each with derivatives computed where it begins.
 
     They end where nothing more is to be gained, so that close rivals do not differ by the state of their fits, or where

@@ -29,7 +29,7 @@ from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.noise_model import note_on_noise, shown_noise
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.sampled_controller import with_errors
-from model.discrepancy.output_error.search import FEW_STEPS, LAST_STEPS, Point, converge, descend, point_at
+from model.discrepancy.output_error.search import FEW_STEPS, Point, converge, descend, point_at
 from model.discrepancy.selection.step import listed, make_step, only_probed, update_to_last_fit
 from model.discrepancy.thresholds import CHANCES, FEEDBACK_SHARE_FOR_ERRORS
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
@@ -137,7 +137,7 @@ def _fit_tolerances(given: Point) -> Point:
     begun = _fit_with_feedback(near, given.observation) or _fit_with_feedback(given, given.observation)
     if begun is None:
         raise SpecError("the simulation does not stay finite: the loop is unstable")
-    return _with_sudden_friction(converge(begun, LAST_STEPS))
+    return _with_sudden_friction(converge(begun, FEW_STEPS))
 
 
 def _with_sudden_friction(fitted: Point) -> Point:
@@ -150,7 +150,7 @@ def _with_sudden_friction(fitted: Point) -> Point:
     if np.array_equal(values, fitted.values):
         return fitted
     begun = fitted.moved_to(values)
-    tried = converge(begun, LAST_STEPS) if begun.is_finite else fitted
+    tried = converge(begun, FEW_STEPS) if begun.is_finite else fitted
     return tried if tried.cost < fitted.cost else fitted
 
 
@@ -177,7 +177,7 @@ def _weighed_with_shown_noise(fitted: Point) -> Point:
             break
         observation = replace(fitted.observation, noise=noise)
         try:
-            fitted = converge(fitted.on(observation), LAST_STEPS)
+            fitted = converge(fitted.on(observation), FEW_STEPS)
             if fitted.strain >= FAR_OFF:
                 again = _fit_tolerances(fitted.at_expected())
                 fitted = again if again.cost < fitted.cost else fitted

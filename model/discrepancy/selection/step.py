@@ -27,7 +27,7 @@ from model.discrepancy.grounds import Reason, Refusal
 from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.noise_model import fit_noise_model
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.search import LAST_STEPS, STEPS, Point, converge, descend, point_at
+from model.discrepancy.output_error.search import FEW_STEPS, STEPS, Point, converge, descend, point_at
 from model.discrepancy.verdict import excess_removed
 from model.fitting.fit import INTERVAL
 from model.fitting.whitening import Whitener
@@ -134,7 +134,7 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
     chosen = decision.best
     if decision.kind == "nothing" or chosen is None:
         return None, current
-    best = with_evidence(current, chosen.probe, converge(chosen.fit.point, LAST_STEPS))
+    best = with_evidence(current, chosen.probe, converge(chosen.fit.point, FEW_STEPS))
     effect, joints = best.hypothesis.name, best.hypothesis.joints
     before, after = current.point, best.fit.point
     held = case.held_residuals(case.credited_against(before, after), after)
@@ -241,7 +241,7 @@ def _without(point: Point, gone: Sequence[str]) -> Fit:
         model = model.without_effect(effect or "", joints or None)
     kept = [k for k, u in enumerate(point.unknowns) if u.name not in gone]
     begun = point_at(point.observation, point.only(kept).of(model), point.tangents[kept])
-    return judge(converge(begun, LAST_STEPS))
+    return judge(converge(begun, FEW_STEPS))
 
 
 def _is_nothing(found: Sequence[tuple[FoundValue, Parameter]]) -> bool:
