@@ -65,7 +65,7 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     if current.point.strain >= FAR_OFF:
         if not any(f.explains for f in fits):
             fits += _fits_from_expected(current, probes, case.options.polished)
-        fits += _fits_of_strained_numbers(current, case)
+        fits += _fits_of_strained_numbers(current, case, fits)
     progress(0.9, "fitting effects of several joints")
     fits += fit_several_joints(current, fits, probes, case.thresholds, cancel)
     fits.sort(key=lambda r: -r.evidence)
@@ -126,7 +126,6 @@ def _fit_all(
     current: Fit, chosen: Sequence[Probe], close: float, progress: Progress, cancel: Cancel
 ) -> list[CandidateFit]:
     """Fits of the probed candidates, the most promising first, until those left are hopeless."""
-    observation = current.point.observation
     fits: list[CandidateFit] = []
     for begin in range(0, len(chosen), AT_ONCE):
         stop_if(cancel)
@@ -136,15 +135,20 @@ def _fit_all(
             break
         names = " and ".join(effect_on(one.hypothesis.name, one.hypothesis.joints) for one in now)
         progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
-        explained = any(f.misfit < LARGER for f in fits)
-        reach = min((f.fit.point.cost + f.price for f in fits), default=math.inf)
+        begun = list(fits)
 
-        def fit(probed: Probe, reach: float = reach, explained: bool = explained) -> CandidateFit | None:
-            goal = reach + close - price_of(observation, probed.hypothesis)
-            return refit(current, probed, goal, explained=explained)
+        def fit(probed: Probe, begun: Sequence[CandidateFit] = begun) -> CandidateFit | None:
+            return _fit_beside(begun, current, probed, close)
 
         fits += [f for f in side_by_side(fit, now) if f is not None]
     return fits
+
+
+def _fit_beside(fits: Sequence[CandidateFit], current: Fit, probed: Probe, close: float) -> CandidateFit | None:
+    """The fit of a probed candidate, while it may still come close to the best of these fits."""
+    reach = min((f.fit.point.cost + f.price for f in fits), default=math.inf)
+    goal = reach + close - price_of(current.point.observation, probed.hypothesis)
+    return refit(current, probed, goal, explained=any(f.misfit < LARGER for f in fits))
 
 
 def _fits_from_expected(current: Fit, probes: Sequence[Probe], most: int) -> list[CandidateFit]:
@@ -165,17 +169,21 @@ def _fits_from_expected(current: Fit, probes: Sequence[Probe], most: int) -> lis
     return [fit for fit in fits if fit is not None]
 
 
-def _fits_of_strained_numbers(current: Fit, case: Case) -> list[CandidateFit]:
+def _fits_of_strained_numbers(current: Fit, case: Case, fits: Sequence[CandidateFit]) -> list[CandidateFit]:
     """Fits of the effects that do what a number far from its expectation does. They begin where the effect has all of
-    that number's distance, and the number is as expected: the same simulation, without the cost of the prior."""
+    that number's distance, and the number is as expected: the same simulation, without the cost of the prior. Where
+    another fit has explained the record, that is their one start."""
+    explained = any(f.explains for f in fits)
     point = current.point
     begun = [start for h in _tried(case, point) if (start := as_effect(point, h)) is not None]
 
     def fit(start: Probe) -> CandidateFit | None:
-        trials = (*start.hypothesis.trials, start.start)
-        widened = replace(start, hypothesis=replace(start.hypothesis, trials=trials))
-        found = [f for f in (refit(current, start), refit_from_expected(current, widened)) if f is not None]
-        return min(found, key=lambda f: f.fit.point.cost, default=None)
+        found = [_fit_beside(fits, current, start, case.thresholds.close)]
+        if not explained:
+            trials = (*start.hypothesis.trials, start.start)
+            widened = replace(start, hypothesis=replace(start.hypothesis, trials=trials))
+            found.append(refit_from_expected(current, widened))
+        return min((f for f in found if f is not None), key=lambda f: f.fit.point.cost, default=None)
 
     return [f for f in side_by_side(fit, begun) if f is not None]
 
