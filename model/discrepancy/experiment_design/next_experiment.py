@@ -24,7 +24,6 @@ from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, same
 from model.discrepancy.candidates.ranking import Decision, Ranking
 from model.discrepancy.diagnosis import UNWRITTEN, DifferencePlace, Inseparable, NextExperiment, PlacedEffect, Verdict
 from model.discrepancy.experiment_design.separation import (
-    LEAST,
     NOISE_SEED,
     Imagined,
     Pair,
@@ -39,6 +38,7 @@ from model.discrepancy.grounds import Measurement, Note, SharedLaw
 from model.discrepancy.localisation.phases import PHASES, AskedMotion
 from model.discrepancy.output_error.observation import Observation
 from model.discrepancy.output_error.search import FEW_STEPS, Point, converge
+from model.discrepancy.thresholds import WITHIN_NOISE
 from model.effects.names import effect_on
 
 
@@ -60,7 +60,7 @@ def classes_of(
             Inseparable(
                 members=members,
                 separation=separation,
-                needed=LEAST,
+                needed=WITHIN_NOISE,
                 experiment=experiment,
                 tried=tried,
                 shares=shares,
@@ -100,7 +100,7 @@ def notes_on(classes: Sequence[Inseparable], budget: float | None) -> tuple[Note
     ]
     if not pairs:
         return named
-    return (*named, Note(kind="not-separable", values={"pairs": pairs, "least": LEAST, "budget": budget}))
+    return (*named, Note(kind="not-separable", values={"pairs": pairs, "least": WITHIN_NOISE, "budget": budget}))
 
 
 def _cliques(pairs: Mapping[Pair, object]) -> list[tuple[int, ...]]:
@@ -206,7 +206,7 @@ def best_experiment(rivals: Sequence[CandidateFit], chooser: ExperimentChooser, 
     if not judged:
         return Asked(None, (Note(kind="no-experiment-left", values={"candidates": names, "budget": chooser.budget}),))
     best = {pair: max(judged, key=lambda j: j.sizes[pair]) for pair in pairs}
-    hopeless = {p: (j.sizes[p], j.experiment.name) for p, j in best.items() if j.sizes[p] < LEAST}
+    hopeless = {p: (j.sizes[p], j.experiment.name) for p, j in best.items() if j.sizes[p] < WITHIN_NOISE}
     separable = [pair for pair in pairs if pair not in hopeless]
     placed = [PlacedEffect(effect=r.hypothesis.name, joints=r.hypothesis.joints) for r in rivals]
     inseparable = classes_of(placed, hopeless, tried)

@@ -24,7 +24,7 @@ from model.discrepancy.candidates.candidate_fit import CandidateFit
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point
-from model.discrepancy.thresholds import MOST_ROUNDS
+from model.discrepancy.thresholds import MOST_ROUNDS, WITHIN_NOISE
 from model.drives.sensor import sensed_angle
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
@@ -162,9 +162,6 @@ def starts_at_rest(observation: Observation, shared: Calibration, starts: Sequen
 Pair = tuple[int, int]
 """Two rivals, by their places in a list, the first place first."""
 
-LEAST = 3.0
-"""Separation of a pair, in deviations, that tells it apart: the evidence then moves by 9, more than the margin of a
-name."""
 ENOUGH = 10.0
 """Separation beyond which a shorter experiment is better than more separation, in deviations."""
 
@@ -182,7 +179,7 @@ class Separations:
         """Its rank for some pairs: experiments that separate them come first, then the most separation (up to `ENOUGH`)
         per second."""
         separation = min(self.sizes[p] for p in pairs)
-        return separation >= LEAST, min(separation, ENOUGH) ** 2 / self.there.duration
+        return separation >= WITHIN_NOISE, min(separation, ENOUGH) ** 2 / self.there.duration
 
 
 def recorded_by(rivals: Sequence[CandidateFit], there: Imagined) -> list[Prediction]:

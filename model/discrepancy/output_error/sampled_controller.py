@@ -21,7 +21,8 @@ from model.inverse_dynamics.drive_limits import AT_LIMIT, SEVERAL
 
 CLEAR = 4.0
 """Distance of a drive from what a set point makes of it, in resolutions, beyond which it was another set point: a drive
-may be rounded more coarsely than a file tells, and then lies near what either of two set points makes."""
+may be rounded more coarsely than a file tells, and then lies near what either of two set points makes. A drive of less
+tells no gain: rounding dominates."""
 
 Memory = tuple[float, float, float, float, float]
 """What a controller remembers: sum and last of the errors, of the inner ones, position."""
@@ -123,8 +124,6 @@ LEAST_AGREEMENT = 0.95
 the controller is another than the machine file says."""
 FINEST = 1e-3
 """Share of a joint's largest drive to which numbers of a record are trusted, where the file states no resolution."""
-LEAST_STEPS = 4.0
-"""Least drive of a sample that is used for a gain, in resolutions: rounding dominates below it."""
 LEAST_SAMPLES = 20
 """Samples that the estimate of a gain needs."""
 ROUNDED_SHARE = 0.5
@@ -182,7 +181,7 @@ class _Recorded:
     @property
     def free(self) -> NDArray[np.bool_]:
         """(k,) whether the drive is away from its limit, and large beside its rounding."""
-        return ~self.limited & (np.abs(self.drive) > LEAST_STEPS * self.resolution)
+        return ~self.limited & (np.abs(self.drive) > CLEAR * self.resolution)
 
     def numbers_by(self, law: ControllerLaw, scale: Scale) -> _Found:
         """The numbers by a law, and the share of samples whose drive is that law's."""
@@ -191,7 +190,7 @@ class _Recorded:
         apart = np.abs(drive - scale.factor * formed)
         agreed = apart[~limited] <= (0.75 * resolution + 2 * FINEST * np.abs(drive))[~limited]
         near = apart <= _farthest(drive, resolution)
-        large = ~limited & near & (np.abs(formed) > LEAST_STEPS * resolution)
+        large = ~limited & near & (np.abs(formed) > CLEAR * resolution)
         share = float(np.mean(agreed)) if agreed.size >= LEAST_SAMPLES else 0.0
         numbers = ControllerNumbers(self.sent, used, formed, drive, limited, large, clear, scale.factor)
         return _Found(share, numbers)

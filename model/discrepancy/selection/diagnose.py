@@ -41,8 +41,6 @@ from model.machine_model.record_verdict import FAR_OFF
 
 NOISE_ROUNDS = 2
 """Fits with the noise that the one before has left."""
-FIRST_FEEDBACK_SHARES = (0.0, 0.5)
-"""Feedback shares of the fits that come before the first one with the full share."""
 SHORT_DISTANCE = 0.3
 """Share of the expected distance over which friction builds up, below which a fit is tried with sudden friction too."""
 
@@ -132,7 +130,7 @@ def _fit_tolerances(given: Point) -> Point:
     effect can, the fit starts again from the given model.
     """
     near = given
-    for share in FIRST_FEEDBACK_SHARES:
+    for share in (0.0, FEEDBACK_SHARE_FOR_ERRORS):
         near = _fit_with_feedback(near, given.observation.with_feedback_share(share)) or near
     begun = _fit_with_feedback(near, given.observation) or _fit_with_feedback(given, given.observation)
     if begun is None:
