@@ -26,9 +26,9 @@ AgainstWhat = Literal["time", "position", "speed", "direction", "drive"]
 UNWRITTEN = ""
 """A sentence that the renderer writes once the answer is complete."""
 
-CLEAR_SHAPE = 0.3
+CLEAR_SHAPE = 0.4
 """Least share of the remaining torque's variance that a dependence must explain to count as a shape that a person could
-write an effect after."""
+write an effect after, and to say that a law is another one."""
 FEWEST_BINS = 5
 """Bins with a torque that such a shape needs: two or three values are no curve. Directions are never more than
 three."""

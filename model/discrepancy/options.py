@@ -9,6 +9,7 @@ from pydantic import Field, FiniteFloat
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord, UserRecord
 from model.discrepancy.grounds import Method
+from model.discrepancy.thresholds import THRESHOLDS, TORQUE_LEAD, UNSURE_NOISE
 from model.effects.library import effect
 
 if TYPE_CHECKING:
@@ -81,9 +82,9 @@ class TorqueOptions(FrozenRecord):
     effects: tuple[str, ...] | None = None
     joints: tuple[int, ...] | None = None
     most_steps: Annotated[int, Field(ge=1, le=20)] = 8
-    least_evidence: FiniteFloat = 30.0
+    least_evidence: FiniteFloat = UNSURE_NOISE * THRESHOLDS.significant
     echo: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.02
-    least_margin: FiniteFloat = 12.0
+    least_margin: FiniteFloat = TORQUE_LEAD
     least_share: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.01
 
 

@@ -14,11 +14,19 @@ FEEDBACK_SHARE_FOR_ERRORS = 0.5
 """The same where errors are reported and judged, held-out ones above all: nearer to what the model alone would do."""
 
 
+LARGER_PART = 0.5
+"""Share of a whole from which something is the larger part of it. What is less than that beside a rival, or what it
+would need, does not catch up with it; of a residual it is no explanation."""
+UNSURE_NOISE = 3.0
+"""How many times the usual evidence an effect needs in torques, and the usual lead a name: a noise of torques is never
+known as well as a likelihood takes it to be. What priors say has no noise in it, and counts so many times as much."""
+MOST_ROUNDS = 20
+"""Rounds of an iteration, at most: what has not settled by then does not settle."""
 CHANCES = 3
 """Candidates of one ranking that records not fitted to may refuse before the search ends."""
 WITHIN_NOISE = 3.0
-"""Residual of a joint, in deviations of noise, that may be noise alone: sound rigs leave up to 2.6, where
-friction turns (docs/how-well.md)."""
+"""Deviations of noise that may be noise alone. Residuals of sound rigs have up to 2.6, where friction turns
+(docs/how-well.md); a pair of rivals that far apart moves the evidence by 9, more than the margin of a name."""
 
 
 @dataclass(frozen=True)
@@ -75,3 +83,5 @@ class Thresholds:
 
 
 THRESHOLDS = Thresholds()
+TORQUE_LEAD = UNSURE_NOISE * THRESHOLDS.margin
+"""Lead in evidence from which one name is given in torques, and for which a further joint is taken into an effect."""

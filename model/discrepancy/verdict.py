@@ -9,14 +9,12 @@ from typing import Literal, TypeVar
 from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import Gap, GapNumber, GapStage, GapWithout, SignalError, Step, Verdict
 from model.discrepancy.grounds import Refusal
-from model.discrepancy.thresholds import Thresholds
+from model.discrepancy.thresholds import THRESHOLDS, Thresholds
 from model.machine_model.model import base_model
 from model.machine_model.record_verdict import SCATTER
 
 LEAST_EXCESS = 0.25
 """Least relative excess variance for which a removed share is reported; a 17 s record resolves it to ±0.06."""
-GROWN = 1.1
-"""Ratio of a joint's mean square errors on held-out traces, above which a fit has made them worse beyond noise."""
 
 
 def verdict(steps: Sequence[Step], *, unexplained: bool, suspected: bool = False, partly: bool = False) -> Verdict:
@@ -69,7 +67,8 @@ def rises_too_much(rise: float, deviation: float, fall: float, evidence: float, 
 
 def worse_held_out(held: Sequence[SignalError]) -> tuple[int, ...]:
     """Joints whose error on held-out traces has grown beyond what noise may do."""
-    return tuple(e.joint for e in held if (e.after / e.floor) ** 2 > GROWN * (e.before / e.floor) ** 2 + LEAST_EXCESS)
+    grown = 1.0 + THRESHOLDS.grown
+    return tuple(e.joint for e in held if (e.after / e.floor) ** 2 > grown * (e.before / e.floor) ** 2 + LEAST_EXCESS)
 
 
 def unexplained(

@@ -22,8 +22,8 @@ from model.discrepancy.candidates.tones import tones_tried
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.noise_model import LARGER, AutoregressiveNoise, fit_noise_model
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.search import LAST_STEPS, STEPS, Point, converge, descend, point_at
-from model.discrepancy.thresholds import Thresholds
+from model.discrepancy.output_error.search import FEW_STEPS, STEPS, Point, converge, descend, point_at
+from model.discrepancy.thresholds import LARGER_PART, Thresholds
 from model.fitting.unknowns import Unknown
 from model.machine_model.record_verdict import FAR_OFF
 
@@ -71,6 +71,11 @@ class CandidateFit:
         """Mean square of the weighted residual."""
         return self.fit.point.misfit
 
+    @property
+    def explains(self) -> bool:
+        """Whether it leaves noise, with likely values of all numbers."""
+        return self.misfit < LARGER and self.fit.point.strain < FAR_OFF
+
 
 def same_answer(one: CandidateFit, better: CandidateFit) -> bool:
     """Whether a candidate is the same answer as one ranked above it: the same effect on the same or fewer joints, or on
@@ -97,18 +102,18 @@ def judge(point: Point) -> Fit:
     return Fit(point, fit_noise_model(observation.by_joint(observation.in_deviations(point.residuals))))
 
 
-def refit(before: Fit, probe: Probe, goal: float | None = None) -> CandidateFit | None:
-    """The candidate, fitted from the start that its probe proposes.
+def refit(before: Fit, probe: Probe, goal: float = math.inf, *, explained: bool = False) -> CandidateFit | None:
+    """The candidate, fitted from the start that its probe proposes, while the cost `goal` at which it would rival the
+    best so far is within reach.
 
     If that fit does not improve on the baseline, the candidate is fitted from the expected values, because a strong
-    effect may have driven the tolerance parameters far off. With a `goal`, the cost at which it would rival a candidate
-    that has explained the record, only the first start is tried, and only while the goal is within reach. None if no
-    simulation stays finite, or if every fit ends far above the baseline's cost.
+    effect may have driven the tolerance parameters far off; not where another candidate has `explained` the record.
+    None if no simulation stays finite, or if every fit ends far above the baseline's cost.
     """
     found: list[Point] = []
     lost = LOST * before.point.cost
-    ways = (_nearby, partial(_from_expected, goal=lost)) if goal is None else (partial(_nearby, goal=goal),)
-    for fit in ways:
+    ways = (partial(_nearby, goal=goal), partial(_from_expected, goal=min(lost, goal)))
+    for fit in ways[:1] if explained else ways:
         try:
             point = fit(before.point, probe)
         except SpecError:
@@ -165,7 +170,7 @@ def _from_expected(before: Point, probe: Probe, goal: float) -> Point | None:
         return None
     changing = _indices(begun.unknowns, [p.name for p in probe.hypothesis.free])
     near = descend(begun, STEPS, changing)
-    if near.cost > before.on(closed_loop, before.tangents).cost:
+    if near.cost > before.cost_in_closed_loop:
         return None
     tangents = _start(before, probe, derivatives=before.expected_on_record).tangents
     there = descend(near.on(before.observation, tangents), STEPS, changing, goal)
@@ -181,13 +186,13 @@ def polish(before: Fit, found: CandidateFit) -> CandidateFit:
     free = _indices(point.unknowns, [p.name for p in found.hypothesis.free])
     known = set(free) <= set(near)
     return _improved(
-        before, found, lambda: descend(point.with_new_tangents(near), LAST_STEPS, free, changing_known=known)
+        before, found, lambda: descend(point.with_new_tangents(near), FEW_STEPS, free, changing_known=known)
     )
 
 
 def finish(before: Fit, found: CandidateFit) -> CandidateFit:
     """The fit, run to convergence, with all derivatives computed anew."""
-    return _improved(before, found, lambda: converge(found.fit.point, LAST_STEPS))
+    return _improved(before, found, lambda: converge(found.fit.point, FEW_STEPS))
 
 
 def _improved(before: Fit, found: CandidateFit, work: Callable[[], Point | None], least: float = 0.0) -> CandidateFit:
@@ -207,7 +212,7 @@ def restart(before: Fit, found: CandidateFit, goal: float = math.inf) -> Candida
 
     The new fit is given up once a cost of `goal` is out of reach.
     """
-    if found.misfit < LARGER and found.fit.point.strain < FAR_OFF:
+    if found.explains:
         return found
     reach = min(goal, found.fit.point.cost)
     return _improved(before, found, lambda: _from_expected(before.point, found.probe, reach), BETTER)
@@ -310,10 +315,6 @@ def _indices(unknowns: Sequence[Unknown], names: Sequence[str]) -> list[int]:
     return [k for k, u in enumerate(unknowns) if u.name in names]
 
 
-WORTH_A_FIT = 0.7
-"""A set of joints is fitted where the evidence of its single fits adds up to this share of the best so far."""
-
-
 def fit_several_joints(
     current: Fit,
     singles: Sequence[CandidateFit],
@@ -337,7 +338,7 @@ def fit_several_joints(
     found: list[tuple[CandidateFit, list[CandidateFit]]] = []
     best = max((r.evidence for r in singles), default=0.0)
     for alike in _alike(singles, thresholds):
-        if sum(r.evidence for r in alike) >= WORTH_A_FIT * best:
+        if sum(r.evidence for r in alike) >= LARGER_PART * best:
             stop_if(cancel)
             fit = _better(current, alike[:2], thresholds)
             if fit is not None:

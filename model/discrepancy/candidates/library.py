@@ -59,9 +59,11 @@ SHAPES: Mapping[str, tuple[dict[str, float], ...]] = {
 """Trial values of numbers that only shape an effect, by part: rad/s, s."""
 
 
-TAUT_QUANTILES, TAUT_WITHIN = (0.25, 0.5, 0.75), (0.05, 0.95)
+TRIED_QUANTILES, MOST_OF_A_RECORD = (0.2, 0.5, 0.8), (0.05, 0.95)
 """Quantiles of a joint's recorded positions at which a cable is tried to become taut, and between which it must: one
-that is taut in the whole record is a spring, and one that never is, is nothing."""
+that is taut in the whole record is a spring, and one that never is, is nothing. The same of the drive, of dead zones
+that are tried, and of the speed, by which Stribeck friction has to have faded to 37 % (1/e): what fades at higher
+speeds than were recorded is Coulomb friction."""
 GRAVITY_FRICTION = "gravity_torque_friction"
 """Friction in proportion to a gravity torque."""
 POSTURES, LEAST_CHANGE = 16, 1e-6
@@ -307,7 +309,7 @@ def _taut_within(hypothesis: Hypothesis, observation: Observation) -> Hypothesis
         return hypothesis
     column = observation.machine.modelled_joints.index(hypothesis.joints[0])
     positions = np.concatenate([r.inputs.readings[:, column] for r in observation.records])
-    low, high = (float(x) for x in np.nanquantile(positions, TAUT_WITHIN))
-    tried = (float(x) for x in np.nanquantile(positions, TAUT_QUANTILES))
+    low, high = (float(x) for x in np.nanquantile(positions, MOST_OF_A_RECORD))
+    tried = (float(x) for x in np.nanquantile(positions, TRIED_QUANTILES))
     trials = tuple({**trial, **dict.fromkeys(rests, rest)} for rest in tried for trial in hypothesis.trials)
     return replace(hypothesis, trials=trials, bounds={**hypothesis.bounds, **dict.fromkeys(rests, (low, high))})

@@ -31,7 +31,7 @@ from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.noise_model import LARGER
 from model.discrepancy.output_error.observation import AT_ONCE, side_by_side
 from model.discrepancy.output_error.search import Point
-from model.discrepancy.thresholds import Thresholds
+from model.discrepancy.thresholds import LARGER_PART, Thresholds
 from model.effects.library import effect
 from model.effects.names import effect_on
 from model.machine_model.record_verdict import FAR_OFF
@@ -40,12 +40,8 @@ FLAGGED_SHARE = 0.1
 """A joint is flagged where its best probe promises this share of the best of all."""
 ALWAYS_FITTED, HOPELESS = 4, 0.2
 """After so many fits, no candidate is fitted whose probe promises less than this share of the best evidence so far."""
-PROMISING = 0.6
-"""Least gain of a probe that is fitted, as a share of the fall of the cost that would make its effect significant."""
-WORTH_POLISHING = 0.5
-"""Least evidence of a fit that is polished, as a share of the best: a fit with less cannot catch up."""
 LEADING = 8
-"""Candidates that whoever watches is told of."""
+"""Number of leading candidates that a watcher is told of."""
 REMEMBERED = 0.3
 """A hypothesis is probed again where its earlier response promises this share of an interesting gain."""
 
@@ -70,8 +66,9 @@ def rank(case: Case, current: Fit, progress: Progress, cancel: Cancel, earlier: 
     _tell_leading(case, current, probes, ())
     fits = _fit_all(case, current, chosen, progress, cancel)
     if current.point.strain >= FAR_OFF:
-        fits += _fits_from_expected(current, probes, case.options.polished)
-        fits += _fits_of_strained_numbers(current, case)
+        if not any(f.explains for f in fits):
+            fits += _fits_from_expected(current, probes, case.options.polished)
+        fits += _fits_of_strained_numbers(current, case, fits)
     progress(0.9, "fitting effects of several joints")
     fits += fit_several_joints(current, fits, probes, case.thresholds, cancel)
     fits.sort(key=lambda r: -r.evidence)
@@ -126,7 +123,7 @@ def _flagged_joints(probes: Sequence[Probe], joints: Sequence[int], interesting:
 def _is_hopeful(current: Fit, probed: Probe, thresholds: Thresholds) -> bool:
     """Whether a probe promises enough of what its effect would need."""
     needed = thresholds.significant + price_of(current.point.observation, probed.hypothesis)
-    return probed.gain >= max(thresholds.interesting, PROMISING * needed)
+    return probed.gain >= max(thresholds.interesting, LARGER_PART * needed)
 
 
 def _tell_leading(case: Case, current: Fit, probes: Sequence[Probe], fits: Sequence[CandidateFit]) -> None:
@@ -147,7 +144,7 @@ def _fit_all(
     case: Case, current: Fit, chosen: Sequence[Probe], progress: Progress, cancel: Cancel
 ) -> list[CandidateFit]:
     """Fits of the probed candidates, the most promising first, until those left are hopeless."""
-    observation, close = current.point.observation, case.thresholds.close
+    close = case.thresholds.close
     fits: list[CandidateFit] = []
     for begin in range(0, len(chosen), AT_ONCE):
         stop_if(cancel)
@@ -157,16 +154,21 @@ def _fit_all(
             break
         names = " and ".join(effect_on(one.hypothesis.name, one.hypothesis.joints) for one in now)
         progress(0.4 + 0.5 * begin / len(chosen), f"fitting {names}")
-        explaining = (f for f in fits if f.misfit < LARGER)
-        reach = min((f.fit.point.cost + price_of(observation, f.hypothesis) for f in explaining), default=None)
+        begun = list(fits)
 
-        def fit(probed: Probe, reach: float | None = reach) -> CandidateFit | None:
-            goal = None if reach is None else reach + close - price_of(observation, probed.hypothesis)
-            return refit(current, probed, goal)
+        def fit(probed: Probe, begun: Sequence[CandidateFit] = begun) -> CandidateFit | None:
+            return _fit_beside(begun, current, probed, close)
 
         fits += [f for f in side_by_side(fit, now) if f is not None]
         _tell_leading(case, current, chosen, fits)
     return fits
+
+
+def _fit_beside(fits: Sequence[CandidateFit], current: Fit, probed: Probe, close: float) -> CandidateFit | None:
+    """The fit of a probed candidate, while it may still come close to the best of these fits."""
+    reach = min((f.fit.point.cost + f.price for f in fits), default=math.inf)
+    goal = reach + close - price_of(current.point.observation, probed.hypothesis)
+    return refit(current, probed, goal, explained=any(f.misfit < LARGER for f in fits))
 
 
 def _fits_from_expected(current: Fit, probes: Sequence[Probe], most: int) -> list[CandidateFit]:
@@ -187,17 +189,21 @@ def _fits_from_expected(current: Fit, probes: Sequence[Probe], most: int) -> lis
     return [fit for fit in fits if fit is not None]
 
 
-def _fits_of_strained_numbers(current: Fit, case: Case) -> list[CandidateFit]:
+def _fits_of_strained_numbers(current: Fit, case: Case, fits: Sequence[CandidateFit]) -> list[CandidateFit]:
     """Fits of the effects that do what a number far from its expectation does. They begin where the effect has all of
-    that number's distance, and the number is as expected: the same simulation, without the cost of the prior."""
+    that number's distance, and the number is as expected: the same simulation, without the cost of the prior. Where
+    another fit has explained the record, that is their one start."""
+    explained = any(f.explains for f in fits)
     point = current.point
     begun = [start for h in _tried(case, point) if (start := as_effect(point, h)) is not None]
 
     def fit(start: Probe) -> CandidateFit | None:
-        trials = (*start.hypothesis.trials, start.start)
-        widened = replace(start, hypothesis=replace(start.hypothesis, trials=trials))
-        found = [f for f in (refit(current, start), refit_from_expected(current, widened)) if f is not None]
-        return min(found, key=lambda f: f.fit.point.cost, default=None)
+        found = [_fit_beside(fits, current, start, case.thresholds.close)]
+        if not explained:
+            trials = (*start.hypothesis.trials, start.start)
+            widened = replace(start, hypothesis=replace(start.hypothesis, trials=trials))
+            found.append(refit_from_expected(current, widened))
+        return min((f for f in found if f is not None), key=lambda f: f.fit.point.cost, default=None)
 
     return [f for f in side_by_side(fit, begun) if f is not None]
 
@@ -223,7 +229,7 @@ def _most_promising(fits: Sequence[CandidateFit], besides: Sequence[CandidateFit
 
 def _polish_best(current: Fit, answers: Sequence[CandidateFit]) -> list[CandidateFit]:
     """The answers; those that polishing could make the best are polished."""
-    least = WORTH_POLISHING * max((r.evidence for r in answers), default=0.0)
+    least = LARGER_PART * max((r.evidence for r in answers), default=0.0)
 
     def work(found: CandidateFit) -> CandidateFit:
         return polish(current, found) if found.evidence >= least else found

@@ -18,7 +18,7 @@ from model.arrays import Floats
 from model.discrepancy.candidates.library import Hypothesis, tone
 from model.discrepancy.candidates.probing import Probe, Projection, projection
 from model.discrepancy.excitation import own_frequencies
-from model.discrepancy.output_error.observation import DIFFERENCE, Observation
+from model.discrepancy.output_error.observation import DIFFERENCE, Observation, step_of_derivatives
 from model.discrepancy.output_error.search import Point
 from model.effects.effect import Tone
 from model.effects.library import effect, library
@@ -142,7 +142,7 @@ def torque_response(point: Point, joint: int, record: int = 0) -> Floats:
             states.append(state)
             sizes.append(size)
             waves.append(np.sin(_phase(point, over, column, np.array([value]), record)[0]))
-    shown = observation.readings(model, states)[record][..., column]
+    shown = observation.readings(model, states, step_of_derivatives(model))[record][..., column]
     shown = (shown[1:] - shown[:1]) / np.array(sizes)[:, None]
     count = _samples(observation.records[record])
     rows = [_lagged(wave, count) for wave in waves]

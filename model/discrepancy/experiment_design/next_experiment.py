@@ -24,7 +24,6 @@ from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, same
 from model.discrepancy.candidates.ranking import Decision, Ranking
 from model.discrepancy.diagnosis import UNWRITTEN, DifferencePlace, Inseparable, NextExperiment, PlacedEffect, Verdict
 from model.discrepancy.experiment_design.separation import (
-    LEAST,
     NOISE_SEED,
     Imagined,
     Pair,
@@ -38,7 +37,8 @@ from model.discrepancy.explanation.effect_words import LAWS, MEASUREMENTS
 from model.discrepancy.grounds import Measurement, Note, SharedLaw
 from model.discrepancy.localisation.phases import PHASES, AskedMotion
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.search import Point, converge
+from model.discrepancy.output_error.search import FEW_STEPS, Point, converge
+from model.discrepancy.thresholds import WITHIN_NOISE
 from model.effects.names import effect_on
 
 
@@ -60,7 +60,7 @@ def classes_of(
             Inseparable(
                 members=members,
                 separation=separation,
-                needed=LEAST,
+                needed=WITHIN_NOISE,
                 experiment=experiment,
                 tried=tried,
                 shares=shares,
@@ -100,7 +100,7 @@ def notes_on(classes: Sequence[Inseparable], budget: float | None) -> tuple[Note
     ]
     if not pairs:
         return named
-    return (*named, Note(kind="not-separable", values={"pairs": pairs, "least": LEAST, "budget": budget}))
+    return (*named, Note(kind="not-separable", values={"pairs": pairs, "least": WITHIN_NOISE, "budget": budget}))
 
 
 def _cliques(pairs: Mapping[Pair, object]) -> list[tuple[int, ...]]:
@@ -121,8 +121,6 @@ SURE = 20.0
 """Margin of evidence below which an experiment is asked for although one effect was named."""
 MOST_RIVALS = 4
 """Most rivals among which an experiment is to decide: each of them is simulated on every experiment."""
-SETTLING = 5
-"""Steps of each search that runs a rival's fit to convergence."""
 LONGEST_DESIGN = 20.0
 """Longest designed motion, s of robot time."""
 DURATIONS = (0.1, 0.2, 0.4, 0.8)
@@ -193,7 +191,7 @@ def converge_rivals(rivals: Sequence[CandidateFit]) -> list[CandidateFit]:
     separates nothing. A rival on the verge of instability has no derivatives and is left out."""
     found = []
     for rival in rivals[:MOST_RIVALS]:
-        point = converge(rival.fit.point, SETTLING)
+        point = converge(rival.fit.point, FEW_STEPS)
         with suppress(SpecError):
             found.append(replace(rival, fit=judge(point.with_new_tangents())))
     return found
@@ -208,7 +206,7 @@ def best_experiment(rivals: Sequence[CandidateFit], chooser: ExperimentChooser, 
     if not judged:
         return Asked(None, (Note(kind="no-experiment-left", values={"candidates": names, "budget": chooser.budget}),))
     best = {pair: max(judged, key=lambda j: j.sizes[pair]) for pair in pairs}
-    hopeless = {p: (j.sizes[p], j.experiment.name) for p, j in best.items() if j.sizes[p] < LEAST}
+    hopeless = {p: (j.sizes[p], j.experiment.name) for p, j in best.items() if j.sizes[p] < WITHIN_NOISE}
     separable = [pair for pair in pairs if pair not in hopeless]
     placed = [PlacedEffect(effect=r.hypothesis.name, joints=r.hypothesis.joints) for r in rivals]
     inseparable = classes_of(placed, hopeless, tried)

@@ -24,6 +24,7 @@ from model.discrepancy.candidates.candidate_fit import CandidateFit
 from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.output_error.observation import Observation, Signals, observe
 from model.discrepancy.output_error.search import Point
+from model.discrepancy.thresholds import MOST_ROUNDS, WITHIN_NOISE
 from model.drives.sensor import sensed_angle
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
@@ -32,8 +33,6 @@ NOISE_SEED = 2
 """Seed of the readings' noise in an imagined run: without noise, friction would hold where the real arm creeps."""
 LOOSE = 1e-9
 """Relative precision that stands for none, so that matrices can be inverted."""
-ROUNDS = 20
-"""Rounds in which the angle to a reading is found; each leaves the share by which the potentiometer's scale is off."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +153,7 @@ def starts_at_rest(observation: Observation, shared: Calibration, starts: Sequen
         (joint,) = start.joints
         first = at.slot(joint, 0)
         angle = wanted = read[joint - 1]
-        for _ in range(ROUNDS):
+        for _ in range(MOST_ROUNDS):
             angle += wanted - sensed_angle(angle, vector[first : first + at.PER_JOINT])
         found.append(float(np.clip(angle - wanted, start.low, start.high)))
     return np.array(found)
@@ -163,9 +162,6 @@ def starts_at_rest(observation: Observation, shared: Calibration, starts: Sequen
 Pair = tuple[int, int]
 """Two rivals, by their places in a list, the first place first."""
 
-LEAST = 3.0
-"""Separation of a pair, in deviations, that tells it apart: the evidence then moves by 9, more than the margin of a
-name."""
 ENOUGH = 10.0
 """Separation beyond which a shorter experiment is better than more separation, in deviations."""
 
@@ -183,7 +179,7 @@ class Separations:
         """Its rank for some pairs: experiments that separate them come first, then the most separation (up to `ENOUGH`)
         per second."""
         separation = min(self.sizes[p] for p in pairs)
-        return separation >= LEAST, min(separation, ENOUGH) ** 2 / self.there.duration
+        return separation >= WITHIN_NOISE, min(separation, ENOUGH) ** 2 / self.there.duration
 
 
 def recorded_by(rivals: Sequence[CandidateFit], there: Imagined) -> list[Prediction]:

@@ -14,13 +14,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.tolerances import prior_cost, prior_rows
 from model.discrepancy.localisation.statistics import LEAST
 from model.discrepancy.options import TorqueOptions
 from model.discrepancy.output_error.search import FORETOLD
+from model.fitting.bounded_step import bounded_step
 from model.fitting.unknowns import Unknown
 from model.fitting.whitening import autocovariance
 from model.inverse_dynamics.recorded_motion import RecordedMotion
@@ -158,8 +158,6 @@ DAMPING = 0.3
 """Damping of a step, over the scales of its unknowns. It decides only what the records do not: a tilt about an axis
 along gravity would be thrown to its bound otherwise, and all other numbers would stay where they are, since the step as
 a whole leads uphill."""
-ROUNDING = 1e-13
-"""Share of the largest sum of squares that is added to each, beyond what rounding makes of them."""
 SETTLED = 1e-2
 """Fall of −2 log posterior in a round below which the fit has settled."""
 
@@ -294,33 +292,21 @@ def _evaluate(
     return BalanceFit(balance, tuple(unknowns), data, values, residual, noise, by_joint, prior_cost(unknowns, values))
 
 
-def gauss_newton(now: BalanceFit, known: Slopes | None = None) -> dict[str, float]:
+def gauss_newton(now: BalanceFit, slopes: Slopes) -> dict[str, float]:
     """Values after one bounded Gauss-Newton step, damped (Levenberg 1944)."""
     unknowns = now.unknowns
     if not unknowns:
         return {}
-    ready = known or {}
-    slopes = stacked({u.name: ready[u.name] if u.name in ready else now.slope(u) for u in unknowns}, now)
-    A = np.concatenate(now.noise.weighted(now.data.stretches, slopes))
-    b = np.concatenate(now.noise.weighted(now.data.stretches, now.residual))
     scale = np.array([u.scale for u in unknowns])
+    A = np.concatenate(now.noise.weighted(now.data.stretches, stacked(slopes, now))) * scale
+    b = np.concatenate(now.noise.weighted(now.data.stretches, now.residual))
     at = np.array([now.values[u.name] for u in unknowns])
     rows, aims = prior_rows(unknowns, at)
+    rows = rows * scale
     low, high = np.array([u.low for u in unknowns]), np.array([u.high for u in unknowns])
-    room = 1e-9 * np.maximum(high - low, scale)
-    # the squares first: the bounded search then works on p rows, not on all samples; what rounding takes of directions
-    # that the records hardly show is far below the damping
-    whole = np.column_stack([A * scale, -b])
-    squares = whole.T @ whole
-    squares[np.diag_indices_from(squares)] += ROUNDING * float(np.max(np.diag(squares), initial=1e-300))
-    triangle: Floats = np.linalg.cholesky(squares).T
-    solved = lsq_linear(
-        np.concatenate([triangle[:, :-1], rows * scale, DAMPING * np.eye(len(unknowns))]),
-        np.concatenate([triangle[:, -1], aims, np.zeros(len(unknowns))]),
-        bounds=((low - at - room) / scale, (high - at + room) / scale),
-        method="bvls",
-    )
-    after = np.clip(at + solved.x * scale, low, high)
+    curvature = A.T @ A + rows.T @ rows + DAMPING**2 * np.eye(len(unknowns))
+    step = bounded_step(curvature, rows.T @ aims - A.T @ b, (low - at) / scale, (high - at) / scale)
+    after = np.clip(at + step * scale, low, high)
     return {u.name: float(v) for u, v in zip(unknowns, after, strict=True)}
 
 

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from model.arrays import Floats
-from model.discrepancy.diagnosis import Step, Suspicion
+from model.discrepancy.diagnosis import CLEAR_SHAPE, Step, Suspicion
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
-from model.discrepancy.inverse_dynamics.localisation import ANOTHER_LAW, is_function_of, remaining_shapes
+from model.discrepancy.inverse_dynamics.localisation import is_function_of, remaining_shapes
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.tolerances import prior_distance
-from model.discrepancy.thresholds import CHANCES, WITHIN_NOISE
+from model.discrepancy.thresholds import CHANCES, LARGER_PART, THRESHOLDS, UNSURE_NOISE, WITHIN_NOISE
 from model.effects.library import find_named_effect
 from model.machine_model.record_verdict import FAR_OFF
 
@@ -98,17 +98,6 @@ def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Flo
     return holdout.is_beyond_noise(fell, left, standing.case.noise)
 
 
-BESIDE_REFUSED = 0.5
-"""Least evidence of an effect beside that of a rival which was refused before it: with less, it takes a small part of
-something else."""
-UNSURE_NOISE = 3.0
-"""How many times the usual evidence an effect needs (10, odds of 150 to 1): a noise is never known as well as a
-likelihood takes it to be. What priors say has no noise in it, and counts so many times as much."""
-SUSPECTED = 10.0
-"""Evidence from which an effect is suspected: odds above 100 to 1, by the usual scale of BIC (Kass and Raftery 1995),
-and still short of what naming it takes."""
-
-
 def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Comparison | None:
     """Whether a candidate is taken; None where it is none to speak of: it lacks evidence, has little beside a rival
     that was refused, or explains noise.
@@ -120,7 +109,7 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Comp
         return None
     if chosen.evidence + chosen.told + (UNSURE_NOISE - 1.0) * chosen.relieved < needed_evidence(standing, chosen):
         return None
-    if any(chosen.rivals(one) and chosen.evidence < BESIDE_REFUSED * one.evidence for one in refused):
+    if any(chosen.rivals(one) and chosen.evidence < LARGER_PART * one.evidence for one in refused):
         return None
     return compare(standing, chosen)
 
@@ -152,7 +141,7 @@ def suspect(standing: Standing, found: Findings) -> Suspicion | None:
             continue
         total = chosen.evidence + chosen.told
         needed = needed_evidence(standing, chosen)
-        if not SUSPECTED <= total < needed:
+        if not THRESHOLDS.significant <= total < needed:
             continue
         comparison = compare(standing, chosen)
         if comparison is None or comparison.removed < max(SUSPECTED_SHARE, case.options.least_share):
@@ -192,7 +181,7 @@ def joints_left_over(standing: Standing) -> tuple[int, ...]:
     of a shape."""
     case, now = standing.case, standing.now
     least = _noises_left(standing)
-    shaped = {shape.joint for shape in remaining_shapes(now, case) if shape.explained >= ANOTHER_LAW}
+    shaped = {shape.joint for shape in remaining_shapes(now, case) if shape.explained >= CLEAR_SHAPE}
     joints = standing.model.machine.modelled_joints
     slow = (least > FAR_ABOVE_NOISE) & (now.noise.memory > LONG_MEMORY)
     shapes = (least > WITHIN_NOISE) & np.array([j in shaped for j in joints])

@@ -8,6 +8,7 @@ import numpy as np
 
 from model.arrays import Floats
 from model.discrepancy.diagnosis import (
+    CLEAR_SHAPE,
     UNWRITTEN,
     AgainstWhat,
     Dependence,
@@ -19,6 +20,7 @@ from model.discrepancy.diagnosis import (
 )
 from model.discrepancy.inverse_dynamics.estimates import torque_unit
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, TorqueCase
+from model.discrepancy.localisation.disagreement import WINDOW
 from model.discrepancy.localisation.statistics import (
     LEAST,
     Quantities,
@@ -33,16 +35,12 @@ from model.discrepancy.localisation.statistics import (
 from model.discrepancy.localisation.structure import LINE
 from model.inverse_dynamics.recorded_motion import RecordedMotion
 
-WINDOW = 0.5
-"""Duration of one cell of the map, s."""
 FAST = 0.5
 """Acceleration above which a joint starts to move or turns back, as a share of its larger ones (95 % quantile)."""
 SLOW = 0.15
 """Speed below which a joint creeps, as a share of its larger ones (95 % quantile)."""
 SHAPE_SHARE = 0.15
 """Least share of the remaining torque's variance that a shape must explain."""
-ANOTHER_LAW = 0.4
-"""Least share of the remaining torque's variance with which a shape says that a law is another one."""
 BEYOND_NOISE = 1.5
 """Least remaining torque that is given a shape, in noise floors."""
 
@@ -151,7 +149,7 @@ def is_function_of(torque: Sequence[Floats], now: BalanceFit, case: TorqueCase, 
     signal, floor = _signal(now, case, j)
     known = Quantities({"drive": np.concatenate(list(torque))}, {}, _stretches(now, case, j))
     bins = dependence(signal, j, "drive", known, floor)
-    return bins is not None and bins.significance > LINE and bins.explained >= ANOTHER_LAW
+    return bins is not None and bins.significance > LINE and bins.explained >= CLEAR_SHAPE
 
 
 def _time(record: RecordedMotion, row: int) -> float:

@@ -12,7 +12,7 @@ from model.discrepancy.candidates.probing import LARGEST_STRETCH
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, stacked
 from model.discrepancy.inverse_dynamics.starts import Start, Trial
 from model.discrepancy.inverse_dynamics.tolerances import prior_distance, prior_rows
-from model.inverse_dynamics.torque_balance import TorqueBalance
+from model.inverse_dynamics.torque_balance import DIFFERENCE, TorqueBalance
 
 NONLINEAR = frozenset(
     {
@@ -30,11 +30,6 @@ NONLINEAR = frozenset(
 """Effects whose torque is far from linear in their size."""
 ONE_SIDED = "one_sided_spring"
 """The effect whose size changes its law with its sign."""
-SMALL = 1e-6
-"""Share of its size at which any other effect is probed besides: the step of the fit's own derivatives. What the
-tolerances took over of an effect would be there twice at its full size, and friction would hold a different part of it
-where a joint turns. A ten-thousandth was too much for that: on a rig whose payload was fitted as a mass, a payload's
-column was fifty times longer than what mass and payload differ by, and promised nothing."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +60,9 @@ class Prober:
         best = Probe(trial, 0.0, trial.starts[0])
         if trial.stated:
             best = Probe(trial, self._lift_priors(trial), dict(trial.origin))
-        shares_of_start = (1.0,) if trial.effect in NONLINEAR else (1.0, SMALL)
+        # Also at the step of the fit's own derivatives: what the tolerances took over of an effect would be there twice
+        # at its full size, and friction would hold a different part of it where a joint turns.
+        shares_of_start = (1.0,) if trial.effect in NONLINEAR else (1.0, DIFFERENCE)
         for start, share in itertools.product(trial.starts, shares_of_start):
             part = {n: null[n] + share * (start[n] - null[n]) for n in trial.amplitudes}
             columns = [self._column(balance, {**start, **null, name: part[name]}) / share for name in trial.amplitudes]

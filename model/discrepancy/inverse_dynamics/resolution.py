@@ -12,6 +12,8 @@ from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.inverse_dynamics.estimates import found_values
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, TorqueCase, minus_twice_log_likelihood, noise_model
 from model.discrepancy.inverse_dynamics.search import Fitted, cost_of
+from model.discrepancy.localisation.structure import CLIP
+from model.discrepancy.thresholds import LARGER_PART
 from model.inverse_dynamics.drive_timing import DELAY, MOST
 from model.inverse_dynamics.recorded_motion import holds_drive_between_samples
 from model.inverse_dynamics.torque_balance import TorqueBalance
@@ -35,13 +37,8 @@ reading went backwards."""
 SLOWER = 0.5
 """Share of the cutoff at which such an effect has to show as well. The variance of an acceleration's noise grows with
 the fifth power of the cutoff, so 3 % of it is left there."""
-NO_NOISE = 5.0
-"""Residual, in noise floors, that is not noise. Sound rigs leave up to 2.6, but for those whose current loop runs out
-of voltage: what is left there is no noise either (decision 0053)."""
 PLACES = 101
 """Places of a sensor's range at which its scale is looked at."""
-HALF = 0.5
-"""Share of its mean square that such an effect leaves at most."""
 LIMITED = 0.01
 """Least share of the record, rests included, in which the drive is above a limit that is named. Hidden limits were
 exceeded in 1.6 % of the samples or more. On sound arms, spikes in 0.3 % of the samples were told as a limit 4 % below
@@ -98,7 +95,7 @@ def _takes_half_of_what_is_no_noise(found: Fitted, before: BalanceFit, case: Tor
     imitates that, however fast it is."""
     own = np.array([j in found.joints for j in found.model.machine.modelled_joints])
     first, last = (case.stretches.mean_squares(fit.residual)[own] for fit in (before, found.fit))
-    return bool(own.any() and (first > (NO_NOISE * case.noise[own]) ** 2).all() and (last < HALF * first).all())
+    return bool(own.any() and (first > (CLIP * case.noise[own]) ** 2).all() and (last < LARGER_PART * first).all())
 
 
 def slower_evidence(found: Fitted, before: BalanceFit, case: TorqueCase) -> float:

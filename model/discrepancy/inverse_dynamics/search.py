@@ -9,13 +9,12 @@ import numpy as np
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.arrays import Floats
-from model.discrepancy.candidates.ranking import WORTH_POLISHING
 from model.discrepancy.inverse_dynamics.candidates import list_trials, take_back
 from model.discrepancy.inverse_dynamics.fitting import BalanceFit, Slopes, TorqueCase, fit, noise_model
 from model.discrepancy.inverse_dynamics.probing import Probe, prepare_probes
 from model.discrepancy.inverse_dynamics.starts import Start
 from model.discrepancy.inverse_dynamics.tolerances import free_unknown
-from model.discrepancy.thresholds import THRESHOLDS
+from model.discrepancy.thresholds import LARGER_PART, MOST_ROUNDS, THRESHOLDS, TORQUE_LEAD
 from model.effects.library import find_named_effect
 from model.effects.machine_numbers import MACHINE_NUMBERS
 from model.effects.names import effect_on
@@ -28,16 +27,10 @@ SHORTLIST = 7
 """Most effects that are fitted after probing."""
 REFINED = 6
 """Most candidates that are fitted with derivatives of their own."""
-REFINED_ROUNDS = 20
-"""Rounds of these fits, at most: one that has not settled would count as evidence against its effect."""
-LARGER_PART = 0.5
-"""Share of a joint's residual from which an effect that explains it is fitted, whatever it promises in evidence."""
 OF_A_JOINT = 3
 """Most of these effects on one joint."""
 ALIKE = 0.97
 """Correlation of the torques of two effects above which they count as the same."""
-JOINT_GAIN = 12.0
-"""Fall of the squares above which a joint is taken into an effect that acts on several."""
 
 STRAINED = 50.0
 """Cost of the tolerances, as χ², above which what is missing has driven them far off: one number by 7 deviations."""
@@ -160,9 +153,9 @@ def _refined(found: Sequence[Fitted], every: Sequence[Fitted], cancel: Cancel) -
     for one in found[:REFINED]:
         stop_if(cancel)
         last = one.fit
-        if one.log_odds >= min(best - THRESHOLDS.close, WORTH_POLISHING * best):
+        if one.log_odds >= min(best - THRESHOLDS.close, LARGER_PART * best):
             own = (last.balance, last.unknowns, last.values, last.data, last.noise.memory)
-            one = replace(one, fit=fit(*own, rounds=REFINED_ROUNDS))  # noqa: PLW2901 (the better one in its place)
+            one = replace(one, fit=fit(*own, rounds=MOST_ROUNDS))  # noqa: PLW2901 (the better one in its place)
         refined.append(one)
     return [*refined, *found[REFINED:]]
 
@@ -196,7 +189,7 @@ def _shortlist(probes: Sequence[Probe], now: BalanceFit) -> list[list[Probe]]:
             by_effect.setdefault(probe.trial.effect, []).append(probe)
     sets = []
     for own in by_effect.values():
-        several = [p for p in own if p.gain > JOINT_GAIN]
+        several = [p for p in own if p.gain > TORQUE_LEAD]
         best = sum(p.gain for p in several) if several else own[0].gain
         sets.append((best, own[0], several))
     chosen = []
@@ -297,7 +290,7 @@ def order_by_odds(found: Fitted) -> float:
 
 def prefer_fewer_joints(found: Sequence[Fitted]) -> list[Fitted]:
     """Candidates, best first, of which the best gives way to the same effect on fewer joints where the others bring
-    little: `JOINT_GAIN` for each is what a joint is taken in for."""
+    little: `TORQUE_LEAD` for each is what a joint is taken in for."""
     if not found:
         return []
     best = found[0]
@@ -305,7 +298,7 @@ def prefer_fewer_joints(found: Sequence[Fitted]) -> list[Fitted]:
     def does_as_much(other: Fitted) -> bool:
         more = len(best.joints) - len(other.joints)
         is_part = other.effect == best.effect and set(other.joints) < set(best.joints)
-        return is_part and bool(other.joints) and best.log_odds - other.log_odds < more * JOINT_GAIN
+        return is_part and bool(other.joints) and best.log_odds - other.log_odds < more * TORQUE_LEAD
 
     fewer = sorted((f for f in found if does_as_much(f)), key=lambda f: len(f.joints))
     return _led_by(fewer[:1], found)

@@ -11,7 +11,8 @@ import numpy as np
 from daq.contracts.machine import NoController
 from model import layout as at
 from model.arrays import Floats
-from model.discrepancy.candidates.library import TAUT_QUANTILES, TAUT_WITHIN
+from model.discrepancy.candidates.library import MOST_OF_A_RECORD, TRIED_QUANTILES
+from model.discrepancy.candidates.tones import MOST_TONES
 from model.discrepancy.excitation import own_frequencies
 from model.inverse_dynamics.drive_timing import MOST
 from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
@@ -155,11 +156,6 @@ EITHER_WAY = (
 """Effects that act one way by their sign: they have no slope from one sign to the other, and are begun with both."""
 SPEED_QUANTILES = (0.05, 0.2, 0.5, 0.8)
 """Quantiles of a joint's speed in magnitude: speeds at which Stribeck friction may have faded."""
-NEARLY_FASTEST = 0.95
-"""Quantile of a joint's speed in magnitude by which Stribeck friction has to have faded to 37 % (1/e): what fades at
-higher speeds than were recorded is Coulomb friction."""
-DRIVE_QUANTILES = (0.2, 0.5, 0.8)
-"""Quantiles of the drive in magnitude that are tried as dead zones."""
 THRESHOLD_SHARES = tuple(float(share) for share in np.geomspace(0.02, 0.6, 16))
 """Thresholds of an amplifier that are tried, as shares of the largest drive, each a quarter larger than the one before:
 a search goes from sample to sample, and finds a threshold only from near it."""
@@ -176,10 +172,9 @@ DELAYS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08)
 """Delays, and time constants of windings, that are tried, s."""
 WARMING_TIMES = (10.0, 40.0, 200.0)
 """Thermal time constants that are tried, s."""
-LARGEST_HEATING = 0.2
-"""Largest rise of a winding's resistance in a second of the record's own current: copper 50 K warmer in a second."""
 RISE = 0.2
-"""Rise of a winding's resistance in a record that is tried: copper 50 K warmer."""
+"""Rise of a winding's resistance in a record that is tried, and the largest in a second of the record's own current:
+copper 50 K warmer."""
 WINDING_SHARES = (0.01, 0.1)
 """Shares of a joint's torque that the motion of the rotor relative to its link may take; they set the compliances that
 are tried."""
@@ -187,8 +182,6 @@ PLAY_SHARES = (0.0005, 0.003, 0.02)
 """Free play that is tried, as a share of the joint's travel."""
 FASTEST_RIPPLE = 1000.0
 """Fastest ripple that is tried, in rad of phase per rad (m)."""
-LONGEST_SCAN = 400
-"""Largest number of frequencies that are tried."""
 
 
 def starts_of(name: str, own: Sequence[Parameter], place: Place) -> Iterator[Start]:
@@ -215,15 +208,15 @@ def narrowed(p: Parameter, place: Place) -> Parameter:  # noqa: PLR0911 (one lin
     """
     if p.effect == "stribeck_friction" and p.null is None:
         slowest = RESOLVED * max(float(r.turning[place.column]) for r in place.records)
-        fastest = max(slowest, float(np.quantile(place.speeds, NEARLY_FASTEST)))
+        fastest = max(slowest, float(np.quantile(place.speeds, MOST_OF_A_RECORD[1])))
         return replace(p, low=min(p.high, max(p.low, slowest)), high=min(p.high, fastest))
     if p.effect == "one_sided_spring" and p.null is None:
         stretch = LEAST_STRETCH * place.travel
         within = (place.positions.min() + stretch, place.positions.max() - stretch)
-        low, high = np.clip(np.quantile(place.positions, TAUT_WITHIN), *within)
+        low, high = np.clip(np.quantile(place.positions, MOST_OF_A_RECORD), *within)
         return replace(p, low=float(low), high=float(high))
     if p.effect == "resistance_drift" and p.null is not None:
-        return replace(p, high=min(p.high, LARGEST_HEATING / max(place.current**2, 1e-12)))
+        return replace(p, high=min(p.high, RISE / max(place.current**2, 1e-12)))
     if p.effect == "amplifier_threshold":
         return replace(p, high=max(p.low, min(p.high, place.passed_drive)))
     if p.effect == "torque_ripple" and p.null is None:
@@ -294,7 +287,7 @@ def _compliance(place: Place) -> Iterator[Start]:
 def _scanned(low: float, high: float, step: float) -> Floats:
     if high <= low:
         return np.array([low])
-    return np.linspace(low, high, int(np.clip((high - low) / step, 2, LONGEST_SCAN)))
+    return np.linspace(low, high, int(np.clip((high - low) / step, 2, MOST_TONES)))
 
 
 def _peaks(rates: Floats, along: Sequence[Floats], place: Place) -> list[float]:
@@ -323,7 +316,7 @@ _SEARCHED: dict[str, Callable[[Place], Iterable[Start]]] = {
     ],
     "dead_zone": lambda place: [
         {"width": float(width)}
-        for width in (0.05 * float(place.drives.max()), *np.quantile(place.drives, DRIVE_QUANTILES))
+        for width in (0.05 * float(place.drives.max()), *np.quantile(place.drives, TRIED_QUANTILES))
     ],
     "amplifier_threshold": lambda place: [
         {"width": share * place.largest_drive}
@@ -351,7 +344,7 @@ _SEARCHED: dict[str, Callable[[Place], Iterable[Start]]] = {
     ],
     "one_sided_spring": lambda place: [
         {"stiffness": side * (place.torque / max(place.travel, 1e-9)), "rest": float(rest)}
-        for rest, side in itertools.product(np.quantile(place.positions, TAUT_QUANTILES), (1.0, -1.0))
+        for rest, side in itertools.product(np.quantile(place.positions, TRIED_QUANTILES), (1.0, -1.0))
     ],
     "base_tilt": lambda _: [{"about_x": 0.05, "about_y": 0.05}],
     "joint_compliance": _compliance,

@@ -13,7 +13,6 @@ from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.estimates import found_values, signal_errors
 from model.discrepancy.inverse_dynamics.fitting import TorqueCase
 from model.discrepancy.inverse_dynamics.judging import (
-    SUSPECTED,
     Comparison,
     compare,
     needed_evidence,
@@ -23,12 +22,10 @@ from model.discrepancy.inverse_dynamics.resolution import OF_CHANGES
 from model.discrepancy.inverse_dynamics.search import Findings, Fitted, order_by_odds
 from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.options import TorqueOptions
+from model.discrepancy.thresholds import THRESHOLDS
 
 SHOWN = 12
 """Most candidates that a step lists."""
-ABOVE_NOISE = 1.2
-"""Least mean square of a joint on held-out records, relative to that of noise, with which it counts for the share
-removed."""
 
 
 def record_step(standing: Standing, found: Findings, compared: Comparison, refused: Sequence[Fitted]) -> Step:
@@ -138,7 +135,7 @@ def _cannot_be_told(options: TorqueOptions, chosen: Fitted, rival: Fitted) -> bo
     if lead < needed:
         return True
     of_records = lead + (chosen.cost - len(chosen.parameters)) - (rival.cost - len(rival.parameters))
-    return of_records < needed and rival.evidence >= SUSPECTED
+    return of_records < needed and rival.evidence >= THRESHOLDS.significant
 
 
 def excess_removed(noise: Floats, fitted: tuple[Floats, Floats], before: Floats, after: Floats) -> float | None:
@@ -152,7 +149,7 @@ def excess_removed(noise: Floats, fitted: tuple[Floats, Floats], before: Floats,
     variance = noise**2
     excess = np.maximum(before - variance, 1e-300)
     fell = fitted[1] < (1 - holdout.AFFECTED) * fitted[0]
-    usable = np.isfinite(before) & np.isfinite(after) & (before > ABOVE_NOISE * variance) & fell
+    usable = np.isfinite(before) & np.isfinite(after) & (before > holdout.MORE_THAN_NOISE**2 * variance) & fell
     if not usable.any():
         return None
     weight = np.where(usable, 1 / np.maximum(fitted[0], 1e-300), 0.0)

@@ -20,11 +20,10 @@ PHASES: tuple[Phase, ...] = get_args(Phase)
 RAMP_START, STEADY_RAMP, REVERSAL, CREEP, HOLD = range(5)
 
 START = 0.3
-"""Duration of the start of a motion, s."""
+"""Duration of the start of a motion, and of a standstill after which motion starts anew, also backwards, s; a shorter
+stop belongs to a reversal or a ramp."""
 TURNING = 0.5
 """Duration of a reversal after a change of direction, s: a slow joint needs it to cross its free play."""
-REST = 0.3
-"""Standstill after which motion starts anew, also backwards, s; a shorter stop belongs to a reversal or a ramp."""
 CREEPING_SPEED = 0.1
 """Speed below which a motion is slow, rad/s (m/s): at 6 °/s, the fall of friction with speed and free play show."""
 SPEED_WINDOW = 0.2
@@ -117,7 +116,7 @@ def _phases(speed: Floats, period: float) -> Integers:
         if direction == 0.0:
             rested += period
             continue
-        if rested >= REST:
+        if rested >= START:
             found[k : k + start] = np.where(found[k : k + start] == STEADY_RAMP, RAMP_START, found[k : k + start])
         elif last_direction * direction < 0:
             found[k : k + turning] = np.where(speed[k : k + turning] == 0.0, HOLD, REVERSAL)

@@ -21,8 +21,8 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
 from model.discrepancy.grounds import ControllerEffect, ControllerProof
 from model.discrepancy.output_error.sampled_controller import (
+    CLEAR,
     LEAST_SAMPLES,
-    LEAST_STEPS,
     controller_numbers,
     with_errors,
 )
@@ -233,7 +233,7 @@ class _JointRecords:
         unit = sensor.direction * sensor.range.value / 2**sensor.bits
         wanted = gains[0] * controller.dac_counts_per_adc_count.value * trace.error[:, column] / unit
         power = trace.power_raw[:, column].astype(np.float64)
-        free = (np.abs(power) < POWER_MAX - 1) & (np.abs(wanted) > LEAST_STEPS)
+        free = (np.abs(power) < POWER_MAX - 1) & (np.abs(wanted) > CLEAR)
         return wanted[free], power[free]
 
 

@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 from daq.contracts.machine import DcMotor, Machine, SampledPid, of_joint
 from daq.contracts.trace import Trace
 from model.arrays import Floats
+from model.discrepancy.thresholds import MOST_ROUNDS
 from model.inverse_dynamics.drive_limits import AT_LIMIT, SEVERAL
 
 CLEAR = 4.0
 """Distance of a drive from what a set point makes of it, in resolutions, beyond which it was another set point: a drive
-may be rounded more coarsely than a file tells, and then lies near what either of two set points makes."""
+may be rounded more coarsely than a file tells, and then lies near what either of two set points makes. A drive of less
+tells no gain: rounding dominates."""
 
 Memory = tuple[float, float, float, float, float]
 """What a controller remembers: sum and last of the errors, of the inner ones, position."""
@@ -122,8 +124,6 @@ LEAST_AGREEMENT = 0.95
 the controller is another than the machine file says."""
 FINEST = 1e-3
 """Share of a joint's largest drive to which numbers of a record are trusted, where the file states no resolution."""
-LEAST_STEPS = 4.0
-"""Least drive of a sample that is used for a gain, in resolutions: rounding dominates below it."""
 LEAST_SAMPLES = 20
 """Samples that the estimate of a gain needs."""
 ROUNDED_SHARE = 0.5
@@ -134,8 +134,6 @@ near one of them makes it wrong."""
 SHOWN_LIMIT = 3
 """Samples at the largest size of a drive that show a limit. A drive in steps comes there without one, too; then samples
 count as hidden that are none, for as long as it stands there."""
-REWEIGHTED = 20
-"""Rounds of weights for a line of least absolute deviations."""
 
 
 @dataclass(frozen=True)
@@ -183,7 +181,7 @@ class _Recorded:
     @property
     def free(self) -> NDArray[np.bool_]:
         """(k,) whether the drive is away from its limit, and large beside its rounding."""
-        return ~self.limited & (np.abs(self.drive) > LEAST_STEPS * self.resolution)
+        return ~self.limited & (np.abs(self.drive) > CLEAR * self.resolution)
 
     def numbers_by(self, law: ControllerLaw, scale: Scale) -> _Found:
         """The numbers by a law, and the share of samples whose drive is that law's."""
@@ -192,7 +190,7 @@ class _Recorded:
         apart = np.abs(drive - scale.factor * formed)
         agreed = apart[~limited] <= (0.75 * resolution + 2 * FINEST * np.abs(drive))[~limited]
         near = apart <= _farthest(drive, resolution)
-        large = ~limited & near & (np.abs(formed) > LEAST_STEPS * resolution)
+        large = ~limited & near & (np.abs(formed) > CLEAR * resolution)
         share = float(np.mean(agreed)) if agreed.size >= LEAST_SAMPLES else 0.0
         numbers = ControllerNumbers(self.sent, used, formed, drive, limited, large, clear, scale.factor)
         return _Found(share, numbers)
@@ -296,7 +294,7 @@ def _line(drive: Floats, formed: Floats, resolution: float, *, offset: bool) -> 
     columns = np.column_stack([formed, np.full(len(formed), float(offset))])
     line: Floats = np.zeros(2)
     weight: Floats = np.ones(len(formed))
-    for _ in range(REWEIGHTED):
+    for _ in range(MOST_ROUNDS):
         line = np.asarray(np.linalg.lstsq(columns * weight[:, None], drive * weight, rcond=None)[0])
         weight = 1 / np.sqrt(np.maximum(np.abs(drive - columns @ line), resolution))
     near = np.abs(drive - columns @ line) <= _farthest(drive, resolution)

@@ -26,18 +26,15 @@ ATTEMPTS = ((1.0, 0.0), (1.0, 0.0), (0.4, 0.0), (1.0, 0.3), (0.12, 0.0), (1.0, 3
 1963), each from derivatives that the attempts before have corrected. A short step helps where the cost is strongly
 curved, a damped one where the record says little."""
 CONVERGED = 1.0
-"""Fall of the cost below which a search ends: one unit is one standard deviation of one parameter."""
+"""Fall of the cost that is still to be had, below which a search ends: one unit is one standard deviation of one
+parameter."""
 FORETOLD = 0.1
 """Share of the readings' change that derivatives may have missed and still hold where a search ends: what they miss of
 a further step is a tenth of it."""
 STEPS = 8
 """Steps of a search that has to find its way: with play in a gear, that is not a smooth problem."""
-FEW_STEPS = 6
+FEW_STEPS = 4
 """Steps of a search that begins near its end, or is followed by another."""
-LAST_STEPS = 4
-"""Steps of each search that takes a fit to its end."""
-MOST_SEARCHES = 8
-"""Searches with new derivatives: two are enough, except from a start that is far away."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +73,11 @@ class Point(Calibration):
         found = self.tangents @ self.tangents.T + np.diag(self.precision)
         found.flags.writeable = False
         return found
+
+    @cached_property
+    def cost_in_closed_loop(self) -> float:
+        """The cost of the same values where the simulation is given nothing of the record."""
+        return self.on(self.observation.with_feedback_share(0.0), self.tangents).cost
 
     @cached_property
     def expected_in_closed_loop(self) -> Point | None:
@@ -162,14 +164,22 @@ def descend(
     return point
 
 
-def converge(point: Point, steps: int, most: int = MOST_SEARCHES, goal: float = math.inf) -> Point:
+def _left_to_gain(before: float, gained: float) -> float:
+    """What a search still gains if its gains go on falling as they did from the one `before` to the last."""
+    if gained < CONVERGED:
+        return 0.0
+    return gained**2 / (before - gained) if gained < before < math.inf else math.inf
+
+
+def converge(point: Point, steps: int, most: int = STEPS, goal: float = math.inf) -> Point:
     """The point to which repeated searches lead, each with derivatives computed where it begins.
 
-    They end where one gains nothing more, so that close rivals do not differ by the state of their fits, or where the
-    remaining ones would not lead to a cost of `goal`. The derivatives of the result are those of the last search's
+    They end where nothing more is to be gained, so that close rivals do not differ by the state of their fits, or where
+    the remaining ones would not lead to a cost of `goal`. The derivatives of the result are those of the last search's
     beginning, hardly away, without the corrections made on the way: intervals come from derivatives, and a correction
     for a short step is mostly noise.
     """
+    before = math.inf
     for number in range(0 if point.converged else most):
         try:
             begun = point.with_new_tangents()
@@ -177,8 +187,9 @@ def converge(point: Point, steps: int, most: int = MOST_SEARCHES, goal: float = 
         except SpecError:
             break  # on the verge of instability, as where a delay is missing: no derivative exists
         gained, point = point.cost - following.cost, replace(following, tangents=begun.tangents)
-        if gained < CONVERGED or _is_foretold(begun, following):
+        if _left_to_gain(before, gained) < CONVERGED or _is_foretold(begun, following):
             return replace(point, converged=True)
+        before = gained
         if point.cost - gained * (most - number - 1) > goal:
             break
     return point

@@ -29,7 +29,7 @@ from model.discrepancy.output_error.holdout import hold_out
 from model.discrepancy.output_error.noise_model import note_on_noise, shown_noise
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.sampled_controller import with_errors
-from model.discrepancy.output_error.search import FEW_STEPS, LAST_STEPS, Point, converge, descend, point_at
+from model.discrepancy.output_error.search import FEW_STEPS, Point, converge, descend, point_at
 from model.discrepancy.selection.step import listed, make_step, only_probed, update_to_last_fit
 from model.discrepancy.thresholds import CHANCES, FEEDBACK_SHARE_FOR_ERRORS
 from model.discrepancy.verdict import first_to_withdraw, unexplained, verdict, withdrawn, worse_held_out
@@ -41,8 +41,6 @@ from model.machine_model.record_verdict import FAR_OFF
 
 NOISE_ROUNDS = 2
 """Fits with the noise that the one before has left."""
-FIRST_FEEDBACK_SHARES = (0.0, 0.5)
-"""Feedback shares of the fits that come before the first one with the full share."""
 SHORT_DISTANCE = 0.3
 """Share of the expected distance over which friction builds up, below which a fit is tried with sudden friction too."""
 
@@ -133,12 +131,12 @@ def _fit_tolerances(given: Point) -> Point:
     effect can, the fit starts again from the given model.
     """
     near = given
-    for share in FIRST_FEEDBACK_SHARES:
+    for share in (0.0, FEEDBACK_SHARE_FOR_ERRORS):
         near = _fit_with_feedback(near, given.observation.with_feedback_share(share)) or near
     begun = _fit_with_feedback(near, given.observation) or _fit_with_feedback(given, given.observation)
     if begun is None:
         raise SpecError("the simulation does not stay finite: the loop is unstable")
-    return _with_sudden_friction(converge(begun, LAST_STEPS))
+    return _with_sudden_friction(converge(begun, FEW_STEPS))
 
 
 def _with_sudden_friction(fitted: Point) -> Point:
@@ -151,7 +149,7 @@ def _with_sudden_friction(fitted: Point) -> Point:
     if np.array_equal(values, fitted.values):
         return fitted
     begun = fitted.moved_to(values)
-    tried = converge(begun, LAST_STEPS) if begun.is_finite else fitted
+    tried = converge(begun, FEW_STEPS) if begun.is_finite else fitted
     return tried if tried.cost < fitted.cost else fitted
 
 
@@ -178,7 +176,7 @@ def _weighed_with_shown_noise(fitted: Point) -> Point:
             break
         observation = replace(fitted.observation, noise=noise)
         try:
-            fitted = converge(fitted.on(observation), LAST_STEPS)
+            fitted = converge(fitted.on(observation), FEW_STEPS)
             if fitted.strain >= FAR_OFF:
                 again = _fit_tolerances(fitted.at_expected())
                 fitted = again if again.cost < fitted.cost else fitted

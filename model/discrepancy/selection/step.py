@@ -27,14 +27,12 @@ from model.discrepancy.grounds import Reason, Refusal
 from model.discrepancy.output_error.case import Case
 from model.discrepancy.output_error.noise_model import fit_noise_model
 from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.search import LAST_STEPS, STEPS, Point, converge, descend, point_at
+from model.discrepancy.output_error.search import FEW_STEPS, STEPS, Point, converge, descend, point_at
+from model.discrepancy.thresholds import FEEDBACK_SHARE
 from model.discrepancy.verdict import excess_removed
 from model.fitting.fit import INTERVAL
 from model.fitting.whitening import Whitener
 from model.machine_model.parameter import Parameter
-
-FEEDBACK_SHARE_FOR_INTERVALS = 0.9
-"""Feedback share with which the shift of an estimate by noise is measured: half as far from the record as the fits."""
 
 
 def found_values(found: Fit, parameters: Sequence[Parameter], shift: Floats | float = 0.0) -> dict[str, FoundValue]:
@@ -71,7 +69,7 @@ def shift_by_noise(point: Point, parameters: Sequence[Parameter]) -> Floats:
     is less noise. The distance that remains to no noise is about as long again, and two deviations cover it. All zero
     where that fit does not stay finite.
     """
-    nearer = point.observation.with_feedback_share(FEEDBACK_SHARE_FOR_INTERVALS)
+    nearer = point.observation.with_feedback_share(0.5 * (1.0 + FEEDBACK_SHARE))  # half as far from the record
     names = {p.name for p in parameters}
     own = [k for k, u in enumerate(point.unknowns) if u.name in names]
     try:
@@ -134,7 +132,7 @@ def make_step(case: Case, current: Fit, ranking: Ranking, decision: Decision) ->
     chosen = decision.best
     if decision.kind == "nothing" or chosen is None:
         return None, current
-    best = with_evidence(current, chosen.probe, converge(chosen.fit.point, LAST_STEPS))
+    best = with_evidence(current, chosen.probe, converge(chosen.fit.point, FEW_STEPS))
     effect, joints = best.hypothesis.name, best.hypothesis.joints
     before, after = current.point, best.fit.point
     held = case.held_residuals(case.credited_against(before, after), after)
@@ -241,7 +239,7 @@ def _without(point: Point, gone: Sequence[str]) -> Fit:
         model = model.without_effect(effect or "", joints or None)
     kept = [k for k, u in enumerate(point.unknowns) if u.name not in gone]
     begun = point_at(point.observation, point.only(kept).of(model), point.tangents[kept])
-    return judge(converge(begun, LAST_STEPS))
+    return judge(converge(begun, FEW_STEPS))
 
 
 def _is_nothing(found: Sequence[tuple[FoundValue, Parameter]]) -> bool:

@@ -57,7 +57,7 @@ def test_a_fit_that_cannot_reach_its_goal_takes_few_simulations(monkeypatch: pyt
     counted = counting(monkeypatch)
     assert refit(before, found) is not None
     with_time, counted[:] = len(counted), []
-    refit(before, found, goal=1.0)
+    refit(before, found, goal=1.0, explained=True)
     assert 0 < len(counted) < 0.7 * with_time
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from daq.contracts.progress import Never
 from model.discrepancy.inverse_dynamics.fitting import fit
-from model.discrepancy.inverse_dynamics.judging import BESIDE_REFUSED, judge
+from model.discrepancy.inverse_dynamics.judging import judge
 from model.discrepancy.inverse_dynamics.probing import Probe
 from model.discrepancy.inverse_dynamics.search import (
     OF_A_JOINT,
@@ -22,6 +22,7 @@ from model.discrepancy.inverse_dynamics.starts import Trial
 from model.discrepancy.inverse_dynamics.step_record import _cannot_be_told
 from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.discrepancy.options import TorqueOptions
+from model.discrepancy.thresholds import LARGER_PART
 from tests.model.discrepancy.inverse_dynamics.searches import sliding
 
 FRICTION = TorqueOptions(effects=("coulomb_friction", "viscous_friction"))
@@ -61,7 +62,8 @@ def test_the_first_candidates_are_fitted_to_their_ends(found: tuple[Fitted, ...]
     away = {name: value + 3.0 for name, value in last.values.items()}
     begun = fit(last.balance, last.unknowns, away, last.data, last.noise.memory, rounds=0)
     assert begun.criterion > last.criterion + 10.0
-    refined = _refined([replace(best, fit=begun)] * (REFINED + 1), Never())
+    some = [replace(best, fit=begun)] * (REFINED + 1)
+    refined = _refined(some, some, Never())
     assert all(one.fit.criterion == pytest.approx(last.criterion, abs=0.1) for one in refined[:REFINED])
     assert refined[REFINED].fit is begun
 
@@ -71,7 +73,7 @@ def test_an_effect_with_less_than_half_the_evidence_of_a_refused_rival_is_not_na
     rubbing: TorqueWorkflow, found: tuple[Fitted, ...], share: float, taken: bool
 ) -> None:
     chosen = next(f for f in found if f.effect == "coulomb_friction")
-    rival = replace(chosen, effect="viscous_friction", evidence=chosen.evidence / (share * BESIDE_REFUSED))
+    rival = replace(chosen, effect="viscous_friction", evidence=chosen.evidence / (share * LARGER_PART))
     assert (judge(rubbing.found, chosen, [rival]) is not None) is taken
     elsewhere = replace(rival, joints=(2,))
     assert judge(rubbing.found, chosen, [elsewhere]) is not None, "it explains another joint's torque"
