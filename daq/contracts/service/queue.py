@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import AwareDatetime, StrictBool
 
 from daq.contracts.service.base import Wire
+from daq.contracts.service.experiments import Reviewer
 
 Role = Literal["viewer", "operator", "owner", "admin"]
 """Who may do what (docs/service.md): a viewer looks and stops; an operator moves the arm, and changes their own
@@ -37,6 +38,8 @@ class QueueStatus(Wire):
     waiting_for: str = ""
     attended_until: AwareDatetime | None = None
     """On a real arm that may not run unattended: until when an operator has confirmed being present."""
+    review: Reviewer | None = None
+    """Who must approve an experiment before it moves a real arm; None: nobody."""
 
 
 class QueueResume(Wire):
