@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from daq.contracts.progress import Cancel
 from daq.contracts.trace import Traces, as_sequence
+from ma2000.given import ModelLike, model_of
 from ma2000.progress import Shown, told
 from model.base_parameters import base_parameters as base
 from model.base_parameters.result import BaseParameters
@@ -14,11 +15,10 @@ from model.fitting.profile import Profile
 from model.fitting.result import FitResult
 from model.inverse_dynamics import fit as torques
 from model.inverse_dynamics.fit import TorqueFit
-from model.machine_model.model import Model
 
 
 def fit(
-    model: Model,
+    model: ModelLike,
     traces: Traces,
     options: FitOptions | None = None,
     progress: Shown = True,
@@ -31,11 +31,11 @@ def fit(
     Raises TraceError, SpecError for unusable input; CancelledError if cancelled.
     """
     with told(progress, "fitting") as tell:
-        return motion.fit(model, as_sequence(traces), options, tell, cancel)
+        return motion.fit(model_of(model), as_sequence(traces), options, tell, cancel)
 
 
 def fit_torques(
-    model: Model,
+    model: ModelLike,
     traces: Traces,
     holdout: Traces = (),
     options: FitOptions | None = None,
@@ -49,11 +49,11 @@ def fit_torques(
     `result.held_out`: share of the torque on `holdout` that remains unexplained. Raises as `fit`.
     """
     with told(progress, "fitting torques") as tell:
-        fitted, held_out = as_sequence(traces), as_sequence(holdout)
-        return torques.fit_torques(model, fitted, held_out, options, progress=tell, cancel=cancel)
+        one = model_of(model)
+        return torques.fit_torques(one, as_sequence(traces), as_sequence(holdout), options, progress=tell, cancel=cancel)
 
 
-def base_parameters(model: Model, traces: Traces = (), *, seed: int = 0) -> BaseParameters:
+def base_parameters(model: ModelLike, traces: Traces = (), *, seed: int = 0) -> BaseParameters:
     """Returns the base parameters of a model's machine: the fewest combinations of inertial and friction parameters on
     which its joint torques depend. Method: QR with column pivoting of the regressor at random admissible postures
     (Gautier 1991).
@@ -64,7 +64,7 @@ def base_parameters(model: Model, traces: Traces = (), *, seed: int = 0) -> Base
     Args:
         seed: seed of the random postures.
     """
-    return base.base_parameters(model, as_sequence(traces), seed=seed)
+    return base.base_parameters(model_of(model), as_sequence(traces), seed=seed)
 
 
 def profile(

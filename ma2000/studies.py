@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from daq.contracts.progress import Cancel
 from daq.contracts.trace import Traces, as_sequence
 from daq.safety.planned import planned
+from ma2000.given import ModelLike, model_of
 from ma2000.progress import Shown, told
 from model.design import search
 from model.design.search import DesignedExperiments, DesignOptions
@@ -17,7 +18,6 @@ from model.discrepancy import workflow
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.options import DiagnosisOptions
 from model.fitting.options import FitOptions
-from model.machine_model.model import Model
 from model.simulation.prepared import Options
 from model.validation.criterion import Fidelity
 from model.validation.fidelity import validate_by_distortion
@@ -26,7 +26,7 @@ from server.jobs.next_experiment import experiment_chooser
 
 
 def validate(
-    model: Model,
+    model: ModelLike,
     traces: Traces,
     parameters: Sequence[str] | None = None,
     *,
@@ -41,6 +41,7 @@ def validate(
 
     Raises SpecError, TraceError; CancelledError if cancelled.
     """
+    model = model_of(model)
     names = names_to_validate(model, parameters)
     options = Options(quantise=False)
     with told(progress, "validating") as tell:
@@ -48,7 +49,7 @@ def validate(
 
 
 def diagnose(
-    model: Model,
+    model: ModelLike,
     traces: Traces,
     holdout: Traces = (),
     options: DiagnosisOptions | None = None,
@@ -68,13 +69,14 @@ def diagnose(
 
     Raises TraceError, SpecError for unusable input; CancelledError if cancelled.
     """
+    model = model_of(model)
     chooser = experiment_chooser(model.machine, design=design)
     with told(progress, "diagnosing") as tell:
         return workflow.diagnose(model, as_sequence(traces), as_sequence(holdout), options, tell, cancel, chooser)
 
 
 def design(
-    model: Model,
+    model: ModelLike,
     options: DesignOptions | None = None,
     fit_options: FitOptions | None = None,
     *,
@@ -85,5 +87,6 @@ def design(
 
     Raises SpecError if no candidate is within the limits; CancelledError if cancelled.
     """
+    one = model_of(model)
     with told(progress, "designing") as tell:
-        return search.design(model, lambda spec: planned(spec, model.machine), options, fit_options, tell, cancel)
+        return search.design(one, lambda spec: planned(spec, one.machine), options, fit_options, tell, cancel)

@@ -13,7 +13,7 @@ from typing import Literal
 from daq.contracts.errors import DaqError
 from daq.contracts.exit_codes import WRONG_INPUT
 
-Extra = Literal["live", "robot", "model", "server", "tables", "ros", "cluster", "postgresql", "archive", "oidc"]
+Extra = Literal["live", "robot", "model", "server", "tables", "ros", "cluster", "postgresql", "archive", "oidc", "mcp"]
 
 CONTAINS: dict[Extra, tuple[Extra, ...]] = {"robot": ("live",), "model": ("robot", "live"), "server": ("robot", "live")}
 """Extras that an extra includes."""
@@ -49,6 +49,7 @@ EXTRA_OF: dict[str, Extra] = {
     "psycopg": "postgresql",
     "obstore": "archive",
     "authlib": "oidc",
+    "mcp": "mcp",
 }
 """The smallest extra that installs each module."""
 

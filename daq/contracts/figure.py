@@ -63,8 +63,18 @@ class _Row:
     wanted: Floats | None = None
 
 
-def figure_of(trace: Recorded, joints: tuple[int, ...] | None = None) -> Figure:
-    """Returns the figure: one row per signal, one column per joint, marks at events."""
+def figure_of(trace: Recorded, joints: tuple[int, ...] | None = None, axes: Axes | None = None) -> Figure:
+    """Returns the figure: one row per signal, one column per joint, marks at events; or positions alone on given axes."""
+    if axes is not None:
+        shown = _only(trace, joints)
+        row = _rows(shown)[0]
+        for column, joint in enumerate(shown.joints):
+            (line,) = axes.plot(shown.time, row.measured[:, column], label=f"joint {joint}")
+            if row.wanted is not None:
+                axes.plot(shown.time, row.wanted[:, column], "--", color=line.get_color(), lw=0.8)
+        axes.set(xlabel="time / s", ylabel=f"{row.title} / {row.unit}")
+        axes.legend()
+        return cast("Figure", axes.figure)
     import matplotlib as mpl
 
     from daq.contracts.notebook_figure import AS_WRITTEN

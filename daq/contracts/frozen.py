@@ -26,6 +26,11 @@ class FrozenRecord(BaseModel):
             return ((name, getattr(self, name)) for name in self.shown)
         return iter(super().__repr_args__())
 
+    def __dir__(self) -> list[str]:
+        """Its own names: a notebook's completion shows fields and methods of the record, and none of pydantic's."""
+        left_out = {name for name in dir(BaseModel) if not name.startswith("__")} - type(self).model_fields.keys()
+        return [name for name in super().__dir__() if name not in left_out]
+
 
 if TYPE_CHECKING:  # pydantic gives its metaclass no public name
     from pydantic._internal._model_construction import ModelMetaclass as _OfPydantic

@@ -11,6 +11,7 @@ from matplotlib.font_manager import findfont, get_font, get_font_names
 from matplotlib.text import Text
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.backend_bases import RendererBase
 
 OTHER_SCRIPTS = (
@@ -63,3 +64,8 @@ class NotebookFigure(Figure):
         picture = io.BytesIO()
         self.savefig(picture, format="png")
         return picture.getvalue()
+
+
+def axes_of(given: Axes | None) -> Axes:
+    """The axes to draw on: those given, or the only ones of a new figure, which a notebook shows."""
+    return NotebookFigure(layout="constrained").subplots() if given is None else given

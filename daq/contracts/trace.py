@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from daq.contracts import tables
-from daq.contracts.errors import TraceError
+from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.experiment import ExperimentSpec, ReportedGain
 from daq.contracts.extras import require_extra
 from daq.contracts.frozen import FrozenRecord
@@ -25,6 +25,7 @@ from daq.contracts.with_arrays import WithArrays
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64]
@@ -189,8 +190,9 @@ class Trace(WithArrays):
         """HTML for notebooks: facts and a small picture."""
         return html_of(self)
 
-    def plot(self, joints: tuple[int, ...] | None = None) -> Figure:
-        """Plots the trace, one column per joint: the joints that the experiment moves, unless `joints` names others.
+    def plot(self, joints: tuple[int, ...] | None = None, *, ax: Axes | None = None) -> Figure:
+        """Plots the trace, one column per joint: the joints that the experiment moves, unless `joints` names others. On
+        given axes (`ax`), plots positions only, with dashed set points.
 
         Raises TraceError for a joint that the trace lacks, and for a trace without samples; MissingExtraError.
         """
@@ -199,7 +201,7 @@ class Trace(WithArrays):
         require_extra("robot", "plot()", "matplotlib")
         if len(self) == 0:
             raise TraceError(f"{self.called}: has no samples to plot")
-        return figure_of(self, joints)
+        return figure_of(self, joints, ax)
 
     def to_pandas(self) -> pd.DataFrame:
         """Returns a table with one row per sample, indexed by time (s); units in `attrs`. Raises MissingExtraError."""
@@ -285,5 +287,8 @@ Traces = Trace | Sequence[Trace]
 
 
 def as_sequence(traces: Traces) -> Sequence[Trace]:
-    """Wraps a single trace in a tuple."""
-    return (traces,) if isinstance(traces, Trace) else traces
+    """Wraps a single trace in a tuple. Raises SpecError for anything but traces."""
+    found = (traces,) if isinstance(traces, Trace) else traces
+    if wrong := [one for one in found if not isinstance(one, Trace)]:
+        raise SpecError(f"traces: give a Trace or several, not {type(wrong[0]).__name__}; `read_trace` reads a file")
+    return found

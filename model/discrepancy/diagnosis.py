@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.frozen import FrozenRecord
 from model.discrepancy.grounds import ControllerProof, Measurement, Method, Note, Reason, Refusal, SharedLaw
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 from model.record_check.finding import RecordFinding
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 ANSWER_FORMAT = 1
 """Version of the answer; a reader refuses newer ones."""
@@ -395,6 +399,27 @@ class Diagnosis(FrozenRecord):
     def computed(self) -> bool:
         """Whether anything was computed: not of records that are to be checked first."""
         return self.verdict != "check-the-record" or self.gap is not None
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws how the error of each joint shrinks from stage to stage, as a share of the given model's; dashed on
+        held-out traces. `ax`: None for new axes. Raises SpecError where no gap was computed."""
+        from daq.contracts.notebook_figure import axes_of
+
+        if self.gap is None:
+            raise SpecError("plot: this diagnosis has no gap to draw: " + self.summary)
+        axes, stages = axes_of(ax), self.gap.stages
+        for place, joint in enumerate(self.gap.joints):
+            for style, rows in (("-o", [s.fitted for s in stages]), ("--o", [s.held_out for s in stages])):
+                errors = [row[place] if row else None for row in rows]
+                if (first := errors[0]) and any(errors):
+                    shares = [float("nan") if e is None else e / first for e in errors]
+                    label = f"joint {joint}{', held out' if style == '--o' else ''}"
+                    axes.plot(shares, style, label=label, color=f"C{place}", mfc="none" if style == "--o" else None)
+        axes.set_xticks(range(len(stages)), [stage.name for stage in stages], rotation=20, ha="right")
+        axes.set_ylim(bottom=0.0)
+        axes.set_ylabel("error / error of the given model")
+        axes.legend()
+        return axes
 
     @property
     def examined_nothing(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from pydantic import Field, ValidationError
 
 from daq.contracts.documents import parse_json, read_text
 from daq.contracts.errors import SpecError
+from daq.contracts.extras import require_extra
 from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
 from model.fitting.fitted import FittedParameter, JointError
@@ -20,6 +21,10 @@ from model.fitting.shown import doubt_of, html_of, known_of, text_of
 from model.machine_model.model import Model
 from model.machine_model.record_verdict import RecordVerdict
 from model.record_check.finding import RecordFinding, doubts_headline
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 RESULT_FORMAT = 1
 """Version of the file; a reader rejects newer ones."""
@@ -98,6 +103,48 @@ class FitResult(FrozenRecord):
     def covariance_matrix(self) -> NDArray[np.float64]:
         """Covariance (p, p), in the order of `names`."""
         return np.array(self.covariance)
+
+    @property
+    def success(self) -> bool:
+        """`converged`, as SciPy calls it."""
+        return self.converged
+
+    @property
+    def nfev(self) -> int:
+        """`evaluations`, as SciPy calls them."""
+        return self.evaluations
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """(p,) `values` as SciPy calls them, in the order of `names`."""
+        return np.array(self.values)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A table with one row a fitted parameter, indexed by its name. Raises MissingExtraError."""
+        require_extra("tables", "to_pandas()", "pandas")
+        import pandas as pd
+
+        return pd.DataFrame([p.model_dump() for p in self.parameters]).set_index("name")
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws how far each parameter moved, in its expected deviations, with its 95 % interval; those without an
+        expectation or an interval are left out. `ax`: None for new axes. Raises MissingExtraError."""
+        from daq.contracts.notebook_figure import axes_of
+
+        axes = axes_of(ax)
+        shown = [
+            p for p in self.parameters if None not in (p.value, p.low, p.high, p.expected) and p.expected_deviation
+        ]
+        for row, p in enumerate(shown):
+            ends = [
+                ((v or 0.0) - (p.expected or 0.0)) / (p.expected_deviation or 1.0) for v in (p.low, p.value, p.high)
+            ]
+            axes.plot([ends[0], ends[2]], [row, row], color="#555555")
+            axes.plot(ends[1], row, "o", color="#555555")
+        axes.axvline(0.0, lw=0.7, color="#8a8a8a")
+        axes.set_yticks(range(len(shown)), [p.name for p in shown])
+        axes.set_xlabel("expected deviations from the expected value")
+        return axes
 
     def save(self, path: Path) -> None:
         """Writes the result as JSON. Raises SpecError if the file cannot be written."""

@@ -22,7 +22,7 @@ from pydantic import (
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
-from daq.contracts.machine import Machine
+from daq.contracts.machine import Machine, load_machine
 from model import layout as at
 from model.effects.effect import EffectFile, Tone
 from model.effects.library import effect, effect_from
@@ -242,8 +242,12 @@ class Model(FrozenRecord):
         return type(self)(**{**fields, **changes})
 
 
-def base_model(machine: Machine, *, friction: bool = True) -> Model:
-    """Returns the model of a machine file: rigid bodies, motors and the friction that it states."""
+def base_model(machine: Machine | str, *, friction: bool = True) -> Model:
+    """Returns the model of a machine file: rigid bodies, motors and the friction that it states.
+
+    machine: a machine, the name of one that ships, or the path of a file. Raises SpecError.
+    """
+    machine = load_machine(machine) if isinstance(machine, str) else machine
     uses = []
     if friction:
         for name, entries in FRICTION_OF_MACHINE.items():

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
+from daq.contracts.extras import require_extra
 from daq.contracts.trace import Trace
 from daq.contracts.with_arrays import WithArrays
 from model.arrays import Floats
@@ -20,6 +21,9 @@ from model.simulation.batch import BatchRun, seed
 from model.simulation.inputs import RunInputs, inputs_of
 from model.simulation.period import OUT_DRIVE, OUT_ERROR, OUT_POSITION, OUT_POWER, OUT_READING, OUT_SPEED
 from model.simulation.prepared import Options, prepare
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +49,15 @@ class Simulation(WithArrays):
         """Returns one line, for notebooks."""
         joints = ", ".join(map(str, self.joints))
         return f"<Simulation: {len(self.time)} periods to {self.time[-1]:.1f} s, joints {joints}>"
+
+    def to_xarray(self) -> xr.Dataset:
+        """Signals over `time` (s) and `joint`, one row a control period. Raises MissingExtraError."""
+        require_extra("tables", "to_xarray()", "xarray")
+        import xarray as xr
+
+        signals = ("position", "velocity", "reading", "error", "drive", "power")
+        found = {name: (("time", "joint"), getattr(self, name)) for name in signals}
+        return xr.Dataset(found, {"time": ("time", self.time, {"units": "s"}), "joint": list(self.joints)})
 
     def at_samples(self, signal: Floats) -> Floats:
         """Returns a signal (k, …) at the samples of the record, (m, …); interpolated between periods where needed."""

@@ -238,6 +238,7 @@ class QueueService:
             running=None if running is None else running.id,
             waiting_for="" if state.paused or running is not None else waiting_for,
             attended_until=attended,
+            review=self.review.reviewer,
         )
 
     def begin_no_more(self) -> None:

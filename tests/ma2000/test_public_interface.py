@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
 
 import ma2000
 from daq.contracts.experiment import Ramp
 from daq.contracts.machine import load_machine
 from ma2000 import _HOME
+from tests.model.discrepancy.answers import an_answer
+from tests.model.discrepancy.motions import trace_of
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "python.md").read_text("utf-8")
@@ -120,6 +123,41 @@ def test_a_wrong_part_of_an_experiment_is_refused_in_one_line() -> None:
         Ramp(amplitude=10)
     words = "amplitude: must lie between -360° and 360°, that is ±6.283 rad (got 10 rad, 572.958°)"
     assert str(refused.value) == f"Ramp: {words}"
+
+
+def test_a_machine_s_name_stands_for_its_model_and_anything_else_is_refused_in_one_line() -> None:
+    assert ma2000.base_model("ma2000").identity == ma2000.base_model(load_machine("ma2000")).identity
+    found = ma2000.base_parameters("ma2000")
+    assert found == ma2000.base_parameters(load_machine("ma2000"))
+    wrong: Any = 3
+    with pytest.raises(
+        ma2000.DaqError, match="model: give a Model, a Machine, or the name or file of a machine, not int"
+    ):
+        ma2000.fit(wrong, [])
+    with pytest.raises(ma2000.DaqError, match="traces: give a Trace or several, not str; `read_trace` reads a file"):
+        ma2000.fit("ma2000", ["trace.mcap"])  # type: ignore[list-item]
+
+
+def test_completion_shows_a_record_s_own_names() -> None:
+    names = set(dir(ma2000.base_model("ma2000")))
+    assert {"machine", "with_effect", "parameters"} <= names
+    assert not {name for name in names if name.startswith("model_")}
+
+
+def test_results_draw_on_axes_of_the_caller_s_and_become_tables() -> None:
+    found, _ = an_answer(6.0)
+    axes = Figure().subplots()
+    assert found.plot(axes) is axes
+    assert [line.get_label() for line in axes.lines][:2] == ["joint 1", "joint 1, held out"]
+    trace = trace_of(found.model_before, 6.0)
+    assert trace.plot((2,), ax=Figure().subplots()).axes[0].get_xlabel() == "time / s"
+    fitted = ma2000.fit(found.model_before, trace, ma2000.FitOptions(parameters=("load.mass",)), progress=False)
+    assert (fitted.success, fitted.nfev) == (fitted.converged, fitted.evaluations)
+    assert fitted.x.tolist() == list(fitted.values)
+    assert fitted.to_pandas().loc["load.mass", "unit"] == "kg"
+    assert fitted.plot().get_figure() is not None
+    arrays = ma2000.simulate(found.model_before, trace).to_xarray()
+    assert arrays["reading"].sel(joint=2).shape == (len(trace),)
 
 
 def test_the_presets_are_printed_on_a_page() -> None:

@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import AwareDatetime, StrictBool
 
 from daq.contracts.service.base import Wire
+from daq.contracts.service.experiments import Reviewer
 
 Role = Literal["viewer", "operator", "owner", "admin"]
 """Roles (docs/service.md). A viewer looks and stops. An operator also moves the arm and changes their own experiments.
@@ -37,6 +38,8 @@ class QueueStatus(Wire):
     waiting_for: str = ""
     attended_until: AwareDatetime | None = None
     """For a real arm that may not run unattended: until when an operator has confirmed being present."""
+    review: Reviewer | None = None
+    """Who must approve an experiment before it moves a real arm; None: nobody."""
 
 
 class QueueResume(Wire):

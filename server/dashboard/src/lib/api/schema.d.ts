@@ -5131,6 +5131,8 @@ export interface components {
             waiting_for?: string;
             /** Attended Until */
             attended_until?: string | null;
+            /** Review */
+            review?: ("operator" | "owner") | null;
         };
         /**
          * Ramp
