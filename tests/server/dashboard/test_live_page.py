@@ -156,6 +156,6 @@ def test_where_there_is_no_3d_the_arm_is_told_in_words(dashboard: Dashboard) -> 
 def test_the_system_page_tells_health_storage_and_what_happened(dashboard: Dashboard) -> None:
     page = dashboard.open("system")
     expect(page.get_by_role("heading", name="Health")).to_be_visible()
-    expect(page.get_by_text("ready", exact=True)).to_be_visible()
+    expect(page.get_by_role("region", name="Health").get_by_text("ready", exact=True)).to_be_visible()
     expect(page.get_by_text(dashboard.service.client.get("/system").json()["storage"]["traces_folder"])).to_be_visible()
     expect(page.get_by_role("cell", name="connection").first).to_be_visible()

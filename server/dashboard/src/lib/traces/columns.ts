@@ -16,6 +16,21 @@ export const NAMES = ['position', 'set_point', 'error', 'drive'] as const;
 export type SignalName = (typeof NAMES)[number];
 export type Range = readonly [number, number];
 
+/** rad, or m: a set point that is farther from where it began belongs to a motion. */
+const MOVES = 0.005;
+
+/** When a trace's motion begins, s: by its set points, or by positions where it has none; its first moment without. */
+export function motionBegin({ time, set_point, position }: Signals): number {
+  const rows = set_point ?? position;
+  const index = time.findIndex((_, at) => rows.some((row) => Math.abs(row[at]! - row[0]!) > MOVES));
+  return time[Math.max(0, index)] ?? 0;
+}
+
+/** The same signals with `zero` (s) as their time 0. */
+export function counted(signals: Signals, zero: number): Signals {
+  return zero === 0 ? signals : { ...signals, time: signals.time.map((at) => at - zero) };
+}
+
 /** Whether the trace has more samples than are here. */
 export function isThinned(signals: Signals): boolean {
   return signals.time.length < signals.samples;

@@ -18,6 +18,8 @@ export class Comparison {
   signals = $state<ShownSignal[]>(['position', 'error']);
   /** Whether positions are shown less where the trace begins. */
   fromStart = $state(true);
+  /** Whether several traces are laid over each other by when their motions begin. */
+  aligned = $state(true);
   /** Chosen by hand; empty for those that moved. */
   chosenJoints = $state.raw<readonly number[]>([]);
   loaded: readonly ShownTrace[] = $derived(this.traces.filter((trace) => trace.signals !== null));
@@ -41,6 +43,12 @@ export class Comparison {
       for (const trace of before) trace.isClosed = !this.traces.includes(trace);
       if (!before.some((trace) => ids.includes(trace.id))) this.range = null;
     });
+  }
+
+  /** Several traces begin where their motions do: for an effect. */
+  align(): void {
+    const isAligned = this.aligned && this.isOneJoint;
+    for (const trace of this.traces) trace.isAligned = isAligned;
   }
 
   isShown(id: string): boolean {

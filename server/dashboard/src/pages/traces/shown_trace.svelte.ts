@@ -3,7 +3,7 @@
 import { api, ask, asProblem, here, type Problem, type TraceDetails, type TraceSignals } from '../../lib/api';
 import { dayAndSecond } from '../../lib/format';
 import { traceName } from '../../lib/traces/label';
-import { isThinned, refined, type Range, type Signals } from '../../lib/traces/columns';
+import { counted, isThinned, motionBegin, refined, type Range, type Signals } from '../../lib/traces/columns';
 import { router } from '../../lib/router.svelte';
 import { fromArchive } from '../../lib/traces/from_archive';
 import { serves, toAsk } from '../../lib/traces/zoom';
@@ -27,8 +27,14 @@ export class ShownTrace {
   private part = $state.raw<Signals | null>(null);
   private asked: Range | null = null;
   private turn = 0;
+  /** Whether its motion's begin is its time 0, so that traces lie over each other; else its first sample is. */
+  isAligned = $state(false);
+  zero: number = $derived(this.isAligned && this.whole !== null ? motionBegin(this.whole) : 0);
+  private own: Signals | null = $derived(
+    this.whole && this.part ? refined(this.whole, this.part) : this.whole,
+  );
   /** What is drawn: the whole, finer where it is zoomed to. */
-  signals: Signals | null = $derived(this.whole && this.part ? refined(this.whole, this.part) : this.whole);
+  signals: Signals | null = $derived(this.own && counted(this.own, this.zero));
 
   constructor(readonly id: string) {
     this.simulating = new Simulating(id, SIMULATING_REQUESTS);
@@ -61,8 +67,9 @@ export class ShownTrace {
   }
 
   /** Asks for every sample of a part, where samples were left out and it is not there yet. */
-  async refine(shown: Range): Promise<void> {
+  async refine(drawn: Range): Promise<void> {
     const { whole } = this;
+    const shown = this.ownTime(drawn);
     if (whole === null || !isThinned(whole) || serves(this.asked, shown)) return;
     const turn = ++this.turn;
     this.asked = toAsk(shown, [whole.time[0]!, whole.time.at(-1)!]);
@@ -78,7 +85,12 @@ export class ShownTrace {
 
   /** Every sample between two moments, for measures. Throws a Problem. */
   async exactly(between: Range): Promise<Signals> {
-    return this.whole !== null && !isThinned(this.whole) ? this.whole : this.ask(EXACT, between);
+    const isWhole = this.whole !== null && !isThinned(this.whole);
+    return counted(isWhole ? this.whole! : await this.ask(EXACT, this.ownTime(between)), this.zero);
+  }
+
+  private ownTime([begin, end]: Range): Range {
+    return [begin + this.zero, end + this.zero];
   }
 
   private async ask(points: number, range?: Range): Promise<TraceSignals> {
