@@ -68,9 +68,7 @@ def test_at_its_null_value_an_effect_changes_nothing(model: Model, inputs: RunIn
 
 
 @pytest.mark.parametrize("name", sorted(library()))
-def test_at_its_expected_size_an_effect_moves_the_arm_or_its_reading(
-    model: Model, inputs: RunInputs, name: str
-) -> None:
+def test_at_its_expected_size_an_effect_moves_arm_or_reading(model: Model, inputs: RunInputs, name: str) -> None:
     changed = with_(model, name)
     sizes = {
         p.name: p.deviation * (-1 if p.name.endswith("voltage") else 1) + (p.null or 0)
