@@ -153,7 +153,7 @@ def test_a_multisine_reaches_its_amplitude_is_faded_and_repeats_to_the_bit() -> 
 def test_a_multisine_completes_a_hundredth_of_its_lowest_period_at_least() -> None:
     slow = {"kind": "multisine", "amplitude": 0.1, "duration": 10.0, "highest": 1.0, "tones": 3}
     assert len(motion(joints=(1,), trajectory=slow | {"lowest": 0.0011})) == 501
-    with pytest.raises(SpecError, match="less than a hundredth of its period fits into 10 s: allowed are 0.001 Hz"):
+    with pytest.raises(SpecError, match=r"less than a hundredth of its period fits into 10 s: allowed are 0\.001 Hz"):
         motion(joints=(1,), trajectory=slow | {"lowest": 0.0009})
 
 
