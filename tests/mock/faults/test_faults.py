@@ -60,7 +60,7 @@ def test_every_fault_has_a_name_a_line_and_its_place_in_the_guide() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("flop", "fault 'flop': not known; there are flip, drop"),
+        ("flop", "fault 'flop': not known; available: flip, drop"),
         ("", "fault '': not known"),
         ("flip:rat=1", "fault flip: no parameter 'rat=1'; write parameter=value with start, duration"),
         ("flip:0.01", "fault flip: no parameter '0.01'"),
