@@ -54,9 +54,7 @@ def test_a_request_s_payload_is_taken_as_it_would_be_packed_or_not_at_all(opcode
 
 @pytest.mark.parametrize("kind", [kind for kind in REQUEST_KINDS if kind.IS_COMMAND], ids=named)
 @given(data=st.data(), session=st.integers(0, 0xFFFFFFFF), number=st.integers(0, 0xFFFFFFFF))
-def test_a_command_travels_behind_its_stamp(
-    kind: type[c.Request], data: st.DataObject, session: int, number: int
-) -> None:
+def test_a_command_follows_its_stamp(kind: type[c.Request], data: st.DataObject, session: int, number: int) -> None:
     request = data.draw(strategies.REQUESTS[kind])
     frame = c.to_frame(1, request, c.Stamp(session, number))
     assert c.stamp_of(frame) == c.Stamp(session, number)
@@ -257,9 +255,7 @@ def test_an_error_beyond_twelve_bits_is_told_as_the_largest_of_its_sign(error: i
 
 
 @pytest.mark.parametrize(("position", "error", "set_point"), [(2048, 0, 500), (4000, 96, 999), (4000, 500, 999)])
-def test_the_set_point_of_a_compact_reading_is_what_position_and_error_come_to(
-    position: int, error: int, set_point: int
-) -> None:
+def test_the_set_point_of_a_compact_reading_is_position_and_error(position: int, error: int, set_point: int) -> None:
     assert c.CompactReading(position, error, 3).whole == c.JointReading(set_point, position, error, 3)
     mirrored = c.CompactReading(4096 - position, -error, 3).whole
     assert mirrored.set_point == (500 if set_point == 500 else 0)

@@ -25,9 +25,7 @@ def test_a_figure_that_has_become_a_tenth_worse_is_named(took: float, met: bool)
     assert compared(Entry("a figure", took, "its floor", 1.0), lines).met is met
 
 
-def test_the_stop_that_is_measured_knows_no_robot_of_the_caller(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_the_stop_that_is_measured_knows_no_caller_s_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """It freezes what is configured: with the caller's settings that would be a real arm."""
     told: dict[str, Any] = {}
 
@@ -66,9 +64,7 @@ def test_the_spread_is_that_of_all_runs_estimated_from_these(
 
 
 @pytest.mark.parametrize("runs", ["0", "1"])
-def test_fewer_than_two_runs_are_refused(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], runs: str
-) -> None:
+def test_two_runs_are_the_least(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], runs: str) -> None:
     with pytest.raises(SystemExit):
         study(monkeypatch, runs)
     assert f"--runs {runs}: the spread of runs needs at least 2" in capsys.readouterr().err

@@ -165,9 +165,7 @@ def test_with_a_robot_only_each_command_of_models_and_service_says_which_extra_i
         assert (done.returncode, bool(re.fullmatch(line, done.stderr))) == (2, True), f"{name}: {done.stderr}"
 
 
-def test_a_service_without_models_records_and_a_job_says_which_extra_it_needs(
-    built: Distributions, tmp_path: Path
-) -> None:
+def test_a_service_without_models_records_and_names_the_extra_of_a_job(built: Distributions, tmp_path: Path) -> None:
     version = next(reversed(PYTHONS))
     programs = installed(PYTHONS[version], f"{built.wheel}[server]", tmp_path / "environment")
     done = run([programs / "python", "-c", SERVICE, programs / "daq"], tmp_path)

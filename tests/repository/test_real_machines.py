@@ -53,9 +53,7 @@ def _repository(folder: Path) -> str:
     return done.stdout.strip()
 
 
-def test_a_file_is_read_at_its_commit_of_a_checkout_or_a_bare_repository_and_of_plain_files_as_it_is(
-    tmp_path: Path,
-) -> None:
+def test_a_file_is_read_at_its_commit_of_any_repository_and_plain_as_it_is(tmp_path: Path) -> None:
     commit = _repository(tmp_path / "rig")
     subprocess.run(["git", "clone", "-q", "--bare", tmp_path / "rig", tmp_path / "own+bare" / "repo"], check=True)
     (tmp_path / "own" / "plain").mkdir(parents=True)
@@ -112,9 +110,7 @@ def test_a_record_is_renamed_and_imported_by_the_product(pendulum: Any, tmp_path
     assert linear.held_out < 0.02
 
 
-def test_a_file_with_many_records_is_read_and_a_torque_that_is_added_is_the_drive_s(
-    pendulum: Any, tmp_path: Path
-) -> None:
+def test_of_many_records_one_is_read_and_a_torque_added_is_the_drive_s(pendulum: Any, tmp_path: Path) -> None:
     series = [{"x": [1.0] * 100}, {"x": [2.0] * 100}]
     (tmp_path / "bam" / "data" / "many.json").write_text(json.dumps({"data": series}))
     rig = replace(pendulum, map={"time": "0.5*#", "position": "{part}.x"})

@@ -78,9 +78,7 @@ def test_a_version_that_cannot_be_released_is_refused_with_the_reason(
         release_notes(tag, tree(tmp_path, changelog, citation))
 
 
-def test_this_tree_can_be_released_once_its_section_has_a_date(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_this_tree_can_be_released_once_it_has_a_date(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     version = versions(ROOT)["pyproject.toml"]
     changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
     (tmp_path / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text("utf-8"), "utf-8")

@@ -35,22 +35,16 @@ def test_the_guides_configuration_can_be_said_and_says_everything() -> None:
     assert settings.machine().limits.joints[1] == load_machine("ma2000").limits.joints[1]
 
 
-def test_what_is_configured_goes_before_the_mock_the_file_asked_for_first(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    # With nothing configured the mock is used
+def test_with_nothing_configured_the_mock_is_used() -> None:
     settings, path = load_settings()
     assert path is None
     assert settings.port == "mock://"
     assert settings.machine() == load_machine("ma2000")
 
-    # A user without a home has no file of his own
-    def homeless(_name: str) -> str:
-        raise RuntimeError("Could not determine home directory.")
 
-    monkeypatch.setattr("daq.config.settings.platformdirs.user_config_dir", homeless)
-    assert config_files() == [Path("daq.toml")]
-    # The file asked for goes before the folders and that before the users
+def test_the_file_asked_for_goes_before_the_folders_and_that_before_the_users(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     users = tmp_path / "configuration" / "ma2000-daq" / "config.toml"
     users.parent.mkdir(parents=True)
     for path, name in ((users, "users"), (tmp_path / "daq.toml", "here"), (tmp_path / "other.toml", "asked")):
@@ -63,6 +57,14 @@ def test_what_is_configured_goes_before_the_mock_the_file_asked_for_first(
     Path("daq.toml").unlink()
     assert load_settings()[0].robot.name == "users"
     assert config_files() == [Path("daq.toml"), users]
+
+
+def test_a_user_without_a_home_has_no_file_of_his_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    def homeless(_name: str) -> str:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr("daq.config.settings.platformdirs.user_config_dir", homeless)
+    assert config_files() == [Path("daq.toml")]
 
 
 def test_the_environment_goes_before_the_file_key_by_key(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -168,9 +168,7 @@ def test_every_so_many_periods_there_is_a_sample(baud: int, joints: int, plain: 
 @pytest.mark.parametrize("baud", [1200, 9600, 19200, 38400, 57600, 115200])
 @pytest.mark.parametrize("joints", range(1, 7))
 @pytest.mark.parametrize("compact", [False, True])
-def test_no_rate_takes_more_of_the_line_than_may_be_taken_and_none_faster_would_fit(
-    baud: int, joints: int, compact: bool
-) -> None:
+def test_no_rate_takes_more_of_the_line_than_it_may_and_no_faster_fits(baud: int, joints: int, compact: bool) -> None:
     rate = line_rate(baud / 10, PERIOD, joints, joints, can_be_compact=compact)
     assert rate.share <= LARGEST_SHARE + 1e-9
     assert rate.every == 1 or rate.share * rate.every / (rate.every - 1) > LARGEST_SHARE

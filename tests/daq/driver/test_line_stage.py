@@ -137,9 +137,7 @@ def test_set_points_are_goals_and_samples_come_every_twentieth_tick(controller: 
     assert {later - earlier for earlier, later in pairwise(ticks)} <= {19, 20, 21}
 
 
-def test_a_stop_holds_for_whoever_comes_next_and_cannot_be_undone_by_a_repeat(
-    controller: Controller, line: Line
-) -> None:
+def test_a_stop_holds_for_whoever_comes_next_and_no_repeat_undoes_it(controller: Controller, line: Line) -> None:
     # A stop holds and whoever comes next finds it
     controller.set_points({1: 3000})
     line.sleep_until(line.now() + 0.05)
@@ -162,9 +160,7 @@ def test_a_stop_holds_for_whoever_comes_next_and_cannot_be_undone_by_a_repeat(
     assert dialect.again(late, frame) == b"P?\r"
 
 
-def test_a_stop_of_another_host_is_seen_and_its_release_is_not_taken_for_the_own(
-    controller: Controller, line: Line
-) -> None:
+def test_a_stop_of_another_host_is_seen_and_its_release_is_not_ours(controller: Controller, line: Line) -> None:
     before = controller.status().stop
     line.stage.obey(b"H")
     assert StatusFlag.FROZEN in controller.status().flags

@@ -49,9 +49,7 @@ def test_a_bench_says_what_it_is_and_looking_writes_nothing(controller: Controll
     assert all(packet[7] == ask.Instruction.SYNC_READ for packet in written)
 
 
-def test_set_points_are_goals_and_a_stop_holds_where_the_servos_are(
-    controller: Controller, bench: VirtualBench
-) -> None:
+def test_set_points_are_goals_and_a_stop_holds_the_servos(controller: Controller, bench: VirtualBench) -> None:
     controller.set_points({1: 2100, 2: 1600})
     assert goals(bench) == [2100, 1600]
     snapshot = controller.next_snapshot()
@@ -70,9 +68,7 @@ def test_set_points_are_goals_and_a_stop_holds_where_the_servos_are(
     assert goals(bench) == list(stopped.frozen.values())
 
 
-def test_samples_have_the_tick_of_their_measurement_on_the_servos_own_clock(
-    controller: Controller, bench: VirtualBench
-) -> None:
+def test_samples_have_the_tick_of_their_measurement_by_the_servos(controller: Controller, bench: VirtualBench) -> None:
     # Samples come every twentieth tick of the servos own clock
     ticks = [controller.next_snapshot().tick]
     for _ in range(50):
@@ -343,9 +339,7 @@ def test_servos_stop_by_themselves_when_their_host_is_gone(controller: Controlle
     assert c.StatusFlag.FROZEN in bench.controller().status().flags
 
 
-def test_a_watch_begins_with_set_points_and_ends_with_the_connection(
-    controller: Controller, bench: VirtualBench
-) -> None:
+def test_a_watch_lasts_from_set_points_to_the_connection_s_end(controller: Controller, bench: VirtualBench) -> None:
     bench.hearing = lambda data: without(data, Table.BUS_WATCHDOG)
     controller.set_points({1: 2100})
     bench.hearing = lambda data: data
@@ -357,9 +351,7 @@ def test_a_watch_begins_with_set_points_and_ends_with_the_connection(
     assert c.StatusFlag.FROZEN not in bench.controller().status().flags
 
 
-def test_a_servo_that_drops_off_the_bus_is_named_and_the_other_is_stopped(
-    controller: Controller, bench: VirtualBench
-) -> None:
+def test_a_servo_off_the_bus_is_named_and_the_other_is_stopped(controller: Controller, bench: VirtualBench) -> None:
     controller.set_points({1: 2800, 2: 1700})
     bench.sleep_until(bench.now() + 0.1)
     bench.bench.gone.add(2)

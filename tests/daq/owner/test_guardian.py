@@ -149,9 +149,7 @@ def test_a_client_that_reads_nothing_or_goes_has_asked_and_holds_up_nobody() -> 
         scene.freezes.wait()
 
 
-def test_a_socket_whose_folder_is_removed_is_made_again_and_who_had_found_it_is_answered(
-    own_runtime_folder: Path,
-) -> None:
+def test_a_socket_without_its_folder_is_made_again_for_all_that_found_it(own_runtime_folder: Path) -> None:
     with guarded() as scene, socket.socket(socket.AF_UNIX) as early:
         early.settimeout(10)
         with scene.guardian._lock:  # so that the early client waits until the folder is gone
@@ -240,9 +238,7 @@ def test_what_is_known_of_a_stop_is_answered() -> None:
     assert (answer.delivered, answer.confirmed, answer.text) == (False, False, "no line")
 
 
-def test_a_board_that_does_not_confirm_keeps_nobody_waiting_and_the_stop_goes_on(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_board_that_does_not_confirm_keeps_only_the_stop_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "ANSWER_WITHIN", 0.01)
     with Freezer("arm", "") as freezer:
         control = controlled(freezer)

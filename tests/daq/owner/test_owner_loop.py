@@ -121,7 +121,7 @@ def served(
         tell_arm=tell_arm,
         read_gains=dict,
         activity="none",
-        guardian=SimpleNamespace(cause=None, outdated=lambda _asked: False),
+        guardian=SimpleNamespace(cause=None, is_older_than_stop=lambda _asked: False),
         number_stop=getattr(controller, "number_stop", lambda: None),
         end_cause=lambda: None,
         speaker=SimpleNamespace(ended=answers.append),
@@ -168,9 +168,7 @@ def test_nothing_moves_a_silent_robot_or_comes_late() -> None:
 
 
 @pytest.mark.parametrize("activity", ["program", "step"])
-def test_what_is_carried_out_is_told_before_it_begins_and_by_its_own_name(
-    activity: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_carried_out_is_told_before_by_its_own_name(activity: str, monkeypatch: pytest.MonkeyPatch) -> None:
     order = cast(Any, RunProgram).model_construct(number=7, asked=time.monotonic(), activity=activity)
     activities: list[str] = []
 
@@ -286,9 +284,7 @@ def test_a_stop_after_the_reset_was_asked_for_holds(scene: Scene, here: bool) ->
 
 @pytest.mark.parametrize("here", [False, True])
 @pytest.mark.parametrize("request_under_way", [ReadStatus, Release])
-def test_a_stop_while_the_reset_is_carried_out_holds(
-    scene: Scene, here: bool, request_under_way: type[Request]
-) -> None:
+def test_a_stop_during_the_reset_holds(scene: Scene, here: bool, request_under_way: type[Request]) -> None:
     scene.between(request_under_way, scene.press_stop)
     with pytest.raises(SafetyError, match="try again"):
         scene.reset(here=here)
@@ -316,9 +312,7 @@ def test_a_stop_of_another_computer_holds(scene: Scene, here: bool) -> None:
 
 
 @pytest.mark.parametrize("here", [False, True])
-def test_a_reset_ends_no_stop_that_its_sender_had_not_seen_however_late_it_is_said_to_have_arrived(
-    scene: Scene, here: bool
-) -> None:
+def test_a_reset_ends_no_stop_that_its_sender_had_not_seen_whatever_time_it_names(scene: Scene, here: bool) -> None:
     """The service was so busy that the reset got the time at which it was read."""
     seen = scene.newest_stop()
     scene.press_stop()
@@ -373,9 +367,7 @@ def test_reports_come_out_in_order_and_a_reader_that_is_gone_is_no_error(pipe: t
         speaker.ended(END)
 
 
-def test_a_reader_that_does_not_read_costs_reports_not_time(
-    pipe: tuple[int, int], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_reader_that_does_not_read_costs_no_time(pipe: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
     reader, writer = pipe
     monkeypatch.setattr(module, "WAITING_REPORTS", 50)
     text = "x" * 10_000

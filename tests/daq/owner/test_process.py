@@ -89,9 +89,7 @@ def ask_at_the_socket(_process: Running) -> None:
     ],
     ids=["SIGTERM", "its client", "its client that leaves", "the stop socket"],
 )
-def test_a_stop_ends_the_run_with_its_trace_closed(
-    tmp_path: Path, end_it: Callable[[Running], None], reason: str
-) -> None:
+def test_a_stop_ends_a_run_and_its_trace(tmp_path: Path, end_it: Callable[[Running], None], reason: str) -> None:
     with running(text_of(tmp_path / "traces")) as process:
         process.run()
         process.until_event("start")

@@ -40,9 +40,7 @@ def test_a_folder_that_others_can_write_to_is_refused(folder: Path) -> None:
     assert request_stop() == [], "and nobody there is believed"
 
 
-def test_a_terminal_without_a_session_finds_the_folder_of_one_with_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_terminal_without_a_session_finds_what_others_began(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(FOLDER_VARIABLE, raising=False)
     monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
     monkeypatch.setenv("TMPDIR", str(tmp_path))
@@ -116,9 +114,7 @@ def test_a_socket_that_cannot_be_made_again_says_so_until_it_can(
         assert (listener.is_there(), listener.problem) == (True, "")
 
 
-def test_a_socket_for_which_no_descriptor_is_left_is_made_once_there_is_one(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_socket_waits_for_a_descriptor_where_none_is_left(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def none_left(*_: object) -> NoReturn:
         raise OSError(24, "Too many open files")
 

@@ -254,9 +254,7 @@ def test_what_is_lost_is_counted_told_and_borne(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("error", [RuntimeError("a bug"), KeyboardInterrupt(), MemoryError()], ids=repr)
-def test_whatever_goes_wrong_in_this_program_the_arm_is_frozen_first(
-    arm: Rig, tmp_path: Path, error: BaseException
-) -> None:
+def test_whatever_goes_wrong_here_the_arm_is_frozen_first(arm: Rig, tmp_path: Path, error: BaseException) -> None:
     def fail() -> None:
         raise error
 
@@ -270,9 +268,7 @@ def test_whatever_goes_wrong_in_this_program_the_arm_is_frozen_first(
     assert len(trace) == 12
 
 
-def test_a_disk_that_fills_up_freezes_the_arm_and_says_where_the_rest_is(
-    arm: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_fills_up_freezes_the_arm_and_is_told(arm: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 

@@ -82,9 +82,7 @@ def test_no_motion_is_faster_than_its_plan_and_an_arm_has_the_time_it_was_given_
         assert set(passed) == {every}
 
 
-def test_a_sample_that_comes_early_does_not_make_the_motion_faster(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_sample_that_comes_early_makes_no_motion_faster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = Controller.next_snapshot
 
     def early(controller: Controller, after: int | None, *others: object) -> object:

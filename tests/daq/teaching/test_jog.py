@@ -115,9 +115,7 @@ def test_it_goes_to_the_limit_or_the_floor_and_no_further_and_says_so_once() -> 
 @pytest.mark.parametrize("joint", StandIn.joints)
 @given(speed=st.floats(0.05, JOG_SPEED), others=st.dictionaries(st.integers(1, 6), st.floats(-JOG_SPEED, JOG_SPEED)))
 @settings(max_examples=5)
-def test_no_key_drives_the_arm_out_of_its_limits(
-    joint: int, upwards: bool, speed: float, others: dict[int, float]
-) -> None:
+def test_no_key_drives_an_arm_beyond_limits(joint: int, upwards: bool, speed: float, others: dict[int, float]) -> None:
     """Two seconds from a tenth of a radian inside each joint's limit, towards it, while others move as they like."""
     own = LIMITS.joint(joint)
     assert own.low is not None

@@ -160,9 +160,7 @@ def test_a_saved_program_loads_as_it_was_and_toml_is_read_too(tmp_path: Path) ->
         ("no/pick.json", r"program .*no/pick\.json: its folder does not exist"),
     ],
 )
-def test_a_file_that_could_not_be_saved_is_refused_before_there_is_a_program(
-    tmp_path: Path, name: str, line: str
-) -> None:
+def test_a_file_that_could_not_be_saved_is_refused_beforehand(tmp_path: Path, name: str, line: str) -> None:
     with pytest.raises(SpecError, match=line):
         require_program_file(tmp_path / name)
     require_program_file(tmp_path / "pick_2.json")

@@ -69,9 +69,7 @@ def test_a_trace_is_listed_with_what_happened_to_it(tmp_path: Path) -> None:
         list_traces(tmp_path / "absent")
 
 
-def test_a_trace_without_its_index_is_listed_only_while_it_is_whole(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_trace_without_its_index_is_listed_while_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "a.mcap", 30)
     data = path.read_bytes()
     path.write_bytes(data[: len(data) - 20])

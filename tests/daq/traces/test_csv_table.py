@@ -105,9 +105,7 @@ def test_times_in_ms_are_asked_about_and_taken_where_they_are_stated(tmp_path: P
 
 
 @pytest.mark.parametrize(("begins", "unit"), [("1700000000", "s"), ("1700000000000", "ms")])
-def test_times_since_1970_count_from_the_first_row_and_keep_their_digits(
-    begins: str, unit: str, tmp_path: Path
-) -> None:
+def test_times_since_1970_count_from_the_first_row_to_the_digit(begins: str, unit: str, tmp_path: Path) -> None:
     path = tmp_path / "rig.csv"
     path.write_text(f"time,position_1\n{begins}.000001,0.5\n{begins}.000003,0.6\n")
     path.with_suffix(".toml").write_text(f'time_unit = "{unit}"\n')

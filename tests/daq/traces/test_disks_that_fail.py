@@ -112,9 +112,7 @@ def test_a_patient_recording_waits_for_the_disk_instead(tmp_path: Path) -> None:
     assert len(read_trace(tmp_path / "a.mcap")) == 300
 
 
-def test_a_patient_recording_hears_of_a_disk_that_fails_while_it_waits(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_patient_recording_hears_of_a_disk_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The queue is full when the disk fails: what waits in it is refused, so that there is room for the next row."""
     stalled, fails = threading.Event(), threading.Event()
     sync = disk.sync

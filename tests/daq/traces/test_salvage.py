@@ -232,9 +232,7 @@ def test_a_part_file_that_another_program_wrote_into_is_kept(tmp_path: Path, mor
     assert read_trace(salvaged.path).record.outcome == "interrupted"
 
 
-def test_a_part_file_that_another_process_has_just_finished_is_left_to_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_part_file_that_another_process_finished_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "a.mcap")
     part = path.rename(tmp_path / "a.mcap.part")
 
@@ -299,9 +297,7 @@ def test_a_trace_of_format_1_is_read_shown_and_written_again_in_the_format_of_to
 
 
 @pytest.mark.parametrize(("old", "expected"), [(True, ""), (False, "ros2")])
-def test_a_salvaged_trace_keeps_its_format_and_says_so_only_of_ros_2_messages(
-    tmp_path: Path, old: bool, expected: str
-) -> None:
+def test_a_salvaged_trace_keeps_its_format_and_its_ros_profile(tmp_path: Path, old: bool, expected: str) -> None:
     path = tmp_path / "a.mcap"
     whole = shutil.copy(FORMAT_1, tmp_path / "whole.mcap") if old else write(tmp_path / "whole.mcap", 40)
     before = read_trace(whole)

@@ -75,9 +75,7 @@ def test_a_joint_that_is_held_or_never_gets_there_has_no_rise_time() -> None:
 
 
 @pytest.mark.parametrize(("unit", "shown", "end"), [("N", "mm", 250.0), ("N·m", "°", 14.3239)])
-def test_a_record_of_forces_without_a_machine_is_of_a_sliding_joint(
-    tmp_path: Path, unit: str, shown: str, end: float
-) -> None:
+def test_a_record_of_forces_is_of_a_sliding_joint(tmp_path: Path, unit: str, shown: str, end: float) -> None:
     path = tmp_path / "axis.csv"
     path.write_text("time,drive_1,position_1\n0,1.5,0.1\n0.01,2.5,0.25\n")
     path.with_suffix(".toml").write_text(f'robot = "axis"\ndrive_unit = "{unit}"\n', "utf-8")

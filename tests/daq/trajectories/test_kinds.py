@@ -67,10 +67,11 @@ def test_a_step_is_one_jump_and_a_staircase_dwells_on_each_of_equal_steps() -> N
     planned = motion(joints=(1,), trajectory={"kind": "step", "amplitude": 0.05})
     assert offsets(planned) == pytest.approx([0, 0.05])
     assert planned.jumps.tolist() == [False, True]
+    assert (marked(planned, "ramp_start"), marked(planned, "ramp_end")) == ([0], [1])
     planned = motion(joints=(1,), trajectory={"kind": "staircase", "amplitude": 0.3, "steps": 3, "dwell": 0.04})
     assert offsets(planned) == pytest.approx([0, 0.1, 0.1, 0.2, 0.2, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0, 0])
     assert planned.jumps.tolist() == [False] + [True, False] * 6
-    assert marked(planned, "reversal") == [6]
+    assert [marked(planned, kind) for kind in ("ramp_start", "reversal", "ramp_end")] == [[0], [6], [12]]
     move = {"kind": "staircase", "amplitude": -0.3, "steps": 3, "dwell": 0.02, "back": False}
     planned = motion(joints=(1,), trajectory=move)
     assert offsets(planned) == pytest.approx([0, -0.1, -0.2, -0.3])
@@ -147,6 +148,13 @@ def test_a_multisine_reaches_its_amplitude_is_faded_and_repeats_to_the_bit() -> 
     both = motion(joints=(1, 2), trajectory={"kind": "multisine"})
     alone = motion(joints=(2,), trajectory={"kind": "multisine"})
     assert np.array_equal(both.angles[:, 1], alone.angles[:, 1])
+
+
+def test_a_multisine_completes_a_hundredth_of_its_lowest_period_at_least() -> None:
+    slow = {"kind": "multisine", "amplitude": 0.1, "duration": 10.0, "highest": 1.0, "tones": 3}
+    assert len(motion(joints=(1,), trajectory=slow | {"lowest": 0.0011})) == 501
+    with pytest.raises(SpecError, match=r"less than a hundredth of its period fits into 10 s: allowed are 0\.001 Hz"):
+        motion(joints=(1,), trajectory=slow | {"lowest": 0.0009})
 
 
 def test_a_path_is_absolute_and_refused_from_elsewhere() -> None:

@@ -40,9 +40,7 @@ def test_the_mock_ends_with_an_owner_that_is_killed() -> None:
         owner.stdout.close()
 
 
-def test_a_mock_that_cannot_start_says_why_and_one_without_processor_is_given_up(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_mock_that_cannot_start_says_why_or_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(TransportError, match=r"the mock controller did not start: .*nonsense") as caught:
         open_endpoint("mock://?fault=nonsense")
     assert "\n" not in str(caught.value)
@@ -58,9 +56,7 @@ def test_a_mock_that_cannot_start_says_why_and_one_without_processor_is_given_up
 @pytest.mark.parametrize(
     ("process", "says"), [("import os; os.kill(os.getpid(), 9)", "signal 9 .*memory"), ("", "code 0")]
 )
-def test_a_mock_that_ends_without_a_word_has_its_end_named(
-    monkeypatch: pytest.MonkeyPatch, process: str, says: str
-) -> None:
+def test_a_mock_that_ends_silently_has_its_end_named(monkeypatch: pytest.MonkeyPatch, process: str, says: str) -> None:
     start = subprocess.Popen
     monkeypatch.setattr(subprocess, "Popen", lambda command, **given: start([command[0], "-c", process], **given))
     with pytest.raises(TransportError, match=f"did not start: .*{says}"):

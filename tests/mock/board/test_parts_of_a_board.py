@@ -35,7 +35,7 @@ def powers(errors: list[int], gains: tuple[int, int, int]) -> list[int]:
         ((20, 0, 20), [4095, -4095], [127, -127]),
     ],
 )
-def test_the_integer_pid_agrees_with_worked_examples(
+def test_the_integer_pid_agrees_with_examples(
     gains: tuple[int, int, int], errors: list[int], expected: list[int]
 ) -> None:
     assert powers(errors, gains) == expected

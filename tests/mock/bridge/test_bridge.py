@@ -140,9 +140,7 @@ def test_a_sample_that_waits_in_vain_is_refused(tmp_path: Path) -> None:
         (0x10, b"\x00\x00\x00\x00\x00", c.Refusal.BAD_VALUE),
     ],
 )
-def test_a_whole_frame_that_is_wrong_is_refused(
-    host: LockStepHost, opcode: int, payload: bytes, reason: c.Refusal
-) -> None:
+def test_a_frame_that_is_wrong_is_refused(host: LockStepHost, opcode: int, payload: bytes, reason: c.Refusal) -> None:
     before = bytes(host.board.memory.get(0xFC00 + offset) for offset in range(0x80))
     output = host.turn(encode_frame(Frame(7, opcode, payload)))
     assert host.dialect.feed(output) == [(7, c.Refused(opcode, reason))]

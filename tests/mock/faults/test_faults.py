@@ -46,6 +46,7 @@ def test_every_fault_has_a_name_a_line_and_its_place_in_the_guide() -> None:
     for name, kind in FAULTS.items():
         assert f"{name}: {kind.summary()}" in text
         assert describe(parse_fault(name))["name"] == name
+    assert parse_fault("disconnect").duration == 0.0, "its own seconds say when it ends"
     guide = (Path(__file__).parents[3] / "docs" / "mock.md").read_text("utf-8")
     listed = dict(re.findall(r"^\| `(\w+)` \|[^|]*\|([^|]*)\|[^|]*\|$", guide, re.MULTILINE))
     assert tuple(listed) == NAMES
@@ -59,7 +60,7 @@ def test_every_fault_has_a_name_a_line_and_its_place_in_the_guide() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("flop", "fault 'flop': not known; there are flip, drop"),
+        ("flop", "fault 'flop': not known; available: flip, drop"),
         ("", "fault '': not known"),
         ("flip:rat=1", "fault flip: no parameter 'rat=1'; write parameter=value with start, duration"),
         ("flip:0.01", "fault flip: no parameter '0.01'"),

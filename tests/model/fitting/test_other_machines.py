@@ -198,7 +198,7 @@ def test_what_no_fit_can_take_is_refused(good: Trace) -> None:
     with pytest.raises(TraceError, match="not finite at sample 17"):
         fit(arm(), [changed(good, position=position)], SOME)
     columns = {n: getattr(good, n)[:, :2] for n in ("position", "set_point", "error", "drive")}
-    assert "joint 3 is not in it" in refused([changed(good, joints=(1, 2), **columns)])
+    assert "joint 3 is not recorded" in refused([changed(good, joints=(1, 2), **columns)])
     assert "set points" in refused([changed(good, set_point=None)])
     assert "nothing to fit" in refused([good], FitOptions(held=("*",)))
 

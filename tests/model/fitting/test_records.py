@@ -210,9 +210,7 @@ def starts(problem: SimulatedProblem) -> np.ndarray:
     return np.array([u.start for u in problem.unknowns])
 
 
-def test_derivatives_are_those_of_the_residual_and_a_start_belongs_to_its_record_alone(
-    problem: SimulatedProblem,
-) -> None:
+def test_derivatives_are_those_of_the_residual_and_a_start_its_record_s(problem: SimulatedProblem) -> None:
     values = starts(problem)
     found = problem.evaluate(values, derivatives=True)
     for k, unknown in enumerate(problem.unknowns):

@@ -33,9 +33,7 @@ def filtered_both_ways(signal: Floats, cutoff: float, period: float) -> Floats:
     share=st.floats(0.02, 0.25),
     more=st.sampled_from([(), (2,), (2, 3)]),
 )
-def test_the_low_pass_is_that_of_scipy_run_both_ways(
-    seed: int, periods: int, share: float, more: tuple[int, ...]
-) -> None:
+def test_the_low_pass_is_scipy_s_run_both_ways(seed: int, periods: int, share: float, more: tuple[int, ...]) -> None:
     """share: of the cutoff, of the sampling rate. Of the ends, 24 samples and more are left out."""
     count = 64 + int(np.ceil(periods / share))
     signal = np.cumsum(np.random.default_rng(seed).standard_normal((count, *more)), axis=0)

@@ -74,9 +74,7 @@ def test_a_record_counts_once_and_what_is_typed_by_hand_or_not_determined_not_at
         ({"learnt_from": 7}, "lineage.fit.learnt_from: "),
     ],
 )
-def test_a_model_file_with_something_else_in_its_lineage_is_refused_in_one_line(
-    wrong: dict[str, object], where: str
-) -> None:
+def test_a_model_file_with_another_lineage_is_refused_in_one_line(wrong: dict[str, object], where: str) -> None:
     with pytest.raises(SpecError) as refused:
         load_posterior(given().with_lineage(Lineage(fit=wrong)), ["new"])
     assert str(refused.value).startswith(f"model: {where}")

@@ -60,9 +60,7 @@ def test_a_drive_of_another_unit_is_doubted(scale: float) -> None:
 @pytest.mark.parametrize(
     ("factor", "offset", "doubted"), [(1.0, 0.0, False), (-1.0, 0.0, True), (1.0, 3.0, True), (57.3, 0.0, True)]
 )
-def test_set_points_far_away_are_doubted_where_the_joint_does_not_go_there(
-    factor: float, offset: float, doubted: bool
-) -> None:
+def test_set_points_where_the_joint_never_goes_are_doubted(factor: float, offset: float, doubted: bool) -> None:
     """Steps that come before the joint has arrived, as a hobby servo is driven."""
     time = np.arange(0.0, 20.0, 0.01)
     steps = np.sign(np.sin(2.0 * np.pi * time / 1.1))

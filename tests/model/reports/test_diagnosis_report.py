@@ -37,9 +37,7 @@ def words(page: str) -> str:
     return re.sub(r"\s+", " ", re.sub(r"<svg.*?</svg>|<style.*?</style>|<[^>]+>", " ", page, flags=re.DOTALL))
 
 
-def test_the_page_tells_the_whole_story_in_order(
-    answer: tuple[Diagnosis, Comparison], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_page_tells_it_all_in_order(answer: tuple[Diagnosis, Comparison], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.undo()  # with its figures
     found, comparison = answer
     report = diagnosis_report(found, comparison)
@@ -163,9 +161,7 @@ def test_a_map_of_what_is_left_is_shown_once_and_a_shape_only_where_it_is_clear(
     assert "As before step 1: nothing was added in between." in page
 
 
-def test_what_was_fitted_and_refused_is_no_promise_of_a_later_step(
-    found: Diagnosis, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_refused_is_no_promise_of_a_later_step(found: Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[list[tuple[str, bool]]] = []
 
     def picture(candidates: object, *_: object) -> Picture:
@@ -257,9 +253,7 @@ def test_a_page_about_torques_does_not_speak_of_a_simulation(found: Diagnosis) -
         ("unknown-effect", "inverse-dynamics", False, "no experiment is proposed, though one may be needed."),
     ],
 )
-def test_a_page_without_an_experiment_says_why(
-    found: Diagnosis, verdict: str, method: str, controlled: bool, says: str
-) -> None:
+def test_no_experiment_has_a_reason(found: Diagnosis, verdict: str, method: str, controlled: bool, says: str) -> None:
     before = found.model_before
     if not controlled:
         machine = before.machine.model_copy(update={"controller": NoController(kind="none")})

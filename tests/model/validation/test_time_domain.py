@@ -183,9 +183,7 @@ def test_doubling_changes_do_double_the_error_and_curves_have_their_least_inside
     assert min(errors) < 0.4 * errors[-1]
 
 
-def test_with_one_output_only_its_error_counts_and_a_wider_damping_changes_all_alike(
-    model: Model, trace: Trace
-) -> None:
+def test_with_one_output_only_its_error_counts_and_damping_changes_all(model: Model, trace: Trace) -> None:
     result = validate_by_distortion(model, [trace], (K_B2, "joint1.motor.back_emf_constant"), outputs=(1,))
     everything = validate_by_distortion(model, [trace], (K_B2,))
     assert result.error == pytest.approx(everything.error_by_joint[0])

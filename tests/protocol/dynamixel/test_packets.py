@@ -72,9 +72,7 @@ def test_the_makers_client_writes_what_we_write(device: int, address: int, data:
 
 
 @given(DEVICES, DATA.filter(len), st.integers(0, 7), st.booleans())
-def test_the_makers_client_reads_what_a_servo_of_ours_answers(
-    device: int, data: bytes, error: int, alert: bool
-) -> None:
+def test_the_makers_client_reads_what_our_servo_answers(device: int, data: bytes, error: int, alert: bool) -> None:
     answer = encode(ask.status(device, data, error, alert=alert))
     read, result, told = client().readTxRx(MemoryPort(lambda _packet: answer), device, 0, len(data))
     assert (bytes(read), result, told) == (data, SUCCESS, error | (0x80 if alert else 0))
