@@ -71,7 +71,7 @@ class TraceWriter:
         self._failure: TraceError | None = None
         self._closed = False
         self._changed = threading.Condition()
-        """Guards what waits and the close; whoever waits for room, and the thread, wait for it to be notified."""
+        """Guards the waiting data and the close. It is notified of changes to either."""
         self._waiting: list[SampleRow | TraceEvent] = []
         self._longest = queue_length
         self._wake_at = min(WORTH_WAKING, queue_length)
@@ -216,8 +216,8 @@ class TraceWriter:
                 return self._finish(close)
 
     def _next(self, until: float) -> tuple[Sequence[SampleRow | TraceEvent | None], _Close | None]:
-        """What waits, once it is worth it, at the time `until` (s, monotonic), or at the close; None where nothing
-        does."""
+        """Waits until enough data wait, until `until` (s, monotonic), or until the close. Returns the waiting data
+        (None if there is none), and the close."""
         with self._changed:
             self._changed.wait_for(
                 lambda: len(self._waiting) >= self._wake_at or self._close_with is not None,

@@ -1,6 +1,6 @@
-"""A mock in lock-step in this process, reached through the bytes of its line alone.
+"""Runs a lock-step mock in this process, reached only through the bytes of its line.
 
-Its time stands still between two turns, so that a process of its own would only cost the change from one to the other.
+Its time stands still between two requests, so a separate process would only add process switches.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from daq.transport.channel import ByteChannel, ChannelError
 from daq.transport.url import BITS_PER_BYTE, MockPort, TransportError
 
 MODULE = "mock_controller.embedded"
-"""Found by its name, as a mock's process is: nothing here knows the mock."""
+"""Imported by name, since nothing here depends on the mock."""
 
 
 class Mock(Protocol):
@@ -31,15 +31,15 @@ class Mock(Protocol):
         ...
 
     def open_line(self) -> int | None:
-        """The number of a new line; None while there is none to be had."""
+        """Opens a line and returns its number; None if none is available."""
         ...
 
     def take(self, line: int, data: bytes) -> bool:
-        """Takes bytes; returns whether the line is whole."""
+        """Passes bytes to the mock. Returns whether the line is intact."""
         ...
 
     def say(self, line: int) -> bytes | None:
-        """What the mock says to them; None where the line is cut."""
+        """Returns the mock's answer to them; None if the line is cut."""
         ...
 
     def close(self) -> None:
@@ -48,7 +48,7 @@ class Mock(Protocol):
 
 
 class EmbeddedEndpoint:
-    """A mock of its own. Raises TransportError with the mock's own words for options that cannot be met;
+    """A mock in this process. Raises TransportError with the mock's own message for invalid options;
     MissingExtraError."""
 
     lock_step = True
@@ -64,15 +64,15 @@ class EmbeddedEndpoint:
 
     @property
     def control(self) -> str | None:
-        """URL of the mock's control port, where faults are switched."""
+        """URL of the mock's control port, for switching faults."""
         return self._mock.control
 
     def waited(self) -> float:
-        """Nothing stands still but what the host lets stand."""
+        """Returns 0: only the host stops this mock's time."""
         return 0.0
 
     def connect(self) -> ByteChannel:
-        """A new channel to the same mock. Raises TransportError when it has ended, or its line is cut."""
+        """Opens a new channel to the same mock. Raises TransportError if the mock has ended, or its line is cut."""
         if self._mock.ended:
             raise TransportError("the mock controller has ended")
         line = self._mock.open_line()
@@ -86,7 +86,7 @@ class EmbeddedEndpoint:
 
 
 class EmbeddedChannel:
-    """One line to a mock in this process. Whoever reads lets the mock work; nobody who writes waits for that."""
+    """One line to a mock in this process. The mock runs on the reading thread, so writing never waits for it."""
 
     description = "the mock controller"
 
@@ -98,7 +98,7 @@ class EmbeddedChannel:
         self._closed = False
 
     def read(self, timeout_s: float) -> bytes:
-        """What the mock says; empty when it has nothing to say and nobody writes within `timeout_s`. Raises
+        """Returns the mock's answer; empty if it has none and nothing is written within `timeout_s`. Raises
         ChannelError at the end."""
         said = self._answers()
         if not said:
@@ -108,14 +108,14 @@ class EmbeddedChannel:
         return said
 
     def write(self, data: bytes) -> None:
-        """Puts bytes on the line. Raises ChannelError after `close`."""
+        """Writes bytes to the line. Raises ChannelError after `close`."""
         with self._written:
             self._check()
             self._unread += data
             self._written.notify()
 
     def close(self) -> None:
-        """Ends the connection; a read that waits raises ChannelError."""
+        """Closes the connection; a waiting read raises ChannelError."""
         with self._written:
             self._closed = True
             self._written.notify_all()

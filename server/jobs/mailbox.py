@@ -87,7 +87,7 @@ class Mailbox:
             part.write_text(json.dumps(data), "utf-8")
 
     def tell_leading(self, leading: tuple[LeadingEffect, ...]) -> None:
-        """Reports the candidates that lead, at once."""
+        """Reports the leading candidates at once."""
         self._now = replace(self._now, leading=leading)
         self.tell(self._now.fraction, self._now.text, at_once=True)
 

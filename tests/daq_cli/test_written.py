@@ -76,7 +76,7 @@ def test_files_that_ship_are_copied_and_never_over_another(daq: CommandLine, tmp
     target = tmp_path / "ours.toml"
     assert daq("config", "copy", "memory-map", "-o", target).code == 0
     assert load_memory_map(target) == default_memory_map()
-    daq("config", "copy", "memory-map", "-o", target).complains(2, "is there already")
+    daq("config", "copy", "memory-map", "-o", target).complains(2, "exists")
     daq("config", "copy", "gripper").complains(2, "memory-map, machine, examples")
 
 
@@ -85,7 +85,7 @@ def test_the_examples_are_copied_whole_and_never_over_a_folder(daq: CommandLine,
     assert daq("config", "copy", "examples", "-o", target).code == 0
     ours = {path.name: path.read_bytes() for path in (ROOT / "examples").iterdir() if path.is_file()}
     assert {path.name: path.read_bytes() for path in target.iterdir()} == ours
-    daq("config", "copy", "examples", "-o", target).complains(2, "is there already; name another folder")
+    daq("config", "copy", "examples", "-o", target).complains(2, "exists; name another folder")
     daq("config", "copy", "examples", "-o", tmp_path / "none" / "here").complains(2, "cannot be written")
 
 

@@ -1,4 +1,4 @@
-; CRC-16, polynomial 1021, most significant bit first: one step a byte through a table that is made at the start.
+; CRC-16, polynomial 1021, most significant bit first: one step per byte, by a table made at the start.
 
 .importzp crc_low, crc_high
 .import crc_table_low, crc_table_high

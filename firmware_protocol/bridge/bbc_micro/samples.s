@@ -315,7 +315,7 @@ answer: jsr begin
         jsr put_readings
         jmp send_reply
 
-; Four bytes a joint: position and error in twelve bits each, then power.
+; Four bytes per joint: position and error in twelve bits each, then power.
 compact:
         lda taken
         jsr put

@@ -1,4 +1,4 @@
-; Takes the machine over, then does one piece of work after the other for ever. BREAK ends it.
+; Takes over the machine, then runs the main loop for ever. BREAK ends it.
 
 .include "machine.inc"
 .include "protocol.inc"

@@ -1,4 +1,4 @@
-/* What the bridge does with a request, and the door of the core (core.h). */
+/* Carries out requests, and implements the interface of the core (core.h). */
 #include "core.h"
 
 #include "framing.h"
@@ -230,7 +230,7 @@ static void answer(const struct frame *frame)
     }
 }
 
-/* ---- the door */
+/* ---- the interface */
 
 bool bridge_wants_byte(void)
 {

@@ -1,4 +1,4 @@
-/* How long ago certain moments were. Time is counted on at every call of the bridge. */
+/* Times since certain events. They are updated at every call of the bridge. */
 #ifndef BRIDGE_MOMENTS_H
 #define BRIDGE_MOMENTS_H
 
@@ -15,16 +15,16 @@ enum moment {
 
 #define LONG_AGO UINT16_MAX
 
-/* All moments are long ago. */
+/* Sets all times to LONG_AGO. */
 void moments_start(void);
 
-/* Reads the board's clock: this is the present from now on. */
+/* Reads the board's clock and updates all times. */
 void moments_read_clock(void);
 
-/* The moment is the present, or lies that many microseconds back. */
+/* Sets a moment to now, or to that many microseconds ago. */
 void moment_was(enum moment moment, uint16_t ago_us);
 
-/* Microseconds from a moment to the present; LONG_AGO for any longer time. */
+/* Microseconds since a moment; at most LONG_AGO. */
 uint16_t us_since(enum moment moment);
 
 #endif

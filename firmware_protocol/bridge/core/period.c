@@ -2,7 +2,7 @@
  *
  * Once a period the controller stores what it measured, and some bit of six positions of 12 bits changes nearly every
  * time, since converters are noisy. The first change that is seen gives the phase. From then on the bridge looks only
- * around the moment when the next results are due, and counts periods by its own clock where nothing changes. */
+ * around the time when the next results are due, and counts periods by its own clock if nothing changes. */
 #include "period.h"
 
 #include <stddef.h>

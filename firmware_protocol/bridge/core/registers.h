@@ -8,7 +8,7 @@
 #include "memory_map.h"
 #include "protocol.h"
 
-/* A memory map may leave out the gains, and registers of process signals and gripper: nobody knows then where they are. */
+/* A memory map may leave out the gains, and registers of process signals and gripper, if they are unknown. */
 #ifdef GAIN_P_LOW
 #define HAS_GAINS 1
 #else
@@ -23,7 +23,7 @@
 /* Whether a mask has the bit of a joint. */
 bool has_joint(uint8_t mask, uint8_t joint);
 
-/* What the memory has of a joint, packed: 10 + 12 + 16 + 8 bits. */
+/* The memory's data of a joint, packed: 10 + 12 + 16 + 8 bits. */
 struct reading {
     uint8_t set_point_low; /* posture units */
     uint8_t high_bits;     /* of the set point from bit 0 on, of the position from bit 4 on */
@@ -46,7 +46,7 @@ void write_set_point(uint8_t joint, uint16_t posture);
 /* Reads a position (ADC counts) byte by byte. */
 uint16_t read_position(uint8_t joint);
 
-/* Reads all positions. Whether one is another than was there. */
+/* Reads all positions. Returns whether any has changed. */
 bool read_positions(uint16_t counts[JOINTS]);
 
 /* Whether no position is other than 0: the memory of a board without supply. */

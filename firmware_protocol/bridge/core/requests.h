@@ -1,4 +1,4 @@
-/* Whether a request is right in itself, whatever the moment (PROTOCOL.md, section 2). */
+/* Whether a request is valid by itself, in any state of the bridge (PROTOCOL.md, section 2). */
 #ifndef BRIDGE_REQUESTS_H
 #define BRIDGE_REQUESTS_H
 

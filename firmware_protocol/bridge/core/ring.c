@@ -6,11 +6,11 @@
 #error "RING_DEPTH has to be 8, 16, 32 or 64: the last bits of a tick tell its place"
 #endif
 
-/* The status of a place whose period has no snapshot. No flag has this value. */
+/* Status of a ring entry whose period has no snapshot. No flag has this value. */
 #define MISSING 0x80u
 
 static struct snapshot kept[RING_DEPTH];
-static uint8_t count; /* of places in use, up to that of the newest tick */
+static uint8_t count; /* of entries in use, up to that of the newest tick */
 static uint32_t newest_tick;
 
 void ring_clear(void)
@@ -19,7 +19,7 @@ void ring_clear(void)
     newest_tick = 0;
 }
 
-/* The place of the tick that is `age` periods older than the newest. */
+/* The entry of the tick that is `age` periods older than the newest. */
 static struct snapshot *place_of_age(uint8_t age)
 {
     return &kept[(uint8_t)((uint8_t)newest_tick - age) % RING_DEPTH];

@@ -14,7 +14,7 @@ struct snapshot {
 
 void ring_clear(void);
 
-/* Adds the snapshot of a period. Periods left out since the newest one have no snapshot; they take places nevertheless. */
+/* Adds the snapshot of a period. Skipped periods since the newest one get entries without a snapshot. */
 void ring_add(uint32_t tick, const struct snapshot *snapshot);
 
 /* The newest tick, 0 when the ring is empty. */

@@ -6,13 +6,13 @@
 
 void sampling_start(void);
 
-/* A host asks; a request that waits is forgotten. */
+/* Begins a host's request; a waiting one is dropped. */
 void sampling_request(uint16_t sequence, uint32_t after, uint8_t mask);
 
-/* Answers the request that waits, if its moment has come. Only while no reply is being sent. */
+/* Answers the waiting request if it can be answered now. Only while no reply is being sent. */
 void sampling_work(void);
 
-/* A request that waits is answered from the board's new life. */
+/* After a reset of the board: the waiting request gets the first snapshot after it. */
 void sampling_board_was_reset(void);
 
 #endif

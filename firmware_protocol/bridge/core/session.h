@@ -19,10 +19,10 @@ uint32_t session_greet(uint32_t nonce);
 void session_end(void);
 bool session_is_open(void);
 
-/* The board was reset: the session ends, and hosts are told. */
+/* The board was reset: the session ends, and RESTARTED is set. */
 void session_board_was_reset(void);
 
-/* Whether a command with this stamp is to be obeyed: NOT_REFUSED, BAD_SESSION or STALE. */
+/* Whether to carry out a command with this stamp: NOT_REFUSED, BAD_SESSION or STALE. */
 enum refusal session_judge(const uint8_t *stamp);
 
 /* Whether the board was reset, or the bridge has started, since the last greeting that began a session. */

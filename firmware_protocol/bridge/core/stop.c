@@ -41,7 +41,7 @@ static void answer(void)
     reply_send();
 }
 
-/* Set points become the posture `to_freeze`. Where that is all zero nothing is written: the board has no supply. */
+/* Sets the set points to the posture `to_freeze`. If it is all zero, nothing is written: the board has no supply. */
 static void freeze(void)
 {
     if (!all_zero(to_freeze)) {

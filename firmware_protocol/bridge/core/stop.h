@@ -10,7 +10,7 @@ void stop_start(bool frozen);
 /* Set points are held from now on. The reply follows when the posture is known, at once where periods are followed. */
 void stop_request(uint16_t sequence);
 
-/* Goes on with a stop whose posture is still being read. Only while no reply is being sent. */
+/* Continues a stop whose posture is still being read. Only while no reply is being sent. */
 void stop_work(void);
 
 /* Whether a stop's reply is still owed. Other requests wait meanwhile, 10 ms at most. */

@@ -1,4 +1,4 @@
-/* What a program of the computer calls of the shared library, besides core.h. */
+/* Functions of the shared library for programs of this computer, besides core.h. */
 #ifndef BRIDGE_HOSTED_H
 #define BRIDGE_HOSTED_H
 
@@ -7,7 +7,7 @@
 void hosted_start(uint8_t (*reader)(uint16_t), void (*writer)(uint16_t, uint8_t), uint32_t (*clock)(void),
                   int period_source, int frozen, uint32_t first_number);
 
-/* Hands over bytes of the host's while the bridge wants them; returns how many. */
+/* Passes bytes from the host while the bridge accepts them; returns how many. */
 int hosted_take(const uint8_t *bytes, int count);
 
 /* Bytes for the host, as many as there are and fit; returns how many. */

@@ -7,7 +7,7 @@
 #include "clock.h"
 #include "uart.h"
 
-/* What outlasts a loss of power: half of every number that was ever given (PROTOCOL.md, section 3), and the freeze.
+/* Data that survive a loss of power: the high half of the numbers given (PROTOCOL.md, section 3), and the freeze.
  * An empty EEPROM reads FF: a new board starts frozen, and the first release is an operator's. */
 static uint16_t EEMEM kept_numbers;
 static uint8_t EEMEM kept_freeze;
@@ -44,7 +44,7 @@ static void keep_state(void)
     }
 }
 
-/* Whether there is more to do for the line at once. */
+/* Whether the line needs more work at once. */
 static bool serve_line(void)
 {
     bool busy = false;
