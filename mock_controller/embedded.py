@@ -41,7 +41,7 @@ class EmbeddedMock:
         self._wake: tuple[int, int] = (-1, -1)
 
     def open_line(self) -> int | None:
-        """The number of a new line, which cuts the one before; None while there is none to be had."""
+        """Returns the number of a new line, which cuts the one before; None while there is none to be had."""
         with self._in_use:
             if self._ended or self._back_at is None or time.monotonic() < self._back_at:
                 return None
@@ -108,7 +108,7 @@ class EmbeddedMock:
         self._ended = True
 
     def clock(self) -> dict[str, Any]:
-        """The relation of board time and the clock."""
+        """Returns the relation of board time and the clock."""
         return {"mode": "lock_step"}
 
     def lost_bytes(self) -> int:

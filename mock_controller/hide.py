@@ -25,7 +25,9 @@ _NUMBERS = 2**48
 
 
 def seed_that_hides(random: Random, effect: str | None = None, joint: int | None = None) -> int:
-    """A drawn seed whose arm hides this effect on this joint alone, clearly. Raises SecretError where no arm does."""
+    """Returns a drawn seed whose arm hides this effect on this joint alone, clearly. Raises SecretError where no arm
+    does.
+    """
     fitting = [size for size in (*SHARED_SIZES, *LATER_SIZES) if effect in (None, size.effect)]
     if not any(joint is None or joint in _joints(size) for size in fitting):
         on = "" if joint is None else f" on joint {joint}"

@@ -48,8 +48,9 @@ def main(arguments: list[str]) -> int:
 def sharpness(
     arm: HiddenArm, experiments: list[Experiment], known: list[Tangents], named: list[Named]
 ) -> list[dict[str, Any]]:
-    """The least d′ of each rival over the places where it is looked for, and the joints there. `known`: the tangents of
-    each experiment."""
+    """Returns the least d′ of each rival over the places where it is looked for, and the joints there. `known`: the
+    tangents of each experiment.
+    """
     compared = Comparison(arm, experiments, known)
     hidden = arm.effects[0]
     found: dict[str, Told] = {}
@@ -67,7 +68,7 @@ def sharpness(
 
 
 def parse_rival(text: str) -> Named:
-    """A name, and perhaps joints: `gear_loss`, `gear_loss:1` or `gear_loss:1,3`. Raises RivalError."""
+    """Returns a name, and perhaps joints: `gear_loss`, `gear_loss:1` or `gear_loss:1,3`. Raises RivalError."""
     effect, _, after = text.partition(":")
     known = known_modifications().get(effect)
     if known is None or not known.shared:

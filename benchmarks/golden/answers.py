@@ -22,7 +22,7 @@ Leaf = str | int | float | bool | None
 
 
 def leaves(answer: Any, path: str = "") -> Iterator[tuple[str, Leaf]]:
-    """Every value of an answer that is to stay, by its path; a list says how long it is."""
+    """Yields every value of an answer that is to stay, by its path; a list says how long it is."""
     if isinstance(answer, dict):
         for key, value in answer.items():
             if key in TIMES or (key in PROSE and not isinstance(value, dict)):
@@ -41,12 +41,12 @@ def leaves(answer: Any, path: str = "") -> Iterator[tuple[str, Leaf]]:
 
 
 def of_json(text: str) -> dict[str, Leaf]:
-    """The leaves of an answer in JSON; of a long list, one digest for each of its columns."""
+    """Returns the leaves of an answer in JSON; of a long list, one digest for each of its columns."""
     return condense(dict(leaves(json.loads(text))))
 
 
 def condense(found: dict[str, Leaf]) -> dict[str, Leaf]:
-    """The same leaves, where each column of a list of more than `LONG` entries has become its SHA-256."""
+    """Returns the same leaves, where each column of a list of more than `LONG` entries has become its SHA-256."""
     short: dict[str, Leaf] = {}
     columns: dict[str, list[tuple[list[int], str]]] = {}
     long = {path[:-2] for path, value in found.items() if path.endswith("[]") and int(value or 0) > LONG}

@@ -118,7 +118,7 @@ def _outcome(truth: Truth, answer: Diagnosis, machine: Machine) -> Outcome:
 
 
 def _numbers(truth: Truth, answer: Diagnosis, machine: Machine) -> tuple[HiddenNumber, ...]:
-    """The hidden effect's numbers, in the model's conventions where these have them, else in the mock's."""
+    """Returns the hidden effect's numbers, in the model's conventions where these have them, else in the mock's."""
     (hidden,) = truth.effects
     found = {name: value for step in answer.steps if step.adopted for name, value in step.parameters.items()}
     numbers: list[HiddenNumber] = []

@@ -43,7 +43,7 @@ def sensitivity_report(label: str, found: SensitivityCurves, machine: Machine) -
 
 
 def largest_change(found: SensitivityCurves, curve: SensitivityCurve, k: int, machine: Machine) -> str:
-    """The largest change of the k-th joint's reading and its time, as people read it: 0.124° at 0.84 s."""
+    """Returns the largest change of the k-th joint's reading and its time, as people read it: 0.124° at 0.84 s."""
     place = curve.peaks[k]
     factor, unit = shown_unit(joint_unit(machine, found.joints[k]))
     return f"{with_unit(f'{factor * curve.by_joint[k][place]:+.3g}', unit)} at {found.time[place]:.2f} s"

@@ -29,7 +29,8 @@ VARIATIONS_SHOWN = 8
 def validation_report(
     label: str, found: tuple[Fidelity, Fidelity], in_time: Sequence[TimeDomain], machine: Machine
 ) -> Report:
-    """The page of a validation; `found` is in the source's convention of τ′ and in that of three standard deviations.
+    """Returns the page of a validation; `found` is in the source's convention of τ′ and in that of three standard
+    deviations.
 
     machine: the model's machine, from which the units of its joints are taken.
     """
@@ -142,7 +143,7 @@ def _curve(axes: Axes, curve: Curve, found: Fidelity) -> None:
 
 
 def _short(name: str) -> str:
-    """A name over two lines where it is long."""
+    """Returns a name over two lines where it is long."""
     head, _, tail = name.partition(".")
     return name if len(name) < 22 else f"{head}.\n{tail}"
 

@@ -224,8 +224,10 @@ def test_a_body_that_cannot_exist_and_half_a_choice_are_refused_in_one_line(
         daq(*words, "--parameters", parameters).complains(2, *says)
         assert not (tmp_path / "no.json").exists()
 
-    refused(machine(tmp_path, 0.02), "link1.mass", "link1: 0.8 kg", "0.0005, 0.006, 0.02", "no body that can exist")
-    refused(machine(tmp_path, 0.006), "link1.inertia_zz", "link1.inertia_zz", "free", "link1.inertia_xx")
+    refused(
+        machine(tmp_path, 0.02), "link1.mass", "link1: 0.8 kg", "0.0005, 0.006, 0.02", "is not physically consistent"
+    )
+    refused(machine(tmp_path, 0.006), "link1.inertia_zz", "link1.inertia_zz", "fit", "link1.inertia_xx")
 
 
 # ---- an effect of the user's own, through every command that takes one
@@ -308,7 +310,7 @@ def test_a_model_that_needs_an_effect_file_names_it(
 
 
 @pytest.mark.parametrize(
-    ("text", "told"), [(None, "cannot be read"), ("1/0", "ZeroDivisionError"), ("x = 1", "states no effect")]
+    ("text", "told"), [(None, "cannot be read"), ("1/0", "ZeroDivisionError"), ("x = 1", "defines no effect")]
 )
 def test_a_file_without_an_effect_is_refused_in_one_line(
     daq: CommandLine, tmp_path: Path, dragged_swing: Path, text: str | None, told: str

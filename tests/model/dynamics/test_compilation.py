@@ -160,7 +160,7 @@ def test_without_room_for_a_cache_it_computes_and_says_so_once(tmp_path: Path, f
     )
     assert run.stdout.split() == ["0", "1"]
     (line,) = run.stderr.splitlines()
-    assert line.startswith(f"Compiled code cannot be kept in {tmp_path / folder} (")
+    assert line.startswith(f"Compiled code cannot be stored in {tmp_path / folder} (")
     assert "NUMBA_CACHE_DIR" in line
 
 

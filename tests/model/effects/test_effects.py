@@ -92,7 +92,7 @@ def test_names_that_are_unknown_and_changes_that_are_impossible_are_refused(mode
         model_of(saved, "old.json")
     with pytest.raises(SpecError, match="'magnetism': not in the library"):
         model.with_effect("magnetism", (1,))
-    with pytest.raises(SpecError, match="joint 4: modelled are joints"):
+    with pytest.raises(SpecError, match="joint 4: not modelled; modelled joints are"):
         model.with_effect("backlash", (4,))
     with pytest.raises(SpecError, match="allowed are"):
         model.with_effect("coulomb_friction", (1,), {"torque": -1.0})

@@ -112,7 +112,7 @@ def test_a_loop_needs_what_drives_it() -> None:
         prepare(model, driven, Options(loop="closed"))
     with pytest.raises(TraceError, match="has no drive, which a simulation in open loop needs"):
         prepare(model, led, Options(loop="open"))
-    with pytest.raises(TraceError, match="has no drive, which is to be the input"):
+    with pytest.raises(TraceError, match="has no drive, which `recorded_drive` needs"):
         prepare(model, led, Options(loop="closed", recorded_drive=True))
     assert prepare(model, driven, Options(loop="open")).recorded is driven.drive
     with pytest.raises(SpecError, match=r"noise has shape \(2, 3\); \(4, 3\) is needed"):

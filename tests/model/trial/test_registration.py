@@ -92,7 +92,7 @@ def test_all_that_decides_the_outcome_has_to_be_registered() -> None:
     with pytest.raises(SpecError, match=r"^numpy: not as registered"):
         registration.check_code({"model": "abc"}, {"numpy": "2.2"}, "here")
     registration = parse_registration(TEXT, "here")
-    with pytest.raises(SpecError, match=r"registration here: lacks scipy, which decide the outcome; .*--hashes"):
+    with pytest.raises(SpecError, match=r"registration here: lacks scipy, which determine the outcome; .*--hashes"):
         registration.check_code({"model": "abc"}, {"numpy": "2.1", "scipy": "1.1"}, "here")
     every = {"model": "abc", **dict.fromkeys(("a", "b", "c", "d"), "")}
     with pytest.raises(SpecError, match=r"lacks a, b, c and 1 more, which") as error:
@@ -110,7 +110,7 @@ def test_registrations_that_were_made_stay_readable(file: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("5.0", "4.0", "detectable: 4.0: the scoring takes d′ ≥ 5"),
+        ("5.0", "4.0", "detectable: 4.0: the scoring uses d′ ≥ 5"),
         ("clean = 3", "dirty = 3", "kind 'dirty'"),
         ("single = 4", "single = 0", "greater than or equal to 1"),
         ('"ramp"\n', '"walk"\n', "runs.ramp.experiment"),
