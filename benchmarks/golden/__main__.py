@@ -25,7 +25,7 @@ from benchmarks.golden.records import ask, record_all_rigs, record_arm
 from daq_cli.app.subcommands import subcommands
 
 PLACE = EXAMPLES.parent / ".golden"
-"""Where the records are kept between runs; git ignores it."""
+"""Folder of the records between runs; git ignores it."""
 KEPT = Path(__file__).parent / "recorded.json.xz"
 SHOWN = 12
 """Differences of one answer that are printed."""
@@ -76,7 +76,7 @@ def _is_wanted(name: str, beginnings: list[str]) -> bool:
 
 
 def _guarded(answer: Callable[[], dict[str, Leaf]]) -> dict[str, Leaf]:
-    """Returns a command that fails is an answer too: it differs from what was recorded."""
+    """Returns an answer; a command that fails is an answer too, which differs from the recorded one."""
     try:
         return answer()
     except (RuntimeError, json.JSONDecodeError) as error:

@@ -275,7 +275,7 @@ def not_recovered(ladder: Ladder) -> str:
 
 
 def joint_2_damping(values: dict[str, float]) -> float:
-    """K_b2 + v_eff2 R/K_T, V·s/rad: the sum of back-EMF and viscous friction, all that joint 2 shows."""
+    """Returns K_b2 + v_eff2 R/K_T, V·s/rad: the sum of back-EMF and viscous friction, all that joint 2 shows."""
     return values["Kb2"] + values.get("v_eff2", 0.0) * RESISTANCE[1] / TORQUE_CONSTANT[1]
 
 
