@@ -50,7 +50,9 @@ def fit_torques(
     """
     with told(progress, "fitting torques") as tell:
         one = model_of(model)
-        return torques.fit_torques(one, as_sequence(traces), as_sequence(holdout), options, progress=tell, cancel=cancel)
+        return torques.fit_torques(
+            one, as_sequence(traces), as_sequence(holdout), options, progress=tell, cancel=cancel
+        )
 
 
 def base_parameters(model: ModelLike, traces: Traces = (), *, seed: int = 0) -> BaseParameters:

@@ -1,7 +1,7 @@
-"""A mock in lock-step inside the host's own process: bytes in, bytes out, without a port between them.
+"""Runs a mock in lock-step inside the host's own process: bytes in, bytes out, without a port between them.
 
-Most of what a turn costs otherwise is the change from one process to the other and back. The host still knows nothing
-of the mock but the bytes of its line.
+This saves the switches between two processes, which otherwise take most of a turn's time. The host still accesses only
+the bytes of its line.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from mock_controller.options import read_options
 class EmbeddedMock:
     """One mock, and the line to it, which a fault or the control port may cut.
 
-    `arguments` are those of the mock's command line, beyond where it listens. Raises ValueError with one clear line for
-    options that cannot be met.
+    `arguments` are those of the mock's command line, without its address. Raises ValueError with one clear line for
+    invalid options.
     """
 
     def __init__(self, arguments: Sequence[str]) -> None:
@@ -32,16 +32,16 @@ class EmbeddedMock:
         self._pace = LockStepPace(self._device.link)
         self._in_use = threading.Lock()
         self._lines = 0
-        """Lines so far: what holds an older one finds it cut."""
+        """Number of lines so far; users of older ones find them cut."""
         self._back_at: float | None = 0.0
-        """From when on (s, monotonic) the line can be had; None: not before `reconnect`."""
+        """Time (s, monotonic) from which the line is available; None: not before `reconnect`."""
         self._cut_wanted: float | None = None
         self._ended = False
         self._control: ControlPort | None = None
         self._wake: tuple[int, int] = (-1, -1)
 
     def open_line(self) -> int | None:
-        """The number of a new line, which cuts the one before; None while there is none to be had."""
+        """Returns the number of a new line, which cuts the previous one; None while none is available."""
         with self._in_use:
             if self._ended or self._back_at is None or time.monotonic() < self._back_at:
                 return None
@@ -49,14 +49,14 @@ class EmbeddedMock:
             return self._lines
 
     def take(self, line: int, data: bytes) -> bool:
-        """Takes bytes of the host; returns whether the line is whole."""
+        """Accepts bytes from the host; returns whether the line is whole."""
         with self._in_use:
             if line == self._lines:
                 self._pace.receive(data)
             return line == self._lines
 
     def say(self, line: int) -> bytes | None:
-        """What the mock says to all that it has taken, its board's time passing; None where the line is cut."""
+        """Advances board time and returns the mock's answers to all accepted bytes; None if the line is cut."""
         with self._in_use:
             if line != self._lines:
                 return None
@@ -70,7 +70,7 @@ class EmbeddedMock:
 
     @property
     def control(self) -> str:
-        """URL of the control port, which is opened when it is first asked for."""
+        """URL of the control port, which is opened when it is first requested."""
         with self._in_use:
             if self._control is None:
                 self._control = ControlPort("127.0.0.1:0", Control(self._device, self).execute)
@@ -91,10 +91,10 @@ class EmbeddedMock:
                 os.close(self._wake[1])
                 self._wake = (self._wake[0], -1)
 
-    # --- what the control port can do
+    # --- actions for the control port
 
     def disconnect(self, seconds: float | None) -> None:
-        """Cuts the line; it comes back after `seconds`, or only by `reconnect`."""
+        """Cuts the line; restores it after `seconds`, or only by `reconnect`."""
         self._hang_up()
         self._back_at = None if seconds is None else time.monotonic() + seconds
 
@@ -108,11 +108,11 @@ class EmbeddedMock:
         self._ended = True
 
     def clock(self) -> dict[str, Any]:
-        """The relation of board time and the clock."""
+        """Returns the relation of board time and the clock."""
         return {"mode": "lock_step"}
 
     def lost_bytes(self) -> int:
-        """None: the host takes what is said when it is said."""
+        """Returns 0: the host takes all bytes at once."""
         return 0
 
     def _cut_soon(self, seconds: float) -> None:

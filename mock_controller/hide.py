@@ -1,9 +1,8 @@
-"""`python -m mock_controller.hide`: a seed for `mock://?secret=SEED` whose arm hides one effect of a clear size; with
-`--effect` and `--joint`, that one. With `--list`, the effects that can be hidden and their joints.
+"""`python -m mock_controller.hide`: prints a seed for `mock://?secret=SEED` whose arm hides one effect of a clear size.
 
-It prints one line of JSON: the seed, which says nothing by itself, and its seal. The seal is the SHA-256 of the line
-that `python -m mock_controller.reveal SEED` prints: nobody can change afterwards what was hidden. Exit code 2 for an
-effect that there is not.
+`--effect` and `--joint` select it; `--list` prints the effects that can be hidden and their joints. The output is one
+line of JSON: the seed, which reveals nothing by itself, and its seal. The seal is the SHA-256 of the line that `python
+-m mock_controller.reveal SEED` prints, so nobody can change the secret afterwards. Exit code 2 for an unknown effect.
 """
 
 from __future__ import annotations
@@ -21,11 +20,13 @@ from mock_controller.hidden.sizes import LATER_SIZES, SHARED_SIZES, SizeRange
 CLEAR = 0.5
 """Least strength: the upper half of the sizes that blind trials draw, on their logarithmic scale."""
 _NUMBERS = 2**48
-"""Seeds are drawn from so many that nobody finds one by its seal."""
+"""Number of possible seeds, so large that nobody finds a seed by its seal."""
 
 
 def seed_that_hides(random: Random, effect: str | None = None, joint: int | None = None) -> int:
-    """A drawn seed whose arm hides this effect on this joint alone, clearly. Raises SecretError where no arm does."""
+    """Returns a drawn seed whose arm hides only this effect on this joint, clearly. Raises SecretError if no arm
+    does.
+    """
     fitting = [size for size in (*SHARED_SIZES, *LATER_SIZES) if effect in (None, size.effect)]
     if not any(joint is None or joint in _joints(size) for size in fitting):
         on = "" if joint is None else f" on joint {joint}"

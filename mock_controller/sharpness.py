@@ -1,8 +1,8 @@
-"""`python -m mock_controller.sharpness SEED --experiment FILE… --rival NAME[:JOINTS]…`: which effects the records of a
-secret arm can tell from the one that it hides.
+"""`python -m mock_controller.sharpness SEED --experiment FILE… --rival NAME[:JOINTS]…`: computes which effects the
+records of a secret arm can distinguish from its hidden one.
 
-Prints one line of JSON: d′ of each rival after a refit of its numbers and of the tolerance parameters. A rival is
-looked for at the joints of the hidden effect, and at those that are named. It reveals what the seed hides, and is meant
+Prints one line of JSON: d′ of each rival after a refit of its parameters and of the tolerance parameters. A rival is
+tried at the joints of the hidden effect, and at those that are named. It reveals the secret of the seed, and is meant
 for scoring answers. Exit code 2 for wrong options.
 """
 
@@ -48,8 +48,10 @@ def main(arguments: list[str]) -> int:
 def sharpness(
     arm: HiddenArm, experiments: list[Experiment], known: list[Tangents], named: list[Named]
 ) -> list[dict[str, Any]]:
-    """The least d′ of each rival over the places where it is looked for, and the joints there. `known`: the tangents of
-    each experiment."""
+    """Returns the least d′ of each rival over the joints where it is tried, and the joints there.
+
+    `known`: the tangents of each experiment.
+    """
     compared = Comparison(arm, experiments, known)
     hidden = arm.effects[0]
     found: dict[str, Told] = {}
@@ -67,11 +69,11 @@ def sharpness(
 
 
 def parse_rival(text: str) -> Named:
-    """A name, and perhaps joints: `gear_loss`, `gear_loss:1` or `gear_loss:1,3`. Raises RivalError."""
+    """Parses a name, and perhaps joints: `gear_loss`, `gear_loss:1` or `gear_loss:1,3`. Raises RivalError."""
     effect, _, after = text.partition(":")
     known = known_modifications().get(effect)
     if known is None or not known.shared:
-        raise RivalError(f"rival {effect!r}: is no effect of the shared list")
+        raise RivalError(f"rival {effect!r}: is not an effect of the shared list")
     try:
         joints = tuple(int(part) for part in after.split(",")) if after else ()
     except ValueError:

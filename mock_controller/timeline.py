@@ -1,4 +1,4 @@
-"""Board and faults on one time axis: time passes in the board, and faults set in and end at their moments."""
+"""Board and faults on one time axis: advances the board, and begins and ends faults at their times."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ class Timeline:
         return self.board.time_us
 
     def next_period_us(self) -> int:
-        """When the controller's next period begins, as far as the last one tells; else the controller's next event."""
+        """Returns when the controller's next period begins, computed from the last one; without one, the controller's
+        next event.
+        """
         newest = self.board.snapshots.newest()
         if newest is None:
             return self.board.next_event_us
@@ -32,7 +34,7 @@ class Timeline:
         return newest.time_us + (past // self._period_us + 1) * self._period_us
 
     def run_until(self, time_us: int) -> None:
-        """Lets time pass up to `time_us`; a time already past changes nothing."""
+        """Advances time to `time_us`; a past time changes nothing."""
         while self.faults.active:
             prepare_us = self.next_period_us() - _BEFORE_PERIOD_US
             if prepare_us <= self._prepared_us:

@@ -23,9 +23,9 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from trials.rigs.folder import write_world
+from trials.rigs.folder import write_rig
 from trials.rigs.kinds import KINDS, REPORTING, TUNING
-from trials.rigs.world import CASES, case_of
+from trials.rigs.recorded_rig import CASES, case_of
 
 Json = dict[str, Any]
 
@@ -151,7 +151,7 @@ def judged(folder: Path, kind: str, seed: int, case: str | None, *, sharp: bool)
     place = folder / f"{kind}-{seed}-{case or case_of(seed)}"
     kept = place / "answer.json"
     if not kept.exists():
-        write_world(place, kind, seed, case, sharp=sharp)
+        write_rig(place, kind, seed, case, sharp=sharp)
         begun = monotonic()
         answer = diagnose(place / "lab")
         kept.write_text(json.dumps({"answer": answer, "seconds": monotonic() - begun}), "utf-8")

@@ -18,7 +18,7 @@ from pathlib import Path
 from time import monotonic
 
 from trials.judge import Json, diagnose
-from trials.rigs.folder import write_world
+from trials.rigs.folder import write_rig
 
 TABLE = Path(__file__).with_name("expected.csv")
 RIGS = Path(__file__).parents[1] / ".golden" / "rigs"
@@ -67,7 +67,7 @@ def _answered(row: Row) -> Row:
     """Returns the row of a rig with the present answer of the diagnosis."""
     place = RIGS / f"{row['kind']}-{row['seed']}-{row['case']}"
     if not (place / "truth.json").exists():
-        write_world(place, row["kind"], int(row["seed"]), row["case"])
+        write_rig(place, row["kind"], int(row["seed"]), row["case"])
     answer = diagnose(place / "lab")
     return row | {"verdict": answer["verdict"] if answer else "failed", "effects": _effects(answer)}
 

@@ -41,9 +41,9 @@ from trials.blind.registered import (
 )
 from trials.intervals import covered
 from trials.judge import QUESTIONS, TOLD_APART, diagnose, names_of, score
-from trials.rigs.folder import write_world
+from trials.rigs.folder import write_rig
 from trials.rigs.kinds import KINDS
-from trials.rigs.world import hidden_rig
+from trials.rigs.recorded_rig import hidden_rig
 
 DECIDES = (*REGISTERED, "daq_cli", "trials/rigs", "trials/judge.py", "trials/registered.py")
 """Parts of the source tree that determine the outcome."""
@@ -64,7 +64,7 @@ DETECTABLE = "the same without those of which d′ is known to be below 5"
 """Second line of a question, for effects that a record shows."""
 
 
-class WorldsRegistration(RegisteredCode):
+class RigsRegistration(RegisteredCode):
     """Arms of several kinds of test rig. `cases` take turns; an answer that takes more than `longest` s counts as
     none.
     """
@@ -121,7 +121,7 @@ def make_arm(place: Path, kind: str, seed: int, case: str, longest: float) -> No
     begun = monotonic()
     kept: dict[str, Any] = {"kind": kind, "seed": seed, "case": case, "late": False, "answer": None, "seconds": 0.0}
     try:
-        write_world(place, kind, seed, case)
+        write_rig(place, kind, seed, case)
     except ValueError as error:
         kept |= {"void": str(error)}
         place.mkdir(parents=True, exist_ok=True)
@@ -151,9 +151,7 @@ def numbers(folder: Path, kind: str) -> list[int]:
     return list(range(found))
 
 
-def run(
-    registration: WorldsRegistration, commit: str, folder: Path, seconds: float, only: Collection[str] = ()
-) -> None:
+def run(registration: RigsRegistration, commit: str, folder: Path, seconds: float, only: Collection[str] = ()) -> None:
     """Runs arm after arm, first the kind on which the least time was spent, and begins none after `seconds`.
 
     `only` are the kinds of this process, if another one runs the rest at the same time.
@@ -350,7 +348,7 @@ def main() -> int:
     if asked.sharpness:
         add_sharpness(asked.folder, asked.seconds, asked.only)
     else:
-        registration = WorldsRegistration.model_validate(
+        registration = RigsRegistration.model_validate(
             parse_toml(read_text(asked.registration, str(asked.registration)), str(asked.registration))
         )
         if unknown := set(asked.only) - set(registration.kinds):

@@ -25,7 +25,7 @@ from benchmarks.golden.records import ask, record_all_rigs, record_arm
 from daq_cli.app.subcommands import subcommands
 
 PLACE = EXAMPLES.parent / ".golden"
-"""Where the records are kept between runs; git ignores it."""
+"""Folder of the records between runs; git ignores it."""
 KEPT = Path(__file__).parent / "recorded.json.xz"
 SHOWN = 12
 """Differences of one answer that are printed."""
@@ -33,7 +33,7 @@ Answers = dict[str, dict[str, Leaf]]
 
 
 def main() -> int:
-    """The exit code."""
+    """Returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*")
     parser.add_argument("--record", action="store_true")
@@ -76,7 +76,7 @@ def _is_wanted(name: str, beginnings: list[str]) -> bool:
 
 
 def _guarded(answer: Callable[[], dict[str, Leaf]]) -> dict[str, Leaf]:
-    """A command that fails is an answer too: it differs from what was recorded."""
+    """Returns an answer; a command that fails is an answer too, which differs from the recorded one."""
     try:
         return answer()
     except (RuntimeError, json.JSONDecodeError) as error:
@@ -96,18 +96,18 @@ def _told(name: str, kept: Answers, answer: dict[str, Leaf], recording: bool) ->
 
 
 def _asked(words: tuple[str, ...]) -> dict[str, Leaf]:
-    """The answer to a command that prints JSON."""
+    """Returns the answer to a command that prints JSON."""
     return of_json(ask(words))
 
 
 def _api() -> dict[str, Leaf]:
-    """The description of the API."""
+    """Returns the description of the API."""
     done = subprocess.run([sys.executable, "-m", "server.openapi"], capture_output=True, text=True, check=True)
     return of_json(done.stdout)
 
 
 def _trace() -> dict[str, Leaf]:
-    """Every value of a trace that is recorded now, in lock-step."""
+    """Returns every value of a trace that is recorded now, in lock-step."""
     with TemporaryDirectory(prefix="golden-") as folder:
         run = ("--port", "mock://?lock_step=1&seed=7&secret=310", "run", "ramp", "--joints", "1-3", "--yes", "--json")
         trace = json.loads(ask((*run, "--folder", folder)))["trace"]
@@ -118,7 +118,7 @@ def _trace() -> dict[str, Leaf]:
 
 
 def _help() -> dict[str, Leaf]:
-    """Every help page, found by walking the lists of subcommands."""
+    """Returns every help page, found by walking the lists of subcommands."""
     pages: dict[str, Leaf] = {}
     waiting: list[tuple[str, ...]] = [()]
     while waiting:

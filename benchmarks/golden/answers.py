@@ -1,4 +1,6 @@
-"""An answer as it is kept and compared: numbers to the last digit, without times, random identities and prose."""
+"""Reduces answers to what is kept and compared: numbers to the last digit, without times, random identities and
+prose.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +18,15 @@ RANDOM = re.compile(r"\b([0-9a-f]{6,64}|\d{4}-\d\d-\d\dT[0-9:.\-]+Z?)\b|\S+\.mca
 
 NUMBERED = re.compile(r"\[\d+\]")
 LONG = 60
-"""Entries of a list up to which every value is kept; a column that differs is looked at in the answer itself."""
+"""Entries of a list up to which every value is kept; to find a difference in a longer column, look at the answer
+itself.
+"""
 
 Leaf = str | int | float | bool | None
 
 
 def leaves(answer: Any, path: str = "") -> Iterator[tuple[str, Leaf]]:
-    """Every value of an answer that is to stay, by its path; a list says how long it is."""
+    """Yields every value of an answer that must not change, by its path; of a list also its length."""
     if isinstance(answer, dict):
         for key, value in answer.items():
             if key in TIMES or (key in PROSE and not isinstance(value, dict)):
@@ -41,12 +45,12 @@ def leaves(answer: Any, path: str = "") -> Iterator[tuple[str, Leaf]]:
 
 
 def of_json(text: str) -> dict[str, Leaf]:
-    """The leaves of an answer in JSON; of a long list, one digest for each of its columns."""
+    """Returns the leaves of an answer in JSON; of a long list, one digest for each of its columns."""
     return condense(dict(leaves(json.loads(text))))
 
 
 def condense(found: dict[str, Leaf]) -> dict[str, Leaf]:
-    """The same leaves, where each column of a list of more than `LONG` entries has become its SHA-256."""
+    """Returns the same leaves; in a list of more than `LONG` entries, each column is replaced by its SHA-256."""
     short: dict[str, Leaf] = {}
     columns: dict[str, list[tuple[list[int], str]]] = {}
     long = {path[:-2] for path, value in found.items() if path.endswith("[]") and int(value or 0) > LONG}
@@ -66,14 +70,14 @@ def condense(found: dict[str, Leaf]) -> dict[str, Leaf]:
 
 
 def of_help(text: str) -> dict[str, Leaf]:
-    """What a help page offers: options, types and what is in brackets, without the sentences about them."""
+    """Returns options, types and bracketed texts of a help page, without its sentences."""
     folded = " ".join(text.split())
     offered = re.findall(r"--?[a-z][a-z-]*|<[^>]*>|\[[^\]]*\]|\{[^}]*\}", folded)
     return {f"[{number}]": word for number, word in enumerate(offered)}
 
 
 def differences(recorded: dict[str, Leaf], found: dict[str, Leaf]) -> list[str]:
-    """Where an answer is no longer what was recorded: values that have changed or are gone. What is new is no fault."""
+    """Returns values of an answer that have changed or are missing. New ones are no fault."""
     told = []
     for path, value in recorded.items():
         if path not in found:

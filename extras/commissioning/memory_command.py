@@ -336,7 +336,7 @@ def proof_line(proof: CommandProof) -> str:
 
 
 def _watch_text(found: list[WatchedByte]) -> str:
-    """The page in rows of 16, then every byte that changes."""
+    """Returns the page in rows of 16, then every byte that changes."""
     values = {one.address: one for one in found}
     first = found[0].address - found[0].address % ROW
     lines = ["     " + " ".join(f" {column:X}" for column in range(ROW)) + "   columns that change"]

@@ -1,4 +1,6 @@
-"""The demonstration: the mock hides an effect, a diagnosis looks for it, and the secret is opened beside the answer."""
+"""The demonstration: the mock hides an effect, a diagnosis looks for it, and the secret is revealed beside the
+answer.
+"""
 
 from daq.plugins import Command, Plugin
 
@@ -6,7 +8,7 @@ PLUGIN = Plugin(
     commands=(
         Command(
             "hide",
-            "Hide an effect in the mock, let a diagnosis look for it, and open the secret.",
+            "Hide an effect in the mock, let a diagnosis look for it, and reveal the secret.",
             "extras.demonstration.command",
             about="computer",
             needs="model",

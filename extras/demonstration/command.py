@@ -27,7 +27,7 @@ def hide(
     folder: Annotated[Path | None, typer.Option(help="Folder that keeps the traces (default: none are kept).")] = None,
     json: JsonOption = False,
 ) -> None:
-    """Hide an effect in the mock, let a diagnosis look for it, and open the secret.
+    """Hide an effect in the mock, let a diagnosis look for it, and reveal the secret.
 
     The seal is the SHA-256 of the secret, shown before anything is recorded: nothing can be changed afterwards.
     """

@@ -1,7 +1,7 @@
-"""The steps of a demonstration: draw, record, and open what was hidden.
+"""Steps of a demonstration: draws a secret, records experiments, and reveals the secret.
 
-The mock's side draws and opens secrets in processes of its own. Between them, only a seed is known here, whose meaning
-nobody but the mock can tell; a diagnosis is given the traces alone, in which it does not stand.
+The mock's side draws and reveals secrets in separate processes. In between, this side knows only a seed, which means
+nothing without the mock. A diagnosis gets only the traces, which do not contain the seed.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ EXPERIMENTS = ("diagnostic", "held-out")
 
 
 class HidingError(DaqError):
-    """A demonstration that cannot go on; the text is one line."""
+    """A demonstration that cannot continue; the text is one line."""
 
 
 @dataclass(frozen=True)
 class Sealed:
-    """A seed, and the SHA-256 of what it hides."""
+    """A seed, and the SHA-256 of its secret."""
 
     seed: int
     seal: str
@@ -71,8 +71,10 @@ def draw(request: HideRequest) -> Sealed:
 def record(
     sealed: Sealed, name: str, machine: Machine, folder: Path, made: Callable[[OwnerOnDemand], None] = lambda _: None
 ) -> Finished:
-    """Records a preset on the arm of a seed in lock-step, as fast as the computer can, and returns how the run ended.
-    `made` is given what can halt it. Raises HidingError."""
+    """Records a preset on the arm of a seed in lock-step, at full speed, and returns how the run ended.
+
+    `made` gets the object that can halt it. Raises HidingError.
+    """
     spec = preset(name).spec.model_copy(
         update={"name": f"hidden-{name}", "notes": "a demonstration on the mock, recorded in lock-step"}
     )
@@ -92,7 +94,7 @@ def record(
 
 
 def opened(sealed: Sealed, answer: Diagnosis, machine: Machine) -> OpenedSecret:
-    """Returns what was hidden beside an answer, scored as in blind trials."""
+    """Returns the secret beside an answer, scored as in blind trials."""
     truth = parse_truth(_told("reveal", str(sealed.seed)))
     (hidden,) = truth.effects
     return OpenedSecret(
@@ -118,7 +120,7 @@ def _outcome(truth: Truth, answer: Diagnosis, machine: Machine) -> Outcome:
 
 
 def _numbers(truth: Truth, answer: Diagnosis, machine: Machine) -> tuple[HiddenNumber, ...]:
-    """The hidden effect's numbers, in the model's conventions where these have them, else in the mock's."""
+    """Returns the hidden effect's parameters, in the model's conventions if they have one, else in the mock's."""
     (hidden,) = truth.effects
     found = {name: value for step in answer.steps if step.adopted for name, value in step.parameters.items()}
     numbers: list[HiddenNumber] = []

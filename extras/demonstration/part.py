@@ -1,4 +1,4 @@
-"""Demonstrations of a service: one at a time, each on a thread, on a mock of its own beside the robot's."""
+"""Demonstrations in a service: one at a time, each on a thread, with a mock of its own in addition to the robot's."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from model.discrepancy.diagnosis import Diagnosis
 
 LOOK_EVERY = 0.2
-"""Time (s) between two looks at whether the diagnosis has ended."""
+"""Time (s) between two checks for the end of the diagnosis."""
 REAL_ARM = "a demonstration needs the mock: this robot is a real arm, or another machine"
 ENDED = ("done", "failed", "cancelled", "interrupted")
 log = logging.getLogger("server.demonstration")
@@ -47,7 +47,7 @@ class Demonstrations(Part):
         self._thread: threading.Thread | None = None
 
     def place(self, rig: RobotServices) -> HidingPlace:
-        """Returns what a robot's mock can hide, and the latest demonstration."""
+        """Returns the effects that a robot's mock can hide, and the latest demonstration."""
         problem = _problem(rig)
         with self._lock:
             number, named = self._counts.get(rig.robot.name, (0, 0))
@@ -56,8 +56,11 @@ class Demonstrations(Part):
         return HidingPlace(problem=problem, choices=offered, latest=latest, opened=number, named=named)
 
     def begin(self, rig: RobotServices, request: HideRequest, by: str) -> Hidden:
-        """Hides an effect and begins to look for it. Raises a 409 on a real arm and while another one goes on, and
-        SpecError for an effect that cannot be hidden."""
+        """Hides an effect and begins to look for it.
+
+        Raises a 409 on a real arm and while another demonstration runs, and SpecError for an effect that cannot be
+        hidden.
+        """
         if problem := _problem(rig):
             raise conflict("not-a-mock", problem, "start a service without a configured port: it has a mock")
         require_room(rig.catalogue.folder)
@@ -80,7 +83,7 @@ class Demonstrations(Part):
         return hidden
 
     def close(self, seconds: float) -> None:
-        """Halts a recording that runs; its job ends with the others."""
+        """Halts a running recording; its job ends with the others."""
         self._closing.set()
         owner, thread = self._owner, self._thread
         if owner is not None:
@@ -106,8 +109,9 @@ class Demonstrations(Part):
             self._keep(rig, self._latest[rig.robot.name], state="failed", problem=f"program fault: {error}")
 
     def _recorded(self, rig: RobotServices, sealed: Sealed, hidden: Hidden, by: str) -> Hidden:
-        """Records both experiments, takes their traces into the catalogue, and has the first compared with the machine
-        file while the second is recorded."""
+        """Records both experiments, enters their traces in the catalogue, and compares the first with the machine file
+        while the second is recorded.
+        """
         fitted, held_out = EXPERIMENTS
         trace, motion = self._trace(rig, sealed, fitted)
         compare = CompareRequest(traces=(trace,), models=(MACHINE,))
@@ -117,7 +121,7 @@ class Demonstrations(Part):
         return self._keep(rig, hidden, held_out=held)
 
     def _trace(self, rig: RobotServices, sealed: Sealed, name: str) -> tuple[str, float]:
-        """Returns the number of a new trace, and the duration of its motion."""
+        """Returns the ID of a new trace, and the duration of its motion."""
         finished = record(sealed, name, rig.robot.machine, rig.catalogue.folder, self._hold)
         self._owner = None
         number = rig.catalogue.add(Path(finished.trace))
@@ -131,7 +135,7 @@ class Demonstrations(Part):
             owner.halt()
 
     def _asked(self, rig: RobotServices, hidden: Hidden, by: str) -> Hidden:
-        """Hands the traces to a job of the service."""
+        """Submits the traces to a job of the service."""
         assert hidden.trace is not None
         assert hidden.held_out is not None
         request = DiagnoseRequest(
@@ -141,8 +145,8 @@ class Demonstrations(Part):
         return self._keep(rig, hidden, state="diagnosing", diagnosis=diagnosis.id)
 
     def _answered(self, rig: RobotServices, hidden: Hidden) -> Diagnosis:
-        """Waits for the answer. Raises HidingError where there is none."""
-        from server.jobs.results import DiagnosisJobResult  # what it needs takes long to load
+        """Waits for the answer. Raises HidingError without one."""
+        from server.jobs.results import DiagnosisJobResult  # imported late because it is slow to import
 
         while (job := self._job(rig, hidden)).state not in ENDED:
             if self._closing.wait(LOOK_EVERY):
@@ -164,6 +168,6 @@ class Demonstrations(Part):
 
 
 def _problem(rig: RobotServices) -> str:
-    """Why a robot can hide nothing; empty where it can."""
+    """Returns why a robot can hide nothing; empty if it can."""
     is_mock = isinstance(parse_port_url(rig.robot.place.url), MockPort)
     return "" if is_mock and rig.robot.machine.name == "ma2000" else REAL_ARM

@@ -1,4 +1,4 @@
-"""Routes of the demonstration: hide something, and see how the diagnosis fares."""
+"""Routes of the demonstration: hide an effect, and follow its diagnosis."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ Demonstration = Annotated[Demonstrations, part(Demonstrations)]
 
 @router.post("", status_code=201)
 def hide_effect(body: HideRequest, rig: RobotDep, made: Demonstration, caller: Operator, _turn: Turn) -> Hidden:
-    """Hides an effect in a mock of its own, records it in lock-step, and has it diagnosed. On a mock alone."""
+    """Hides an effect in a separate mock, records it in lock-step, and has it diagnosed. Only for robots on a mock."""
     return made.begin(rig, body, caller.name)
 
 
 @router.get("")
 def get_hiding_place(rig: RobotDep, made: Demonstration, _: Viewer, _turn: Turn) -> HidingPlace:
-    """Returns what can be hidden, and the latest demonstration; its secret once the diagnosis has answered."""
+    """Returns the effects that can be hidden, and the latest demonstration; its secret once the diagnosis has
+    answered.
+    """
     return made.place(rig)

@@ -44,7 +44,7 @@ class Allowed:
 
 
 def scale_of(machine: Machine, joints: tuple[int, ...]) -> Scale:
-    """Posture units of these joints. Raises SpecError for a joint without a sensor."""
+    """Returns posture units of these joints. Raises SpecError for a joint without a sensor."""
     calibrations = [machine.calibration(joint) for joint in joints]
     zero = np.array([own.angle_at_zero_rad for own in calibrations])
     return Scale(zero, np.array([own.rad_per_posture_unit for own in calibrations]))

@@ -260,7 +260,9 @@ def ladder_checks(steps: Sequence[LadderStep]) -> tuple[Check, ...]:
 
 
 def not_recovered(ladder: Ladder) -> str:
-    """A sentence that names the parameters of the last model that are far from those of the plant, table 7.9."""
+    """Returns a sentence that names the parameters of the last model that are far from those of the plant, table
+    7.9.
+    """
     last = ladder.steps[-1]
     truth = last.published_values
     off = [s for s, v in last.values.items() if abs(v / truth[s] - 1) > RECOVERED]
@@ -273,7 +275,7 @@ def not_recovered(ladder: Ladder) -> str:
 
 
 def joint_2_damping(values: dict[str, float]) -> float:
-    """K_b2 + v_eff2 R/K_T, V·s/rad: the sum of back-EMF and viscous friction, all that joint 2 shows."""
+    """Returns K_b2 + v_eff2 R/K_T, V·s/rad: the sum of back-EMF and viscous friction, all that joint 2 shows."""
     return values["Kb2"] + values.get("v_eff2", 0.0) * RESISTANCE[1] / TORQUE_CONSTANT[1]
 
 

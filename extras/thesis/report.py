@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def torque_section(found: TorqueAnalysis) -> Section:
-    """The three figures for any machine and motion."""
+    """Returns the three figures for any machine and motion."""
     time = np.array(found.time)
     return Section(
         "Figures 7.12 to 7.14: inertia and torques along the motion",
@@ -96,7 +96,7 @@ METHODS = {"nelder_mead": "Nelder and Mead, as in the source", "least_squares": 
 
 
 def thesis_report(found: Reproduction) -> Report:
-    """The page of the reproduction, to be read beside the thesis."""
+    """Returns the page of the reproduction, to be read beside the thesis."""
     borne_out = len(found.checks) - len(found.failed)
     sections = [
         Section("What the source says, and whether it comes out", (_checks(found),)),

@@ -139,7 +139,7 @@ def _gravity_torques(chain: ChainArrays, position: Floats) -> tuple[GravityTorqu
 
 
 def _without_moments(chain: ChainArrays) -> ChainArrays:
-    """The chain with every body's mass at its centre. A load counts as part of the last body."""
+    """Returns the chain with every body's mass at its centre. A load counts as part of the last body."""
     inertial = chain.inertial.copy()
     for body in inertial:
         mass, first = body[0], body[1:4]
@@ -150,7 +150,9 @@ def _without_moments(chain: ChainArrays) -> ChainArrays:
 
 
 def _as_published(chain: ChainArrays) -> ChainArrays:
-    """The arm with link 3 and its load as one shifted rod, (7.20) to (7.28), whose inertia is 13 to 22 % too high."""
+    """Returns the arm with link 3 and its load as one shifted rod, (7.20) to (7.28), whose inertia is 13 to 22 % too
+    high.
+    """
     inertial = chain.inertial.copy()
     mass, length = inertial[2, 0], chain.geometry[2, 2]
     beyond = -inertial[2, 1] / mass  # s_3x: from the common centre of mass to the end of the link

@@ -38,7 +38,7 @@ class LoopParts:
 
 
 def reading_deviation(board: BoardParameters) -> float:
-    """Standard deviation (counts) of a reading: the converter's noise and its rounding."""
+    """Returns the standard deviation (counts) of a reading: the converter's noise and its rounding."""
     return float(np.sqrt(board.noise**2 + ROUNDING_VARIANCE))
 
 

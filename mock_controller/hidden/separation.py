@@ -90,7 +90,7 @@ class Tangents:
     deviations: NDArray[np.float64]
 
     def within_reach(self, moved: NDArray[np.float64]) -> NDArray[np.float64]:
-        """`moved` (standard deviations), clipped to the bounds of each constant."""
+        """Returns `moved` (standard deviations), clipped to the bounds of each constant."""
         low, high = zip(*(_reach(name) for name in self.names), strict=True)
         return np.minimum(np.maximum(moved, np.array(low) / self.deviations), np.array(high) / self.deviations)
 

@@ -1,7 +1,7 @@
-"""The steps of an arm with rigid gears, no inductance and nothing added: most arms, a thousand times a second.
+"""Integrates an arm with rigid gears, no inductance and nothing added: most arms, a thousand times per second.
 
-One loop over plain numbers, joint by joint, without a call but those into the engine and the mathematics: it takes two
-thirds of the time that the same takes by `CoulombLevel.at` and `deflect`, whose results it has to the bit.
+It is one loop over plain numbers, joint by joint, which calls only the engine and mathematical functions. It takes two
+thirds of the time of `CoulombLevel.at` and `deflect`, with exactly the same results.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ _SIX = struct.Struct("6d")
 
 class RigidSteps:
     """One arm. `half_damping` (N·m·s/rad) is the half of each joint's damping that is applied as a force;
-    `presliding_rate` (rad/s) covers the presliding displacement in one step."""
+    `presliding_rate` (rad/s) covers the presliding displacement in one step.
+    """
 
     def __init__(
         self,
@@ -36,7 +37,7 @@ class RigidSteps:
         self._presliding_rate = presliding_rate
 
     def run(self, pushed: Sequence[float], bristles: Sequence[float], count: int) -> list[float]:
-        """Takes `count` steps under six constant torques (N·m); returns the bristles' deflections after them."""
+        """Does `count` steps under six constant torques (N·m); returns the bristles' deflections after them."""
         model, data, step, write = self._model, self._data, mujoco.mj_step, _SIX.pack_into
         angles, rates, applied = data.qpos.tolist, data.qvel.tolist, memoryview(data.qfrc_applied).cast("B")
         p1, p2, p3, p4, p5, p6 = pushed

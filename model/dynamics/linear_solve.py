@@ -47,11 +47,11 @@ def solve_3(
 
 @compiled
 def solve_symmetric(matrix: NDArray[Any], vector: NDArray[Any]) -> NDArray[Any]:
-    """Solution of a symmetric positive definite system by L Δ Lᵀ.
+    """Solves a symmetric positive definite system by L Δ Lᵀ.
 
     Args:
-        matrix: (n, n); the lower triangle is read, and overwritten by L below the diagonal and by the
-            reciprocals of the pivots on it.
+        matrix: (n, n); the lower triangle is read, and overwritten by L below the diagonal and by the reciprocals of
+            the pivots on it.
         vector: (n,), overwritten by the solution, which is also returned.
     """
     n = vector.shape[0]

@@ -94,7 +94,7 @@ class RodArm:
         )
 
     def chain(self) -> Chain:
-        """The same arm as a general chain; always with the exact inertia of link 3."""
+        """Returns the same arm as a general chain; always with the exact inertia of link 3."""
         one, two, three = self.rotor_inertia
         cylinder = np.diag([0.0, 0.5, 0.0]) * self.mass_1 * self.radius_1**2
         # (7.23) keeps only the inertia about the waist; a body needs the other moments, which no motion shows.

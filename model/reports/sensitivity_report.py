@@ -28,8 +28,8 @@ def sensitivity_report(label: str, found: SensitivityCurves, machine: Machine) -
     strongest = found.curves[0]
     joint = found.joints[strongest.moves_most]
     answer = (
-        f"{strongest.name} moves the readings most: a change by {strongest.expected:.3g} {strongest.unit} moves joint "
-        f"{joint} by up to {largest_change(found, strongest, strongest.moves_most, machine)}."
+        f"{strongest.name} changes the readings most: a change by {strongest.expected:.3g} {strongest.unit} moves "
+        f"joint {joint} by up to {largest_change(found, strongest, strongest.moves_most, machine)}."
     )
     facts = (("model", f"{label}, {found.model}"), ("trace", found.trace), ("parameters", str(len(found.curves))))
     caption = (
@@ -43,19 +43,19 @@ def sensitivity_report(label: str, found: SensitivityCurves, machine: Machine) -
 
 
 def largest_change(found: SensitivityCurves, curve: SensitivityCurve, k: int, machine: Machine) -> str:
-    """The largest change of the k-th joint's reading and its time, as people read it: 0.124° at 0.84 s."""
+    """Returns the largest change of the k-th joint's reading and its time, in words: 0.124° at 0.84 s."""
     place = curve.peaks[k]
     factor, unit = shown_unit(joint_unit(machine, found.joints[k]))
     return f"{with_unit(f'{factor * curve.by_joint[k][place]:+.3g}', unit)} at {found.time[place]:.2f} s"
 
 
 def save_curves(found: SensitivityCurves, machine: Machine, path: Path, kind: str) -> None:
-    """The curves as a picture of that kind (png, svg, pdf), one panel per joint. Raises OSError."""
+    """Saves the curves as a picture of that kind (png, svg, pdf), one panel per joint. Raises OSError."""
     saved(lambda figure: _draw(figure, found, machine), PANEL_HEIGHT * len(found.joints), path, kind)
 
 
 def changes_table(found: SensitivityCurves, machine: Machine) -> Table:
-    """How much each parameter moves each joint, and when."""
+    """Returns how much each parameter changes each joint's reading, and when."""
     rows = []
     for curve in found.curves:
         changes = (largest_change(found, curve, k, machine) for k in range(len(found.joints)))

@@ -31,8 +31,9 @@ def torque_report(
     base: BaseParameters | None = None,
     files: Mapping[str, str] | None = None,
 ) -> Report:
-    """The page; `curves` are those of the fitted model on the traces to draw, `base` its base parameters on those that
-    were fitted to, `files` the names of the traces' files by number, where they are known."""
+    """Returns the page; `curves` are those of the fitted model on the traces to draw, `base` its base parameters on
+    those that were fitted to, `files` the names of the traces' files by number, where they are known.
+    """
     files = files or {}
     machine = found.model.machine
     sections = (

@@ -1,4 +1,4 @@
-"""The report of a validation by distortion: the sum, the curves behind it, and the variations with time."""
+"""The report of a validation by distortion: the sum, its curves, and the variations over time."""
 
 from __future__ import annotations
 
@@ -23,15 +23,16 @@ if TYPE_CHECKING:
 
 CURVES_ABREAST = 4
 VARIATIONS_SHOWN = 8
-"""Number of variations with time that are drawn: those that explain most of what is left."""
+"""Number of variations over time that are drawn: those that explain most of the residual."""
 
 
 def validation_report(
     label: str, found: tuple[Fidelity, Fidelity], in_time: Sequence[TimeDomain], machine: Machine
 ) -> Report:
-    """The page of a validation; `found` is in the source's convention of τ′ and in that of three standard deviations.
+    """Returns the page of a validation; `found` is in the source's convention of τ′ and in that of three standard
+    deviations.
 
-    machine: the model's machine, from which the units of its joints are taken.
+    machine: the model's machine, which gives the units of its joints.
     """
     source, three = found
     sections = [
@@ -67,7 +68,7 @@ def _answer(source: Fidelity) -> str:
 
 
 def distortion_table(source: Fidelity, three: Fidelity) -> Table:
-    """How far each parameter alone would have to vary, in both conventions of τ′."""
+    """Returns how far each parameter alone would have to vary, in both conventions of τ′."""
     rows = []
     for one, other in zip(source.parameters, three.parameters, strict=True):
         down = "–" if one.change_down is None else f"−{one.change_down:.3g}"
@@ -123,7 +124,7 @@ def _curves(found: Fidelity) -> Picture:
 
     caption = (
         "Mean squared error over its least against each parameter, the others held. The dashed line is twice the "
-        "least; a flat curve is a parameter that the record does not feel."
+        "least; a flat curve is a parameter that does not influence the record."
     )
     return Picture(drawn(draw, 1.45 * rows + 0.2), caption)
 
@@ -142,7 +143,7 @@ def _curve(axes: Axes, curve: Curve, found: Fidelity) -> None:
 
 
 def _short(name: str) -> str:
-    """A name over two lines where it is long."""
+    """Splits a long name into two lines."""
     head, _, tail = name.partition(".")
     return name if len(name) < 22 else f"{head}.\n{tail}"
 
@@ -152,7 +153,7 @@ def _in_time(one: TimeDomain, machine: Machine) -> Section:
     blocks: list[Text | Table | Picture | Points] = [
         Text(
             "All parameters vary together, as little as explains the measured accelerations. A variation beyond its "
-            "noise says which term is wrong, when, and what it goes with."
+            "noise shows which term is wrong, when, and what it depends on."
         ),
         variation_table(one),
         _residual_picture(one, machine),
@@ -164,7 +165,7 @@ def _in_time(one: TimeDomain, machine: Machine) -> Section:
 
 
 def variation_table(one: TimeDomain) -> Table:
-    """How far each parameter would have to vary with time, and with what."""
+    """Returns how far each parameter would have to vary over time, and with what."""
     rows = []
     for v in one.parameters:
         strongest = [f"{c.regressor} of joint {c.joint} ({c.value:+.2f})" for c in v.against if c.significant][:2]
@@ -175,8 +176,8 @@ def variation_table(one: TimeDomain) -> Table:
     return Table(
         ("parameter", "σ of α(t)", "τ′", "unit", "beyond noise", "explains, constant", "varying", "goes with"),
         tuple(rows),
-        "σ of the variation against what is expected (4.24). Beyond noise: share of the time at which it is. Explains: "
-        "share of the residual's energy that this parameter explains by itself, as a constant and varying.",
+        "σ of the variation against the expected one (4.24). Beyond noise: share of the time at which it is. Explains: "
+        "share of the residual's energy that this parameter explains alone, as a constant and varying.",
     )
 
 
@@ -222,7 +223,7 @@ def _variation_picture(one: TimeDomain, shown: Sequence[Variation]) -> Picture:
 
     caption = (
         f"α(t) of the {len(shown)} parameters that explain most, with twice its noise (shaded) and ±τ′ (dashed). "
-        "The line is interrupted where no joint moves that depends on the parameter."
+        "The line is interrupted while no joint moves that depends on the parameter."
     )
     return Picture(drawn(draw, 1.35 * rows + 0.3), caption)
 

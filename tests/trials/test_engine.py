@@ -49,7 +49,7 @@ def test_as_much_time_goes_by_as_is_written_down(rate: float) -> None:
 
 
 def test_a_period_that_is_no_whole_number_of_steps_is_refused() -> None:
-    with pytest.raises(ValueError, match="no whole number of steps"):
+    with pytest.raises(ValueError, match="not a whole number of steps"):
         simulate(Bodies((Link.rod(0.3, 0.8),), 0.0, HANGING), joints(1), loop(1e-4, 1 / 300), np.zeros((9, 1)))
 
 

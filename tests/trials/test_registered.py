@@ -8,7 +8,7 @@ import pytest
 
 import trials.registered as trial
 
-REGISTRATION = trial.WorldsRegistration(
+REGISTRATION = trial.RigsRegistration(
     version=1, title="", kinds=("axis-pid", "planar-pid"), cases=("sound", "single"), longest=10.0, hashes={}
 )
 

@@ -20,11 +20,11 @@ from trials import judge
 from trials.judge import score
 from trials.rigs.bodies import mjcf
 from trials.rigs.drawing import sound_rig
-from trials.rigs.folder import write_world
+from trials.rigs.folder import write_rig
 from trials.rigs.hiding import OPEN, effects_of, hide, joints_of, known, tilted
 from trials.rigs.kinds import KINDS, REPORTED, REPORTING, TUNING
 from trials.rigs.lab import machine_text
-from trials.rigs.world import hidden_rig, make_world
+from trials.rigs.recorded_rig import hidden_rig, make_rig
 
 OURS = Path(trials.rigs.__file__).parent
 FORBIDDEN = {"model", "daq", "daq_cli", "server", "mock_controller", "firmware_protocol", "benchmarks", "tests"}
@@ -73,9 +73,9 @@ def test_no_kind_is_for_tuning_and_for_reports() -> None:
 
 
 def test_a_seed_gives_the_same_folder_to_the_bit(tmp_path: Path) -> None:
-    first, again = (write_world(tmp_path / name, "planar-board", 4) for name in ("first", "again"))
+    first, again = (write_rig(tmp_path / name, "planar-board", 4) for name in ("first", "again"))
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in again]
-    other = write_world(tmp_path / "other", "planar-board", 6)
+    other = write_rig(tmp_path / "other", "planar-board", 6)
     assert [p.read_bytes() for p in other if p.suffix == ".csv"] != [
         p.read_bytes() for p in first if p.suffix == ".csv"
     ]
@@ -90,7 +90,7 @@ def test_a_seed_gives_the_same_folder_to_the_bit(tmp_path: Path) -> None:
     ],
 )
 def test_the_product_reads_what_a_lab_has(tmp_path: Path, kind: str) -> None:
-    write_world(tmp_path, kind, 2)
+    write_rig(tmp_path, kind, 2)
     machine = load_machine(str(tmp_path / "lab" / "machine.toml"))
     assert len(machine.joints) == KINDS[kind].joints
     assert (machine.controller.kind != "none") == KINDS[kind].known_loop
@@ -123,7 +123,7 @@ def test_stated_numbers_are_off_by_as_much_as_their_deviations_say() -> None:
 
 @pytest.mark.parametrize("kind", list(TUNING))
 def test_sound_arms_follow_their_set_points(kind: str) -> None:
-    for motion in make_world(kind, 1, "sound").records.values():
+    for motion in make_rig(kind, 1, "sound").records.values():
         assert np.isfinite(motion.position).all()
         assert np.abs(motion.set_point - motion.angle).max() < 1.0
 
@@ -142,7 +142,7 @@ def test_a_base_that_turns_about_x_leans_its_weight_to_y() -> None:
 
 
 def test_the_truth_lies_outside_of_what_the_diagnosis_gets(tmp_path: Path) -> None:
-    write_world(tmp_path, "axis-pid", 1)
+    write_rig(tmp_path, "axis-pid", 1)
     truth = json.loads((tmp_path / "truth.json").read_text("utf-8"))
     assert truth["case"] == "single"
     assert len(truth["hidden"]) == 1

@@ -125,13 +125,13 @@ class Campaign:
         return replace(self, folder=task.folder)._stage(task.stage, task.seed)
 
     def scores(self) -> list[Score]:
-        """The scores of all cases in the folder."""
+        """Returns the scores of all cases in the folder."""
         self.folder.reload()
         rows = self.folder.rows("score")
         return [with_rivals(Score.model_validate(row), self.folder.row("sharpness", row["seed"])) for row in rows]
 
     def table(self) -> TrialTable:
-        """The table of all scores."""
+        """Returns the table of all scores."""
         scores = self.scores()
         return trial_table(scores, sum(row["outcome"] != "complete" for row in self.folder.rows("record")))
 

@@ -12,10 +12,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from trials.rigs.folder import write_world
+from trials.rigs.folder import write_rig
 from trials.rigs.hiding import DRAWN
 from trials.rigs.kinds import KINDS, REPORTING
-from trials.rigs.world import CASES
+from trials.rigs.recorded_rig import CASES
 
 
 def main(arguments: list[str]) -> int:
@@ -37,7 +37,7 @@ def main(arguments: list[str]) -> int:
         return 0
     if asked.folder is None or asked.kind is None:
         parser.error("FOLDER and --kind are needed")
-    for path in write_world(asked.folder, asked.kind, asked.seed, asked.case, asked.effect, sharp=asked.sharpness):
+    for path in write_rig(asked.folder, asked.kind, asked.seed, asked.case, asked.effect, sharp=asked.sharpness):
         print(path)
     return 0
 

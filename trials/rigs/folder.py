@@ -8,25 +8,25 @@ from pathlib import Path
 from typing import Any
 
 from trials.rigs.lab import beside_text, machine_text, records_text
+from trials.rigs.recorded_rig import make_rig
 from trials.rigs.rig import Rig
 from trials.rigs.sharpness import sharpness
-from trials.rigs.world import make_world
 
 
-def write_world(
+def write_rig(
     folder: Path, kind: str, seed: int, case: str | None = None, effect: str | None = None, *, sharp: bool = False
 ) -> list[Path]:
     """Writes one rig's folder; returns the paths. The truth is beside `lab`, never in it."""
-    world = make_world(kind, seed, case, effect)
+    made = make_rig(kind, seed, case, effect)
     lab = folder / "lab"
     lab.mkdir(parents=True, exist_ok=True)
-    texts = {lab / "machine.toml": machine_text(world.rig)}
-    for name, motion in world.records.items():
-        texts[lab / f"{name}.csv"] = records_text(world.rig, motion, name)
-        texts[lab / f"{name}.toml"] = beside_text(world.rig)
-    truth = truth_of(world.rig, world.case)
-    if sharp and world.case in ("single", "sound"):
-        truth["sharpness"] = [asdict(rival) for rival in sharpness(world.rig)]
+    texts = {lab / "machine.toml": machine_text(made.rig)}
+    for name, motion in made.records.items():
+        texts[lab / f"{name}.csv"] = records_text(made.rig, motion, name)
+        texts[lab / f"{name}.toml"] = beside_text(made.rig)
+    truth = truth_of(made.rig, made.case)
+    if sharp and made.case in ("single", "sound"):
+        truth["sharpness"] = [asdict(rival) for rival in sharpness(made.rig)]
     texts[folder / "truth.json"] = json.dumps(truth, indent=1, ensure_ascii=False) + "\n"
     for path, text in texts.items():
         path.write_text(text, "utf-8")

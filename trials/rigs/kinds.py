@@ -16,7 +16,7 @@ VOLTS, CURRENT = "volts", "current"
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of world; every range is drawn from, every tuple chosen from.
+    """A kind of test rig. Values are drawn from every range and chosen from every tuple.
 
     Args:
         joints: number of joints. controller, rate: of the loop, Hz. drive: what the controller commands.

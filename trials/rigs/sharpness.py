@@ -37,8 +37,8 @@ from trials.rigs.drawing import generator
 from trials.rigs.engine import Floats, simulate, step_within
 from trials.rigs.hiding import OPEN, WHOLE_MACHINE, drawn, effects_of, find_drawn_law, hide, joints_of
 from trials.rigs.parameters import Records
+from trials.rigs.recorded_rig import COLOURED_CORNER, TRAINING, wanted, without_settling
 from trials.rigs.rig import Rig, Tolerance
-from trials.rigs.world import COLOURED_CORNER, TRAINING, wanted, without_settling
 
 STEP = 2e-4
 """s, about, of the simulations here."""

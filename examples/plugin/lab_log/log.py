@@ -18,7 +18,7 @@ def is_log(path: Path, first: bytes) -> bool:
 
 
 def read(path: Path, limits: TraceLimits, _choice: Choice) -> Trace:
-    """The log as a trace. Raises TraceError."""
+    """Returns the log as a trace. Raises TraceError."""
     if path.stat().st_size > limits.file_bytes:
         raise TraceError(f"{path}: is larger than {limits.file_bytes} bytes")
     try:

@@ -192,7 +192,7 @@ def stale(bench: Bench) -> set[str]:
 
 
 def step_named(name: str) -> Step:
-    """A step by its name. Raises SpecError."""
+    """Returns a step by its name. Raises SpecError."""
     for one in STEPS:
         if one.name == name:
             return one

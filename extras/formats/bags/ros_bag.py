@@ -115,7 +115,7 @@ def _contents(path: Path, limits: TraceLimits) -> Contents:
 
 
 def _read(path: Path, found: Contents, topic: str) -> list[_State]:
-    """The joint states of a topic. Raises TraceError."""
+    """Returns the joint states of a topic. Raises TraceError."""
     with _one_error(path):
         origin = f"{path}: topic {listed([topic])}"
         return list(_decoded(origin, found.messages[topic], decoder(found.types[topic], found.ros_1)))

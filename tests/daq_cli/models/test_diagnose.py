@@ -211,7 +211,7 @@ def test_the_method_is_the_one_that_was_asked_for(
     [
         (("nowhere.csv",), "nowhere.csv"),
         (("FIRST", "--out", "model.toml"), "is written as .json"),
-        (("FIRST", "--report", "page.pdf"), "is written as .html"),
+        (("FIRST", "--report", "page.pdf"), "must be an .html file"),
         (("FIRST", "--next", "asked.toml"), "an experiment is written as .json"),
         (("FIRST", "--next", "nowhere/asked.json"), "there is no folder"),
         (("FIRST", "--effects", "gremlins"), "not in the library"),

@@ -256,7 +256,7 @@ def test_the_table_names_the_joint_and_the_moment_and_the_strongest_parameter_fi
     by_joint = [float(cell.rstrip("°")) for cell in lines[0].split() if cell.endswith("°")]
     assert len(by_joint) == 3
     assert max(range(3), key=lambda j: abs(by_joint[j])) == 1
-    assert f"{BACK_EMF} moves the readings most" in page.read_text("utf-8")
+    assert f"{BACK_EMF} changes the readings most" in page.read_text("utf-8")
     assert "joint 3" in picture.read_text("utf-8")
 
 

@@ -262,7 +262,7 @@ def test_a_result_of_another_memory_map_is_done_again(daq: CommandLine, tmp_path
     record.keep("period", {})
     daq("config", "copy", "memory-map", "-o", tmp_path / "memory_map.toml")
     options = [word for step in STEPS for word in ("--skip", step.name)]
-    assert "To be done again" in daq("--port", MOCK, "commission", "--folder", tmp_path, *options).err
+    assert "To be repeated" in daq("--port", MOCK, "commission", "--folder", tmp_path, *options).err
     assert Record.of(tmp_path).steps["bridge"]["skipped"]
 
 
@@ -331,7 +331,7 @@ def test_a_map_with_question_marks_is_refused_with_their_lines_before_anything_i
 ) -> None:
     (tmp_path / "memory_map.toml").write_text("version = 1\nlow = [?, 0xFC01]\n", "utf-8")
     said = daq("--port", MOCK, "commission", "--folder", tmp_path, "--skip", "memory")
-    said.complains(2, "line 2", "in place of each question mark")
+    said.complains(2, "line 2", "each question mark")
     assert not (tmp_path / "commissioning.toml").exists()
 
 

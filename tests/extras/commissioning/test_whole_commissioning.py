@@ -119,7 +119,7 @@ def test_with_a_secret_memory_map_and_secret_sensors_every_step_is_done_in_the_e
     with mock(f"secret_map={MAP}") as arm:
         said = commission(daq, arm, tmp_path)
         assert said.code == 3
-        assert "it works by another map" in said.err
+        assert "it uses another map" in said.err
         written = told_by(str(arm.control), "written")["written"]
     assert set(tomllib.loads((tmp_path / "commissioning.toml").read_text("utf-8"))["step"]) == {"line", "memory"}
     found, truth = load_memory_map(tmp_path / "memory_map.toml"), draw_memory(MAP, "kept").map

@@ -89,7 +89,7 @@ def test_a_set_point_that_came_late_is_not_caught_up_with_in_a_jump(attempt: Tra
     [
         ({"outcome": "stopped"}, "ended as stopped"),
         ({"every": 2}, "a sample only every 2 periods"),
-        ({"spec": None}, "does not say which experiment"),
+        ({"spec": None}, "does not state its experiment"),
     ],
 )
 def test_a_trace_of_something_else_is_refused_in_one_line(attempt: Trace, changes: dict[str, Any], line: str) -> None:
@@ -116,5 +116,5 @@ def test_a_joint_that_does_not_follow_is_named(attempt: Trace) -> None:
 def test_a_model_of_another_machine_is_refused(attempt: Trace) -> None:
     other = machine().model_copy(update={"name": "another"})
     model = arm().model_copy(update={"machine": other})
-    with pytest.raises(SpecError, match="is of another, the experiment is for ma2000"):
+    with pytest.raises(SpecError, match="is of another, but the experiment is for ma2000"):
         learned(attempt, model=model)

@@ -18,7 +18,7 @@ from tests.model.discrepancy import outside_arm
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.recording import recorded
 from tests.model.imported import imported
-from trials.rigs.folder import write_world
+from trials.rigs.folder import write_rig
 
 ROOT = Path(__file__).parents[3]
 Made = Callable[[Path], tuple[Machine, Trace]]
@@ -77,7 +77,7 @@ def world(kind: str, seed: int, case: str | None = None, effect: str | None = No
     """A record of an independent world."""
 
     def made(folder: Path) -> tuple[Machine, Trace]:
-        write_world(folder, kind, seed, case, effect)
+        write_rig(folder, kind, seed, case, effect)
         return load_machine(str(folder / "lab" / "machine.toml")), import_csv(folder / "lab" / "training.csv")
 
     return made

@@ -224,7 +224,7 @@ def test_an_answer_that_was_changed_after_it_was_sealed_is_not_scored(done: Camp
     copy.folder.add("detect", rows(done, "detect")[SECRETS[1]])
     copy.folder.add("diagnose", sealed)
     (tmp_path / "answers" / sealed["answer"]).write_bytes((answers / sealed["answer"]).read_bytes() + b" ")
-    with pytest.raises(TrialStageError, match="is not the one that was sealed"):
+    with pytest.raises(TrialStageError, match="differs from the one that was sealed"):
         copy._score(SECRETS[1])
 
 
@@ -237,7 +237,7 @@ def test_the_order_of_cases_reveals_nothing(done: Campaign) -> None:
 
 
 def test_a_folder_of_another_trial_is_refused(done: Campaign) -> None:
-    with pytest.raises(SpecError, match="holds a trial of other options"):
+    with pytest.raises(SpecError, match="holds a trial with other options"):
         TrialFolder.open(done.folder.path, "diagnostic", False, None)
 
 
@@ -350,7 +350,7 @@ def test_a_registered_trial_runs_only_committed_and_with_the_code_that_was_regis
     file.write_text(text, "utf-8")
     git(empty_folder, "init", "-q")
     words = ("blind", "--folder", "trial", "--registration", file, "--until", "detect")
-    daq(*words).complains(2, "is not committed as it stands")
+    daq(*words).complains(2, "has uncommitted changes")
     git(empty_folder, "add", file.name)
     git(empty_folder, "commit", "-q", "-m", "registered")
     daq(*words, "--seeds", "1:2").complains(2, "--seeds and --registration")
@@ -360,7 +360,7 @@ def test_a_registered_trial_runs_only_committed_and_with_the_code_that_was_regis
     daq(*words, "--run", "ramp").complains(2, "run 'ramp': the registration has diagnostic")
     kept = empty_folder / "registration-diagnostic.md"
     kept.write_text("a table", "utf-8")
-    daq(*words).complains(2, "registration-diagnostic.md: this run has been made")
+    daq(*words).complains(2, "registration-diagnostic.md: this run has already been made")
     kept.unlink()
     file.write_text(text.replace(digest, "0" * 64), "utf-8")
     daq(*words).complains(2, f"{path}: not as registered")

@@ -87,7 +87,7 @@ def test_nothing_is_worked_out_before_the_answer_is_sealed_and_scored_or_for_ano
     with pytest.raises(TrialStageError, match="has not been scored"):
         work_out_sharpness(folder, SEED, MACHINE, short)
     (folder.path / "answers" / "a.json").write_text("{}", "utf-8")
-    with pytest.raises(TrialStageError, match="is not the one that was sealed"):
+    with pytest.raises(TrialStageError, match="differs from the one that was sealed"):
         work_out_sharpness(folder, SEED, MACHINE, short)
 
 
@@ -135,7 +135,7 @@ def test_an_experiment_that_was_asked_for_and_is_no_longer_known_is_said(
 ) -> None:
     campaign = scored(tmp_path, hidden)
     campaign.folder.add("diagnose", campaign.folder.row("diagnose", SEED) | {"traces": ["1.mcap", "2.mcap"]})
-    with pytest.raises(TrialStageError, match="an experiment that was asked for is not known"):
+    with pytest.raises(TrialStageError, match="a requested experiment is not known"):
         campaign._carry_out(SimpleNamespace(folder=campaign.folder, stage="sharpness", seed=SEED))
 
 

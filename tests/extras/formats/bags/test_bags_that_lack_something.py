@@ -62,7 +62,9 @@ def test_rows_in_a_write_ahead_log_are_read_and_the_recorders_death_is_told(tmp_
     before = {one: one.read_bytes() for one in path.parent.glob("a.db3*")}
     trace = imported(path)
     assert (len(trace), trace.record.outcome) == (200, "interrupted")
-    assert trace.record.notes.startswith("INCOMPLETE: a.db3: its recording was never ended, and what it had not yet")
+    assert trace.record.notes.startswith(
+        "INCOMPLETE: a.db3: its recording was never ended, so unwritten data is missing"
+    )
     assert "pages of" not in trace.record.notes
     assert before == {one: one.read_bytes() for one in path.parent.glob("a.db3*")}  # nobody's files are changed
     wal = path.with_name("a.db3-wal")
@@ -86,11 +88,11 @@ def test_rows_that_were_never_committed_are_taken_back(tmp_path: Path) -> None:
     name = str(other).encode()
     sizes = struct.pack(">II", len(name), sum(name))
     journal.write_bytes(sound + (0x40000000 // 4096 + 1).to_bytes(4, "big") + name + sizes + sound[:8])
-    with pytest.raises(TraceError, match="cannot take it back"):
+    with pytest.raises(TraceError, match="cannot undo it"):
         imported(path)
     assert other.exists()
     journal.write_bytes(b"x" * journal.stat().st_size)
-    with pytest.raises(TraceError, match=r"the damaged a\.db3-journal cannot take it back"):
+    with pytest.raises(TraceError, match=r"the damaged a\.db3-journal cannot undo it"):
         imported(path)
 
 
@@ -100,7 +102,7 @@ def test_what_metadata_promise_and_a_storage_lacks_is_told(tmp_path: Path) -> No
         about = path / "metadata.yaml"
         about.write_text(about.read_text().replace("message_count: 50", "message_count: 200"))
         trace = imported(path)
-        line = "INCOMPLETE: metadata.yaml promises 200 messages on /joint_states, 50 are there."
+        line = "INCOMPLETE: metadata.yaml announces 200 messages on /joint_states, but there are 50."
         assert (line in trace.record.notes, trace.record.outcome) == (True, "interrupted")
     about.write_text(about.read_text().replace("message_count: 200", "message_count: 50"))
     (made,) = (tmp_path / "sqlite3").glob("*.db3")
@@ -112,7 +114,7 @@ def test_what_metadata_promise_and_a_storage_lacks_is_told(tmp_path: Path) -> No
         assert (imported(path).record.outcome, len(imported(path))) == (None, 50)
     with sqlite3.connect(made) as database:
         database.execute("DELETE FROM messages WHERE id > 40")
-    assert "sqlite3.db3 promises 50 messages on /joint_states, 39 are there" in imported(made).record.notes
+    assert "sqlite3.db3 announces 50 messages on /joint_states, but there are 39" in imported(made).record.notes
     made.write_bytes(b"")
     with pytest.raises(TraceError, match="is neither MCAP nor SQLite"):
         imported(tmp_path / "sqlite3")
@@ -173,7 +175,7 @@ def test_a_damaged_chunk_is_left_out_and_told(tmp_path: Path) -> None:
     path.write_bytes(data)
     trace = imported(path)
     assert 250 < len(trace) < 300
-    line = f"the statistics promise 300 messages on /joint_states, {len(trace)} are there"
+    line = f"the statistics announce 300 messages on /joint_states, but there are {len(trace)}"
     assert line in trace.record.notes
     assert "1 damaged parts were left out" in trace.record.notes
 

@@ -59,7 +59,7 @@ def test_a_folder_that_a_cut_off_recording_left_is_named_as_that(daq: CommandLin
 
 def test_the_unit_of_the_effort_is_asked_for(daq: CommandLine, tmp_path: Path) -> None:
     path = bag(tmp_path / "a", [{}] * 3)
-    daq("traces", "import", path).complains(2, "say --drive-unit N·m, N, A or V, or none to leave it out")
+    daq("traces", "import", path).complains(2, "give --drive-unit N·m, N, A or V, or none to leave it out")
     daq("traces", "import", path, "--drive-unit", "kV").complains(2, "--drive-unit kV: write V, A, N·m, N, none")
     amperes, without = (daq("traces", "import", path, "--drive-unit", unit, "--json").out for unit in ("A", "none"))
     assert read_trace(Path(json.loads(amperes)["file"])).record.drive_unit == "A"

@@ -35,7 +35,7 @@ def test_a_file_that_is_no_urdf_is_refused_in_one_line(daq: CommandLine, kind: s
     [
         ("--joints turn,,lift", "--joints 'turn,,lift': write names like shoulder,elbow"),
         ("--joints turn,wrist", "has no joint 'wrist' that moves; it has turn, lift, reach"),
-        ("", "joint 'right_finger' mimics another; name the arm's joints"),
+        ("", "joint 'right_finger' mimics another; name the arm's independent joints"),
         ("--joints turn,right_finger", "joint 'right_finger' mimics 'left_finger'; a model's joints are independent"),
         ("--joints turn,left_finger", "joint 'right_finger' mimics 'left_finger', which moves"),
         ("--joints turn --hold lift", "--hold 'lift': write joint=position pairs"),
@@ -43,14 +43,14 @@ def test_a_file_that_is_no_urdf_is_refused_in_one_line(daq: CommandLine, kind: s
         ("--joints turn --hold lift=1e999", "--hold lift '1e999': write a number"),
         ("--joints turn --hold turn=1", "--hold turn=1.0: it is one of the joints that move"),
         ("--joints turn --gravity 0,0", "--gravity '0,0': write 3 numbers, separated by commas"),
-        ("--joints turn --tip foot", "--tip foot: is no link that the last joint carries; it carries column, boom"),
+        ("--joints turn --tip foot", "--tip foot: the last joint carries no such link; it carries column, boom"),
         ("--joints turn --drives nothing.toml", "machine 'nothing.toml': no such file"),
         ("--joints turn,lift --drives 1N·m/A,1N·m/A,1N·m/A", "--drives names 3, and there are 2 joints"),
         ("--joints turn,lift --drives 1N·m/A,feetech/sts", "drive 'feetech/sts' is not in the library; did you mean"),
         ("--joints reach --drives 1N·m/A", "drive: unit is 'N·m/A', must be 'N/V'"),
         ("--joints turn --drives ma2000", "drives of ma2000: none of its joints (waist, shoulder"),
         ("Turn --joints turn", "arm.urdf: name: found 'Turn', must match"),
-        ("--joints turn -o arm.urdf", "arm.urdf: is there already; name another file with -o"),
+        ("--joints turn -o arm.urdf", "arm.urdf: already exists; name another file with -o"),
         ("--joints turn -o there/arm.toml", "there is no folder"),
     ],
 )
@@ -114,7 +114,7 @@ def test_what_is_asked_becomes_the_file() -> None:
     assert "drive 'robotis/xm430' is not in the library; did you mean" in done.stderr
     assert "unit is 'furlong·kg', must be 'm'" in done.stderr
     assert "'across': answer parallel or crossed" in done.stderr
-    assert "Measure first, for their deviations move the torques most:" in done.stderr
+    assert "Measure first, because their deviations change the torques most:" in done.stderr
     assert Path("pan-tilt.toml").read_text("utf-8").splitlines() == [
         'name = "pan-tilt"',
         "",

@@ -40,10 +40,10 @@ _ENTITIES = '<!ENTITY a "ha">' + "".join(
     f'<!ENTITY {after} "{f"&{before};" * 10}">' for before, after in zip("abcdefgh", "bcdefghi", strict=True)
 )
 HOSTILE: dict[str, tuple[str, str]] = {
-    "billion laughs": (robot(link("&i;"), before=f"<!DOCTYPE robot [{_ENTITIES}]>"), "document type or entities"),
+    "billion laughs": (robot(link("&i;"), before=f"<!DOCTYPE robot [{_ENTITIES}]>"), "an XML DOCTYPE or entities"),
     "an outside entity": (
         robot(link("a"), before='<!DOCTYPE robot [<!ENTITY secret SYSTEM "file:///etc/passwd">]>'),
-        "document type or entities",
+        "an XML DOCTYPE or entities",
     ),
     "a million links": ("<robot>" + '<link name="a"/>' * 1_000_000 + "</robot>", "at most 8388608 are read"),
     "many links": ("<robot>" + '<link name="a"/>' * 2000 + "</robot>", "has more than 1000 links"),
@@ -86,7 +86,7 @@ HOSTILE: dict[str, tuple[str, str]] = {
     ),
     "a closed chain": (
         robot(*map(link, "abc"), joint("j", "a", "b"), joint("k", "a", "c"), joint("m", "b", "c")),
-        "joint 'm': its child 'c' hangs on joint 'k' too: a loop",
+        "joint 'm': its child 'c' is also the child of joint 'k': a loop",
     ),
     "two roots": (robot(*map(link, "abc"), joint("j", "a", "b")), "links 'a' and 'c' are both roots"),
     "the same link twice": (
@@ -112,7 +112,7 @@ HOSTILE: dict[str, tuple[str, str]] = {
             joint("j", "a", "b"),
             joint("k", "b", "c", content=f'{TURNING}<mimic joint="j" multiplier="2"/>'),
         ),
-        "joint 'k' mimics another; name the arm's joints (--joints), which are independent: it has j, k",
+        "joint 'k' mimics another; name the arm's independent joints (--joints): it has j, k",
     ),
     "nothing that moves": (robot(link("a"), link("b", ""), joint("j", "a", "b")), "joint 1 has no inertia"),
     "axes that are nearly parallel": (

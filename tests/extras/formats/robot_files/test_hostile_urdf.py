@@ -49,7 +49,7 @@ def test_a_hostile_urdf_is_refused_in_one_line(
         (["elbow"], {"elbow": 1.0}, None, "--hold elbow=1.0: it is one of the joints that move"),
         (["elbow"], {"wrist": 1.0}, None, "--hold wrist=1.0: there is no such joint"),
         (["elbow"], {"shoulder": float("nan")}, None, "--hold shoulder=nan: a finite position is needed"),
-        (["shoulder"], {}, "base", "--tip base: is no link that the last joint carries; it carries upper, lower"),
+        (["shoulder"], {}, "base", "--tip base: the last joint carries no such link; it carries upper, lower"),
     ],
 )
 def test_joints_that_make_no_arm_are_refused_in_one_line(
@@ -119,7 +119,7 @@ def test_what_is_not_taken_over_of_limits_and_gears_is_noted(tmp_path: Path) -> 
     text = TWO_JOINTS.replace("</joint>", inside, 1).replace("</robot>", geared)
     notes = machine_from_urdf(written(tmp_path, text)).notes
     assert "the soft limits of its safety_controller are narrower" in notes
-    assert "mechanicalReduction of its transmissions is not taken over" in notes
+    assert "mechanicalReduction of its transmissions is not imported" in notes
     assert "safety_controller" not in machine_from_urdf(written(tmp_path, TWO_JOINTS)).notes
 
 

@@ -36,7 +36,7 @@ def test_the_guides_configuration_can_be_said_and_says_everything(tmp_path: Path
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ('bucket = "UP"', "names no bucket; write 3 to 63 lower-case letters"),
+        ('bucket = "UP"', "is not the name of a bucket; write 3 to 63 lower-case letters"),
         *(
             (line, f"archive.{line.partition(' ')[0]}")
             for line in (
@@ -121,5 +121,5 @@ def test_without_obstore_one_line_says_what_to_install() -> None:
     )
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert ended.stdout == (
-        "archive.bucket traces: obstore is not installed: `pip install 'ma2000-daq[archive]'` where daq is installed\n"
+        "archive.bucket traces: obstore is not installed: `pip install 'ma2000-daq[archive]'` in daq's environment\n"
     )

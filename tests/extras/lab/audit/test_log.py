@@ -81,8 +81,8 @@ def _without_triggers(store: Store) -> None:
 @pytest.mark.parametrize(
     ("statement", "row", "why"),
     [
-        ("UPDATE audit SET actor = 'bert' WHERE sequence = 2", 2, "does not say what was written"),
-        ("UPDATE audit SET detail = detail || ' ' WHERE sequence = 1", 1, "does not say what was written"),
+        ("UPDATE audit SET actor = 'bert' WHERE sequence = 2", 2, "is not what was written"),
+        ("UPDATE audit SET detail = detail || ' ' WHERE sequence = 1", 1, "is not what was written"),
         ("UPDATE audit SET outcome = 'hidden' WHERE sequence = 2", 2, "cannot be read"),
         ("DELETE FROM audit WHERE sequence = 1", 2, "row 1 is missing"),
         ("DELETE FROM audit WHERE sequence = 2", 3, "row 2 is missing"),

@@ -163,7 +163,7 @@ def test_another_batch_does_not_go_on_in_the_folder(tmp_path: Path, traces: Path
     out = tmp_path / "out"
     run(out, traces)
     other = COMMON.model_copy(update={"study": SimulateStudy(quantise=False)})
-    with pytest.raises(SpecError, match="another study, or other options; take another folder"):
+    with pytest.raises(SpecError, match="another study, or other options; use another folder"):
         run(out, traces, common=other)
     named = COMMON.model_copy(update={"model": base_model(MACHINE).model_dump_json()})
     with pytest.raises(SpecError, match="another model"):
@@ -171,7 +171,7 @@ def test_another_batch_does_not_go_on_in_the_folder(tmp_path: Path, traces: Path
     elsewhere = COMMON.model_copy(update={"machine": MACHINE.model_copy(update={"name": "another"})})
     with pytest.raises(SpecError, match="another machine for traces that name none"):
         run(out, traces, common=elsewhere)
-    with opened(out, asked_of(COMMON)), pytest.raises(BatchInUseError, match="another batch computes into it"):
+    with opened(out, asked_of(COMMON)), pytest.raises(BatchInUseError, match="another batch is computing into it"):
         run(out, traces)
 
 
@@ -187,7 +187,7 @@ def test_a_folder_that_is_no_batch_is_told(tmp_path: Path, traces: Path) -> None
     out = tmp_path / "out"
     run(out, traces)
     (out / "rows.jsonl").write_text('{"trace": 1}\n')
-    with pytest.raises(SpecError, match="a line is no row of a batch"), opened(out, asked_of(COMMON)):
+    with pytest.raises(SpecError, match="a line is not a row of a batch"), opened(out, asked_of(COMMON)):
         pass
     (out / "batch.json").write_text("[]")
     with pytest.raises(SpecError, match="not a batch's"), opened(out, asked_of(COMMON)):

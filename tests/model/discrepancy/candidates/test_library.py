@@ -65,7 +65,7 @@ def test_an_unknown_effect_is_refused() -> None:
 
 
 def test_a_joint_that_is_not_modelled_is_refused() -> None:
-    with pytest.raises(SpecError, match="on joint 5: modelled are joints"):
+    with pytest.raises(SpecError, match="on joint 5: not modelled; modelled joints are"):
         hypotheses(imagined.arm(), ["coulomb_friction", "dead_zone"], [5])
 
 

@@ -15,7 +15,7 @@ from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.machine_model.model import base_model
 from tests.model.discrepancy.inverse_dynamics import rigs
-from trials.rigs.folder import write_world
+from trials.rigs.folder import write_rig
 
 
 def sliding(hidden: Mapping[str, float], options: TorqueOptions) -> TorqueWorkflow:
@@ -30,7 +30,7 @@ def sliding(hidden: Mapping[str, float], options: TorqueOptions) -> TorqueWorkfl
 
 def diagnosed_rig(folder: Path, kind: str, seed: int, case: str | None = None, effect: str | None = None) -> Diagnosis:
     """One record of an independent test rig diagnosed, the other held out, from the files that its lab has."""
-    write_world(folder, kind, seed, case, effect)
+    write_rig(folder, kind, seed, case, effect)
     lab = folder / "lab"
     training, held_out = (import_csv(lab / f"{name}.csv") for name in ("training", "held_out"))
     return diagnose_torques(base_model(load_machine(str(lab / "machine.toml"))), [training], [held_out])

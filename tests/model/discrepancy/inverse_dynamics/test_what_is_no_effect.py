@@ -119,7 +119,7 @@ def test_no_effect_is_named_beside_more_torque_than_there_is(
 
 def test_times_in_another_unit_are_said_to_be_that() -> None:
     trace = rigs.slide_trace(1, {})
-    with pytest.raises(SpecError, match="times are in s, positions in rad or m"):
+    with pytest.raises(SpecError, match="times must be in s, positions in rad or m"):
         of_slide(replace(trace, time=1000.0 * trace.time))
 
 

@@ -1346,7 +1346,7 @@ export interface paths {
         };
         /**
          * Get Archive
-         * @description Returns whether the archive answers, and what waits for it.
+         * @description Returns whether the archive answers, and the traces that wait for it.
          */
         get: operations["get_archive"];
         put?: never;
@@ -1366,13 +1366,13 @@ export interface paths {
         };
         /**
          * Get Trace Archive
-         * @description Returns where a trace is, and how far it is on its way.
+         * @description Returns where a trace is, and the progress of its transfer.
          */
         get: operations["get_trace_archive"];
         put?: never;
         /**
          * Archive Trace
-         * @description Sends a trace to the archive now; with `drop`, its local copy goes when it is there.
+         * @description Sends a trace to the archive now; with `drop`, its local copy is deleted afterwards.
          */
         post: operations["archive_trace"];
         delete?: never;
@@ -1392,7 +1392,7 @@ export interface paths {
         put?: never;
         /**
          * Fetch Trace
-         * @description Fetches a trace that only the archive has, as opening it does; returns how far this is.
+         * @description Fetches a trace that only the archive has, as opening it does; returns the progress.
          */
         post: operations["fetch_trace"];
         delete?: never;
@@ -1410,37 +1410,13 @@ export interface paths {
         };
         /**
          * List Audit
-         * @description Lists who asked for which change, from where, and what became of it, the newest first. Needs the role operator.
+         * @description Lists who requested which change, from where, and its outcome, the newest first. Needs the role operator.
          *
          *     Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
          */
         get: operations["list_audit"];
         put?: never;
         post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/robots/{robot}/hidden": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Hiding Place
-         * @description Returns what can be hidden, and the latest demonstration; its secret once the diagnosis has answered.
-         */
-        get: operations["get_hiding_place"];
-        put?: never;
-        /**
-         * Hide Effect
-         * @description Hides an effect in a mock of its own, records it in lock-step, and has it diagnosed. On a mock alone.
-         */
-        post: operations["hide_effect"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1460,7 +1436,7 @@ export interface paths {
          * Submit Fleet Experiment
          * @description Puts the same experiment into the queue of several robots. If one of them cannot run it, none gets it.
          *
-         *     It begins where its robot's queue lets it: a paused queue stays paused. With the same Idempotency-Key each robot
+         *     It begins when its robot's queue allows it: a paused queue stays paused. With the same Idempotency-Key each robot
          *     gets it once.
          */
         post: operations["submit_fleet_experiment"];
@@ -1479,7 +1455,7 @@ export interface paths {
         };
         /**
          * Compare Fleet
-         * @description Compares the robots' fits to the same experiment over time, and says which numbers have changed.
+         * @description Compares the robots' fits to the same experiment over time, and reports values that have changed.
          */
         get: operations["compare_fleet"];
         put?: never;
@@ -1499,8 +1475,9 @@ export interface paths {
         };
         /**
          * Get Notifications
-         * @description Returns how far the messages to each webhook and each person with e-mail are. The configuration alone says who
-         *     is told; no request can add or change an address.
+         * @description Returns the state of the messages to each webhook and each person with e-mail.
+         *
+         *     Recipients are set only in the configuration; no request can add or change an address.
          */
         get: operations["get_notifications"];
         put?: never;
@@ -1520,7 +1497,7 @@ export interface paths {
         };
         /**
          * Get Login Ways
-         * @description Returns how people sign in: by a token always, and by OpenID Connect where it is configured. Needs no token.
+         * @description Returns the ways to sign in: always by token, and by OpenID Connect if it is configured. Needs no token.
          */
         get: operations["get_login_ways"];
         put?: never;
@@ -1542,7 +1519,7 @@ export interface paths {
         put?: never;
         /**
          * Log Out
-         * @description Ends the caller's session; a token stays. Returns where the provider's own session is left.
+         * @description Ends the caller's session; a token stays valid. Returns the URL that ends the provider's own session.
          */
         post: operations["log_out"];
         delete?: never;
@@ -2754,7 +2731,7 @@ export interface components {
         };
         /**
          * FarNumber
-         * @description A number of the model at least 4 stated deviations from the machine file. `value`: of the model; `stated`,
+         * @description A parameter of the model at least 4 stated deviations from the machine file. `value`: of the model; `stated`,
          *     `deviation`: of the file; all in `unit`.
          */
         FarNumber: {
@@ -3518,105 +3495,6 @@ export interface components {
             };
         };
         /**
-         * Hidden
-         * @description One demonstration. Numbers of traces and jobs come as they are made: `comparison` simulates the machine file on
-         *     the trace while `diagnosis` looks for what is missing.
-         */
-        Hidden: {
-            /** Id */
-            id: string;
-            /**
-             * State
-             * @enum {string}
-             */
-            state: "recording" | "diagnosing" | "opened" | "failed";
-            /**
-             * Began
-             * Format: date-time
-             */
-            began: string;
-            /**
-             * Seal
-             * @default
-             */
-            seal?: string;
-            picked: components["schemas"]["HideRequest"];
-            /** Motion */
-            motion?: number | null;
-            /** Trace */
-            trace?: string | null;
-            /** Held Out */
-            held_out?: string | null;
-            /** Comparison */
-            comparison?: string | null;
-            /** Diagnosis */
-            diagnosis?: string | null;
-            /** Seconds */
-            seconds?: number | null;
-            /**
-             * Problem
-             * @default
-             */
-            problem?: string;
-            secret?: components["schemas"]["OpenedSecret"] | null;
-        };
-        /**
-         * HiddenNumber
-         * @description A number of the hidden effect. `found`: the answer's, with its 95 % interval, where it has named the effect and
-         *     both count the same quantity.
-         */
-        HiddenNumber: {
-            /** Called */
-            called: string;
-            /** Unit */
-            unit: string;
-            /** Hidden */
-            hidden: number;
-            /** Found */
-            found?: number | null;
-            /** Low */
-            low?: number | null;
-            /** High */
-            high?: number | null;
-        };
-        /**
-         * HideChoice
-         * @description An effect that can be hidden; no joints: it acts on the whole arm.
-         */
-        HideChoice: {
-            /** Effect */
-            effect: string;
-            /** Called */
-            called: string;
-            /** Joints */
-            joints: number[];
-        };
-        /**
-         * HideRequest
-         * @description What to hide. Without `effect` or `joint`, the mock draws them, and nobody knows them.
-         */
-        HideRequest: {
-            /** Effect */
-            effect?: string | null;
-            /** Joint */
-            joint?: number | null;
-        };
-        /**
-         * HidingPlace
-         * @description Whether this robot's mock can hide effects (`problem` is empty then), which, and what it did last.
-         */
-        HidingPlace: {
-            /** Problem */
-            problem: string;
-            /** Choices */
-            choices: components["schemas"]["HideChoice"][];
-            latest: components["schemas"]["Hidden"] | null;
-            /** Opened */
-            opened: number;
-            /** Named */
-            named: number;
-        };
-        /**
          * HistoryMessage
          * @description The last minutes, thinned without losing peaks. A signal has one row per joint; a missing value is None.
          */
@@ -3795,10 +3673,10 @@ export interface components {
          * JointAgreement
          * @description One joint over one or more traces.
          *
-         *     `rmse` and `largest` of measured − simulated, `floor` its noise: what the model would leave of records that it had
-         *     made itself, noise of the sensors included (of speeds: its own). `count`: one count of the sensor, None
-         *     where it has none. All are in `unit`. `share` is `rmse` divided by the root mean square of the measured motion about
-         *     its mean: 0 for a perfect model, 1 for one that predicts no motion at all.
+         *     `rmse` and `largest` are of measured − simulated. `floor` is its noise: the error of records that the model itself
+         *     makes, sensor noise included (for speeds: only that). `count`: one count of the sensor, None without one. All are in
+         *     `unit`. `share` is `rmse` divided by the root mean square of the measured motion about its mean: 0 for a perfect
+         *     model, 1 for one that predicts no motion at all.
          */
         JointAgreement: {
             /** Joint */
@@ -3882,9 +3760,9 @@ export interface components {
         };
         /**
          * JointLeft
-         * @description What a model leaves of one joint's records. `rms`: root mean square of the residual; `noise`: what would be left
-         *     of records that the model itself had made; `there`: of the recorded torque, or of the recorded motion about its mean
-         *     (None where that is hardly more than noise of the readings); in `unit`.
+         * @description Residual of a model on one joint's records, in `unit`. `rms`: root mean square of the residual; `noise`: that of
+         *     records that the model itself makes; `there`: of the recorded torque, or of the recorded motion about its mean (None
+         *     if that hardly exceeds noise of the readings).
          */
         JointLeft: {
             /** Joint */
@@ -3982,7 +3860,7 @@ export interface components {
         };
         /**
          * Lineage
-         * @description Where a model comes from: identity of the model it was made from, traces and a summary of the fit.
+         * @description Origin of a model: identity of its parent model, traces, and a summary of the fit.
          */
         Lineage: {
             /** Parent */
@@ -4220,7 +4098,7 @@ export interface components {
         };
         /**
          * ModelAgreement
-         * @description One model on all traces: `held_out` pools those that are marked so, `in_sample` the others; None for none.
+         * @description One model on all traces: `held_out` pools those marked so, `in_sample` the others; None for none.
          */
         ModelAgreement: {
             /** Label */
@@ -4534,28 +4412,6 @@ export interface components {
             start: string;
         };
         /**
-         * OpenedSecret
-         * @description What was hidden, and how the answer compares. `python -m mock_controller.reveal SEED` prints `seed`'s secret, and
-         *     the SHA-256 of that line is the seal that was shown before.
-         */
-        OpenedSecret: {
-            /** Seed */
-            seed: number;
-            /** Effect */
-            effect: string;
-            /** Joints */
-            joints: number[];
-            /** Called */
-            called: string;
-            /** Numbers */
-            numbers: components["schemas"]["HiddenNumber"][];
-            /**
-             * Outcome
-             * @enum {string}
-             */
-            outcome: "named" | "among" | "joint" | "missed" | "wrong";
-        };
-        /**
          * OutputRequest
          * @description Switches one process output. Refused while the arm is stopped, unless `while_stopped`.
          */
@@ -4648,10 +4504,10 @@ export interface components {
         };
         /**
          * ParameterDifference
-         * @description One parameter with its value in each model, None where a model does not have it.
+         * @description One parameter with its value in each model, None if a model does not have it.
          *
-         *     `deviations` is the spread of the values in expected deviations; None where a model lacks the
-         *     parameter or no deviation is expected.
+         *     `deviations` is the range of the values in expected deviations; None if a model lacks the parameter or no deviation
+         *     is expected.
          */
         ParameterDifference: {
             /** Name */
@@ -5258,8 +5114,8 @@ export interface components {
          * RecordVerdict
          * @description Whether a model explains records within their noise.
          *
-         *     `left`: joints with more than noise, the worst first. `far`: numbers of the model far from the machine file, the
-         *     furthest first: they may have taken the place of an effect. `text`: the same in one to three sentences.
+         *     `left`: joints with more than noise, the worst first. `far`: parameters far from the machine file, the farthest
+         *     first; they may compensate for an effect. `text`: the same in one to three sentences.
          */
         RecordVerdict: {
             /** Explains */
@@ -6240,7 +6096,7 @@ export interface components {
         };
         /**
          * TraceAgreement
-         * @description One trace; `held_out` tells whether the model was fitted to it, None where nothing was fitted.
+         * @description One trace; `held_out` states whether the model was fitted to it, None if nothing was fitted.
          */
         TraceAgreement: {
             /** Trace */
@@ -8987,9 +8843,9 @@ export interface operations {
                 subject?: string | null;
                 /** @description Only rows with this outcome. */
                 outcome?: ("done" | "refused" | "failed") | null;
-                /** @description Only rows from this moment on. */
+                /** @description Only rows from this time on. */
                 since?: string | null;
-                /** @description Only rows before this moment. */
+                /** @description Only rows before this time. */
                 until?: string | null;
                 /** @description Length of this part of the list. */
                 limit?: number;
@@ -9009,56 +8865,6 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Page_AuditEntry_"];
-                };
-            };
-        };
-    };
-    get_hiding_place: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["HidingPlace"];
-                };
-            };
-        };
-    };
-    hide_effect: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["HideRequest"];
-            };
-        };
-        responses: {
-            /** @description Successful Response */
-            201: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Hidden"];
                 };
             };
         };

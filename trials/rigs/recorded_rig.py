@@ -34,7 +34,7 @@ RECORDS = (TRAINING, HELD_OUT)
 
 
 @dataclass(frozen=True)
-class World:
+class RecordedRig:
     """A rig, its drawn case, and its records by name."""
 
     rig: Rig
@@ -47,10 +47,12 @@ def case_of(seed: int) -> str:
     return CASE_OF_SEED[seed % len(CASE_OF_SEED)]
 
 
-def make_world(kind_name: str, seed: int, case: str | None = None, effect: str | None = None) -> World:
+def make_rig(kind_name: str, seed: int, case: str | None = None, effect: str | None = None) -> RecordedRig:
     """Makes the rig of a seed with records, always exactly the same. `effect` hides only that one."""
     rig = hidden_rig(kind_name, seed, case, effect)
-    return World(rig, "single" if effect else case or case_of(seed), {name: record(rig, name) for name in RECORDS})
+    return RecordedRig(
+        rig, "single" if effect else case or case_of(seed), {name: record(rig, name) for name in RECORDS}
+    )
 
 
 @cache
