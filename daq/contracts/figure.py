@@ -64,7 +64,7 @@ class _Row:
 
 
 def figure_of(trace: Recorded, joints: tuple[int, ...] | None = None, axes: Axes | None = None) -> Figure:
-    """Returns the figure: one row per signal, one column per joint, marks at events; or positions alone on given axes."""
+    """Returns the figure: one row per signal, one column per joint, marks at events; or positions on given axes."""
     if axes is not None:
         shown = _only(trace, joints)
         row = _rows(shown)[0]
