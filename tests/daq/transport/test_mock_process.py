@@ -10,6 +10,7 @@ from contextlib import closing
 import pytest
 
 from daq.contracts.processor import ProcessorTime
+from daq.driver import Controller
 from daq.transport import TransportError, mock_process, open_endpoint
 from daq.transport.mock_process import start_mock
 from daq.transport.url import MockPort
@@ -76,6 +77,16 @@ def test_a_mock_that_is_held_up_tells_for_how_long_its_board_stood_still() -> No
         assert mock.waited() <= clock["waited_us"] * 1e-6
     finally:
         mock.close()
+
+
+def test_a_mock_in_this_process_says_what_one_in_its_own_says() -> None:
+    said = []
+    for url in ("mock://?lock_step=1&seed=3", "mock://?lock_step=1&seed=3&pty=1"):
+        with Controller.connect(url) as controller:
+            held = controller.next_snapshot(None, (1, 2, 3)).set_points
+            moves = ({joint: posture + step for joint, posture in held.items()} for step in range(10))
+            said.append([controller.next_snapshot(None, (1, 2, 3), postures) for postures in moves])
+    assert said[0] == said[1]
 
 
 def test_a_mock_can_be_left_and_come_back_to_and_is_missed_when_it_has_ended() -> None:

@@ -220,3 +220,24 @@ def test_reset_forgets_everything() -> None:
 def test_impossible_requests_are_refused_in_one_line(volts: list[float], duration: int, says: str) -> None:
     with pytest.raises(PlantError, match=says):
         Plant(default_plant()).advance(volts, duration)
+
+
+class Unchanged:
+    """A modification that changes nothing, so that each step is taken with everything that one may add."""
+
+    name = "unchanged"
+    joint = 1
+
+    def friction_level(self, level: float, angle: float, rate: float) -> float:
+        del angle, rate
+        return level
+
+
+def test_the_short_step_of_the_usual_arm_gives_the_long_ones_motion_to_the_bit() -> None:
+    usual, other = Plant(default_plant()), Plant(default_plant(), [Unchanged()])
+    for period in range(100):
+        volts = [0.3 * math.sin(0.1 * period + joint) for joint in range(6)]
+        for plant in (usual, other):
+            plant.advance(volts, 20_000)
+        assert usual.joint_angles == other.joint_angles
+        assert usual.joint_rates == other.joint_rates
