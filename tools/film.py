@@ -15,7 +15,7 @@ import io
 import shutil
 from pathlib import Path
 
-from PIL import Image
+from PIL import Image, ImageChops
 from playwright.sync_api import Page, sync_playwright
 
 SIZE = (1120, 760)
@@ -26,6 +26,8 @@ EVERY_MS = 300
 """Time between two pictures, as they are taken, and as they are shown."""
 MOST = 90
 """Pictures of a film; more are thinned."""
+HARDLY = 12
+"""Largest difference of grey (of 255) of pictures that hardly differ."""
 LAST_MS = 6000
 """How long the last picture stays."""
 OPTIONS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -55,11 +57,23 @@ def filmed(page: Page, effect: str | None, joint: int | None) -> list[Image.Imag
 
 def write(pictures: list[Image.Image], path: Path) -> None:
     """Writes an animated WebP, thinned to MOST pictures; the end of it is kept whole."""
-    begun, end = pictures[:-AFTERWARDS], pictures[-AFTERWARDS:]
+    begun, end = _changing(pictures[:-AFTERWARDS]), pictures[-AFTERWARDS:]
     every = -(-len(begun) // (MOST - AFTERWARDS))
     kept = [*begun[::every], *end]
     times = [EVERY_MS] * (len(kept) - 1) + [LAST_MS]
     kept[0].save(path, save_all=True, append_images=kept[1:], duration=times, loop=0, quality=55, method=6)
+
+
+def _changing(pictures: list[Image.Image]) -> list[Image.Image]:
+    """Returns pictures without those that hardly differ from the one before: nothing is to be seen while nothing
+    happens."""
+    small = [picture.convert("L").resize((80, 54)) for picture in pictures]
+    kept = [pictures[0]]
+    for before, now, picture in zip(small, small[1:], pictures[1:], strict=False):
+        greys = enumerate(ImageChops.difference(before, now).histogram())
+        if max(grey for grey, count in greys if count) > HARDLY:
+            kept.append(picture)
+    return kept
 
 
 def _waited(page: Page) -> Image.Image:
