@@ -51,7 +51,7 @@ def test_an_experiment_goes_from_preview_to_trace_and_a_job(service: Service) ->
     ended = service.robot.get(f"/experiments/{submitted['id']}?wait=60").json()
     assert ended["state"] == "done"
     assert answer(server, "experiments", most=1)[0]["id"] == submitted["id"]
-    assert answer(server, "trace", number=ended["trace"])["id"] == ended["trace"]
+    assert answer(server, "trace", number=ended["trace"])["entry"]["id"] == ended["trace"]
     assert ended["trace"] in {one["id"] for one in answer(server, "traces")}
     begun = answer(server, "fit", request={"traces": [ended["trace"]], "parameters": ["load.mass"]})
     assert answer(server, "job", number=begun["id"])["request"]["kind"] == "fit"
@@ -77,7 +77,7 @@ def test_an_experiment_goes_from_preview_to_trace_and_a_job(service: Service) ->
         ("submit", {"spec": {"folder": "/tmp"}}, "folder"),
         ("fit", {"request": {"traces": ["../x"]}}, "traces.0"),
         ("fit", {"request": {"traces": ["a"], "name": "<script>"}}, "name"),
-        ("diagnose", {"request": {"traces": [], "joints": [0]}}, "traces"),
+        ("diagnose", {"request": {"traces": [], "joints": [0]}}, "joints.0"),
         ("diagnose", {"request": {"traces": ["a"], "effects": ["__import__('os')"]}}, "effects.0"),
         ("approve", {"number": "1"}, "approve"),
     ],
