@@ -101,8 +101,8 @@ def test_outcome_and_counters_come_from_the_end_and_what_is_missing_is_said() ->
     ("changes", "says"),
     [
         ({"trace_id": "../etc"}, "its ID '../etc' must be letters, digits, - and _"),
-        ({"trace_id": "a" * 65}, "is not letters"),
-        ({"trace_id": ""}, "is not letters"),
+        ({"trace_id": "a" * 65}, "must be letters, digits, - and _"),
+        ({"trace_id": ""}, "must be letters, digits, - and _"),
         ({"created": "2026-01-01T00:00:00"}, "created = 2026-01-01T00:00:00 has no time zone"),
         ({"source": "dream"}, "its metadata is not that of a trace: source: "),
     ],

@@ -101,7 +101,7 @@ def test_a_trace_is_found_by_what_a_person_types_or_by_its_path(folder: Path) ->
     with pytest.raises(TraceError, match=r"2 traces in .* match: .*aa1111.*ab2222.*; give more characters"):
         find_trace(folder, "a")
     for wanted in ("ff", ""):
-        with pytest.raises(TraceError, match=r"is not a file, and the folder .* has none"):
+        with pytest.raises(TraceError, match=r"is not a file, and the folder .* has no trace with this ID or name"):
             find_trace(folder, wanted)
 
 

@@ -64,7 +64,7 @@ def test_a_figure_shows_every_signal_of_the_joints_that_move_or_are_asked_for(tr
 
     assert drawn(None) == ["joint 1, waist", "joint 3, elbow"]
     assert drawn((2,)) == ["joint 2, shoulder"]
-    with pytest.raises(TraceError, match="joint 5 is not in it"):
+    with pytest.raises(TraceError, match="joint 5 is not recorded"):
         drawn((5,))
 
 

@@ -188,7 +188,7 @@ def test_the_guide_s_example_acts_as_its_equation_says_and_has_exact_derivatives
     np.testing.assert_allclose(found, (above - below) / (2 * step), atol=1e-6 * np.abs(found).max())
 
 
-def test_own_effects_see_drive_load_position_and_time_and_move_as_the_librarys_do(tmp_path: Path) -> None:
+def test_a_torque_written_as_the_librarys_gives_the_librarys_motion(tmp_path: Path) -> None:
     model = base_model(load_machine(str(ROOT / "examples" / "single_axis.toml"))).without_effect("viscous_friction")
     load_effect_file(written(tmp_path, torque="def torque(k, speed):\n    return -k * speed\n"))
     own, known = (
@@ -198,7 +198,10 @@ def test_own_effects_see_drive_load_position_and_time_and_move_as_the_librarys_d
     np.testing.assert_allclose(
         simulate(own, SWING, SMOOTH).position, simulate(known, SWING, SMOOTH).position, atol=1e-12
     )
-    # Drive, load, position and time as the run itself has them, seen through the acceleration they make
+
+
+def test_an_own_effect_sees_drive_load_position_and_time(tmp_path: Path) -> None:
+    """Drive, load, position and time as the run itself has them, seen through the acceleration they make."""
     load_effect_file(written(tmp_path, torque="def torque(drive, load, position, time, k):\n    return k * load\n"))
     rest = trace_of(np.full((200, 1), 0.8), period=0.005)
     model = rod()
@@ -295,7 +298,7 @@ def test_effects_keep_to_their_joints_and_to_the_room_there_is(tmp_path: Path) -
     load_effect_file(written(tmp_path, more=", joints=(2,)"))
     model = base_model(load_machine("ma2000"))
     assert model.with_effect("pull", (2,)).own_columns == {"pull": 0}
-    with pytest.raises(SpecError, match=r"its file has it on joints \[2\] alone"):
+    with pytest.raises(SpecError, match=r"its file allows only joints \[2\]"):
         model.with_effect("pull", (1,))
     many = ", ".join(f'OwnParameter("k{n}", unit="N·m", deviation=0.1)' for n in range(8))
     arguments = ", ".join(f"k{n}" for n in range(8))
