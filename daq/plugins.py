@@ -98,8 +98,8 @@ class Plugin:
     parts: tuple[str, ...] = ()
     """Parts of a running service: classes `server.parts.Part`, as "module:Class"."""
     sections: tuple[str, ...] = ()
-    """Functions of a `Diagnosis` and its traces, as "module:function": a `model.blocks.Section` for its report, or
-    None."""
+    """Functions for the report of a diagnosis, as "module:function". Each gets the `Diagnosis` and its traces, and
+    returns a `model.blocks.Section`, or None."""
     routes_at_root: tuple[str, ...] = ()
     """Routers with paths at the root, as "module:router"."""
     routes: tuple[str, ...] = ()
@@ -115,7 +115,7 @@ def plugins() -> tuple[Plugin, ...]:
 
 
 def report_sections(found: object, traces: Sequence[object]) -> list[Any]:
-    """What plug-ins add to the report of a diagnosis of these traces, as sections."""
+    """Returns the sections that plug-ins add to the report of a diagnosis. `found`: the `Diagnosis` of `traces`."""
     made = (named(section)(found, traces) for plugin in plugins() for section in plugin.sections)
     return [section for section in made if section is not None]
 

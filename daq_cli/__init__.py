@@ -10,7 +10,7 @@ from typing import NoReturn
 
 def main() -> None:
     """Entry point of `daq`. A stop is sent before other modules are imported."""
-    gc.set_threshold(100_000)  # with 700, collections take a third of the import time and find nothing
+    gc.set_threshold(100_000)  # with 700, garbage collection takes a third of the import time and finds nothing
     stopping = sys.argv[1:2] == ["stop"] and not {"-h", "--help"} & set(sys.argv)
     try:
         if stopping:

@@ -222,8 +222,8 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
         local,
         names,
         stop_port,
-        lambda *answered: services.tell(lambda part: part.request_answered(*answered)),
-        lambda kind: services.tell(lambda part: part.refused(kind)),
+        lambda *answered: services.notify_parts(lambda part: part.request_answered(*answered)),
+        lambda kind: services.notify_parts(lambda part: part.refused(kind)),
         cookie=session_cookie(section.address),
         parts=services.parts,
     )
@@ -276,7 +276,7 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
         with suppress(RuntimeError):  # the service is ending, and records no more events
             services.event_log.record_later(news.robot, "stop", news.text, actor=news.actor)
         note = _note_of_stop(news)
-        services.tell(lambda part: part.acted(note))
+        services.notify_parts(lambda part: part.acted(note))
 
     services.stop_port = listener.getsockname()[1]
     door.stopped = stopped

@@ -223,7 +223,7 @@ class Services:
 
         hub = self.event_log.hubs[name] = Hub(self.clock, history, status)
         robot.listeners.append(hub.on_report)
-        robot.listeners.append(lambda report: self.tell(lambda part: part.arm_reported(name, report)))
+        robot.listeners.append(lambda report: self.notify_parts(lambda part: part.arm_reported(name, report)))
         robot.disconnected.append(lambda _why: hub.look())
         models = Models(self.folder / "models", name, robot.machine, self.models, self.clock)
         jobs = JobService(
@@ -253,7 +253,7 @@ class Services:
             models=models,
             events=self.event_log,
             unattended=settings.server.unattended,
-            jogged=lambda note: self.tell(lambda part: part.acted(note, again=True)),
+            jogged=lambda note: self.notify_parts(lambda part: part.acted(note, again=True)),
             owners=settings.robot.owners,
         )
 
@@ -261,7 +261,7 @@ class Services:
         """Returns what will soon need a person, one line each."""
         return self.storage_warnings() + [line for part in self.parts for line in part.warnings()]
 
-    def tell(self, news: Callable[[Part], None]) -> None:
+    def notify_parts(self, news: Callable[[Part], None]) -> None:
         """Passes news to every part, on this thread."""
         for part in self.parts:
             try:
@@ -310,8 +310,8 @@ class Services:
                 add_unfinished_traces=lambda: self._take_in(catalogue),
                 unattended=settings.server.unattended,
                 reviewer=None if settings.robot.review == "off" else settings.robot.review,
-                paused=lambda reason: self.tell(lambda part: part.queue_paused(robot.name, reason)),
-                ended=lambda *end: self.tell(lambda part: part.experiment_ended(robot.name, *end)),
+                paused=lambda reason: self.notify_parts(lambda part: part.queue_paused(robot.name, reason)),
+                ended=lambda *end: self.notify_parts(lambda part: part.experiment_ended(robot.name, *end)),
             )
         )
         robot.listeners.append(queue.on_report)
@@ -319,10 +319,10 @@ class Services:
         return queue
 
     def _count_event(self, robot: str, kind: str) -> None:
-        self.tell(lambda part: part.event_recorded(robot, kind))
+        self.notify_parts(lambda part: part.event_recorded(robot, kind))
 
     def _job_changed(self, hub: Hub, job: Job) -> None:
-        self.tell(lambda part: part.job_changed(job))
+        self.notify_parts(lambda part: part.job_changed(job))
         hub.publish("jobs", JobMessage(job=job))
 
     def _lapsed(self, robot: Robot, holder: str) -> None:

@@ -220,10 +220,10 @@ class Controller:
         is None if another host had stopped the arm already: then nothing may be released.
 
         The status requests before and after the stop are written together with it, so that no other request comes
-        between. Other line protocols have only one host, and are asked one request at a time.
+        between. Other line protocols have only one host, and get one request at a time.
         """
-        asked = (ReadStatus(), Stop(), ReadStatus())
-        together = (asked,) if self.link.scale.turn_bytes is None else tuple((one,) for one in asked)
+        requests = (ReadStatus(), Stop(), ReadStatus())
+        together = (requests,) if self.link.scale.turn_bytes is None else tuple((one,) for one in requests)
         try:
             parts = [self.link.exchange_timed(*requests) for requests in together]
             before, stopped, after = (reply for replies, _ in parts for reply in replies)

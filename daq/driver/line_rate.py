@@ -68,8 +68,8 @@ def bytes_of_a_turn(joints: int, moving: int) -> int:
 
 def bytes_of_a_compact_turn(joints: int, moving: int) -> int:
     """The same for an exchange by `MoveAndSample`."""
-    asked = FRAME_OVERHEAD + STAMP_BYTES + _SAMPLE + _MASK + _SET_POINT * moving
-    return asked + bytes_of_a_snapshot(joints, compact=True)
+    request_bytes = FRAME_OVERHEAD + STAMP_BYTES + _SAMPLE + _MASK + _SET_POINT * moving
+    return request_bytes + bytes_of_a_snapshot(joints, compact=True)
 
 
 def bytes_of_a_snapshot(joints: int, *, compact: bool) -> int:
@@ -117,7 +117,7 @@ TOLD = (1, 3, 6)
 """Numbers of joints for which rates are reported: one, the major axes, all."""
 
 
-def told_rates(bytes_per_second: float, period_s: float, *, can_be_compact: bool) -> tuple[LineRate, ...]:
+def reported_rates(bytes_per_second: float, period_s: float, *, can_be_compact: bool) -> tuple[LineRate, ...]:
     """Returns the rates to report: samples of some joints, with a set point for each of them."""
     return tuple(
         line_rate(bytes_per_second, period_s, joints, joints, can_be_compact=can_be_compact) for joints in TOLD

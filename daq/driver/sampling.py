@@ -162,8 +162,8 @@ class RingSampling:
         """Sends set points and request in one frame."""
         deliveries = self._deliveries
         batch, written = deliveries.send(postures)
-        asked = AFTER_NEWEST if after is None else after
-        request = MoveAndSample(asked, mask_of(tuple(joints)), written.postures)
+        newer_than = AFTER_NEWEST if after is None else after
+        request = MoveAndSample(newer_than, mask_of(tuple(joints)), written.postures)
         (answer,) = self._ask(request)
         if isinstance(answer, CompactSnapshot):
             deliveries.taken(batch, written, SetPointsTaken(max(answer.taken_tick, 0), answer.status), None)

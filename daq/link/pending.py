@@ -61,8 +61,8 @@ class PendingReplies:
         None."""
         transaction = self._waiting.get(sequence)
         if transaction is None or not _answers(reply, transaction.request):
-            asked = reply.opcode if isinstance(reply, Refused) else reply.OPCODE & 0x7F
-            self.tally.count("duplicates" if (sequence, asked) in self._answered else "stale")
+            opcode = reply.opcode if isinstance(reply, Refused) else reply.OPCODE & 0x7F
+            self.tally.count("duplicates" if (sequence, opcode) in self._answered else "stale")
             return None
         transaction.reply = reply
         transaction.answered_at = now

@@ -2,9 +2,9 @@
 
 import gc
 
-gc.disable()  # collections would take a third of the imports' time, and find nothing
+gc.disable()  # garbage collection would take a third of the import time, and find nothing
 
-from daq.owner.process import main  # noqa: E402 - after that
+from daq.owner.process import main  # noqa: E402 - imported after gc.disable()
 
 gc.enable()
 

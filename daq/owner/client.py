@@ -193,13 +193,13 @@ class OwnerOnDemand:
 
     def __init__(self, opening: Open) -> None:
         self._opening = opening
-        self._heard: SimpleQueue[Report | Future[Answer] | str] = SimpleQueue()
+        self._reports: SimpleQueue[Report | Future[Answer] | str] = SimpleQueue()
 
     def __enter__(self) -> Self:
         """Raises OrderFailedError if the robot cannot be reached."""
-        self._process = OwnerProcess(self._opening, self._heard.put, self._heard.put)
+        self._process = OwnerProcess(self._opening, self._reports.put, self._reports.put)
         try:
-            while not isinstance(report := self._heard.get(), Opened):
+            while not isinstance(report := self._reports.get(), Opened):
                 _require_opening(report)
         except BaseException:
             self._close()
@@ -227,37 +227,37 @@ class OwnerOnDemand:
             raise OrderFailedError("stopped before it began (by Ctrl-C); nothing moved", exit_codes.STOPPED)
         return self._process.ask(kind, asked=time.monotonic(), **fields)
 
-    def tell(self, order: Order) -> None:
+    def send(self, order: Order) -> None:
         """Sends an order that has no answer."""
         self._process.send(order)
 
-    def answer_to(self, asked: Future[Answer], heard: Callable[[Report], None] = lambda _report: None) -> Answer:
-        """Waits for an answer and calls `heard` with every report that comes meanwhile. The answer may contain a
+    def answer_to(self, asked: Future[Answer], on_report: Callable[[Report], None] = lambda _report: None) -> Answer:
+        """Waits for an answer and calls `on_report` with every report that comes meanwhile. The answer may contain a
         problem.
 
         Raises OrderFailedError if the process has ended.
         """
-        asked.add_done_callback(self._heard.put)
-        while (report := self._heard.get()) is not asked:
-            self._pass_on(report, heard)
+        asked.add_done_callback(self._reports.put)
+        while (report := self._reports.get()) is not asked:
+            self._pass_on(report, on_report)
         try:
             return asked.result()
         except OwnerGoneError as error:
             raise _gone(error.why) from error
 
-    def hear(self, heard: Callable[[Report], None], within: float) -> None:
-        """Calls `heard` with every report that comes within `within` s. Raises OrderFailedError if the process
+    def listen(self, on_report: Callable[[Report], None], within: float) -> None:
+        """Calls `on_report` with every report that comes within `within` s. Raises OrderFailedError if the process
         fails."""
         until = time.monotonic() + within
         while (left := until - time.monotonic()) > 0:
             with contextlib.suppress(Empty):
-                self._pass_on(self._heard.get(timeout=left), heard)
+                self._pass_on(self._reports.get(timeout=left), on_report)
 
-    def _pass_on(self, report: Report | Future[Answer] | str, heard: Callable[[Report], None]) -> None:
+    def _pass_on(self, report: Report | Future[Answer] | str, on_report: Callable[[Report], None]) -> None:
         if isinstance(report, CannotOpen):
             _require_opening(report)
         elif not isinstance(report, Future | str):
-            heard(report)
+            on_report(report)
 
     def ask(self, kind: Callable[..., Any], **fields: object) -> dict[str, Any]:
         """Sends an order and returns the data of its answer. Raises OrderFailedError."""
@@ -266,12 +266,12 @@ class OwnerOnDemand:
     def run(
         self,
         spec: ExperimentSpec,
-        heard: Callable[[Report], None] = lambda _report: None,
+        on_report: Callable[[Report], None] = lambda _report: None,
         *,
         moves_real_arm: bool = False,
     ) -> Finished:
         """Runs an experiment. Raises OrderFailedError if it left no trace."""
-        return end_of(self.answer_to(self.begin(RunExperiment, spec=spec, moves_real_arm=moves_real_arm), heard))
+        return end_of(self.answer_to(self.begin(RunExperiment, spec=spec, moves_real_arm=moves_real_arm), on_report))
 
     def _close(self) -> None:
         if not self._process.close(OWN_GRACE):

@@ -87,19 +87,19 @@ class Guardian:
         """Stops the arm on request of this process. For any thread."""
         return self._end(EndCause.STOP)
 
-    def clear_cause(self, asked: float) -> bool:
-        """Clears the cause of the last stop, for a reset that was requested at `asked` (monotonic clock, s). Returns
+    def clear_cause(self, requested_at: float) -> bool:
+        """Clears the cause of the last stop, for a reset made at `requested_at` (monotonic clock, s). Returns
         False and clears nothing if a newer stop came after that request."""
         with self._lock:
-            if self.is_older_than_stop(asked):
+            if self.is_older_than_stop(requested_at):
                 return False
             self._cause = None
             return True
 
-    def is_older_than_stop(self, asked: float) -> bool:
-        """Whether a request made at `asked` (monotonic clock, s) is older than the end of the newest stop. Its sender
-        could not know of that stop."""
-        return self._last_stop_done >= asked
+    def is_older_than_stop(self, requested_at: float) -> bool:
+        """Whether a request made at `requested_at` (monotonic clock, s) is older than the end of the newest stop. Its
+        sender could not know of that stop."""
+        return self._last_stop_done >= requested_at
 
     def __enter__(self) -> Self:
         self._wake_read, self._wake_write = os.pipe()

@@ -94,19 +94,19 @@ class Inbox:
             self._long -= 1
 
     def _read_all(self) -> None:
-        told = False
+        end_reported = False
         try:
             while line := self._input.readline(LONGEST_ORDER):
                 order = ORDER.validate_json(line)
                 if isinstance(order, Close):
-                    told = True
+                    end_reported = True
                     break
                 self._put(order)
         finally:
             self.closing.set()
             self.finish.set()
             self._waiting.put(None)
-            self._leave(told)
+            self._leave(end_reported)
 
     def _put(self, order: Order) -> None:
         match order:
@@ -137,9 +137,9 @@ class Inbox:
             if self._long:
                 os.write(self._to_guardian, said)
 
-    def _leave(self, told: bool) -> None:
+    def _leave(self, end_reported: bool) -> None:
         """Makes the guardian end the work. To the guardian, the end of its pipe means that the client has died."""
-        if told:
+        if end_reported:
             self._end_what_runs(STOP)
         elif self._long:
             os.close(self._to_guardian)

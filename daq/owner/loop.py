@@ -39,7 +39,7 @@ class _BetweenAttempts:
         """Returns True if the client returns the port, or this process must end."""
         until = time.monotonic() + timeout
         while not _leaving(self.robot):
-            self.robot.tell_arm()
+            self.robot.report_arm()
             order = self.robot.inbox.take(max(0.0, min(1.0, until - time.monotonic())))
             if order is not None:
                 _refuse(self.robot, order, _being_tried(self.robot), ReachError.exit_code)
@@ -80,7 +80,7 @@ def serve(robot: OwnedRobot) -> None:
                 last = None
             except (LinkError, NoSampleError) as error:
                 _link_lost(robot, str(error))
-            robot.tell_arm()
+            robot.report_arm()
 
 
 def _watch(robot: OwnedRobot, last: int | None) -> int:
@@ -98,7 +98,7 @@ def _carry_out(robot: OwnedRobot, order: LongOrder | QuickOrder) -> None:
         answer = long_orders.answered_quickly(robot, order)
         # Report before answering: a client that knows of the reset may resume the queue at once. Report even an
         # unchanged state: the service may have noted a stop that this process never reported.
-        robot.tell_arm(anew=True)
+        robot.report_arm(anew=True)
         robot.speaker.ended(answer)
         return
     try:
@@ -106,7 +106,7 @@ def _carry_out(robot: OwnedRobot, order: LongOrder | QuickOrder) -> None:
             raise ReachError(_being_tried(robot))
         require_current(robot, order, BEGINS_WITHIN)
         robot.activity = order.activity
-        robot.tell_arm()  # at once, so that the service refuses the orders that are not possible now
+        robot.report_arm()  # at once, so that the service refuses the orders that are not possible now
         answer = _moved(robot, order)
     except DaqError as error:
         answer = Answer(number=order.number, problem=str(error), exit_code=error.exit_code)
@@ -114,7 +114,7 @@ def _carry_out(robot: OwnedRobot, order: LongOrder | QuickOrder) -> None:
         answer = Answer(number=order.number, problem=str(error), exit_code=exit_codes.WRONG_INPUT)
     robot.activity = "none"
     robot.inbox.done()
-    robot.tell_arm()
+    robot.report_arm()
     robot.speaker.ended(answer)
     if robot.opening.watched and not _is_away(robot):
         robot.read_gains()

@@ -48,7 +48,7 @@ class OwnedRobot:
 
         def listen(snapshot: BoardSnapshot) -> None:
             self.speaker.say(self.samples.sample(snapshot, time.monotonic()))
-            self.tell_arm()
+            self.report_arm()
 
         if self.opening.live:
             self.controller.listener = listen
@@ -102,7 +102,7 @@ class OwnedRobot:
         """Reports a line to the person who teaches the arm."""
         self.speaker.say(TeachingText(text=line))
 
-    def tell_arm(self, *, anew: bool = False) -> None:
+    def report_arm(self, *, anew: bool = False) -> None:
         """Reports the arm's state if it has changed, once per second, or, with `anew`, always."""
         if not self.opening.live:
             return

@@ -81,12 +81,12 @@ def own(opening: Open, inbox: Inbox, speaker: Speaker, loaded: Callable[[], None
         serve(robot)
 
 
-def _identity(told: Identity) -> RobotIdentity:
+def _identity(identity: Identity) -> RobotIdentity:
     return RobotIdentity(
-        simulated=told.simulated,
-        protocol=told.version,
-        period=told.period_s,
-        boots=told.boots,
-        samples=told.keeps_samples,
-        compact=Capability.COMPACT in told.capabilities,
+        simulated=identity.simulated,
+        protocol=identity.version,
+        period=identity.period_s,
+        boots=identity.boots,
+        samples=identity.keeps_samples,
+        compact=Capability.COMPACT in identity.capabilities,
     )

@@ -25,7 +25,7 @@ class Speaker:
     """
 
     def __init__(self, output: int) -> None:
-        self.untold = 0
+        self.dropped = 0
         """Number of reports that were dropped."""
         self._output = output
         self._queue: queue.Queue[BaseModel | None] = queue.Queue(WAITING_REPORTS)
@@ -61,7 +61,7 @@ class Speaker:
         try:
             self._queue.put_nowait(report)
         except queue.Full:
-            self.untold += 1
+            self.dropped += 1
 
     def _write(self, data: bytes) -> None:
         # Bypass Python's buffer: it would retry unwritten data at exit, and report the error.

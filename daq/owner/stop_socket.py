@@ -182,16 +182,16 @@ def request_stop(robot: str | None = None, process: int | None = None) -> list[S
 
     Sockets of dead processes are removed and not counted.
     """
-    asked = []
+    sent = []
     for folder in runtime_folders():
         if not _is_own(folder):
             continue
         for path in sorted(folder.glob("*.sock")):
             name, _, owner = path.stem.rpartition("-")
             if robot in (None, name) and (process is None or owner == str(process)):
-                asked += _ask(path)
+                sent += _ask(path)
     attempts = []
-    for path, connection, begun in asked:
+    for path, connection, begun in sent:
         with connection:
             answer, gone = _answer(connection)
         if not gone:

@@ -157,21 +157,21 @@ def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) 
     begun = run.controller.link.mark()
     with writer, run.control.frozen_on_error():
         for change in changes:
-            follower.tell("gains", change.message)
+            follower.report("gains", change.message)
         if record.gains is None:
-            follower.tell("note", GAINS_UNKNOWN)
+            follower.report("note", GAINS_UNKNOWN)
         if rate.every > run.controller.link.scale.every:
-            follower.tell("note", f"{SLOW_LINE}{rate.in_words}")
+            follower.report("note", f"{SLOW_LINE}{rate.in_words}")
         ending = follower.follow(prepared.motion, _progress(run.listener, prepared.motion))
         if ending.kind == "finished":
             ending = _finish(run, changes)
         if ending.kind != "finished":
             for change in changes:
-                follower.tell("gains", change.kept_message)
+                follower.report("gains", change.kept_message)
             if ending.kind != "lost":
                 follower.observe(round(AFTERMATH / run.controller.period_s))
         if follower.late_set_points:
-            follower.tell("note", late_set_points_line(follower.late_set_points))
+            follower.report("note", late_set_points_line(follower.late_set_points))
         outcome = _outcome(ending, run.stop_requests.interrupted())
         counters = run.controller.link.counters_since(begun).numbers()
         if follower.late_set_points is not None:

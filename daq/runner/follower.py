@@ -127,11 +127,11 @@ class Follower:
                 if until is not None and row.tick >= until:
                     break
         except ControllerRestartedError as error:
-            self.tell("restart", str(error))
+            self.report("restart", str(error))
         except HardwareFaultError as error:
-            self.tell("fault", str(error))
+            self.report("fault", str(error))
         except (LinkError, NoSampleError) as error:
-            self.tell("link_lost", str(error))
+            self.report("link_lost", str(error))
 
     def follow(self, plan: Plan, progress: Callable[[int], None]) -> Ending:
         """Plays `plan` from its first set point, where the arm's set points already are, to its last.
@@ -151,7 +151,7 @@ class Follower:
         except HardwareFaultError as error:
             return self._halted(Event.TRIP, "fault", "fault", str(error))
 
-    def tell(self, kind: EventKind, message: str) -> None:
+    def report(self, kind: EventKind, message: str) -> None:
         """Reports an event at the last row's time, or at the beginning if there is no row."""
         time, tick = (0.0, None) if self.last is None else (self.last.time, self.last.tick)
         self._observer.event(time, kind, message, tick)
@@ -216,7 +216,7 @@ class Follower:
     def _tell_retries(self) -> None:
         retries = self._controller.counters.retries
         if retries != self._retries:
-            self.tell("retry", f"{retries - self._retries} requests had to be repeated")
+            self.report("retry", f"{retries - self._retries} requests had to be repeated")
             self._retries = retries
 
     def _judge(self, verdict: Verdict, row: SampleRow) -> Ending | None:
@@ -236,9 +236,9 @@ class Follower:
     ) -> Ending:
         """Freezes the arm before it reports, so that no listener can delay the freeze."""
         confirmation = self._control.handle(event, cause)
-        self.tell(told_as, cause)
+        self.report(told_as, cause)
         if confirmation is not None:
-            self.tell("note", stop_line(confirmation))
+            self.report("note", stop_line(confirmation))
             if not confirmation.acknowledged:
                 cause = f"{cause}; {stop_line(confirmation)}"
         return Ending(ending, cause)

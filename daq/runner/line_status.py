@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from daq.contracts.service.robot import LinkStatus, RobotIdentity, SampleRate
-from daq.driver.line_rate import LineRate, bound_ms, stop_latency_s, told_rates
+from daq.driver.line_rate import LineRate, bound_ms, reported_rates, stop_latency_s
 
 
 def with_rates(link: LinkStatus, bytes_per_second: float, identity: RobotIdentity) -> LinkStatus:
@@ -11,7 +11,7 @@ def with_rates(link: LinkStatus, bytes_per_second: float, identity: RobotIdentit
     if not identity.samples:
         return link.model_copy(update={"stop_seconds": stop_latency_s(bytes_per_second)})
     rates = tuple(
-        _wire(rate) for rate in told_rates(bytes_per_second, identity.period, can_be_compact=identity.compact)
+        _wire(rate) for rate in reported_rates(bytes_per_second, identity.period, can_be_compact=identity.compact)
     )
     return link.model_copy(update={"rates": rates, "stop_seconds": stop_latency_s(bytes_per_second)})
 
@@ -20,10 +20,10 @@ def rates_line(link: LinkStatus) -> str:
     """Returns a line for people; empty if nothing is known."""
     if not link.rates or link.stop_seconds is None:
         return ""
-    told = ", ".join(
+    rates = ", ".join(
         f"{rate.joints} joint{'s' * (rate.joints > 1)} {rate.samples_per_second:.3g}" for rate in link.rates
     )
-    return f"samples per second on this line: {told}; a stop takes up to {bound_ms(link.stop_seconds)} ms"
+    return f"samples per second on this line: {rates}; a stop takes up to {bound_ms(link.stop_seconds)} ms"
 
 
 def _wire(rate: LineRate) -> SampleRate:

@@ -149,7 +149,7 @@ def jog(
     jogger = Jogger(machine, limits, arm.joints, arm.every)
     guards = RunningGuards(machine, limits, arm.joints, moving=arm.joints, every=arm.every)
     lag = Lag(control_period(machine), arm.every)
-    told: tuple[str, ...] = ()
+    reported: tuple[str, ...] = ()
     with arm.driven():
         while not ended():
             row = arm.next_sample()
@@ -159,9 +159,9 @@ def jog(
                 raise arm.freeze_for_stop(verdict.stop)
             if verdict.trips:
                 raise arm.freeze_for_fault("; ".join(verdict.trips))
-            if step.refused != told:
-                told = step.refused
-                for line in told:
+            if step.refused != reported:
+                reported = step.refused
+                for line in reported:
                     tell(line)
             if step.postures and not verdict.hold:
                 arm.set_points(step.postures)

@@ -57,5 +57,5 @@ def check(
     if found:
         print_record(found)
     else:
-        print(f"nothing is doubted in {len(read)} trace{'' if len(read) == 1 else 's'}")
+        print(f"no doubts about {len(read)} trace{'' if len(read) == 1 else 's'}")
     end_if_doubted(found)

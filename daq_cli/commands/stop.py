@@ -60,7 +60,8 @@ def stop(
 
 
 def _is_unknown(call: Invocation) -> bool:
-    """Whether the command line names a robot that is not configured here. In doubt it is: then all are stopped."""
+    """Whether the command line names a robot that is not configured here. If that is unclear, the name counts
+    as unknown, and all robots are stopped."""
     if call.robot_option is None or call.port_option is not None:
         return False
     try:

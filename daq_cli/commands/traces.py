@@ -270,7 +270,7 @@ def _print_imported(robot: RobotAccess, file: Path) -> None:
     except ImportError:  # a plain installation reads traces but computes nothing
         return
     doubts = lines_of(doubts_in(check_records(base_model(machine), [trace])))
-    for line in doubts or ["nothing is doubted"]:
+    for line in doubts or ["no doubts"]:
         print_prose(line, "CHECK  " if doubts else "check: ", err=True)
     typer.echo(printable(f"next: daq {'check' if doubts else 'diagnose'} {file}"), err=True)
 

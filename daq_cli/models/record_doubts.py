@@ -42,7 +42,7 @@ def stop_if_doubted(
         print_json({"record": [finding.model_dump(mode="json") for finding in found]})
     else:
         print_record(found)
-    console().print("nothing is computed of a doubted record; --despite-doubts computes all the same")
+    console().print("nothing is computed, since the check raises doubts; --despite-doubts computes anyway")
     end_if_doubted(found)
 
 

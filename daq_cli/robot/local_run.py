@@ -25,10 +25,10 @@ def acquire_locally(
         raise SpecError(f"folder {str(folder)!r}: a trace's folder has a name of printable characters")
     with owned(call, machine, consent, folder, moves=True) as owner, run_display(spec) as display:
 
-        def heard(report: Report) -> None:
+        def on_report(report: Report) -> None:
             if isinstance(report, Progress):
                 display.progress(report.fraction, report.text)
             elif isinstance(report, EventHappened):
                 display.event(report.event.kind, report.event.time, report.event.message)
 
-        return owner.run(spec, heard, moves_real_arm=not owner.identity.simulated)
+        return owner.run(spec, on_report, moves_real_arm=not owner.identity.simulated)

@@ -46,7 +46,7 @@ class _Seen:
     first: LiveSample | None = None
     newest: LiveSample | None = None
 
-    def hear(self, report: Report) -> None:
+    def on_report(self, report: Report) -> None:
         """Handles a report."""
         if isinstance(report, TeachingText):
             self.tell(report.text)
@@ -72,10 +72,10 @@ class _Driven:
         self.seen = _Seen(self.line.tell)
 
     def jog(self, velocities: Mapping[int, float]) -> None:
-        self.owner.tell(JogDrive(velocities=dict(velocities), said=time.monotonic()))
+        self.owner.send(JogDrive(velocities=dict(velocities), said=time.monotonic()))
 
     def set_gripper(self, *, closed: bool) -> None:
-        answer = self.owner.answer_to(self.owner.begin(MoveGripper, closed=closed), self.seen.hear)
+        answer = self.owner.answer_to(self.owner.begin(MoveGripper, closed=closed), self.seen.on_report)
         if answer.problem:
             self.line.tell(answer.problem)
 
@@ -84,9 +84,9 @@ class _Driven:
         return None if newest is None else dict(zip(newest.joints, newest.set_point, strict=True))
 
     def wait(self, seconds: float) -> None:
-        self.owner.hear(self.seen.hear, seconds)
+        self.owner.listen(self.seen.on_report, seconds)
         if self.jogging.done():
-            done(self.owner.answer_to(self.jogging, self.seen.hear))
+            done(self.owner.answer_to(self.jogging, self.seen.on_report))
 
 
 @dataclass(frozen=True)
@@ -102,21 +102,21 @@ class LocalTeaching:
         with open_keyboard() as keyboard, self._owned() as owner:
             jogging = owner.begin(JogBegin)
             drive_with_keys(_Driven(owner, jogging, line), keyboard, pendant, keep, line)
-            owner.tell(Finish())
+            owner.send(Finish())
             done(owner.answer_to(jogging))
 
     def perform(self, program: Program) -> str:
         """Plans and checks the program from the arm's present posture, and carries it out."""
         with self._owned() as owner:
             performing = owner.begin(RunProgram, program=program.model_dump(mode="json"))
-            return str(done(owner.answer_to(performing, _Seen(console().print).hear)).data["text"])
+            return str(done(owner.answer_to(performing, _Seen(console().print).on_report)).data["text"])
 
     def lead(self, joints: Sequence[int], seconds: float | None, keep: Callable[[RecordedPath], None]) -> None:
         """Records for `seconds` of the arm's time, or until Enter is pressed."""
         with self._owned() as owner:
             seen, leading = _Seen(console().print), owner.begin(LeadBegin, joints=tuple(joints))
             while seen.first is None and not leading.done():
-                owner.hear(seen.hear, LOOK_EVERY)
+                owner.listen(seen.on_report, LOOK_EVERY)
             if not leading.done():
                 announce_lead(seconds)
             while not leading.done():
@@ -125,10 +125,10 @@ class LocalTeaching:
                     if seconds is None
                     else seen.periods * owner.identity.period >= seconds
                 ):
-                    owner.tell(Finish())
+                    owner.send(Finish())
                     break
-                owner.hear(seen.hear, LOOK_EVERY)
-            answer = owner.answer_to(leading, seen.hear)
+                owner.listen(seen.on_report, LOOK_EVERY)
+            answer = owner.answer_to(leading, seen.on_report)
             if "path" in answer.data:
                 keep(RecordedPath.model_validate(answer.data["path"]))
             done(answer)

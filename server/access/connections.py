@@ -42,9 +42,9 @@ class Connection(HttpToolsProtocol):
     _reading_head = False
     _headers = 0
     """Number of headers of this request so far, including trailers."""
-    _head = 0
+    _parsed_head = 0
     """Number of bytes of this request's head that the parser has reported."""
-    _untold = 0
+    _received_head = 0
     """Number of bytes received of the head. The parser reports a header only when it is complete."""
     _silent = 0
     """Number of bytes since the parser's last report: it stores a trailer after the body until the trailer is
@@ -69,9 +69,9 @@ class Connection(HttpToolsProtocol):
         if self._refusal is not None:
             return
         if self._reading_head:
-            self._untold += len(data)
+            self._received_head += len(data)
         self._silent += len(data)
-        if max(self._untold if self._reading_head else 0, self._silent - len(data)) > LARGEST_HEAD:
+        if max(self._received_head if self._reading_head else 0, self._silent - len(data)) > LARGEST_HEAD:
             self._refusal = _too_large(f"address and headers have more than {LARGEST_HEAD >> 10} kB")
             self.send_400_response("")
             return
@@ -83,7 +83,7 @@ class Connection(HttpToolsProtocol):
         self._silent = 0
         super().on_message_begin()
         self.scope["state"]["arrived"] = time.monotonic()
-        self._reading_head, self._headers, self._head, self._untold = True, 0, 0, 0
+        self._reading_head, self._headers, self._parsed_head, self._received_head = True, 0, 0, 0
 
     def on_url(self, url: bytes) -> None:
         """Counts a part of the address. Raises ProblemError, which the parser converts to its own error."""
@@ -130,8 +130,8 @@ class Connection(HttpToolsProtocol):
         self.loop.call_later(LINGER, self.transport.close)
 
     def _count(self, size: int) -> None:
-        self._head += size
-        if self._head > LARGEST_HEAD:
+        self._parsed_head += size
+        if self._parsed_head > LARGEST_HEAD:
             self._refuse(_too_large(f"address and headers have more than {LARGEST_HEAD >> 10} kB"))
 
     def _refuse(self, problem: ProblemError) -> None:

@@ -1,4 +1,4 @@
-"""Cookies of signed-in people. Pure, without web framework and database, since the stop listener uses them too.
+"""Cookies of signed-in people, without web framework and database, since the stop listener uses this module too.
 
 Browsers do not distinguish the ports of a host in cookies. The cookie names therefore contain the port at which people
 reach the service, which separates the sessions of two services on one host.
@@ -15,8 +15,8 @@ TLS_PREFIX = "__Host-"
 """Prefix of a cookie name that browsers accept from its host over TLS only. On loopback, names have no prefix."""
 SESSION, SIGN_IN = "daq-session", "daq-sign-in"
 STOPS_FOR = 3600.0
-"""Time (s) for which an ended session may still stop the robot, and nothing else: nobody must find at the wrong moment
-that they have to sign in again. After signing out, a session stops nothing."""
+"""Time (s) for which an expired session may still stop the robot, and do nothing else: nobody should have to sign in
+again before stopping the robot. A session that was signed out stops nothing."""
 
 
 def session_cookie(address: str | None) -> str:
@@ -43,8 +43,8 @@ def session_of(headers: Mapping[str, str], cookie: str) -> str:
 
 
 def says_where_it_is_from(headers: Mapping[str, str]) -> bool:
-    """Whether a browser states which page a request is for. All browsers do this for requests that change something, so
-    a request with a session but without it does not come from our page."""
+    """Whether the headers state from which page the request comes. All browsers state it in requests that change
+    something. A request with a session cookie and without these headers therefore does not come from our page."""
     return "origin" in headers or "sec-fetch-site" in headers
 
 

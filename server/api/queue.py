@@ -60,7 +60,7 @@ def resume_queue(
     arrived: Arrived,
     caller: Operator,
 ) -> QueueStatus:
-    """Resumes the queue. The operator thereby consents that it moves the robot. A real arm needs `moves_real_arm`."""
+    """Resumes the queue. With this, the operator consents to motion. A real arm needs `moves_real_arm`."""
     rig.require_consent(request.moves_real_arm, "is its workspace clear? then resume with moves_real_arm")
     rig.queue.resume(caller.name, moves_real_arm=request.moves_real_arm, asked=arrived)
     return rig.queue.status()

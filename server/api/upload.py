@@ -32,7 +32,7 @@ LOOK_EVERY = 4 << 20
 LARGEST_MODEL = 16 << 20
 """Largest size (bytes) of a model file: a saved fit contains its curves, too."""
 ADVICE = {
-    "not-a-trace": "docs/traces.md tells what a trace looks like",
+    "not-a-trace": "docs/traces.md describes traces",
     "not-a-model": "send a file as `daq fit` writes it",
 }
 

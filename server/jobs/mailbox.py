@@ -73,7 +73,7 @@ class Mailbox:
 
     # ---- the worker's side
 
-    def tell(self, fraction: float, text: str, *, at_once: bool = False) -> None:
+    def report(self, fraction: float, text: str, *, at_once: bool = False) -> None:
         """Reports progress, as `daq.contracts.progress.Progress`. Reports that follow too soon are dropped, unless
         `at_once` is set, for the start of a long stage."""
         now = time.monotonic()
@@ -89,7 +89,7 @@ class Mailbox:
     def tell_leading(self, leading: tuple[LeadingEffect, ...]) -> None:
         """Reports the leading candidates at once."""
         self._now = replace(self._now, leading=leading)
-        self.tell(self._now.fraction, self._now.text, at_once=True)
+        self.report(self._now.fraction, self._now.text, at_once=True)
 
     def is_set(self) -> bool:
         """Whether the job must end, as `daq.contracts.progress.Cancel`."""

@@ -62,7 +62,7 @@ class Ended:
 def carry_out(folder: Path) -> Ended:
     """Carries out the job in a folder. Errors for the user are returned, not raised."""
     mailbox = Mailbox(folder)
-    mailbox.tell(0.0, "reading")
+    mailbox.report(0.0, "reading")
     task = Task.model_validate(mailbox.read(REQUEST))
     try:
         with missing_extras_named(f"a job of the kind {task.request.kind}", "model"):
@@ -217,7 +217,7 @@ class _Worker:
         if controlled and all(trace.set_point is not None for trace in (*traces, *held)):
             models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
             comparison = self._compared(models, [*traces, *held], found.holdout, DIAGNOSIS_SHARE, MAP_SHARE)
-            self.mailbox.tell(MAP_SHARE, "locating where the model as given disagrees", at_once=True)
+            self.mailbox.report(MAP_SHARE, "locating where the model as given disagrees", at_once=True)
             given = where_given(begin, [t for t in (*traces, *held) if t.record.trace_id in found.traces])
         before = found.model_before
         changed = found.model_after.with_lineage(before.lineage).identity != before.identity
@@ -273,7 +273,7 @@ class _Worker:
         """Reports a stage's progress as part of the job's. The end of a stage is left out, since the next stage reports
         its start."""
         if fraction < 1:
-            self.mailbox.tell(begin + (end - begin) * fraction, text)
+            self.mailbox.report(begin + (end - begin) * fraction, text)
 
     def _keep_model(self, model: Model) -> None:
         self.mailbox.write_text(MODEL, model.model_dump_json(indent=1) + "\n")
@@ -281,7 +281,7 @@ class _Worker:
     def _done(self, result: JobResult, report: Report, headline: str, model: Model | None = None) -> Ended:
         from model.reports.page import html
 
-        self.mailbox.tell(REPORT_SHARE, "writing the report", at_once=True)
+        self.mailbox.report(REPORT_SHARE, "writing the report", at_once=True)
         self.mailbox.write_text(REPORT, html(report))
         self.mailbox.write_text(RESULT, result.model_dump_json())
         return Ended(model=None if model is None else model.identity, headline=headline)

@@ -111,7 +111,7 @@ class QueueService:
             if running is not None and running.id == identity:
                 running.cancelled_by = by
                 if running.answer is not None:
-                    self._context.robot.tell(HaltRun())
+                    self._context.robot.send(HaltRun())
                 return self.with_progress(self._context.experiments.get(name, identity))
         found = self._context.experiments.cancel_waiting(name, identity, self._context.clock.utc(), by)
         self._context.record_event("experiment", "cancelled", actor=by, experiment=identity)
@@ -512,7 +512,7 @@ class QueueService:
                     running = self._running
                     if running is not None and running.cancelled_by is None:
                         running.cancelled_by = "the service: no operator confirmed to be present"
-                        self._context.robot.tell(HaltRun())
+                        self._context.robot.send(HaltRun())
 
     def _with_stop_reason(self, ending: Ending, running: Running | None) -> Ending:
         """Returns the ending with the reason of a stop: who cancelled the run, or the end of the service."""

@@ -158,7 +158,7 @@ class ControlService:
         if self._lease is None or not _same(self._lease.secret, secret):
             raise conflict("control-lost", "you no longer have control of the robot", "take control again")
         if not self._lease.holds(now):
-            line = f"you lost control of the robot: nothing was heard of this client for {LEASE_TIME:g} s"
+            line = f"you lost control of the robot: this client has sent nothing for {LEASE_TIME:g} s"
             raise conflict("control-lost", line, "take control again")
         return self._lease
 

@@ -203,7 +203,7 @@ class Robot:
                 raise ReachError(f"robot {self.name} is not connected")
             return self._owner.ask(kind, **fields)
 
-    def tell(self, order: Order) -> None:
+    def send(self, order: Order) -> None:
         """Sends an order that has no answer. It is dropped if the robot is not connected."""
         owner = self._owner
         if owner is not None:

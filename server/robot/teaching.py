@@ -40,7 +40,7 @@ IF_A_LEAD_GOES_ON = (
 )
 
 _HELD = {"stopped": "stopped", "fault": "at fault"}
-"""States in which it moves only after a reset, in words."""
+"""States in which the arm moves only after a reset, in words."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class TeachingService:
                 return
             if self._under_way is None or self._under_way[0] != "jog":
                 self._begin(Word(said), "jog", JogBegin)
-            self._robot.tell(JogDrive(velocities=velocities, said=said))
+            self._robot.send(JogDrive(velocities=velocities, said=said))
 
     def perform(self, word: Word, program: Program, activity: Literal["program", "step"] = "program") -> None:
         """Begins a taught program. Raises a 409 during another teaching activity, or without control."""
@@ -110,7 +110,7 @@ class TeachingService:
             under_way = self._under_way
             if under_way is None or under_way[0] not in ("jog", "lead"):
                 return
-            self._robot.tell(Finish())
+            self._robot.send(Finish())
             leading = under_way[0] == "lead"
             within = self._lead_ends_within if leading else self._ends_within
             if not self._changed.wait_for(lambda: self._under_way is not under_way, within):
@@ -123,7 +123,7 @@ class TeachingService:
         with self._changed:
             under_way = self._under_way
         if under_way is not None:
-            self._robot.tell(Finish() if under_way[0] in ("jog", "lead") else HaltRun())
+            self._robot.send(Finish() if under_way[0] in ("jog", "lead") else HaltRun())
 
     def status(self) -> TeachingStatus:
         """Returns the status of teaching now."""

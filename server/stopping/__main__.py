@@ -2,8 +2,8 @@
 
 import gc
 
-gc.disable()  # collections would take half of the imports' time, and find nothing; `keep_steady` lets them begin
+gc.disable()  # garbage collection would take half of the import time; `keep_steady` enables it
 
-from server.stopping.process import main  # noqa: E402 - after that
+from server.stopping.process import main  # noqa: E402 - imported after gc.disable()
 
 raise SystemExit(main())

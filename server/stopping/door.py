@@ -68,10 +68,10 @@ class StopDoor:
     def set_owner(self, robot: str, process: int | None, terminal: Terminal | None) -> None:
         """Tells the listener which process owns the robot's port from now on."""
         known = None if terminal is None else (terminal.number, terminal.made, terminal.holder)
-        told = Owned(robot=robot, process=process, terminal=known)
+        owned = Owned(robot=robot, process=process, terminal=known)
         with self._lock:
-            self._owned[robot] = told
-            self._process.send(told)
+            self._owned[robot] = owned
+            self._process.send(owned)
 
     def set_tokens(self, callers: Mapping[str, Caller]) -> None:
         """Passes on the tokens that the service has read, by digest; also to a process that is restarted later."""
@@ -112,8 +112,8 @@ class StopDoor:
         descriptor = self._listener.fileno()
         process = self._process = Child("server.stopping", descriptors=[descriptor])
         process.send(self._begin.model_copy(update={"descriptor": descriptor}))
-        for told in self._owned.values():
-            process.send(told)
+        for owned in self._owned.values():
+            process.send(owned)
         for caller in self._joined.values():
             process.send(_joined(caller))
         return process

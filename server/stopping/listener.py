@@ -125,7 +125,7 @@ class _Server(ThreadingHTTPServer):
             try:
                 self.on_stop(name, found[name], asked)
             except Exception:  # the arm was stopped; the other arms and the client still need this thread
-                log.exception("stop listener: the stop of %s is not told", name)
+                log.exception("stop listener: cannot report the stop of %s", name)
 
         here = list(robots[:1])  # on this thread, so that one stop needs no further thread
         elsewhere: list[threading.Thread] = []

@@ -98,10 +98,10 @@ class Robots:
     def __init__(self, urls: dict[str, str]) -> None:
         self._reach = {name: Reach(name, url) for name, url in urls.items()}
 
-    def set_owner(self, told: Owned) -> None:
+    def set_owner(self, owned: Owned) -> None:
         """Notes which process owns the port now; it may be none."""
-        terminal = None if told.terminal is None else Terminal(*told.terminal)
-        self._reach[told.robot] = replace(self._reach[told.robot], owner=told.process, terminal=terminal)
+        terminal = None if owned.terminal is None else Terminal(*owned.terminal)
+        self._reach[owned.robot] = replace(self._reach[owned.robot], owner=owned.process, terminal=terminal)
 
     def names(self) -> tuple[str, ...]:
         """Returns the names of all robots."""

@@ -76,7 +76,7 @@ def _require_not_emptied(file: Path) -> None:
     lost. A missing file means a first start."""
     with suppress(OSError):  # SQLite's own error, later, has more details
         if file.stat().st_size == 0 and not file.with_name(f"{file.name}-wal").exists():
-            raise DamagedError(f"database {file}: is empty; {BRING_BACK}; without one, delete it to begin anew")
+            raise DamagedError(f"database {file}: is empty; {BRING_BACK}; or delete it to start with an empty database")
 
 
 class Store:

@@ -143,7 +143,7 @@ class ScheduleRequest(UserWire):
     @model_validator(mode="after")
     def _says_when(self) -> Self:
         if (self.every is None) == (self.cron is None):
-            raise ValueError("says nothing about when, or twice; give `every` or `cron`")
+            raise ValueError("give either `every` or `cron`")
         if self.zone is not None and self.cron is None:
             raise ValueError("`zone` is for `cron`; leave it out")
         _require_once(self)
@@ -220,7 +220,7 @@ class MotionMark(Wire):
 
 def _require_once(request: ExperimentRequest | ScheduleRequest) -> None:
     if request.preset is not None and "spec" in request.model_fields_set:
-        raise ValueError("says twice what to run; give `spec` or `preset`")
+        raise ValueError("give either `spec` or `preset`, not both")
 
 
 MotionPreview.model_rebuild()

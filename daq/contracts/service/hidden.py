@@ -1,4 +1,4 @@
-"""The demonstration: an effect that the mock hides, what a diagnosis makes of it, and the secret once it is opened."""
+"""The demonstration: the mock hides an effect, a diagnosis looks for it, and the service opens the secret."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from daq.contracts.service.base import Wire
 
 HiddenState = Literal["recording", "diagnosing", "opened", "failed"]
 Outcome = Literal["named", "among", "joint", "missed", "wrong"]
-"""`named`: alone and rightly; `among`: in the group that the answer gives; `joint`: only the joint is right;
-`missed`: nothing significant was found; `wrong`: anything else."""
+"""`named`: the answer names the effect and no other; `among`: the answer gives a group that contains the effect;
+`joint`: only the joint is right; `missed`: nothing significant was found; `wrong`: anything else."""
 
 
 class HideRequest(Wire):
-    """What to hide. Without `effect` or `joint`, the mock draws them, and nobody knows them."""
+    """The request to hide an effect. Without `effect` or `joint`, the mock draws them at random, unseen by anybody."""
 
     effect: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")] | None = None
     joint: JointNumber | None = None
 
 
 class HideChoice(Wire):
-    """An effect that can be hidden; no joints: it acts on the whole arm."""
+    """An effect that can be hidden. `joints` is empty if it acts on the whole arm."""
 
     effect: str
     called: str
@@ -31,8 +31,8 @@ class HideChoice(Wire):
 
 
 class HiddenNumber(Wire):
-    """A number of the hidden effect. `found`: the answer's, with its 95 % interval, where it has named the effect and
-    both count the same quantity."""
+    """A parameter of the hidden effect. `found` is the answer's value, with its 95 % interval from `low` to `high`. It
+    is set if the answer names the effect and both values are of the same quantity."""
 
     called: str
     unit: str
@@ -43,8 +43,8 @@ class HiddenNumber(Wire):
 
 
 class OpenedSecret(Wire):
-    """What was hidden, and how the answer compares. `python -m mock_controller.reveal SEED` prints `seed`'s secret, and
-    the SHA-256 of that line is the seal that was shown before."""
+    """The hidden effect, and how the answer compares. `python -m mock_controller.reveal SEED` prints the secret of
+    `seed` in one line. The SHA-256 of that line is the seal that was shown before."""
 
     seed: int
     effect: str
@@ -55,8 +55,8 @@ class OpenedSecret(Wire):
 
 
 class Hidden(Wire):
-    """One demonstration. Numbers of traces and jobs come as they are made: `comparison` simulates the machine file on
-    the trace while `diagnosis` looks for what is missing."""
+    """One demonstration. Identifiers of traces and jobs are set as these are created. The job `comparison` simulates
+    the machine file on the trace, while the job `diagnosis` looks for missing effects."""
 
     id: str
     state: HiddenState
@@ -64,7 +64,7 @@ class Hidden(Wire):
     seal: str = ""
     picked: HideRequest
     motion: float | None = None
-    """Duration (s) of the recorded motion. It was recorded faster than that, in lock-step."""
+    """Duration (s) of the recorded motion. Recording takes less time, since the mock runs in lock-step."""
     trace: str | None = None
     held_out: str | None = None
     comparison: str | None = None
@@ -76,7 +76,8 @@ class Hidden(Wire):
 
 
 class HidingPlace(Wire):
-    """Whether this robot's mock can hide effects (`problem` is empty then), which, and what it did last."""
+    """Effects that this robot's mock can hide, and the latest demonstration. If the mock can hide none, `problem` says
+    why; otherwise `problem` is empty."""
 
     problem: str
     choices: tuple[HideChoice, ...]
@@ -84,4 +85,4 @@ class HidingPlace(Wire):
     opened: int
     """Demonstrations since the service started."""
     named: int
-    """Those whose effect was named alone and rightly."""
+    """Demonstrations whose answer named the effect and no other."""

@@ -102,7 +102,7 @@ async def finish_login(services: ServicesDep, request: Request) -> Response:
     log.info("%s (%s) has signed in", caller.name, caller.role)
     await run_in_threadpool(services.signed_in, caller)  # it waits for a read of the database, which a stop must not
     note = _of_sign_in(request, caller, services)
-    services.tell(lambda part: part.acted(note))
+    services.notify_parts(lambda part: part.acted(note))
     answer = RedirectResponse(f"{HOME}?robot={way.robot}" if way.robot else HOME, 303)
     _forget_cookie(answer, services, sign_in_cookie(_address(services)))
     _set_cookie(answer, services, session_cookie(_address(services)), secret, int(lasts.total_seconds()), "strict")
@@ -172,7 +172,7 @@ def _told(request: Request, services: Services, problem: ProblemError) -> Respon
     Anybody can cause such problems without limit.
     """
     log.warning("sign-in: %s: %s", problem.kind, problem.detail)
-    services.tell(lambda part: part.refused(problem.kind))
+    services.notify_parts(lambda part: part.refused(problem.kind))
     note = AuditNote(
         at=services.clock.utc(),
         actor=None,
@@ -183,5 +183,5 @@ def _told(request: Request, services: Services, problem: ProblemError) -> Respon
         status=303,
         detail=problem.kind,
     )
-    services.tell(lambda part: part.acted(note, again=True))
+    services.notify_parts(lambda part: part.acted(note, again=True))
     return RedirectResponse(f"{HOME}?sign-in={problem.kind}", 303)

@@ -15,8 +15,8 @@ from daq.driver.line_rate import (
     bytes_of_a_snapshot,
     bytes_of_a_turn,
     line_rate,
+    reported_rates,
     stop_latency_s,
-    told_rates,
 )
 from daq.driver.tick_time import WINDOW_TICKS, TickTime
 from firmware_protocol import commands as c
@@ -180,10 +180,10 @@ def test_rates_are_told_with_joints_share_and_stop_for_one_for_three_and_for_all
         "25 samples per second of 3 joints, every 2nd control period, 74 % of the line; a stop takes up to 45 ms"
     )
     assert line_rate(11520, PERIOD, 1, 1).in_words.startswith("50 samples per second of 1 joint, every control period")
-    found = told_rates(1920, PERIOD, can_be_compact=True)
+    found = reported_rates(1920, PERIOD, can_be_compact=True)
     assert [(rate.joints, rate.moving) for rate in found] == [(1, 1), (3, 3), (6, 6)]
     assert found == tuple(line_rate(1920, PERIOD, joints, joints, can_be_compact=True) for joints in (1, 3, 6))
-    assert [rate.compact for rate in told_rates(1920, PERIOD, can_be_compact=False)] == [False] * 3
+    assert [rate.compact for rate in reported_rates(1920, PERIOD, can_be_compact=False)] == [False] * 3
 
 
 def test_a_stop_waits_for_the_largest_frame_and_ten_milliseconds_of_the_bridge() -> None:

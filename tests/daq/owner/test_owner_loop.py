@@ -105,7 +105,7 @@ def served(
     def take(_timeout: float) -> Any:
         return orders.get(next(numbers))
 
-    def tell_arm(**told: bool) -> None:
+    def report_arm(**told: bool) -> None:
         if anew is not None and told.get("anew"):
             anew.append(len(answers))
         states.append(str(control.arm.state))
@@ -118,7 +118,7 @@ def served(
         opening=SimpleNamespace(watched=True),
         controller=controller,
         control=control,
-        tell_arm=tell_arm,
+        report_arm=report_arm,
         read_gains=dict,
         activity="none",
         guardian=SimpleNamespace(cause=None, is_older_than_stop=lambda _asked: False),
@@ -374,5 +374,5 @@ def test_a_reader_that_does_not_read_costs_no_time(pipe: tuple[int, int], monkey
     with Speaker(writer) as speaker:
         for _ in range(200):  # 2 MB: no pipe takes that, nor do 50 waiting reports
             speaker.progress(0.5, text)
-        assert speaker.untold > 0
+        assert speaker.dropped > 0
         os.close(reader)

@@ -12,7 +12,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from daq.contracts.service.robot import LinkStatus, RobotIdentity
 from daq.driver import BoardSnapshot, Controller, StopConfirmation
-from daq.driver.line_rate import told_rates
+from daq.driver.line_rate import reported_rates
 from daq.runner.arm_control import ArmControl, StoppedError, stop_line
 from daq.runner.lag import OLDEST_TO_ACT_ON, Lag
 from daq.runner.line_status import rates_line, with_rates
@@ -268,7 +268,7 @@ def identity(**fields: bool) -> RobotIdentity:
 @pytest.mark.parametrize(("baud", "compact"), [(115200, False), (19200, False), (19200, True)])
 def test_a_status_has_the_rates_of_its_line_and_the_longest_time_of_a_stop(baud: int, compact: bool) -> None:
     found = with_rates(LINK, baud / 10, identity(compact=compact))
-    rates = told_rates(baud / 10, 0.02, can_be_compact=compact)
+    rates = reported_rates(baud / 10, 0.02, can_be_compact=compact)
     assert [(rate.joints, rate.every) for rate in found.rates] == [(rate.joints, rate.every) for rate in rates]
     assert [rate.samples_per_second for rate in found.rates] == [
         pytest.approx(50.0 / rate.every, abs=5e-4) for rate in rates

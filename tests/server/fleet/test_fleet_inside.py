@@ -69,6 +69,6 @@ def test_a_part_that_fails_keeps_news_neither_from_the_others_nor_from_the_servi
 ) -> None:
     listening = Listening()
     service: Any = SimpleNamespace(parts=[Broken(), listening])
-    Services.tell(service, lambda part: part.queue_paused("arm", "stopped"))
+    Services.notify_parts(service, lambda part: part.queue_paused("arm", "stopped"))
     assert listening.heard == ["arm: stopped"]
     assert "Broken" in caplog.text

@@ -62,7 +62,7 @@ class Arm:
         """As in addresses and rows."""
         return self.place.name
 
-    def tell(self, order: object) -> None:
+    def send(self, order: object) -> None:
         """An order without an answer."""
         self.orders.append(order)
 

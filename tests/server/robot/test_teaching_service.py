@@ -41,7 +41,7 @@ class Asked(Robot):
         self.answers.append(Future())
         return self.answers[-1]
 
-    def tell(self, order: Any) -> None:
+    def send(self, order: Any) -> None:
         """An order without."""
         self.orders.append(order)
         if isinstance(order, Finish):
