@@ -760,7 +760,7 @@ export interface paths {
         put?: never;
         /**
          * Resume Queue
-         * @description Resumes the queue. The operator thereby consents that it moves the robot. A real arm needs `moves_real_arm`.
+         * @description Resumes the queue. With this, the operator consents to motion. A real arm needs `moves_real_arm`.
          */
         post: operations["resume_queue"];
         delete?: never;
@@ -1417,6 +1417,31 @@ export interface paths {
         get: operations["list_audit"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/hidden": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Hiding Place
+         * @description Returns the effects that can be hidden, and the latest demonstration; its secret once the diagnosis has
+         *     answered.
+         */
+        get: operations["get_hiding_place"];
+        put?: never;
+        /**
+         * Hide Effect
+         * @description Hides an effect in a separate mock, records it in lock-step, and has it diagnosed. Only for robots on a mock.
+         */
+        post: operations["hide_effect"];
         delete?: never;
         options?: never;
         head?: never;
@@ -3495,6 +3520,105 @@ export interface components {
             };
         };
         /**
+         * Hidden
+         * @description One demonstration. Numbers of traces and jobs come as they are made: `comparison` simulates the machine file on
+         *     the trace while `diagnosis` looks for what is missing.
+         */
+        Hidden: {
+            /** Id */
+            id: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "recording" | "diagnosing" | "opened" | "failed";
+            /**
+             * Began
+             * Format: date-time
+             */
+            began: string;
+            /**
+             * Seal
+             * @default
+             */
+            seal?: string;
+            picked: components["schemas"]["HideRequest"];
+            /** Motion */
+            motion?: number | null;
+            /** Trace */
+            trace?: string | null;
+            /** Held Out */
+            held_out?: string | null;
+            /** Comparison */
+            comparison?: string | null;
+            /** Diagnosis */
+            diagnosis?: string | null;
+            /** Seconds */
+            seconds?: number | null;
+            /**
+             * Problem
+             * @default
+             */
+            problem?: string;
+            secret?: components["schemas"]["OpenedSecret"] | null;
+        };
+        /**
+         * HiddenNumber
+         * @description A number of the hidden effect. `found`: the answer's, with its 95 % interval, where it has named the effect and
+         *     both count the same quantity.
+         */
+        HiddenNumber: {
+            /** Called */
+            called: string;
+            /** Unit */
+            unit: string;
+            /** Hidden */
+            hidden: number;
+            /** Found */
+            found?: number | null;
+            /** Low */
+            low?: number | null;
+            /** High */
+            high?: number | null;
+        };
+        /**
+         * HideChoice
+         * @description An effect that can be hidden; no joints: it acts on the whole arm.
+         */
+        HideChoice: {
+            /** Effect */
+            effect: string;
+            /** Called */
+            called: string;
+            /** Joints */
+            joints: number[];
+        };
+        /**
+         * HideRequest
+         * @description What to hide. Without `effect` or `joint`, the mock draws them, and nobody knows them.
+         */
+        HideRequest: {
+            /** Effect */
+            effect?: string | null;
+            /** Joint */
+            joint?: number | null;
+        };
+        /**
+         * HidingPlace
+         * @description Whether this robot's mock can hide effects (`problem` is empty then), which, and what it did last.
+         */
+        HidingPlace: {
+            /** Problem */
+            problem: string;
+            /** Choices */
+            choices: components["schemas"]["HideChoice"][];
+            latest: components["schemas"]["Hidden"] | null;
+            /** Opened */
+            opened: number;
+            /** Named */
+            named: number;
+        };
+        /**
          * HistoryMessage
          * @description The last minutes, thinned without losing peaks. A signal has one row per joint; a missing value is None.
          */
@@ -4410,6 +4534,28 @@ export interface components {
             label: string;
             /** Start */
             start: string;
+        };
+        /**
+         * OpenedSecret
+         * @description What was hidden, and how the answer compares. `python -m mock_controller.reveal SEED` prints `seed`'s secret, and
+         *     the SHA-256 of that line is the seal that was shown before.
+         */
+        OpenedSecret: {
+            /** Seed */
+            seed: number;
+            /** Effect */
+            effect: string;
+            /** Joints */
+            joints: number[];
+            /** Called */
+            called: string;
+            /** Numbers */
+            numbers: components["schemas"]["HiddenNumber"][];
+            /**
+             * Outcome
+             * @enum {string}
+             */
+            outcome: "named" | "among" | "joint" | "missed" | "wrong";
         };
         /**
          * OutputRequest
@@ -8865,6 +9011,56 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Page_AuditEntry_"];
+                };
+            };
+        };
+    };
+    get_hiding_place: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HidingPlace"];
+                };
+            };
+        };
+    };
+    hide_effect: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["HideRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Hidden"];
                 };
             };
         };
