@@ -760,7 +760,7 @@ export interface paths {
         put?: never;
         /**
          * Resume Queue
-         * @description Resumes the queue. The operator thereby consents that it moves the robot. A real arm needs `moves_real_arm`.
+         * @description Resumes the queue. With this, the operator consents to motion. A real arm needs `moves_real_arm`.
          */
         post: operations["resume_queue"];
         delete?: never;
