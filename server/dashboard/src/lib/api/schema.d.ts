@@ -95,7 +95,7 @@ export interface paths {
         put?: never;
         /**
          * Disconnect Robot
-         * @description Disconnects, so that other programs can use the port. Refused while somebody else has control.
+         * @description Disconnects, so that other programs can use the port. Refused while another client has control.
          */
         post: operations["disconnect_robot"];
         delete?: never;
@@ -115,7 +115,7 @@ export interface paths {
         put?: never;
         /**
          * Stop Robot
-         * @description Freezes the arm at its measured posture at once. Anybody who may see the robot may stop it, without control.
+         * @description Freezes the arm at its measured posture at once. Everybody who may see the robot may stop it, without control.
          *
          *     Unless the answer is `confirmed`, use the emergency stop. Only a reset ends the freeze.
          */
@@ -139,7 +139,7 @@ export interface paths {
          * Reset Robot
          * @description Resets the arm after a stop or a fault. Nothing moves; the queue stays paused until it is resumed.
          *
-         *     It ends the stop that it names, `stop` of the robot's status, and is refused if another one has come since.
+         *     Ends the stop that the request names (`stop` of the robot's status). Refused if there is a newer stop.
          */
         post: operations["reset_robot"];
         delete?: never;
@@ -177,7 +177,7 @@ export interface paths {
         };
         /**
          * Get Fleet
-         * @description Returns the state of every robot at a glance, with the age of its newest sample.
+         * @description Returns an overview of every robot, with the age of its newest sample.
          */
         get: operations["get_fleet"];
         put?: never;
@@ -199,7 +199,7 @@ export interface paths {
         put?: never;
         /**
          * Stop Fleet
-         * @description Freezes every arm of this service at once. Anybody who may see the robots may stop them, without control.
+         * @description Freezes every arm of this service at once. Everybody who may see the robots may stop them, without control.
          *
          *     Unless the answer is `confirmed`, use the emergency stops. Only a reset of each arm ends its freeze.
          */
@@ -303,7 +303,7 @@ export interface paths {
         };
         /**
          * Get Teaching
-         * @description Returns the teaching activity under way, and how the last one ended.
+         * @description Returns the current teaching activity, and how the last one ended.
          */
         get: operations["get_teaching"];
         put?: never;
@@ -325,7 +325,7 @@ export interface paths {
         put?: never;
         /**
          * Jog Robot
-         * @description Drives joints for at most 0.3 s. While a key is held, the client repeats this about ten times a second.
+         * @description Drives joints for at most 0.3 s. While a key is held, the client repeats this about ten times per second.
          */
         post: operations["jog_robot"];
         delete?: never;
@@ -385,7 +385,8 @@ export interface paths {
         put?: never;
         /**
          * Lead Robot
-         * @description Starts recording a path while the arm is led by hand. HOLD THE ARM: the led joints have no drive and sink.
+         * @description Starts recording a path while the arm is guided by hand. HOLD THE ARM: the guided joints have no drive and
+         *     sink.
          */
         post: operations["lead_robot"];
         delete?: never;
@@ -405,7 +406,7 @@ export interface paths {
         put?: never;
         /**
          * Finish Teaching
-         * @description Ends jogging or leading; the answer holds the recorded path.
+         * @description Ends jogging or hand guiding; the answer contains the recorded path.
          */
         post: operations["finish_teaching"];
         delete?: never;
@@ -465,7 +466,7 @@ export interface paths {
         };
         /**
          * List Programs
-         * @description Lists the stored programs, the last changed first.
+         * @description Lists the stored programs, most recently changed first.
          */
         get: operations["list_programs"];
         put?: never;
@@ -485,21 +486,21 @@ export interface paths {
         };
         /**
          * Get Program
-         * @description Returns one program with its revision, which a change has to name.
+         * @description Returns one program with its revision, which a change must state.
          */
         get: operations["get_program"];
         /**
          * Put Program
          * @description Stores a program, or a change to its `revision`. Moves nothing and needs no control.
          *
-         *     A body with another name than the address renames the program. A program that somebody else has changed meanwhile
-         *     is not overwritten (409).
+         *     A body with another name than the path renames the program. A program that another client has changed meanwhile is
+         *     not overwritten (409).
          */
         put: operations["put_program"];
         post?: never;
         /**
          * Delete Program
-         * @description Deletes a program for good.
+         * @description Deletes a program permanently.
          */
         delete: operations["delete_program"];
         options?: never;
@@ -518,7 +519,7 @@ export interface paths {
         put?: never;
         /**
          * Run Stored Program
-         * @description Runs a stored program, as POST …/teaching/program runs one that is sent.
+         * @description Runs a stored program, like POST …/teaching/program.
          */
         post: operations["run_stored_program"];
         delete?: never;
@@ -592,7 +593,7 @@ export interface paths {
         head?: never;
         /**
          * Change Experiment
-         * @description Changes an experiment that still waits: one's own, or, for owners of the robot, anybody's.
+         * @description Changes a waiting experiment: the caller's own or, for owners of the robot, anybody's.
          *
          *     A new specification is checked like that of a new experiment, and ends its approval.
          */
@@ -611,13 +612,14 @@ export interface paths {
          * Approve Experiment
          * @description Approves exactly this content of a waiting experiment, so that it may move a real arm.
          *
-         *     Whoever submitted or changed it cannot. It begins as soon as the queue lets it; a change ends the approval.
+         *     Nobody can approve an experiment that they submitted or changed. It begins as soon as the queue allows; a change
+         *     ends the approval.
          */
         put: operations["approve_experiment"];
         post?: never;
         /**
          * Withdraw Experiment Approval
-         * @description Ends the approval of an experiment that still waits. Every operator may.
+         * @description Withdraws the approval of a waiting experiment. Every operator may do this.
          */
         delete: operations["withdraw_experiment_approval"];
         options?: never;
@@ -636,9 +638,9 @@ export interface paths {
         put?: never;
         /**
          * Cancel Experiment
-         * @description Cancels an experiment: one's own, or, for owners of the robot, anybody's.
+         * @description Cancels an experiment: the caller's own or, for owners of the robot, anybody's.
          *
-         *     One that runs is ended by a stop: the arm is frozen and needs a reset.
+         *     A running experiment is ended by a stop: the arm is frozen and needs a reset.
          */
         post: operations["cancel_experiment"];
         delete?: never;
@@ -656,7 +658,7 @@ export interface paths {
         };
         /**
          * List Presets
-         * @description Lists the named experiments for the joints of this robot: to run as they are, or to start from.
+         * @description Lists the named experiments for the joints of this robot: to run unchanged, or as a start.
          */
         get: operations["list_presets"];
         put?: never;
@@ -738,7 +740,7 @@ export interface paths {
         put?: never;
         /**
          * Pause Queue
-         * @description Pauses the queue: no further experiment begins, and one that runs goes on.
+         * @description Pauses the queue: no further experiment begins, and a running one continues.
          */
         post: operations["pause_queue"];
         delete?: never;
@@ -828,14 +830,14 @@ export interface paths {
         post?: never;
         /**
          * Delete Schedule
-         * @description Deletes a schedule: one's own, or, for owners of the robot, anybody's. Its experiments are kept.
+         * @description Deletes a schedule: the caller's own or, for owners of the robot, anybody's. Its experiments are kept.
          */
         delete: operations["delete_schedule"];
         options?: never;
         head?: never;
         /**
          * Change Schedule
-         * @description Switches a schedule on or off: one's own, or, for owners of the robot, anybody's.
+         * @description Switches a schedule on or off: the caller's own or, for owners of the robot, anybody's.
          */
         patch: operations["change_schedule"];
         trace?: never;
@@ -856,7 +858,7 @@ export interface paths {
         post?: never;
         /**
          * Withdraw Schedule Approval
-         * @description Ends the approval of a schedule. Runs that wait keep theirs. Every operator may.
+         * @description Withdraws the approval of a schedule. Waiting runs keep theirs. Every operator may do this.
          */
         delete: operations["withdraw_schedule_approval"];
         options?: never;
@@ -883,14 +885,14 @@ export interface paths {
         put: operations["renew_control"];
         /**
          * Take Control
-         * @description Gives one client control of the robot. Without heartbeats it lapses: the arm holds and the queue is paused.
+         * @description Gives one client control of the robot. Without heartbeats control ends: the arm holds and the queue is paused.
          */
         post: operations["take_control"];
         /**
          * Give Control Back
-         * @description Gives control back. The arm holds its posture; a program that still runs is stopped.
+         * @description Returns control. The arm holds its posture; a running program is stopped.
          *
-         *     If experiments are waiting, the queue is paused until somebody resumes it.
+         *     If experiments are waiting, the queue is paused until a person resumes it.
          */
         delete: operations["give_control_back"];
         options?: never;
@@ -938,14 +940,14 @@ export interface paths {
         post?: never;
         /**
          * Delete Trace
-         * @description Deletes a trace for good. Refused while a model or a job uses it.
+         * @description Deletes a trace permanently. Refused while a model or a job uses it.
          */
         delete: operations["delete_trace"];
         options?: never;
         head?: never;
         /**
          * Change Trace
-         * @description Changes the tags or the notes, which the catalogue keeps: the file stays as it was recorded.
+         * @description Changes the tags or the notes in the catalogue: the file stays unchanged.
          */
         patch: operations["change_trace"];
         trace?: never;
@@ -1027,7 +1029,7 @@ export interface paths {
          * Submit Job
          * @description Queues a computation, which begins when a worker is free. The same Idempotency-Key returns the same job (200).
          *
-         *     Comparisons and validations of few traces have a worker of their own, so they never wait for a fit or a diagnosis.
+         *     Comparisons and validations of few traces have a separate worker, so they never wait for a fit or a diagnosis.
          */
         post: operations["submit_job"];
         delete?: never;
@@ -1071,7 +1073,7 @@ export interface paths {
         put?: never;
         /**
          * Cancel Job
-         * @description Cancels a job. One that runs ends within about a second.
+         * @description Cancels a job. A running job ends within about a second.
          */
         post: operations["cancel_job"];
         delete?: never;
@@ -1135,10 +1137,10 @@ export interface paths {
         put?: never;
         /**
          * Upload Model
-         * @description Imports a model file as written by `daq fit`.
+         * @description Imports a model file written by `daq fit`.
          *
-         *     The same file again is the same entry (200). Refused are models with user-defined effects, and models that name
-         *     traces which the service does not have.
+         *     The same file again is the same entry (200). Refused are models with user-defined effects, and models fitted to
+         *     traces that the service does not have.
          */
         post: operations["upload_model"];
         delete?: never;
@@ -1223,7 +1225,7 @@ export interface paths {
         post?: never;
         /**
          * Delete Model
-         * @description Deletes a model for good. Refused while another model was made from it.
+         * @description Deletes a model permanently. Refused while another model was made from it.
          */
         delete: operations["delete_model"];
         options?: never;
@@ -1421,6 +1423,31 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/robots/{robot}/hidden": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Hiding Place
+         * @description Returns the effects that can be hidden, and the latest demonstration; its secret once the diagnosis has
+         *     answered.
+         */
+        get: operations["get_hiding_place"];
+        put?: never;
+        /**
+         * Hide Effect
+         * @description Hides an effect in a separate mock, records it in lock-step, and has it diagnosed. Only for robots on a mock.
+         */
+        post: operations["hide_effect"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/fleet/experiments": {
         parameters: {
             query?: never;
@@ -1575,9 +1602,9 @@ export interface paths {
         };
         /**
          * Readyz
-         * @description Answers 200 while the database and the folder of a robot's traces can be written; none need be connected.
+         * @description Answers 200 while the database and the folders of traces are writable. The robots need not be connected.
          *
-         *     Callers who may see the robot get the details. The answer is up to a second old.
+         *     Callers who may see the robot get the details. The answer may be up to a second old.
          */
         get: operations["readyz"];
         put?: never;
@@ -1594,7 +1621,7 @@ export interface components {
     schemas: {
         /**
          * Absolute
-         * @description Joints to these angles (rad), all arriving together; `speed` (rad/s) is the fastest joint's (SAMOVE's RATE).
+         * @description Moves joints to these angles (rad), arriving together; `speed` (rad/s) is the fastest joint's (SAMOVE's RATE).
          */
         Absolute: {
             /**
@@ -1792,7 +1819,7 @@ export interface components {
         };
         /**
          * AwaitInput
-         * @description Waits until process input `line` (0–7) is on or off; the program ends in an error after `longest` s.
+         * @description Waits until process input `line` (0–7) is on or off; the program fails after `longest` s.
          */
         AwaitInput: {
             /**
@@ -2256,10 +2283,12 @@ export interface components {
         };
         /**
          * DiagnosisData
-         * @description A diagnosis (docs/diagnosis-json.md), and the traces beside simulations of the models before and after it, if
-         *     these can be simulated. `differences` are the parameters that changed, including those of added effects; `given` is
-         *     where the given model disagreed with the traces before anything was fitted. `efforts` are the traces' torques
-         *     (forces) beside those that both models predict from the motion, of a diagnosis in torques.
+         * @description A diagnosis (docs/diagnosis-json.md), and the traces with simulations of the models before and after it, if these
+         *     can be simulated.
+         *
+         *     `differences`: parameters that changed, including those of added effects. `given`: where the given model disagreed
+         *     with the traces before any fit. `efforts`: for a diagnosis by inverse dynamics, the traces' torques (forces) and
+         *     those that both models predict from the motion.
          */
         DiagnosisData: {
             /**
@@ -2403,7 +2432,7 @@ export interface components {
         };
         /**
          * DiagnosisStep
-         * @description One step of the workflow. `called`: what was added, as people write it.
+         * @description One step of the workflow. `called`: name of the added effect for people.
          */
         DiagnosisStep: {
             /** Effect */
@@ -2829,8 +2858,8 @@ export interface components {
         };
         /**
          * FitData
-         * @description A fit, and the traces beside simulations of the models before and after it. `undetermined`: what the traces
-         *     cannot determine, a sentence each, with the parameters as people write them.
+         * @description A fit, and the traces with simulations of the models before and after it. `undetermined`: what the traces cannot
+         *     determine, one sentence each, with names of parameters for people.
          */
         FitData: {
             /**
@@ -3489,6 +3518,105 @@ export interface components {
             checks: {
                 [key: string]: string;
             };
+        };
+        /**
+         * Hidden
+         * @description One demonstration. Numbers of traces and jobs come as they are made: `comparison` simulates the machine file on
+         *     the trace while `diagnosis` looks for what is missing.
+         */
+        Hidden: {
+            /** Id */
+            id: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "recording" | "diagnosing" | "opened" | "failed";
+            /**
+             * Began
+             * Format: date-time
+             */
+            began: string;
+            /**
+             * Seal
+             * @default
+             */
+            seal?: string;
+            picked: components["schemas"]["HideRequest"];
+            /** Motion */
+            motion?: number | null;
+            /** Trace */
+            trace?: string | null;
+            /** Held Out */
+            held_out?: string | null;
+            /** Comparison */
+            comparison?: string | null;
+            /** Diagnosis */
+            diagnosis?: string | null;
+            /** Seconds */
+            seconds?: number | null;
+            /**
+             * Problem
+             * @default
+             */
+            problem?: string;
+            secret?: components["schemas"]["OpenedSecret"] | null;
+        };
+        /**
+         * HiddenNumber
+         * @description A number of the hidden effect. `found`: the answer's, with its 95 % interval, where it has named the effect and
+         *     both count the same quantity.
+         */
+        HiddenNumber: {
+            /** Called */
+            called: string;
+            /** Unit */
+            unit: string;
+            /** Hidden */
+            hidden: number;
+            /** Found */
+            found?: number | null;
+            /** Low */
+            low?: number | null;
+            /** High */
+            high?: number | null;
+        };
+        /**
+         * HideChoice
+         * @description An effect that can be hidden; no joints: it acts on the whole arm.
+         */
+        HideChoice: {
+            /** Effect */
+            effect: string;
+            /** Called */
+            called: string;
+            /** Joints */
+            joints: number[];
+        };
+        /**
+         * HideRequest
+         * @description What to hide. Without `effect` or `joint`, the mock draws them, and nobody knows them.
+         */
+        HideRequest: {
+            /** Effect */
+            effect?: string | null;
+            /** Joint */
+            joint?: number | null;
+        };
+        /**
+         * HidingPlace
+         * @description Whether this robot's mock can hide effects (`problem` is empty then), which, and what it did last.
+         */
+        HidingPlace: {
+            /** Problem */
+            problem: string;
+            /** Choices */
+            choices: components["schemas"]["HideChoice"][];
+            latest: components["schemas"]["Hidden"] | null;
+            /** Opened */
+            opened: number;
+            /** Named */
+            named: number;
         };
         /**
          * HistoryMessage
@@ -4408,6 +4536,28 @@ export interface components {
             start: string;
         };
         /**
+         * OpenedSecret
+         * @description What was hidden, and how the answer compares. `python -m mock_controller.reveal SEED` prints `seed`'s secret, and
+         *     the SHA-256 of that line is the seal that was shown before.
+         */
+        OpenedSecret: {
+            /** Seed */
+            seed: number;
+            /** Effect */
+            effect: string;
+            /** Joints */
+            joints: number[];
+            /** Called */
+            called: string;
+            /** Numbers */
+            numbers: components["schemas"]["HiddenNumber"][];
+            /**
+             * Outcome
+             * @enum {string}
+             */
+            outcome: "named" | "among" | "joint" | "missed" | "wrong";
+        };
+        /**
          * OutputRequest
          * @description Switches one process output. Refused while the arm is stopped, unless `while_stopped`.
          */
@@ -4422,7 +4572,7 @@ export interface components {
         };
         /**
          * Overlay
-         * @description One trace beside its simulations, thinned to the extremes of short stretches, so that no peak is lost.
+         * @description One trace with its simulations, thinned to the extremes of short intervals, so that no peak is lost.
          *
          *     `time` is in s; signals have one row per joint, in the order of `joints`, in `units`. `simulated` and `residual`
          *     (measured − simulated, thinned separately) have such rows for every model, in the order of the result's `models`.
@@ -4778,7 +4928,7 @@ export interface components {
         };
         /**
          * PlayPath
-         * @description A recorded path, `rate` times as fast as it was led, after a slow move to its start (CONTPATH).
+         * @description Plays a recorded path, `rate` times as fast as it was recorded, after a slow move to its start (CONTPATH).
          */
         PlayPath: {
             /**
@@ -5181,7 +5331,7 @@ export interface components {
         };
         /**
          * Relative
-         * @description Joints by these angles (rad) from where the instruction before left them, all arriving together.
+         * @description Moves joints by these angles (rad) from the end of the previous instruction, arriving together.
          */
         Relative: {
             /**
@@ -6326,7 +6476,7 @@ export interface components {
         };
         /**
          * TriedEffect
-         * @description An effect that the diagnosis tried. `called`: the effect and its joints as people write them.
+         * @description An effect that the diagnosis tried. `called`: names of the effect and its joints for people.
          */
         TriedEffect: {
             /** Effect */
@@ -6383,7 +6533,7 @@ export interface components {
         /**
          * ValidationData
          * @description A validation by distortion: `fidelity` in the source's convention of τ′, `three_sigma` in the other one (with the
-         *     same curves), and for each trace, thinned, how parameters would have to vary with time.
+         *     same curves). For each trace: how parameters would have to vary with time, thinned.
          */
         ValidationData: {
             fidelity: components["schemas"]["Fidelity"];
@@ -8859,6 +9009,56 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Page_AuditEntry_"];
+                };
+            };
+        };
+    };
+    get_hiding_place: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HidingPlace"];
+                };
+            };
+        };
+    };
+    hide_effect: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["HideRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Hidden"];
                 };
             };
         };
