@@ -135,7 +135,7 @@ def test_a_hard_gear_is_a_rigid_one_and_one_too_hard_for_the_step_is_refused() -
     soft, hard = difference(300.0), difference(20_000.0)
     assert soft > 1e-3
     assert hard < soft / 10
-    with pytest.raises(PlantError, match=r"joint 6: coupling .* too hard"):
+    with pytest.raises(PlantError, match=r"joint 6: coupling .* too stiff"):
         Plant(default_plant(), build_modifications([("joint_compliance", {"joint": 6, "compliance": 1e-3})]))
 
 

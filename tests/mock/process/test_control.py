@@ -167,8 +167,8 @@ def test_arguments_win_over_the_file_and_both_over_defaults(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "nowhere to be reached: give --pty or --tcp HOST:PORT"),
-        (["--pty", "--tcp", "127.0.0.1:0"], "pty and tcp: give one of them"),
+        ([], "no address: give --pty or --tcp HOST:PORT"),
+        (["--pty", "--tcp", "127.0.0.1:0"], "pty and tcp: give only one of them"),
         (["--tcp", "127.0.0.1:0", "--link", "x"], "link: a name for the pseudo-terminal needs --pty"),
         (["--pty", "--baud", "fast"], "argument --baud: invalid int value: 'fast'"),
         (["--pty", "--baud", "0"], "baud: input should be greater than or equal to 300, is 0"),

@@ -236,7 +236,7 @@ def test_a_saved_model_says_which_file_it_needs(air_drag: Effect, tmp_path: Path
         load_model(path)
     (tmp_path / "air_drag.py").write_text(shown() + "# edited\n")
     load_effect_file(tmp_path / "air_drag.py")
-    with pytest.raises(SpecError, match="was changed since"):
+    with pytest.raises(SpecError, match="but that file now has"):
         load_model(path)
 
 
@@ -259,7 +259,7 @@ def written(folder: Path, parameter: str = PARAMETER, torque: str = TORQUE, name
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
-        ({"name": "Pull-1"}, "write lower-case"),
+        ({"name": "Pull-1"}, "use only lower-case"),
         ({"name": "backlash"}, "the library already has an effect backlash"),
         ({"parameter": 'OwnParameter("q", unit="N·m", deviation=0.1)'}, "parameter q is not an argument"),
         ({"parameter": 'OwnParameter("k", unit="N·m", deviation=-1)'}, "expected deviation -1 must be above"),
@@ -284,7 +284,7 @@ def test_files_that_are_none_and_names_that_are_taken(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="cannot be read"):
         load_effect_file(tmp_path / "none.py")
     (tmp_path / "empty.py").write_text("x = 1\n")
-    with pytest.raises(SpecError, match="states no effect"):
+    with pytest.raises(SpecError, match="defines no effect"):
         load_effect_file(tmp_path / "empty.py")
     first = load_effect_file(written(tmp_path))
     assert load_effect_file(tmp_path / "pull.py") is first

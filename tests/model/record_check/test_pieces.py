@@ -87,7 +87,7 @@ def test_what_an_answer_needs_is_named_with_its_joint_and_a_whole_record_lacks_n
 
 def test_motions_and_readings_that_tell_little_are_said() -> None:
     assert "hardly moves" in reports(position=1e-9 * np.round(SWING))["position"].means
-    assert "one way only" in reports(position=TIME[:, None] ** 2)["position"].means
+    assert "in one direction only" in reports(position=TIME[:, None] ** 2)["position"].means
     assert reports(drive=np.round(2 * SWING))["drive"].there == "-2 to 2 V, only 5 different values"
     assert reports(drive=0 * SWING)["drive"].there == "0 to 0 V, constant"
     held = np.repeat(SWING[::4], 4, axis=0)

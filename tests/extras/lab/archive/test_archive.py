@@ -159,7 +159,10 @@ def test_wrong_bytes_never_become_a_trace(
         bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
         transfer = bench.service.of(trace).transfer
         assert transfer is not None
-        assert (transfer.state, transfer.problem[-30:]) == ("failed", "is not what was sent (SHA-256)"[-30:])
+        assert (transfer.state, transfer.problem[-30:]) == (
+            "failed",
+            "differs from the file that was sent (SHA-256)"[-30:],
+        )
         assert list(bench.catalogue.folder.iterdir()) == []
         assert bench.service.fetch(trace).kind == "archive"
         proxy.fail("")
@@ -240,7 +243,7 @@ def test_a_limit_is_told_before_it_bites(store: ObjectStore, make: Make) -> None
     assert 0 < share < 1
     assert bench.service.warnings(share + 0.01) == []
     (line,) = bench.service.warnings(share - 0.01)
-    assert line.endswith("of 1 MB (archive.keep_size): beyond that the oldest archived ones go")
+    assert line.endswith("of 1 MB (archive.keep_size): beyond that the oldest archived ones are dropped")
 
 
 def test_a_deleted_trace_is_deleted_in_the_archive_even_if_that_is_away(
