@@ -297,7 +297,7 @@ def test_the_command_prints_the_nearest_place_of_each_rival(
     assert first["d_prime"] < 5.0
     assert (second["effect"], second["d_prime"] > 5.0) == ("input_delay", True)
     assert command.main([*words, "--rival", "tight_spot"]) == 2
-    assert "is no effect of the shared list" in capsys.readouterr().err
+    assert "is not an effect of the shared list" in capsys.readouterr().err
 
 
 def test_wrong_rivals_and_experiments_are_refused(tmp_path: Path) -> None:

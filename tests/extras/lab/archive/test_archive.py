@@ -69,7 +69,7 @@ def test_a_trace_is_sent_when_it_is_in_the_catalogue(bench: Bench, store: Object
     after = bench.trace()
     bench.until_archived(before, after)
     for trace in (before, after):
-        found, content = bench.archived.get(trace), bench.path(trace).read_bytes()
+        found, content = bench.archive_index.get(trace), bench.path(trace).read_bytes()
         assert found is not None
         assert store.objects(bench.service.status().place.split()[0])[found.object] == content
         assert found.sha256 == hashlib.sha256(content).hexdigest()
@@ -121,7 +121,7 @@ def test_a_local_copy_stays_while_the_store_fails_and_goes_when_it_is_back(
     assert status.problem.startswith("archive traces-")
     assert ACCESS not in status.problem
     assert SECRET not in status.problem
-    assert bench.archived.get(trace) is None
+    assert bench.archive_index.get(trace) is None
     assert bench.path(trace).read_bytes() == content
     assert any("1 traces wait to be sent" in line for line in bench.service.warnings(0.9))
     proxy.fail("")
@@ -159,7 +159,10 @@ def test_wrong_bytes_never_become_a_trace(
         bench.until(lambda: ("fetch", "failed", 0) in bench.counted)
         transfer = bench.service.of(trace).transfer
         assert transfer is not None
-        assert (transfer.state, transfer.problem[-30:]) == ("failed", "is not what was sent (SHA-256)"[-30:])
+        assert (transfer.state, transfer.problem[-30:]) == (
+            "failed",
+            "differs from the file that was sent (SHA-256)"[-30:],
+        )
         assert list(bench.catalogue.folder.iterdir()) == []
         assert bench.service.fetch(trace).kind == "archive"
         proxy.fail("")
@@ -175,7 +178,7 @@ def test_a_local_copy_goes_only_when_the_archive_has_these_very_bytes(
     trace = bench.trace()
     bench.service.start()
     bench.until_archived(trace)
-    found, content = bench.archived.get(trace), bench.path(trace).read_bytes()
+    found, content = bench.archive_index.get(trace), bench.path(trace).read_bytes()
     assert found is not None
     bucket = bench.service.status().place.split()[0]
     if changes == "the file is changed":
@@ -240,7 +243,7 @@ def test_a_limit_is_told_before_it_bites(store: ObjectStore, make: Make) -> None
     assert 0 < share < 1
     assert bench.service.warnings(share + 0.01) == []
     (line,) = bench.service.warnings(share - 0.01)
-    assert line.endswith("of 1 MB (archive.keep_size): beyond that the oldest archived ones go")
+    assert line.endswith("of 1 MB (archive.keep_size): beyond that the oldest archived ones are dropped")
 
 
 def test_a_deleted_trace_is_deleted_in_the_archive_even_if_that_is_away(
@@ -256,7 +259,7 @@ def test_a_deleted_trace_is_deleted_in_the_archive_even_if_that_is_away(
     assert len(store.objects(bucket)) == 2
     proxy.fail("")
     bench.until(lambda: len(store.objects(bucket)) == 1)
-    assert bench.archived.get(kept) is not None
+    assert bench.archive_index.get(kept) is not None
 
 
 def test_a_trace_of_the_archive_is_not_uploaded_a_second_time_and_without_an_archive_it_says_so(
@@ -289,7 +292,7 @@ def test_an_object_that_cannot_be_deleted_is_told_and_the_others_are_sent(
     assert len(bench.told) == told
     proxy.fail("")
     bench.service.deleted()
-    bench.until(lambda: bench.archived.to_delete(ROBOT) == [])
+    bench.until(lambda: bench.archive_index.to_delete(ROBOT) == [])
     assert len(store.objects(bench.service.status().place.split()[0])) == 2
     bench.until(lambda: bench.service.warnings(0.9) == [])
 
@@ -321,7 +324,7 @@ def test_a_trace_that_always_fails_holds_up_no_other(bench: Bench, proxy: Faulty
         proxy.fail("500", "PUT", only=digest)
         bench.service.start()
         bench.until_archived(good)
-        assert bench.archived.get(bad) is None
+        assert bench.archive_index.get(bad) is None
         bench.until(lambda: any(f"(trace {bad})" in line for line in bench.service.warnings(0.9)))
         proxy.fail("")
         bench.service.deleted()  # wakes it: it would look again after some minutes

@@ -219,7 +219,7 @@ def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archi
     places = filled(tmp_path / "there")
     (places.traces["ma2000"] / "aaa.mcap").write_bytes(b"another trace of this number")
     before = everything(tmp_path / "there")
-    with pytest.raises(BackupError, match=r"exist already .*: with --overwrite they are moved aside"):
+    with pytest.raises(BackupError, match=r"already exist .*: with --overwrite they are moved aside"):
         restore(archive, places, NOW, quietly)
     assert everything(tmp_path / "there") == before
     restored = restore(archive, places, NOW, quietly, overwrite=True)
@@ -439,7 +439,7 @@ def test_a_backup_of_a_running_service_is_brought_back_elsewhere(
     said = daq("restore", "../arm.zip")
     assert said.code == 0, said.err
     assert f"{trace[:8]}" in daq("traces", "ls").out
-    daq("restore", "../arm.zip").complains(2, "exist already")
+    daq("restore", "../arm.zip").complains(2, "already exist")
     with closing(Store(f"sqlite:///{tmp_path / 'elsewhere' / 'service' / 'service.sqlite'}")) as store:
         experiments = ExperimentStore(store)
         assert experiments.get("ma2000", done).state == "done"
