@@ -158,7 +158,7 @@ def test_the_same_controller_is_known_again_after_a_long_time_and_another_one_is
         left, why = same_bytes(known, base, [page(begun)])
         assert why == ""
         assert set(left.constants) <= set(known.constants)
-        assert "bytes that nothing changed are others" in same_bytes(known, base, [page(board(seed + 100))])[1]
+        assert "bytes that nothing changed are different" in same_bytes(known, base, [page(board(seed + 100))])[1]
 
 
 def test_bytes_of_registers_identify_nobody() -> None:
