@@ -20,7 +20,7 @@ def test_a_table_is_shown_plotted_verified_and_exported_as_it_is(daq: CommandLin
     shown = daq("traces", "show", path).out
     assert "at most 20 s (after 0.1 s); it has no ticks, so missing samples cannot be detected" in shown
     assert "its last row has no line end" in shown
-    assert "is CSV: it has no checksums" in daq("traces", "verify", path).out
+    assert "is CSV, without checksums" in daq("traces", "verify", path).out
     assert daq("traces", "plot", path, "-o", tmp_path / "a.png").code == 0
     assert daq("traces", "export", path, "-o", tmp_path / "b.csv").code == 0
     daq("traces", "export", path).complains(2, "is CSV already; name the file to write with -o")
@@ -101,7 +101,7 @@ def test_a_malicious_trace_is_refused_in_one_line(daq: CommandLine, tmp_path: Pa
     [
         ("-1e308,0\n1e308,1", "", "row 2, column 'time': -1e+308 is too large, allowed is ±4e+09 s"),
         ("0,0\n1,1e308", "", "row 3, column 'position_1': 1e+308 is too large, allowed is ±1e+09 rad or m"),
-        ("0,0\n1e-320,0", "", "row 3, column 'time': 1e-320 does not increase after 0.0 by 1e-09 s at least"),
+        ("0,0\n1e-320,0", "", "row 3, column 'time': 1e-320 does not increase after 0.0 by at least 1e-09 s"),
         ("-0.0,0\n0,0", "", "row 3, column 'time': 0.0 does not increase after -0.0"),
         ("0,\0", "", "row 2, column 'position_1'"),
         ("0," + "9" * 200_000, "", "is not CSV: field larger than field limit"),

@@ -132,7 +132,7 @@ def test_a_separation_is_told_once_and_only_where_there_is_one(answer: Diagnosis
     place = DifferencePlace(joint=2, phase="creep", share=0.7, other_joint=False)
     given = told(reason="They would differ by 6.4 standard deviations.", differs_at=place)
     assert given.count("6.4 standard deviations") == 1
-    assert "It would tell" not in told(separates=(), predicted_separation=0.0)
+    assert "It would separate" not in told(separates=(), predicted_separation=0.0)
 
 
 @pytest.mark.parametrize(
