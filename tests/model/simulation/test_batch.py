@@ -215,7 +215,10 @@ def test_a_model_file_gives_the_same_model_back_and_a_newer_one_is_refused(model
         (_with(values={"link1.mass": -1e9}), "link1.mass = -1000000000.0 kg: allowed are 0.0 to inf"),
         (_with(effects=[{"name": "backlash", "joints": [1, 2]}, {"name": "backlash", "joints": [2]}]), "twice for the"),
         (_with(effects=[{"name": "backlash", "joints": [1, 1]}]), "backlash: in the model twice for the same joint"),
-        (_with(ties={"load.mass": ["link1.mass", "link2.mass"]}), "tie 'load.mass': the model has a parameter of this"),
+        (
+            _with(ties={"load.mass": ["link1.mass", "link2.mass"]}),
+            "tie 'load.mass': the model already has a parameter of this name",
+        ),
         (_with(ties={"x": ["link1.mass"]}), "ties.x: has 1 entries, must have at least 2"),
         (_with(ties={"x": ["link1.mass", "link1.mass"]}), "names a parameter twice"),
         (_with(ties={"x": ["link1.mass", "link9.mass"]}), "are not parameters of the model"),
