@@ -3521,8 +3521,8 @@ export interface components {
         };
         /**
          * Hidden
-         * @description One demonstration. Numbers of traces and jobs come as they are made: `comparison` simulates the machine file on
-         *     the trace while `diagnosis` looks for what is missing.
+         * @description One demonstration. Identifiers of traces and jobs are set as these are created. The job `comparison` simulates
+         *     the machine file on the trace, while the job `diagnosis` looks for missing effects.
          */
         Hidden: {
             /** Id */
@@ -3564,8 +3564,8 @@ export interface components {
         };
         /**
          * HiddenNumber
-         * @description A number of the hidden effect. `found`: the answer's, with its 95 % interval, where it has named the effect and
-         *     both count the same quantity.
+         * @description A parameter of the hidden effect. `found` is the answer's value, with its 95 % interval from `low` to `high`. It
+         *     is set if the answer names the effect and both values are of the same quantity.
          */
         HiddenNumber: {
             /** Called */
@@ -3583,7 +3583,7 @@ export interface components {
         };
         /**
          * HideChoice
-         * @description An effect that can be hidden; no joints: it acts on the whole arm.
+         * @description An effect that can be hidden. `joints` is empty if it acts on the whole arm.
          */
         HideChoice: {
             /** Effect */
@@ -3595,7 +3595,7 @@ export interface components {
         };
         /**
          * HideRequest
-         * @description What to hide. Without `effect` or `joint`, the mock draws them, and nobody knows them.
+         * @description The request to hide an effect. Without `effect` or `joint`, the mock draws them at random, unseen by anybody.
          */
         HideRequest: {
             /** Effect */
@@ -3605,7 +3605,8 @@ export interface components {
         };
         /**
          * HidingPlace
-         * @description Whether this robot's mock can hide effects (`problem` is empty then), which, and what it did last.
+         * @description Effects that this robot's mock can hide, and the latest demonstration. If the mock can hide none, `problem` says
+         *     why; otherwise `problem` is empty.
          */
         HidingPlace: {
             /** Problem */
@@ -4537,8 +4538,8 @@ export interface components {
         };
         /**
          * OpenedSecret
-         * @description What was hidden, and how the answer compares. `python -m mock_controller.reveal SEED` prints `seed`'s secret, and
-         *     the SHA-256 of that line is the seal that was shown before.
+         * @description The hidden effect, and how the answer compares. `python -m mock_controller.reveal SEED` prints the secret of
+         *     `seed` in one line. The SHA-256 of that line is the seal that was shown before.
          */
         OpenedSecret: {
             /** Seed */
