@@ -228,7 +228,7 @@ def test_a_torque_is_found_at_its_address_whatever_the_order_of_its_arguments(tm
     assert found.imag / DUAL_STEP == pytest.approx(2 * 3.0 + 11 * 0.5)
 
 
-def test_the_table_has_a_torque_for_each_joint_and_effect_also_in_dual_numbers(tmp_path: Path) -> None:
+def test_the_table_has_a_row_for_each_joint_and_a_column_for_each_effect(tmp_path: Path) -> None:
     loaded(tmp_path, "pull", "k, c", "k + c", "k", "c")
     loaded(tmp_path, "push", "speed, k", "k * speed", "k")
     model = base_model(ARM).with_effect("pull", (1, 3)).with_effect("push", (3,))
@@ -238,6 +238,9 @@ def test_the_table_has_a_torque_for_each_joint_and_effect_also_in_dual_numbers(t
     assert table[0, 0, 0] == table[2, 0, 0] != table[2, 1, 0]
     assert table[2, :, 1].tolist() == list(BEYOND_COLUMNS)
     assert own_table(base_model(ARM), np.float64).shape == (3, 0, 2)
+
+
+def test_runs_in_dual_numbers_have_a_torque_of_their_own(tmp_path: Path) -> None:
     loaded(tmp_path, "pull", "k, speed", "k * speed", "k")
     model = base_model(ARM).with_effect("pull", (1,))
     assert own_table(model, np.float64)[0, 0, 0] != own_table(model, np.complex128)[0, 0, 0]
