@@ -34,7 +34,7 @@ def _page(path: Path | None) -> Path | None:
     """Rejects an unsuitable or unwritable file before the computation."""
     if path is not None:
         if path.suffix != ".html":
-            raise SpecError(f"report {path}: is written as .html")
+            raise SpecError(f"report {path}: must be an .html file")
         check_folder(path, "report")
     return path
 

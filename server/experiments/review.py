@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine
-from daq.contracts.service.experiments import Reviewer
+from daq.contracts.service.queue import Reviewer
 from daq.contracts.service.robot import RobotIdentity
 
 

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from daq.contracts.service.experiments import ExperimentState, Reviewer
+from daq.contracts.service.experiments import ExperimentState
+from daq.contracts.service.queue import Reviewer
 from daq.owner.messages import Answer
 from server.clock import Clock
 from server.robot.control import ControlService

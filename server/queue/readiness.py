@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from daq.contracts.consent import lacks_consent
-from daq.contracts.service.experiments import Reviewer
+from daq.contracts.service.queue import Reviewer
 from daq.contracts.service.robot import RobotIdentity
 from daq.owner.messages import ArmReport
 

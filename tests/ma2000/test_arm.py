@@ -51,7 +51,7 @@ def test_an_unknown_preset_and_a_port_that_is_none_are_refused(tmp_path: Path) -
 
 @pytest.mark.parametrize("word", ["yes", 1])
 def test_consent_is_the_word_true_and_nothing_else(tmp_path: Path, word: object) -> None:
-    with pytest.raises(SpecError, match="True is the operator's consent"):
+    with pytest.raises(SpecError, match="must be True \\(the operator consents\\) or False"):
         ma2000.run(folder=tmp_path, moves_real_arm=word)  # type: ignore[arg-type]
 
 
@@ -71,7 +71,7 @@ def test_an_interrupt_stops_the_arm_and_names_the_trace(tmp_path: Path) -> None:
 
 
 def test_a_port_that_is_no_mock_is_refused_before_anything_starts(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="runs on mock:// alone; for an arm, use `daq serve`"):
+    with pytest.raises(SpecError, match="runs only on mock://; for an arm, use `daq serve`"):
         ma2000.LocalService(tmp_path / "lab", "serial:///dev/ttyUSB0")
     assert not (tmp_path / "lab").exists()
 

@@ -10,6 +10,7 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.in_unit import InUnit
 from daq.contracts.labels import Outcome
 from daq.contracts.service.base import Moment, UserWire, Wire
+from daq.contracts.service.queue import Reviewer
 from daq.contracts.trace import EventKind
 
 ExperimentState = Literal["queued", "running", "done", "failed", "cancelled", "interrupted"]
@@ -22,9 +23,6 @@ ENDS: frozenset[ExperimentState] = frozenset({"done", "failed", "cancelled", "in
 
 ExperimentOrder = Literal["submitted", "ended"]
 """Order of a list: `submitted`, the newest first; `ended`, only ended experiments, the last ended first."""
-
-Reviewer = Literal["operator", "owner"]
-"""Who must approve an experiment before it moves a real arm: another operator, or another owner of the robot."""
 
 Priority = Annotated[int, Field(ge=-100, le=100)]
 """Priority: the highest runs first; of equal ones, the one submitted first."""

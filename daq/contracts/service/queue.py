@@ -7,13 +7,14 @@ from typing import Literal
 from pydantic import AwareDatetime, StrictBool
 
 from daq.contracts.service.base import Wire
-from daq.contracts.service.experiments import Reviewer
 
 Role = Literal["viewer", "operator", "owner", "admin"]
 """Roles (docs/service.md). A viewer looks and stops. An operator also moves the arm and changes their own experiments.
 An owner is responsible for an arm, and changes all its experiments. An admin is an owner of all arms."""
 ROLES: tuple[Role, ...] = ("viewer", "operator", "owner", "admin")
 """All roles in order; each includes the rights of those before it."""
+Reviewer = Literal["operator", "owner"]
+"""Who must approve an experiment before it moves a real arm: another operator, or another owner of the robot."""
 
 
 def role_of(text: str) -> Role:

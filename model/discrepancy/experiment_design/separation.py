@@ -232,7 +232,7 @@ def _unhidden(
     derivatives = predicted.tangents(kept, moved)
     delta, distance = target - predicted.shown(moved), moved - begun
     if not np.isfinite(delta).all():
-        raise SpecError("the simulation does not stay finite: the loop is unstable")
+        raise SpecError("the simulation does not stay finite: the control loop is unstable")
     gradient = derivatives @ delta - information @ distance
     step = np.linalg.solve(information + derivatives @ derivatives.T, gradient)
     square = float(delta @ delta + distance @ information @ distance - gradient @ step)

@@ -260,7 +260,7 @@ class Observation:
         shown = self.readings(tried.model, states, step_of_derivatives(tried.model))
         found = self.weighted([one[1:] - one[:1] for one in shown]) / np.array(moves)[:, None]
         if not np.isfinite(found).all():
-            raise SpecError("the simulation does not stay finite: the loop is unstable")
+            raise SpecError("the simulation does not stay finite: the control loop is unstable")
         return found
 
     @property

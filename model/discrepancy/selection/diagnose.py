@@ -135,7 +135,7 @@ def _fit_tolerances(given: Point) -> Point:
         near = _fit_with_feedback(near, given.observation.with_feedback_share(share)) or near
     begun = _fit_with_feedback(near, given.observation) or _fit_with_feedback(given, given.observation)
     if begun is None:
-        raise SpecError("the simulation does not stay finite: the loop is unstable")
+        raise SpecError("the simulation does not stay finite: the control loop is unstable")
     return _with_sudden_friction(converge(begun, FEW_STEPS))
 
 

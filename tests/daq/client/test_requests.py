@@ -225,7 +225,7 @@ def test_a_trace_is_found_by_the_beginning_of_its_number_or_name() -> None:
         assert traces.find(wanted).id == found
     with pytest.raises(TraceError, match="2 of the service match"):
         Traces(StandIn([_entries(*two)]).connection(), "robots/ma2000").find("ab")
-    with pytest.raises(TraceError, match="none of the service"):
+    with pytest.raises(TraceError, match="no trace of the service has"):
         Traces(StandIn([_entries(*two)]).connection(), "robots/ma2000").find("ramp")
     with pytest.raises(TraceError, match="no trace yet"):
         Traces(StandIn([_entries()]).connection(), "robots/ma2000").find("last")

@@ -164,7 +164,7 @@ def test_a_stop_of_another_host_is_seen_and_its_release_is_not_ours(controller: 
     before = controller.status().stop
     line.stage.obey(b"H")
     assert StatusFlag.FROZEN in controller.status().flags
-    with pytest.raises(RequestRefusedError, match="is newer than the one that was to end"):
+    with pytest.raises(RequestRefusedError, match="is newer than the one to be ended"):
         controller.release(before)
     assert line.stage.state == "H"
 

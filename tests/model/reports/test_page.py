@@ -82,7 +82,7 @@ def test_a_cell_and_a_heading_for_each_column() -> None:
 
 @pytest.mark.parametrize("name", ["page.htm", "page.pdf", "page"])
 def test_another_kind_of_file_is_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(SpecError, match=r"written as \.html"):
+    with pytest.raises(SpecError, match=r"must be an \.html file"):
         write_report(Report("t", "a", (), ()), tmp_path / name)
 
 

@@ -97,7 +97,7 @@ def _gripper_of(moved: list[bool]) -> SimpleNamespace:
 
 def _robot(moved: list[bool], ended: str | None = None, halted: str | None = None) -> SimpleNamespace:
     control = SimpleNamespace(halted=halted)
-    guardian = SimpleNamespace(outdated=lambda _asked: False)
+    guardian = SimpleNamespace(is_older_than_stop=lambda _asked: False)
     return SimpleNamespace(
         opening=SimpleNamespace(watched=True),
         activity="none",

@@ -48,7 +48,7 @@ def test_what_is_guessed_is_shown_and_asked_for(tmp_path: Path) -> None:
     assert "not stated: the unit of position" in str(asked.value)
     assert "--map 'time=stamp in ms' --map 'position=q{} in ?' --map 'drive=tau{} in ?'" in str(asked.value)
     stated = file(tmp_path / "stated.csv", ROWS, "time [ms],q0 [deg],q1 [deg],tau0 [Nm],tau1 [Nm],mode")
-    with pytest.raises(TraceError, match="--as-guessed takes this as it is"):
+    with pytest.raises(TraceError, match="--as-guessed accepts this guess"):
         open_trace(stated)
     trace = open_trace(stated, choice=Choice(as_guessed=True))
     assert trace.record.columns == {
@@ -142,7 +142,7 @@ def test_records_in_one_file_rows_without_a_reading_and_times_that_come_twice(tm
         open_trace(path, choice=Choice(map=mapping))
     first = open_trace(path, choice=Choice(map=mapping, where="episode=0"))
     np.testing.assert_array_equal(first.position[:, 0], [1, 2])
-    assert "no number, left out: 1, the first is data row 2" in first.record.notes
+    assert "not a number, left out: 1, the first is data row 2" in first.record.notes
     assert "repeat the previous time, left out: 1, the first is data row 4" in first.record.notes
     with pytest.raises(TraceError, match="no row is left where time=7"):
         open_trace(path, choice=Choice(map=mapping, where="time=7..9"))

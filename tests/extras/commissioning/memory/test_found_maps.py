@@ -89,7 +89,7 @@ WRONG_PLACE = JointEvidence(1, Pair(Place(0, 1), Place(4), 1.0, 0.0), None, evid
     ("changes", "given", "problem", "most_writes"),
     [
         ({"sign": -1}, evidence(), "moves away from its set point", 3),
-        ({"kept": False}, evidence(), "stands there", 3),
+        ({"kept": False}, evidence(), "was read back", 3),
         ({}, evidence(proved=False), "not proved", 0),
         ({}, WRONG_PLACE, "", 0),
     ],

@@ -186,7 +186,7 @@ def test_a_stamp_that_comes_twice_and_positions_that_are_no_number_are_left_out(
     changes: list[dict[str, Any]] = [{}] * 5 + [again] + [{}] * 4 + [nan] * 3 + [{}] * 7
     trace = imported(bag(tmp_path / "a", changes))
     assert len(trace) == 20 - 1 - 3
-    assert "no number, left out: 3, the first is message 11." in trace.record.notes
+    assert "not a number, left out: 3, the first is message 11." in trace.record.notes
     assert "Messages with the time of the one before, left out: 1, the first is message 6." in trace.record.notes
     assert len(imported(tmp_path / "a", received=True)) == 17
 

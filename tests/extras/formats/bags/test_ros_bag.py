@@ -138,7 +138,7 @@ def test_a_velocity_that_is_not_measured_is_left_out(tmp_path: Path) -> None:
     ("changes", "choice", "complaint"),
     [
         ([{}, {"position": []}], {}, "message 2: has 2 names and 0 positions"),
-        ([{"position": [float("nan"), 0]}], {}, "no number, left out: 1, the first is message 1. None is left"),
+        ([{"position": [float("nan"), 0]}], {}, "not a number, left out: 1, the first is message 1. None is left"),
         ([{}], {"drive_unit": None}, "its effort may be in N·m, .*, or in amperes.*; give --drive-unit N·m, N, A or V"),
         ([{}, {"stamp": START - 5}], {}, "message 2: its time .* does not come after .*--received"),
         ([{}], {"topic": "/other"}, "topic /other: has no joint states; topics with some: /joint_states"),
@@ -182,7 +182,7 @@ def test_files_that_are_no_bag_are_told_in_one_line(tmp_path: Path) -> None:
     for name in ("x.db3", "x.bag"):
         (tmp_path / name).write_bytes(b"nonsense")
     for path, complaint in [
-        (trace, "is a trace already"),
+        (trace, "is already a trace"),
         (damaged, "has no topic of sensor_msgs/msg/JointState; it has no topic"),
         (tmp_path / "x.db3", "is neither MCAP nor SQLite nor a bag of ROS 1"),
         (tmp_path / "x.bag", "is neither MCAP nor SQLite nor a bag of ROS 1"),

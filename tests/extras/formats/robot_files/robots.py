@@ -66,7 +66,7 @@ HOSTILE: dict[str, tuple[str, str]] = {
     ),
     "an axis beyond measure": (
         turning('<axis xyz="1e308 1e308 0"/>'),
-        "joint 'j': axis xyz is '1e308 1e308 0'; 3 finite numbers are needed, ±1e+09 at most",
+        "joint 'j': axis xyz is '1e308 1e308 0'; 3 finite numbers are needed, at most ±1e+09",
     ),
     "no axis to speak of": (
         turning('<axis xyz="0 0 0"/>'),
@@ -97,7 +97,10 @@ HOSTILE: dict[str, tuple[str, str]] = {
         robot(*map(link, "abc"), joint("j", "a", "b"), joint("j", "b", "c")),
         "joint 'j': there is more than one of that name",
     ),
-    "no such link": (robot(link("a"), joint("j", "a", "z")), "joint 'j': its child is 'z', which is no link"),
+    "no such link": (
+        robot(link("a"), joint("j", "a", "z")),
+        "joint 'j': its child is 'z', but the file has no such link",
+    ),
     "a floating joint": (turning(kind="floating"), "'j': is floating, it moves freely"),
     "a planar joint": (turning(kind="planar"), "'j': is planar, it moves in a plane"),
     "an unknown joint": (turning(kind="hinge"), "joint 'j': type is 'hinge'"),

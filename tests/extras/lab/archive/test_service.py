@@ -111,7 +111,7 @@ def test_the_commands_show_send_and_fetch(
     assert said.code == 0
     assert said.out.startswith(f"{trace}: here and in the archive since ")
     daq("--server", root, "traces", "archive", "--drop").complains(2, "--drop: name a trace")
-    daq("--server", root, "traces", "fetch", "nothing").complains(2, "none of the service has")
+    daq("--server", root, "traces", "fetch", "nothing").complains(2, "no trace of the service has")
 
 
 def test_a_service_without_an_archive_says_so(

@@ -75,7 +75,7 @@ def test_every_executor_of_the_page_is_understood() -> None:
 
 
 def test_a_worker_of_another_version_is_refused_by_name() -> None:
-    with pytest.raises(OtherVersionError, match=r"worker .*process \d+: has ma2000-daq .* and ma2000-daq 0\.0\.1 on "):
+    with pytest.raises(OtherVersionError, match=r"worker .*process \d+: has ma2000-daq .*, but ma2000-daq 0\.0\.1 on "):
         Checked(square, Program("0.0.1", "3.9"))(2)
 
 
