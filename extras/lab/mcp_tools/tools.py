@@ -106,11 +106,9 @@ def tools_of(server: str, token: str | None, robot: str | None = None) -> MCPSer
 
     @served.tool(annotations=READS)
     def job(number: Number, context: Context) -> Answer:
-        """State of a fit or diagnosis, its headline when it is done, and its result."""
+        """State of a fit or diagnosis; when it is done, `headline` has its answer and `model` its model."""
         with at(context) as one:
-            found = one.jobs.get(number)
-            result = one.jobs.result(number).get("summary") if found.state == "done" else None
-            return {**_shown(found), "result": result}
+            return _shown(one.jobs.get(number))
 
     @served.tool(annotations=ADDS)
     def stop(context: Context) -> Answer:
