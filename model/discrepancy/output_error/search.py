@@ -26,8 +26,7 @@ ATTEMPTS = ((1.0, 0.0), (1.0, 0.0), (0.4, 0.0), (1.0, 0.3), (0.12, 0.0), (1.0, 3
 1963), each from derivatives that the attempts before have corrected. A short step helps where the cost is strongly
 curved, a damped one where the record says little."""
 CONVERGED = 1.0
-"""Fall of the cost that is still to be had, below which a search ends: one unit is one standard deviation of one
-parameter."""
+"""Fall of the cost below which a search ends: one unit is one standard deviation of one parameter."""
 FORETOLD = 0.1
 """Share of the readings' change that derivatives may have missed and still hold where a search ends: what they miss of
 a further step is a tenth of it."""
@@ -164,22 +163,14 @@ def descend(
     return point
 
 
-def _left_to_gain(before: float, gained: float) -> float:
-    """What a search still gains if its gains go on falling as they did from the one `before` to the last."""
-    if gained < CONVERGED:
-        return 0.0
-    return gained**2 / (before - gained) if gained < before < math.inf else math.inf
-
-
 def converge(point: Point, steps: int, most: int = STEPS, goal: float = math.inf) -> Point:
     """The point to which repeated searches lead, each with derivatives computed where it begins.
 
-    They end where nothing more is to be gained, so that close rivals do not differ by the state of their fits, or where
+    They end where one gains nothing more, so that close rivals do not differ by the state of their fits, or where
     the remaining ones would not lead to a cost of `goal`. The derivatives of the result are those of the last search's
     beginning, hardly away, without the corrections made on the way: intervals come from derivatives, and a correction
     for a short step is mostly noise.
     """
-    before = math.inf
     for number in range(0 if point.converged else most):
         try:
             begun = point.with_new_tangents()
@@ -187,9 +178,8 @@ def converge(point: Point, steps: int, most: int = STEPS, goal: float = math.inf
         except SpecError:
             break  # on the verge of instability, as where a delay is missing: no derivative exists
         gained, point = point.cost - following.cost, replace(following, tangents=begun.tangents)
-        if _left_to_gain(before, gained) < CONVERGED or _is_foretold(begun, following):
+        if gained < CONVERGED or _is_foretold(begun, following):
             return replace(point, converged=True)
-        before = gained
         if point.cost - gained * (most - number - 1) > goal:
             break
     return point
