@@ -2,6 +2,7 @@
 
 import re
 from math import degrees
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -42,7 +43,9 @@ def test_a_diagnosis_is_begun_followed_and_ended(studied: Studied, studied_dashb
     expect(page.get_by_role("link", name=re.compile("friction"))).to_have_count(1)
 
 
-def test_the_answer_is_told_with_the_numbers_that_were_found(studied: Studied, studied_dashboard: Dashboard) -> None:
+def test_the_answer_is_told_with_the_numbers_that_were_found(
+    studied: Studied, studied_dashboard: Dashboard, tmp_path: Path
+) -> None:
     found = studied.result(studied.diagnosis)
     assert found["verdict"] == "named", found["summary"]
     (step,) = found["steps"]
@@ -50,7 +53,7 @@ def test_the_answer_is_told_with_the_numbers_that_were_found(studied: Studied, s
     page.get_by_role("link", name=re.compile("Coulomb friction on joint 2")).click()
     expect(page.get_by_role("heading", level=1)).to_have_text(re.compile("^Coulomb friction on joint 2, "))
     expect(page.get_by_text(found["summary"][1:]).first).to_be_visible()
-    _see_the_story(page, found)
+    _see_the_story(page, found, tmp_path / "report.html")
     page.get_by_role("button", name="Everything behind it").click()
     _see_the_map(page, found["given"])
     best = page.get_by_role("region", name="Candidates").get_by_role("listitem").filter(has_text="named")
@@ -68,7 +71,7 @@ def test_the_answer_is_told_with_the_numbers_that_were_found(studied: Studied, s
     expect(overlay.get_by_role("img", name=re.compile("^Measured minus simulated of joint 3"))).to_be_visible()
 
 
-def _see_the_story(page: Page, found: dict[str, Any]) -> None:
+def _see_the_story(page: Page, found: dict[str, Any], report: Path) -> None:
     """Where, what, how much and what next; and the same in a saved file, which opens without the service."""
     what, shrinks = (page.get_by_role("region", name=name) for name in ("What candidates", "How much it shrinks"))
     expect(what.get_by_role("listitem").first).to_contain_text("Coulomb friction, joint 2")
@@ -79,8 +82,9 @@ def _see_the_story(page: Page, found: dict[str, Any]) -> None:
     expect(page.get_by_role("img", name=re.compile("joint 2 explained"))).to_be_visible()
     with page.expect_download() as saving:
         page.get_by_role("button", name="Report").click()
+    saving.value.save_as(report)
     saved = page.context.new_page()
-    saved.goto(f"file://{saving.value.path()}")
+    saved.goto(report.as_uri())
     expect(saved.get_by_role("heading", level=1)).to_have_text(re.compile("^Coulomb friction on joint 2, "))
     expect(saved.get_by_role("region", name="How much it shrinks").get_by_role("listitem")).to_have_count(3)
     assert faults_of(saved) == []
