@@ -26,6 +26,9 @@ FIRST_DAMPING, LEAST_DAMPING = 1e-3, 1e-9
 """Damping of the first step and least damping, as shares of the information's diagonal (Marquardt 1963)."""
 MOST_DAMPING = 1e15
 """Largest damping: with an unstable arm only very short steps stay useful."""
+ROUNDING = 1e-12
+"""Derivatives by one coordinate below this share of the largest are rounding and count as zero. Otherwise a coordinate
+without data would follow it."""
 TINY = 1e-12
 """Amount added to the diagonal of the damped information; keeps it positive definite without data."""
 LEAST_GAIN, FAIR_GAIN, GOOD_GAIN = 1e-3, 0.25, 0.6
@@ -112,6 +115,8 @@ class _Objective:
         if derivatives:
             flat = data.jacobian.reshape(data.residual.size, -1)
             whole = self.coordinates.chain(x, np.concatenate([flat, np.diag(self.precision)[self.claimed]]))
+            sizes = np.abs(whole).max(axis=0, initial=0.0)
+            whole[:, sizes < ROUNDING * sizes.max(initial=0.0)] = 0.0
         return np.concatenate([data.residual.ravel(), prior]), whole
 
 

@@ -39,7 +39,8 @@ class NeededTorque:
             return self._latest[1]
         lacking = [c for c in changed.tolist() if c not in self._units]
         if len(lacking) > self.asked:
-            return self._direct(chain)
+            self._latest = numbers, self._direct(chain)
+            return self._latest[1]
         for c in lacking:
             self._units[c] = self._unit(chain, c)
         if 2 * len(changed) <= len(self._units):
