@@ -187,7 +187,7 @@ def test_a_stamp_that_comes_twice_and_positions_that_are_no_number_are_left_out(
     trace = imported(bag(tmp_path / "a", changes))
     assert len(trace) == 20 - 1 - 3
     assert "not a number, left out: 3, the first is message 11." in trace.record.notes
-    assert "Messages with the time of the one before, left out: 1, the first is message 6." in trace.record.notes
+    assert "Messages with the time of the previous one, left out: 1, the first is message 6." in trace.record.notes
     assert len(imported(tmp_path / "a", received=True)) == 17
 
 

@@ -24,6 +24,7 @@ const ROBOT: FleetRobot = {
     running: null,
     waiting_for: '',
     attended_until: null,
+    review: null,
   },
 };
 
