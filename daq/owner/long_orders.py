@@ -72,7 +72,7 @@ def _with_late_stop(robot: OwnedRobot, result: RunResult) -> RunResult:
     the link of an arm that is not monitored."""
     link = robot.controller.link
     if link.state is not LinkState.LOST or link.control is not None:
-        return result  # the package's own mock is gone for good; any other robot may come back
+        return result  # the link is alive, or the robot is our own mock, whose lost link cannot come back
     robot.speaker.progress(1.0, "the link is lost: trying to deliver the stop")
     line = deliver_late_stop(robot.controller, robot.opening.late_stop_window)
     return replace(result, reason=f"{result.reason}; {line}")

@@ -20,7 +20,8 @@ RECOMPUTED_TOLERANCE = 0.03
 
 
 class Reproduction(FrozenRecord):
-    """The source, reproduced. `fidelity` holds both conventions of τ′, the source's first."""
+    """The source, reproduced. `fidelity` holds both conventions of τ′, the source's first. `ladders`, one per method:
+    the four models of chapter 7, fitted one after the other."""
 
     fidelity: tuple[RecomputedFidelity, ...]
     influence: tuple[Influence, ...]

@@ -15,7 +15,8 @@ from mock_controller.quantities import DataFileError, Provenance, QuantityReader
 class BoardTiming:
     """Times of the controller, in µs.
 
-    A period begins with sampling and a fetch window; drive and published values change `computing_delay` later.
+    A period begins with sampling. For `fetch_window` the board then reads set points and gains from the shared memory.
+    After `computing_delay` the drive changes and the values are published, one byte per `publish_byte`.
     `host_byte`: time for which the host holds the memory per byte. `reset`: duration of a brown-out.
     """
 

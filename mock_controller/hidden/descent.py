@@ -1,4 +1,7 @@
-"""Levenberg–Marquardt least squares, for residuals that each cost a simulation."""
+"""Levenberg–Marquardt least squares, for residuals that each cost a simulation.
+
+It computes whether a record can distinguish a hidden effect from others (`sharpness.py`).
+"""
 
 from __future__ import annotations
 

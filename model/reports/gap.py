@@ -28,6 +28,7 @@ MOST_COLUMNS = 3
 
 def gap_section(gap: Gap) -> Section:
     """Returns picture and table of each model's error."""
+    # the error with fitted parameters alone, without the effects
     without = () if gap.without is None else (Text(gap.without.text),)
     return Section("How the gap shrinks", (_picture(gap), *without, _table(gap)))
 

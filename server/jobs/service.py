@@ -212,7 +212,7 @@ class JobService:
                 # The disk may be full, or the database locked: try again at the next check.
                 log.exception("jobs")
                 failed = True
-                for lane in LANES:  # other robots must not wait for this one's turn
+                for lane in LANES:  # a lane serves robots in turn; `self._wake.set` identifies this robot there
                     self._workers.wait_no_more(lane, self._wake.set)
             self._wake.wait(LOOK_EVERY if self._running or self._fetched or failed else None)
 

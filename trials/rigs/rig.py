@@ -39,8 +39,8 @@ class Tolerance:
 class Hidden:
     """An effect that the file does not contain. `joint` counts from 1, None for the machine.
 
-    `name` is the drawn name. `known_as` is the library's name for its law; `beside` are the library's other effects
-    that it includes.
+    `name` is the drawn name, and `law` the index of the effect's variant (`hiding.py`). A law may be that of an effect
+    of the library with another name: `known_as`. `beside` are the library's other effects that it includes.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Rig:
     sound_joints: Records
     tolerances: tuple[Tolerance, ...]
     strongest: tuple[float, ...]
-    """N·m that each joint needs for holding and moving: a typical size."""
+    """Torque (N·m) that each joint needs to hold and accelerate; effects are scaled by it."""
     highest: float
     """V of the supply."""
     reach: tuple[float, ...]

@@ -38,8 +38,8 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
             _require_room(target.absolute().parent, [(DATABASE, database), *files], reserve)
             part = Path(folder) / "backup.zip"
             entries, left_out = _pack(part, files, progress)
-            # The archive may have taken over traces since the copy. Its rows state where they are, and by now every
-            # trace is either packed or has its row. So a running service need not pause while its disk is full.
+            # The archive may have deleted local traces since the copy (it does so when the disk is full). Each of those
+            # is now either packed or has a row in the live database: copy these rows, so the service need not pause.
             note_dropped(places.database, database, {Path(one.name).name for one in entries if is_trace(one.name)})
             with zipfile.ZipFile(part, "a") as pack:
                 entries.insert(0, _put(pack, DATABASE, database))
@@ -66,7 +66,7 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
 
 
 def _pack(part: Path, files: list[tuple[str, Path]], progress: Progress) -> tuple[list[Entry], list[str]]:
-    """Writes the files into the archive. Returns the written entries, and the names of missing files."""
+    """Writes the files into the zip file. Returns the written entries, and the names of missing files."""
     entries, left_out = [], []
     descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o600)
     with os.fdopen(descriptor, "w+b") as stream, zipfile.ZipFile(stream, "w") as pack:

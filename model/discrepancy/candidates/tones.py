@@ -27,11 +27,12 @@ from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.model import Model
 
 RESPONSE = 1.5
-"""Length of the impulse response, s: a simulation that is given most of the record decays slowly."""
+"""Length of the impulse response, s. In a simulation that follows the record, the controller hardly sees a deviation,
+so it decays slowly."""
 TRIAL_RATES = {Tone.OVER_POSITION: (23.0, 47.0), Tone.OVER_TIME: (0.7, 2.1, 4.3)}
 """Rates of the tones that the response is fitted to: rad of phase per unit of the joint's travel; Hz."""
-MOST_TONES = 500
-"""Tones tried of one effect on one joint, unless the record is so long that tones between them would be missed."""
+USUAL_TONES = 500
+"""Tones tried per effect and joint. Longer records get more, so that no tone is skipped."""
 HIGHEST = 8.0
 """Highest frequency that is tried, Hz: the arm follows no faster."""
 SHORTEST_WAVE = 4096 / 75
@@ -61,17 +62,17 @@ def propose_tones(point: Point, joints: Sequence[int]) -> list[Probe]:
 
 
 def tones_tried(observation: Observation, hypothesis: Hypothesis) -> int:
-    """Number of tones that a hypothesis' tone was chosen from, at least MOST_TONES: it decides the cost in evidence."""
+    """Number of tones that a hypothesis' tone was chosen from, at least USUAL_TONES; it sets the cost in evidence."""
     rates = rates_tried(observation, hypothesis.name, hypothesis.joints[0])
-    return max(MOST_TONES, len(rates))
+    return max(USUAL_TONES, len(rates))
 
 
 def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
     """Rates (k,) in equal steps: Hz of a disturbance, or rad of a ripple per unit of the joint's travel (waves a turn).
-    None where a joint moves by less than a wave.
+    Empty if the joint moves by less than one wave.
 
     Tones that differ by less than one over the record's duration (its travel) cannot be distinguished. Steps are half
-    (an eighth) of that; wider, up to that itself, where they would be more than MOST_TONES.
+    (an eighth) of that; wider, up to that itself, where they would be more than USUAL_TONES.
     """
     machine = observation.machine
     column = machine.modelled_joints.index(joint)
@@ -91,7 +92,7 @@ def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
     if not low < high:
         return np.zeros(0)
     span = high - low
-    return np.linspace(low, high, int(max(2.0, min(span / step, max(MOST_TONES, math.ceil(span / alike) + 1)))))
+    return np.linspace(low, high, int(max(2.0, min(span / step, max(USUAL_TONES, math.ceil(span / alike) + 1)))))
 
 
 def _of_the_excitation(rates: Floats, observation: Observation) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from daq.contracts.machine import NoController
 from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.candidates.library import MOST_OF_A_RECORD, TRIED_QUANTILES
-from model.discrepancy.candidates.tones import MOST_TONES
+from model.discrepancy.candidates.tones import USUAL_TONES
 from model.discrepancy.excitation import own_frequencies
 from model.inverse_dynamics.drive_timing import MOST
 from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
@@ -287,7 +287,7 @@ def _compliance(place: Place) -> Iterator[Start]:
 def _scanned(low: float, high: float, step: float) -> Floats:
     if high <= low:
         return np.array([low])
-    return np.linspace(low, high, int(np.clip((high - low) / step, 2, MOST_TONES)))
+    return np.linspace(low, high, int(np.clip((high - low) / step, 2, USUAL_TONES)))
 
 
 def _peaks(rates: Floats, along: Sequence[Floats], place: Place) -> list[float]:

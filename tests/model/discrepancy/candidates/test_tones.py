@@ -8,7 +8,7 @@ import pytest
 from daq.contracts.machine import Machine
 from daq.contracts.quantity import Quantity
 from model.discrepancy.candidates.library import tone
-from model.discrepancy.candidates.tones import MOST_TONES, propose_tones, rates_tried, tones_tried, torque_response
+from model.discrepancy.candidates.tones import USUAL_TONES, propose_tones, rates_tried, tones_tried, torque_response
 from model.discrepancy.output_error.observation import Observation, observe
 from model.discrepancy.output_error.search import Point, point_at
 from model.machine_model.model import Model
@@ -77,12 +77,12 @@ def test_no_disturbance_falls_between_the_tones_that_are_tried(seconds: float) -
     assert rates[-1] == 8.0
     hypothesis = tone(imagined.arm(), "periodic_disturbance", 1, {"frequency": 1.0}, 0.1)
     assert hypothesis is not None
-    assert tones_tried(observation, hypothesis) == max(MOST_TONES, len(rates))
+    assert tones_tried(observation, hypothesis) == max(USUAL_TONES, len(rates))
 
 
 def test_a_record_of_55_s_is_searched_with_the_usual_number_of_tones() -> None:
     observation = looked_at(55.0)
-    assert len(rates_tried(observation, "periodic_disturbance", 1)) == MOST_TONES
+    assert len(rates_tried(observation, "periodic_disturbance", 1)) == USUAL_TONES
     assert rates_tried(observation, "torque_ripple", 1)[-1] == pytest.approx(100.0)
 
 

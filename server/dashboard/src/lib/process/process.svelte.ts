@@ -1,9 +1,9 @@
-/** Gripper and process signals. Nobody tells of their changes: they are looked at. What asks is handed in. */
+/** Gripper and process signals. The service does not push their changes, so this class polls. */
 
 import { asProblem, type Problem } from '../api/problem';
 import type { ProcessState } from '../api/types';
 
-/** s after which signals that could not be looked at again are no longer shown as what is: three looks. */
+/** Age (s) from which signals count as out of date: three polls. */
 export const OLD_AFTER = 3;
 
 export interface ProcessRequests {
@@ -16,7 +16,7 @@ export class ProcessSignals {
   /** Null until they are known. */
   signals = $state.raw<ProcessState | null>(null);
   problem = $state.raw<Problem | null>(null);
-  /** When the signals shown were asked for, s. */
+  /** Time of the request that gave the signals shown, s. */
   private askedAt = $state<number | null>(null);
   private turn = 0;
   private waiting = 0;
@@ -27,27 +27,27 @@ export class ProcessSignals {
     private readonly now: () => number,
   ) {}
 
-  /** Asks for them, unless an answer is still awaited: it will tell. */
+  /** Requests them, unless an answer is still awaited. */
   async look(): Promise<void> {
-    if (this.waiting === 0) await this.newest(() => this.requests.look());
+    if (this.waiting === 0) await this.sendLatest(() => this.requests.look());
   }
 
-  /** How old the signals are at `now`, s; null where they are new enough to be what is, or not known at all. */
+  /** Age (s) of the signals at `now`; null if they are current, or not known. */
   oldAt(now: number): number | null {
     const age = this.askedAt === null ? 0 : now - this.askedAt;
     return age > OLD_AFTER ? age : null;
   }
 
   grip(closed: boolean): Promise<void> {
-    return this.newest(() => this.requests.grip(closed));
+    return this.sendLatest(() => this.requests.grip(closed));
   }
 
   set(output: number, on: boolean): Promise<void> {
-    return this.newest(() => this.requests.set(output, on));
+    return this.sendLatest(() => this.requests.set(output, on));
   }
 
-  /** What was asked for earlier says nothing any more once something was asked for later. */
-  private async newest(request: () => Promise<ProcessState>): Promise<void> {
+  /** Sends a request. Its answer is ignored if a newer request was sent meanwhile. */
+  private async sendLatest(request: () => Promise<ProcessState>): Promise<void> {
     const turn = ++this.turn;
     const at = this.now();
     this.waiting += 1;

@@ -115,7 +115,7 @@ export function programOf(name: string, machine: string, instructions: readonly 
   return { version: 1, name, machine, notes: '', instructions: [...instructions] };
 }
 
-/** Why a name is none; empty where it is one. */
+/** Why a name is not valid; empty if it is. */
 export function problemOfName(name: string): string {
   return /^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$/.test(name)
     ? ''
