@@ -213,7 +213,7 @@ def wait_for_trace(folder: Path, watched: int) -> None:
 
 
 def test_a_program_fault_is_told_as_one_and_freezes_nothing_else(tmp_path: Path) -> None:
-    with running(text_of(tmp_path / "traces"), before="ulimit -n 9") as process:  # too few open files
+    with running(text_of(tmp_path / "traces"), before="ulimit -n 6") as process:  # too few open files
         end = process.end()
         assert isinstance(end, CannotOpen), end
         assert process.exit_code() != 0
