@@ -67,7 +67,9 @@ class Demonstrations(Part):
         sealed = draw(request)
         with self._lock:
             if self._thread is not None and self._thread.is_alive():
-                raise conflict("demonstration-runs", "another demonstration goes on", "wait until its secret is opened")
+                raise conflict(
+                    "demonstration-runs", "another demonstration is running", "wait until its secret is opened"
+                )
             hidden = Hidden(
                 id=secrets.token_hex(6),
                 state="recording",

@@ -158,7 +158,7 @@ def test_what_may_have_ended_since_does_not_come_back(tmp_path: Path) -> None:
 
 def test_a_backup_is_for_nobody_else_to_read_and_never_written_over(archive: Path, tmp_path: Path) -> None:
     assert archive.stat().st_mode & 0o077 == 0
-    with pytest.raises(BackupError, match="exists already"):
+    with pytest.raises(BackupError, match="already exists"):
         back_up(places_in(tmp_path / "here"), archive, NOW, quietly)
     assert verify(archive).count("traces") == 2
 
@@ -209,9 +209,9 @@ def test_a_trace_that_is_archived_and_dropped_meanwhile_is_noted_as_archived(tmp
     restore(tmp_path / "arm.zip", there, NOW, quietly)
     with closing(Store(there.url)) as store:
         traces = TraceStore(store)
-        traces.archived = ArchivedStore(store)  # as the archive's part does
+        traces.archive_index = ArchivedStore(store)  # as the archive's part does
         entries = [traces.get("ma2000", number) for number in ("aaa", "bbb")]
-        assert traces.archived.get("bbb") == made
+        assert traces.archive_index.get("bbb") == made
         assert [(one.local, one.archived) for one in entries] == [(True, False), (False, True)]
 
 

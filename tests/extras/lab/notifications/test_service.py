@@ -78,7 +78,7 @@ def test_a_command_tries_every_destination(
         problems = {one["destination"]: one["problem"] for one in json.loads(told.out)}
         assert problems["webhook lab"] == ""
         assert problems["webhook far"].startswith("127.1: it leads to a private address")
-    daq("notify", "test", "nobody").complains(2, "no destination 'nobody'", "there is lab, far")
+    daq("notify", "test", "nobody").complains(2, "no destination 'nobody'; available: lab, far")
     assert PATH not in daq("config", "show").out
     (tmp_path / "daq.toml").write_text("")
     daq("notify", "test").complains(2, "no notifications are configured", "[notifications]")
