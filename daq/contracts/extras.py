@@ -15,7 +15,12 @@ from daq.contracts.exit_codes import WRONG_INPUT
 
 Extra = Literal["live", "robot", "model", "server", "tables", "ros", "cluster", "postgresql", "archive", "oidc", "mcp"]
 
-CONTAINS: dict[Extra, tuple[Extra, ...]] = {"robot": ("live",), "model": ("robot", "live"), "server": ("robot", "live")}
+CONTAINS: dict[Extra, tuple[Extra, ...]] = {
+    "robot": ("live",),
+    "model": ("robot", "live"),
+    "server": ("robot", "live"),
+    "mcp": ("robot", "live"),
+}
 """Extras that an extra includes."""
 EXTRA_OF: dict[str, Extra] = {
     "websockets": "live",

@@ -83,7 +83,7 @@ def test_a_spring_on_one_side_is_taut_for_a_part_of_the_travel() -> None:
 def test_a_drive_in_another_unit_than_the_machine_files_is_refused() -> None:
     trace = rigs.bench_trace(1, {})
     amperes = replace(trace, record=trace.record.model_copy(update={"drive_unit": "A"}))
-    with pytest.raises(TraceError, match=r"the drive is in A, that of .* in V"):
+    with pytest.raises(TraceError, match=r"the drive is in A, but that of .* in V"):
         diagnose_torques(base_model(rigs.bench_machine()), [amperes])
 
 
