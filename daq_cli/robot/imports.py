@@ -20,7 +20,7 @@ def foreign_trace(file: Path, limits: TraceLimits, choice: Choice) -> Trace:
     from daq.traces.kinds import kind_of
 
     if kind_of(file, limits) == "trace":
-        raise SpecError(f"{file}: is a trace already; copy it into the folder of traces")
+        raise SpecError(f"{file}: is already a trace; copy it into the folder of traces")
     return open_trace(file, limits, choice)
 
 

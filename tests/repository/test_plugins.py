@@ -193,7 +193,7 @@ def test_the_wheel_holds_every_tracked_file_of_the_packages(tmp_path: Path) -> N
     built = (ROOT / "docs" / "_site" / "index.html").is_file()
     assert ("ma2000/docs_site/index.html" in packed) == built
     documents = {name.removeprefix("ma2000/documents/") for name in packed if name.startswith("ma2000/documents/")}
-    pages = {name for name in tracked if name.startswith("docs/") and name.endswith((".md", ".png", ".svg"))}
+    pages = {name for name in tracked if name.startswith("docs/") and name.endswith((".md", ".png", ".svg", ".webp"))}
     assert documents == (set() if built else pages | ({"README.md", *BROUGHT.values()} - expected))
 
 

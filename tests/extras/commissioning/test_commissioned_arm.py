@@ -225,7 +225,7 @@ def test_the_map_leaves_out_what_has_no_place_and_the_bridge_works_by_it(daq: Co
     assert kept.absent == ABSENT
     assert all(kept[name].low == truth[name].low for name in kept.registers)
     assert begun_map(path).read_text("utf-8").count("?") == 20, "for somebody with a manual"
-    assert "the arm keeps its own; process signals and the gripper are not offered" in what_is_absent(findings, path)
+    assert "the arm keeps its own; process signals and the gripper are not available" in what_is_absent(findings, path)
     (tmp_path / "memory_findings.json").write_text(json.dumps(findings_data(findings, [])), "utf-8")
     Record.of(tmp_path).keep("memory", {"absent": list(ABSENT)})
     only = ("commission", "--folder", tmp_path, "--only", "bridge")

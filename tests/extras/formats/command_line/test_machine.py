@@ -45,7 +45,7 @@ def test_a_file_that_is_no_urdf_is_refused_in_one_line(daq: CommandLine, kind: s
         ("--joints turn --gravity 0,0", "--gravity '0,0': write 3 numbers, separated by commas"),
         ("--joints turn --tip foot", "--tip foot: the last joint carries no such link; it carries column, boom"),
         ("--joints turn --drives nothing.toml", "machine 'nothing.toml': no such file"),
-        ("--joints turn,lift --drives 1N·m/A,1N·m/A,1N·m/A", "--drives names 3, and there are 2 joints"),
+        ("--joints turn,lift --drives 1N·m/A,1N·m/A,1N·m/A", "--drives names 3, but there are 2 joints"),
         ("--joints turn,lift --drives 1N·m/A,feetech/sts", "drive 'feetech/sts' is not in the library; did you mean"),
         ("--joints reach --drives 1N·m/A", "drive: unit is 'N·m/A', must be 'N/V'"),
         ("--joints turn --drives ma2000", "drives of ma2000: none of its joints (waist, shoulder"),
