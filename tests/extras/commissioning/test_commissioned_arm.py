@@ -232,7 +232,7 @@ def test_the_map_leaves_out_what_has_no_place_and_the_bridge_works_by_it(daq: Co
     refused = daq("--port", MOVED, *only)
     assert refused.code == 3
     assert (
-        f"the bridge has gains, unlike memory_map.toml. Give it this one: for a board `make firmware MAP={path}`"
+        f"the bridge has gains, unlike memory_map.toml. Load this one: for a board `make firmware MAP={path}`"
         in (refused.err)
     )
     assert daq("--port", f"{MOVED}&memory_map={path}", *only).code == 0

@@ -30,7 +30,7 @@ def test_what_is_no_bag_or_leaves_a_choice_is_told_in_one_line(daq: CommandLine,
     daq("traces", "import", two).complains(2, "joint states on /left, /right; choose one with --topic")
     daq("traces", "import", write(tmp_path / "a.mcap")).complains(2, "is already a trace")
     (tmp_path / "rig.csv").write_text("time,position_1\n0,0\n1,1\n")
-    daq("traces", "import", tmp_path / "rig.csv", "--topic", "/left").complains(2, "are for bags; this is none")
+    daq("traces", "import", tmp_path / "rig.csv", "--topic", "/left").complains(2, "exist only in bags")
     daq("traces", "import", tmp_path / "absent.bag").complains(2, "absent.bag: ")
     (tmp_path / "two.toml").write_text("topics = '/left'\n")
     daq("traces", "import", two).complains(2, "two.toml", "topics")
