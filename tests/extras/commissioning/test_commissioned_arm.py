@@ -231,9 +231,8 @@ def test_the_map_leaves_out_what_has_no_place_and_the_bridge_works_by_it(daq: Co
     only = ("commission", "--folder", tmp_path, "--only", "bridge")
     refused = daq("--port", MOVED, *only)
     assert refused.code == 3
-    assert (
-        f"the bridge has gains, unlike memory_map.toml. Load this one: for a board `make firmware MAP={path}`"
-        in (refused.err)
+    assert f"the bridge has gains, unlike memory_map.toml. Load this one: for a board `make firmware MAP={path}`" in (
+        refused.err
     )
     assert daq("--port", f"{MOVED}&memory_map={path}", *only).code == 0
     page = (tmp_path / "acceptance.html").read_text("utf-8")
