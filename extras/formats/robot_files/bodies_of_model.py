@@ -15,7 +15,8 @@ from extras.formats.robot_files.denavit_hartenberg import transform
 from model import layout as at
 from model.arrays import Floats
 from model.effects.library import effect
-from model.machine_model.model import Model
+from model.effects.names import effect_on
+from model.machine_model.model import EffectUse, Model
 from model.machine_model.nominal import NO_LIMIT
 
 IN_BODIES = frozenset((at.MASS_ADDED, at.PAYLOAD, at.TILT_X, at.TILT_Y, at.SHIFT))
@@ -139,17 +140,20 @@ def motor_numbers(link: OutgoingLink) -> tuple[float, float, float]:
     return float(numbers[at.GEAR]), constant, resistance
 
 
+def effects_left_out(model: Model, held: frozenset[int]) -> list[EffectUse]:
+    """Returns the effects of a model that a format cannot hold. held: columns that it can."""
+    return [
+        use
+        for use in model.effects
+        if use.file is not None or not {p.column for p in effect(use.name).parameters} <= held | IN_BODIES
+    ]
+
+
 def left_out(model: Model, held: frozenset[int]) -> list[str]:
-    """Returns the parts of a model that a format cannot hold: effects, sensors, the controller. held: columns that it
-    can.
+    """Returns the parts of a model that a format cannot hold, in words: effects, sensors, controller. held: columns
+    that it can.
     """
-    found = []
-    for use in model.effects:
-        columns = {parameter.column for parameter in effect(use.name).parameters}
-        own_file = use.file is not None
-        if own_file or not columns <= held | IN_BODIES:
-            joints = f" (joint {', '.join(map(str, use.joints))})" if use.joints else ""
-            found.append(f"{use.name}{joints}")
+    found = [effect_on(use.name, use.joints) for use in effects_left_out(model, held)]
     if any(joint.sensor is not None for joint in model.machine.joints):
         found.append("sensors")
     if not isinstance(model.machine.controller, NoController):

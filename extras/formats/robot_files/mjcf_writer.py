@@ -9,11 +9,19 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from daq.contracts.errors import SpecError
-from extras.formats.robot_files.bodies_of_model import OutgoingLink, left_out, motor_numbers, outgoing_arm
+from extras.formats.robot_files.bodies_of_model import (
+    OutgoingArm,
+    OutgoingLink,
+    effects_left_out,
+    left_out,
+    motor_numbers,
+    outgoing_arm,
+)
 from extras.formats.robot_files.numbers import text_of
 from model import layout as at
 from model.arrays import Floats
-from model.machine_model.model import Model
+from model.effects.names import effect_name
+from model.machine_model.model import EffectUse, Model
 
 HELD = frozenset(
     (
@@ -41,6 +49,18 @@ LEAST_MASS = 1e-9
 """Least mass (kg) of a body: MuJoCo rejects a massless one that moves."""
 
 
+def effects_not_in_mjcf(model: Model) -> tuple[EffectUse, ...]:
+    """Returns the effects of a model that its MJCF leaves out."""
+    return (*effects_left_out(model, HELD), *_of_motors(model, outgoing_arm(model)))
+
+
+def _of_motors(model: Model, arm: OutgoingArm) -> list[EffectUse]:
+    """Effects of motors, where a drive without back-EMF has no motor in MJCF."""
+    if all(link.back for link in arm.links):
+        return []
+    return [use for use in model.effects if use.name in OF_MOTORS]
+
+
 def mjcf_text(model: Model) -> tuple[str, list[str]]:
     """Returns the model's MJCF, and the parts of the model that it leaves out.
 
@@ -50,8 +70,8 @@ def mjcf_text(model: Model) -> tuple[str, list[str]]:
     arm = outgoing_arm(model)
     lost = left_out(model, HELD)
     simple = [link.joint for link in arm.links if not link.back]
-    lost += [f"{use.name} of {', '.join(simple)}" for use in model.effects if use.name in OF_MOTORS and simple]
-    nearly = [f"{use.name} {NEARLY[use.name]}" for use in model.effects if use.name in NEARLY]
+    lost += [f"{effect_name(use.name)} of {', '.join(simple)}" for use in _of_motors(model, arm)]
+    nearly = [f"{effect_name(use.name)} {NEARLY[use.name]}" for use in model.effects if use.name in NEARLY]
     said = f" Made from model {model.identity}. Not in it: {'; '.join(lost) or 'nothing'}. "
     said += f"Nearly: {'; '.join(nearly)}. " if nearly else ""
     root = Xml.Element("mujoco", model=arm.name)

@@ -15,10 +15,10 @@ import numpy as np
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
-from extras.formats.robot_files.mjcf_writer import mjcf_text
+from extras.formats.robot_files.mjcf_writer import effects_not_in_mjcf, mjcf_text
 from model import layout as at
 from model.arrays import Floats
-from model.machine_model.model import Model
+from model.machine_model.model import EffectUse, Model
 from model.record_check.check import as_used
 
 WINDOW = 0.25
@@ -39,14 +39,14 @@ class Replay:
 
     joints:  numbers of the joints, from 1; units: of their positions (rad, m)
     before, after: (n,) root mean square of recorded − replayed position with each model
-    left_out: what MJCF cannot hold of the model after
+    left_out: effects of the model after that MJCF cannot hold
     """
 
     joints: tuple[int, ...]
     units: tuple[str, ...]
     before: Floats
     after: Floats
-    left_out: tuple[str, ...]
+    left_out: tuple[EffectUse, ...]
 
 
 def replay(before: Model, after: Model, traces: Sequence[Trace]) -> Replay:
@@ -58,9 +58,7 @@ def replay(before: Model, after: Model, traces: Sequence[Trace]) -> Replay:
     used = as_used(traces, machine)
     errors = [_root_mean_square(np.concatenate([_errors(model, one) for one in used])) for model in (before, after)]
     units = tuple(machine.joint(joint).units.position for joint in machine.modelled_joints)
-    controllers = ("sensors", "controller")  # the recorded drive stands for both
-    lost = tuple(words for words in mjcf_text(after)[1] if words not in controllers)
-    return Replay(machine.modelled_joints, units, errors[0], errors[1], lost)
+    return Replay(machine.modelled_joints, units, errors[0], errors[1], effects_not_in_mjcf(after))
 
 
 def _root_mean_square(errors: Floats) -> Floats:

@@ -10,7 +10,7 @@ from daq.contracts.trace import Trace
 from extras.formats.robot_files.replay import WINDOW, Replay, replay
 from model.blocks import Block, Cell, Section, Table, Text, cells
 from model.discrepancy.diagnosis import Diagnosis
-from model.effects.names import capitalised
+from model.effects.names import capitalised, effect_on
 from model.reports.numbers import column
 from model.units import shown_unit, with_unit
 
@@ -34,7 +34,8 @@ def replay_section(found: Diagnosis, traces: Sequence[Trace]) -> Section | None:
     except DaqError as error:
         return Section(TITLE, (Text(f"MuJoCo replays nothing: {error}.", "quiet"),))
     judged = made[-1][1]
-    lost = [words for words in judged.left_out if any(words.startswith(f"{step.effect}") for step in added)]
+    names = {step.effect for step in added}
+    lost = [effect_on(use.name, use.joints) for use in judged.left_out if use.name in names]
     joints = sorted({joint for step in added for joint in step.joints}) or list(judged.joints)
     blocks: list[Block] = [Text(HOW)]
     if lost:
@@ -64,6 +65,6 @@ def replay_table(made: Sequence[tuple[str, Replay]]) -> Table:
             texts = column([factor * float(one.before[place]), factor * float(one.after[place])])
             rows.append((Cell(kind), *cells(str(joint), *(with_unit(text, unit) for text in texts))))
     caption = "Root mean square of recorded − replayed position."
-    lost = made[-1][1].left_out
+    lost = [effect_on(use.name, use.joints) for use in made[-1][1].left_out]
     caption += f" {capitalised('; '.join(lost))}: not in MJCF." if lost else ""
     return Table(("traces", "joint", "before", "after"), tuple(rows), caption)

@@ -75,7 +75,7 @@ def test_text_goes_to_standard_output_unless_a_file_is_named(daq: CommandLine) -
     said = daq("machine", "to-urdf", "ma2000")
     assert said.out.startswith("<?xml version='1.0' encoding='utf-8'?>\n<robot name=\"ma2000\">")
     assert said.err.startswith(
-        "left out: load_dependent_friction (joint 1, 2, 3); sensors; controller; inertia of drives"
+        "left out: load-dependent friction on joints 1, 2 and 3; sensors; controller; inertia of drives"
     )
     assert daq("machine", "to-urdf", "ma2000", "-o", "out.urdf").out == "out.urdf\n"
     assert Path("out.urdf").read_text("utf-8") == said.out

@@ -59,7 +59,7 @@ def test_a_report_says_that_mujoco_agrees_or_has_no_form_of_the_effect() -> None
     unlike = found.model_before.with_effect("dead_zone", (2,), {"width": 1.0})
     silent = replay_section(found.model_copy(update={"steps": (step,), "model_after": unlike}), traces)
     assert silent is not None
-    assert "no form of dead_zone (joint 2)" in str(silent.blocks[1])
+    assert "no form of dead zone on joint 2" in str(silent.blocks[1])
 
 
 MJLAB = {
@@ -88,7 +88,7 @@ def test_actuators_are_python_with_the_fields_of_their_program(form: str, name: 
     assert kinds
     for kind, fields in kinds.items():
         assert fields <= {named, *MJLAB[kind].split()}, kind
-    assert "backlash (joint 2)" in lost
+    assert "backlash on joint 2" in lost
 
 
 def test_the_position_loop_of_mjlab_gives_the_torque_of_the_servo() -> None:

@@ -154,8 +154,8 @@ def test_a_fitted_model_goes_out_with_its_own_numbers() -> None:
 def test_what_a_format_cannot_hold_is_named() -> None:
     model = base_model(load_machine("ma2000")).with_effect("backlash", (2,))
     urdf, mjcf = urdf_text(model)[1], mjcf_text(model)[1]
-    assert "backlash (joint 2)" in urdf
-    assert "backlash (joint 2)" in mjcf
+    assert "backlash on joint 2" in urdf
+    assert "backlash on joint 2" in mjcf
     assert any(line.startswith("inertia of drives (") for line in urdf)
     assert not any(line.startswith("inertia of drives") for line in mjcf)
 
