@@ -14,7 +14,7 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.inverse_dynamics.answer import _unseen
 from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.output_error.controller_evidence import JudgedController, judge_controller
+from model.discrepancy.controller.evidence import JudgedController, judge_controller
 from model.discrepancy.workflow import diagnose
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES
 from model.machine_model.model import base_model

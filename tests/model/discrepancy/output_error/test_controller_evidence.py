@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from daq.contracts.machine import Machine, SampledPid
 from daq.contracts.quantity import Quantity
 from daq.contracts.trace import Trace
-from model.discrepancy.output_error.controller_evidence import (
+from model.discrepancy.controller.evidence import (
     check_controller,
     settled_by_records,
     with_findings,

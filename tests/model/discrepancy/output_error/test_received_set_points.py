@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
 from model.arrays import Floats
-from model.discrepancy.output_error.controller_evidence import (
+from model.discrepancy.controller.evidence import (
     ControllerFinding,
     check_controller,
     settled_by_records,
     with_used_set_points,
 )
-from model.discrepancy.output_error.sampled_controller import with_errors
+from model.discrepancy.controller.sampled import with_errors
 from tests.model.discrepancy import outside_arm
 from tests.model.imported import imported
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.output_error.controller_evidence import (
+from model.discrepancy.controller.evidence import (
     check_controller,
     settled_by_records,
     with_used_set_points,
 )
 from model.discrepancy.output_error.observation import observe
-from model.discrepancy.output_error.sampled_controller import with_errors
+from model.discrepancy.controller.sampled import with_errors
 from model.discrepancy.output_error.search import point_at
 from model.discrepancy.selection.diagnose import _fit_tolerances, _given_point
 from model.discrepancy.workflow import diagnose

@@ -19,18 +19,15 @@ joint (generalised least squares; Söderström and Stoica 1989, section 7.5).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from model.arrays import Floats
 from model.discrepancy.grounds import Note
-from model.discrepancy.localisation.phases import Residuals
-from model.discrepancy.localisation.structure import CLIP, PREDICTABLE, clipped, joints_with_structure
-from model.discrepancy.output_error.observation import Observation, ShownNoise
-from model.discrepancy.output_error.search import Point
+from model.discrepancy.localisation.structure import CLIP, PREDICTABLE, clipped
+from model.discrepancy.readings.observation import Observation, ShownNoise
 from model.fitting.whitening import Whitener, fitted_whitener
-from model.machine_model.model import Model
 
 LONGEST_MEMORY = 6
 """Largest order of the autoregression in samples: 0.12 s at 20 ms."""
@@ -78,28 +75,16 @@ LARGER = 1.15
 and may have ended in a wrong minimum."""
 
 
-def shown_noise(point: Point) -> ShownNoise | None:
-    """The noise that a point's residual shows; None where that is no more than what is stated, or where it has a
-    shape."""
-    observation = point.observation
-    stated = float(np.mean(observation.in_deviations(point.residuals) ** 2))
-    if stated < LARGER or joints_with_structure(residuals_of(point.fitted_model, observation, point.residuals)):
-        return None
-    known = replace(observation, noise=None)
+def shown_noise(by_joint: Sequence[Sequence[Floats]]) -> ShownNoise:
+    """The noise that a residual shows: runs (m,) of every joint in stated deviations."""
     whiteners, sizes = [], []
-    for runs in known.by_joint(known.in_deviations(point.residuals)):
-        size = max(1.0, float(np.sqrt(np.mean(clipped(np.concatenate(runs)) ** 2))))
+    for runs in by_joint:
+        sizes.append(max(1.0, float(np.sqrt(np.mean(clipped(np.concatenate(list(runs))) ** 2)))))
         whiteners.append(fitted_whitener(runs, LONGEST_MEMORY, 1.0))
-        sizes.append(size)
     return ShownNoise(tuple(whiteners), np.array(sizes))
 
 
-def residuals_of(model: Model, observation: Observation, signals: Sequence[Floats]) -> Residuals:
-    """Residuals of an observation as their shape is looked for."""
-    return Residuals(model, observation.records, signals, observation.sizes)
-
-
-def note_on_noise(observation: Observation, rms: Sequence[float], joints: Sequence[int]) -> tuple[Note, ...]:
+def note_on_noise(observation: Observation, rms: Floats, joints: Sequence[int]) -> tuple[Note, ...]:
     """A note on joints whose readings are noisier than the machine file states; none where there are none.
 
     Args:

@@ -9,17 +9,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import fft, ifft, next_fast_len
 
 from model.arrays import Floats
-from model.discrepancy.candidates.library import Hypothesis, tone
-from model.discrepancy.candidates.probing import Probe, Projection, projection
+from model.discrepancy.engine.fitting import Fit
+from model.discrepancy.engine.probing import Projection, Trial
+from model.discrepancy.engine.residual import Samples
 from model.discrepancy.excitation import own_frequencies
-from model.discrepancy.output_error.observation import DIFFERENCE, Observation, step_of_derivatives
-from model.discrepancy.output_error.search import Point
+from model.discrepancy.readings.observation import DIFFERENCE, Observation
+from model.discrepancy.readings.residual import ReadingResidual
+from model.discrepancy.readings.trials import tone_trial
 from model.effects.effect import Tone
 from model.effects.library import effect, library
 from model.fitting.records import Record, resolution
@@ -42,29 +45,23 @@ BLOCK = 4_000_000
 """Samples of tones in memory at a time: 64 MB."""
 
 
-def propose_tones(point: Point, joints: Sequence[int]) -> list[Probe]:
-    """The best ripple and the best disturbance of every joint, the most promising first; only the other one for a joint
-    that has one of them already."""
-    clear, found = projection(point), []
+def propose_tones(clear: Projection, compared: ReadingResidual, joints: Sequence[int]) -> list[Trial]:
+    """The best ripple and the best disturbance of every joint; only the other one for a joint that has one of them
+    already."""
+    found = []
     for joint in joints:
-        absent = _absent(point.model, joint)
+        absent = _absent(clear.now.model, joint)
         if not absent:
             continue
-        shown_by = _most_moving(point.observation, joint)
+        shown_by = _most_moving(compared.observation, joint)
         if shown_by is None:
             continue
-        response = torque_response(point, joint, shown_by)
+        response = torque_response(clear.now, compared, joint, shown_by)
         for name, over in absent.items():
-            best = _best_tone(point, clear, name, over, joint, response)
+            best = _best_tone(clear, compared, name, over, joint, response)
             if best is not None:
                 found.append(best)
-    return sorted(found, key=lambda p: -p.gain)
-
-
-def tones_tried(observation: Observation, hypothesis: Hypothesis) -> int:
-    """Number of tones that a hypothesis' tone was chosen from, at least USUAL_TONES; it sets the cost in evidence."""
-    rates = rates_tried(observation, hypothesis.name, hypothesis.joints[0])
-    return max(USUAL_TONES, len(rates))
+    return found
 
 
 def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
@@ -118,33 +115,30 @@ def _samples(record: Record) -> int:
     return max(2, round(RESPONSE / record.inputs.period))
 
 
-def torque_response(point: Point, joint: int, record: int = 0) -> Floats:
+def torque_response(now: Fit, compared: ReadingResidual, joint: int, record: int = 0) -> Floats:
     """Impulse response (s,) of a joint's reading to a torque on it, rad/(N·m), as one record shows it.
 
     It is found with kinds of tones that the joint does not have yet, because changing those it has would show what
     their own amplitude does. Raises ValueError where it has both.
     """
-    observation = point.observation
-    column, model = point.model.machine.modelled_joints.index(joint), point.model
+    observation = compared.observation
+    column, model = now.model.machine.modelled_joints.index(joint), now.model
     absent = _absent(model, joint)
     if not absent:
         raise ValueError(f"joint {joint} has every kind of tone already")
     for name in absent:
         model = model.with_effect(name, (joint,))
-    begun = point.of(model)
-    states, sizes, waves = [observation.state(begun)], [], []
+    moved, sizes, waves = [], [], []
     for name, over in absent.items():
         for value in TRIAL_RATES[over]:
-            state = observation.state(begun)
-            state[0][list(model.parameter(f"joint{joint}.{name}.{over}").slots)] = value
             sine = model.parameter(f"joint{joint}.{name}.sine")
             size = DIFFERENCE * (sine.deviation or 1.0)
-            state[0][list(sine.slots)] += size
-            states.append(state)
+            rate = f"joint{joint}.{name}.{over}"
+            moved.append({**now.values, rate: value, sine.name: sine.value + size})
             sizes.append(size)
-            waves.append(np.sin(_phase(point, over, column, np.array([value]), record)[0]))
-    shown = observation.readings(model, states, step_of_derivatives(model))[record][..., column]
-    shown = (shown[1:] - shown[:1]) / np.array(sizes)[:, None]
+            waves.append(np.sin(_phase(now, observation, over, column, np.array([value]), record)[0]))
+    every = replace(compared, model=model, samples=whole_record(observation, record, column))
+    shown = -every.changes(now.values, moved) / np.array(sizes)[:, None]
     count = _samples(observation.records[record])
     rows = [_lagged(wave, count) for wave in waves]
     regressor = np.concatenate([r[count:] for r in rows])
@@ -152,6 +146,13 @@ def torque_response(point: Point, joint: int, record: int = 0) -> Floats:
     gram = regressor.T @ regressor
     gram[np.diag_indices_from(gram)] += 1e-6 * np.trace(gram) / count
     return np.asarray(np.linalg.solve(gram, regressor.T @ target))
+
+
+def whole_record(observation: Observation, record: int, column: int) -> Samples:
+    """All samples of one joint (index) in one record, those that are not compared too."""
+    every = ((record, slice(0, len(observation.records[record].measured))),)
+    joints = len(observation.deviations)
+    return Samples(tuple(every if j == column else () for j in range(joints)), np.ones(joints))
 
 
 def _absent(model: Model, joint: int) -> dict[str, Tone]:
@@ -165,22 +166,22 @@ def _lagged(wave: Floats, count: int) -> Floats:
     return np.ascontiguousarray(np.lib.stride_tricks.sliding_window_view(padded, count)[:, ::-1])
 
 
-def _phase(point: Point, over: Tone, column: int, values: Floats, record: int = 0) -> Floats:
+def _phase(now: Fit, observation: Observation, over: Tone, column: int, values: Floats, record: int = 0) -> Floats:
     """Phase (k, m) of tones of the given cycles or frequencies along a record."""
-    source = point.observation.records[record]
+    source = observation.records[record]
     if over is Tone.OVER_POSITION:
-        angle = source.measured[:, column] - point.residuals[record][:, column]
+        angle = source.measured[:, column] - now.signals[record][:, column]
         return values[:, None] * angle[None]
     time = (source.inputs.rows + 0.0) * source.inputs.period
     return 2 * np.pi * values[:, None] * time[None]
 
 
 def _passed(
-    point: Point, over: Tone, column: int, values: Floats, response: Floats, record: int
+    now: Fit, observation: Observation, over: Tone, column: int, values: Floats, response: Floats, record: int
 ) -> NDArray[np.complex128]:
     """Readings (k, m) that tones of unit torque cause, the cosine as real part and the sine as imaginary part."""
-    source = point.observation.records[record]
-    waves = np.exp(1j * _phase(point, over, column, values, record))
+    source = observation.records[record]
+    waves = np.exp(1j * _phase(now, observation, over, column, values, record))
     if over is Tone.OVER_POSITION:
         samples = waves.shape[1]
         room = next_fast_len(samples + len(response) - 1)
@@ -191,42 +192,39 @@ def _passed(
     return np.concatenate([waves[:, run] for run in source.runs], axis=1)
 
 
-def _best_tone(point: Point, clear: Projection, name: str, over: Tone, joint: int, response: Floats) -> Probe | None:
+def _best_tone(
+    clear: Projection, compared: ReadingResidual, name: str, over: Tone, joint: int, response: Floats
+) -> Trial | None:
     """The tone that explains most of what is left, once the tolerance parameters have moved too."""
-    observation = point.observation
-    column = point.model.machine.modelled_joints.index(joint)
+    now, observation = clear.now, compared.observation
+    column = now.model.machine.modelled_joints.index(joint)
     rates = rates_tried(observation, name, joint)
     if over is Tone.OVER_TIME:
         rates = rates[~_of_the_excitation(rates, observation)]
-    n = len(observation.deviations)
-    columns = np.arange(column, len(clear.residual), n)
-    best, shown = None, np.zeros_like(point.weighted)
-    for own in np.array_split(rates, math.ceil(len(rates) * len(columns) / BLOCK)) if len(rates) else ():
-        waves = [_passed(point, over, column, own, response, t) for t in range(len(observation.records))]
-        both = np.concatenate(waves, axis=1) / observation.deviations[column]
-        both = observation.whitened(column, both.real) + 1j * observation.whitened(column, both.imag)
-        sine, cosine = np.ascontiguousarray(both.imag), np.ascontiguousarray(both.real)
-        gains, first, second = _explained(clear, sine, cosine, columns)
+    columns = compared.samples.columns[column]
+    count = columns.stop - columns.start
+    best: tuple[float, float] | None = None
+    for own in np.array_split(rates, math.ceil(len(rates) * count / BLOCK)) if len(rates) else ():
+        waves = [_passed(now, observation, over, column, own, response, t) for t in range(len(observation.records))]
+        both = np.zeros((2 * len(own), len(now.row)))
+        shown = np.concatenate(waves, axis=1)
+        both[:, columns] = -np.concatenate([shown.imag, shown.real])
+        sine, cosine = np.split(now.weighted(both)[:, columns], 2)
+        gains = _explained(clear, sine, cosine, columns)
         k = int(np.argmax(gains))
         if best is None or gains[k] > best[0]:
-            best = float(gains[k]), float(first[k]), float(second[k]), float(own[k])
-            shown[column::n] = first[k] * sine[k] + second[k] * cosine[k]
+            best = float(gains[k]), float(own[k])
     if best is None:
         return None
-    gain, in_sine, in_cosine, rate = best
-    sizes = {"sine": in_sine, "cosine": in_cosine, over.value: rate}
-    found = tone(point.model, name, joint, sizes, float(rates[0]), observation.scales)
-    return None if found is None else Probe(found, gain, found.trials[0], clear.moves(shown), shown)
+    places = max(USUAL_TONES, len(rates))
+    model = now.fitted_model
+    return tone_trial(model, name, joint, {over.value: best[1]}, float(rates[0]), places, observation)
 
 
-def _explained(
-    clear: Projection, sine: Floats, cosine: Floats, columns: NDArray[np.int64]
-) -> tuple[Floats, Floats, Floats]:
-    """How much pairs of signals (k, m) take off the cost, and the amplitude of either signal, (k,) each."""
-    by_sine, sines = clear.gains(sine, columns)
-    by_cosine, cosines = clear.gains(cosine, columns)
-    mixed = clear.cross(sine, cosine, columns)
+def _explained(clear: Projection, sine: Floats, cosine: Floats, columns: slice) -> Floats:
+    """How much pairs of signals (k, m) take off the cost, (k,)."""
+    sines, cosines, mixed, by_sine, by_cosine = clear.pairs(sine, cosine, columns)
     determinant = np.maximum(sines * cosines - mixed**2, 1e-9 * sines * cosines + 1e-30)
     first = (cosines * by_sine - mixed * by_cosine) / determinant
     second = (sines * by_cosine - mixed * by_sine) / determinant
-    return first * by_sine + second * by_cosine, first, second
+    return np.asarray(first * by_sine + second * by_cosine)

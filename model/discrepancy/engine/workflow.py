@@ -1,4 +1,4 @@
-"""Steps of a diagnosis by inverse dynamics: find an effect that is missing, add it, check that it holds."""
+"""Steps of a diagnosis: find an effect that is missing, add it, check that it holds."""
 
 from __future__ import annotations
 
@@ -7,50 +7,53 @@ from dataclasses import dataclass, field, replace
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.diagnosis import Candidate, Suspicion
-from model.discrepancy.grounds import Note, Refusal
-from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.fitting import TorqueCase
-from model.discrepancy.inverse_dynamics.judging import has_another_form, judge, suspect
-from model.discrepancy.inverse_dynamics.resolution import is_resolved
-from model.discrepancy.inverse_dynamics.search import (
+from model.discrepancy.engine import holdout
+from model.discrepancy.engine.candidate import Fitted
+from model.discrepancy.engine.case import Case
+from model.discrepancy.engine.fitting import Fit
+from model.discrepancy.engine.judging import judge, suspect
+from model.discrepancy.engine.search import (
     Findings,
-    Fitted,
     evidence,
     order_by_odds,
     prefer_fewer_joints,
     prefer_shorter_laws,
     search,
 )
-from model.discrepancy.inverse_dynamics.standing import Standing, begin
-from model.discrepancy.inverse_dynamics.step_record import list_tried, record_step
-from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
+from model.discrepancy.engine.standing import Standing, begin
+from model.discrepancy.engine.step_record import list_tried, record_step, rivals_of
+from model.discrepancy.grounds import Note, Refusal
 from model.discrepancy.thresholds import CHANCES
 from model.discrepancy.verdict import withdrawn
 from model.effects.names import effect_on
-from model.machine_model.model import Model
 
 
 @dataclass
-class TorqueWorkflow:
-    """State of a diagnosis: what was found so far, and the ranking of a step that added nothing."""
+class Workflow:
+    """State of a diagnosis: what was found so far, and the ranking of a step that added nothing.
 
-    model: Model
-    case: TorqueCase
+    recorded: s, time of all records. rivals: candidates close to the last effect that was added.
+    """
+
+    case: Case
+    recorded: float
     progress: Progress
     cancel: Cancel
+    first: Fit | None = None
+    """The fit of the given model, where it is known."""
     tried: tuple[Candidate, ...] = ()
     notes: list[Note] = field(default_factory=list)
     suspicion: Suspicion | None = None
+    rivals: tuple[Fitted, ...] = ()
+    left: tuple[int, ...] = ()
+    """Joints on which more is left than noise, and is no noise."""
 
     def __post_init__(self) -> None:
-        self.found = begin(self.model, self.case)
-        self.first = self.found.now
-        fitted = len(self.found.known)
-        source = {"source": tolerances(self.model)[1], "share": FITTED_SHARE, "fitted": fitted}
-        self.notes.append(Note(kind="tolerance-source", values=source))
+        self._report(0.0, "fitting the tolerance parameters")
+        self.found = begin(self.case, self.first)
 
     def run(self) -> None:
-        """Take steps until nothing more is significant or holds."""
+        """Takes steps until nothing more is significant or holds."""
         self._take_steps()
         self._withdraw_wrong_laws()
         self.notes += [
@@ -70,24 +73,29 @@ class TorqueWorkflow:
             self.found = self._adopt(before, findings)
             if len(self.found.adopted) == len(before.adopted):
                 self.tried = list_tried(self.found, findings)
-                self.suspicion = suspect(self.found, findings)
+                self.suspicion = suspect(self.found, findings, self.recorded)
                 break
             self._report(0.9, "what is not needed any more")
             self._prune(len(before.steps))
 
     def _report(self, fraction: float, text: str) -> None:
         stop_if(self.cancel)
-        whole, done = self.case.options.most_steps, len(self.found.steps)
-        named = ", ".join(effect_on(s.effect, s.joints) for s in self.found.adopted if s.effect)
+        found = getattr(self, "found", None)
+        steps, adopted = ((), ()) if found is None else (found.steps, found.adopted)
+        named = ", ".join(effect_on(s.effect, s.joints) for s in adopted if s.effect)
         so_far = f"found so far: {named}; " if named else ""
-        self.progress(min(0.99, (done + fraction) / (whole + 1)), f"{so_far}step {done + 1}: {text}")
+        share = (len(steps) + fraction) / (self.case.options.most_steps + 1)
+        self.progress(min(0.99, share), f"{so_far}step {len(steps) + 1}: {text}")
 
     def _search(self, found: Standing) -> Findings:
         """What a step finds, without what the records do not resolve, the most probable by all records first."""
-        findings = search(found.model, found.now, self.case, self._report, self.cancel)
-        fitted = prefer_fewer_joints(sorted(self._with_held_out(found, findings.fitted), key=order_by_odds))
-        fitted = prefer_shorter_laws(fitted, found.now, self.case.options.least_margin)
-        resolved = [is_resolved(f, found.now, self.case) for f in fitted]
+        findings = search(found.now, self.case, self._report, self.cancel)
+        options = self.case.options
+        fitted = prefer_fewer_joints(
+            sorted(self._with_held_out(found, findings.fitted), key=order_by_odds), options.least_margin
+        )
+        fitted = prefer_shorter_laws(fitted, findings.now, options.least_margin)
+        resolved = [self.case.is_resolved(f, findings.now) for f in fitted]
         return replace(
             findings,
             fitted=tuple(f for f, is_one in zip(fitted, resolved, strict=True) if is_one),
@@ -96,9 +104,8 @@ class TorqueWorkflow:
 
     def _with_held_out(self, found: Standing, candidates: Sequence[Fitted]) -> list[Fitted]:
         """Candidates with what held-out records say for them; those for which fitted records do not speak are left."""
-        held = self.case.held_out
-        asked = [c for c in candidates if held and c.evidence > 0]
-        told = holdout.evidence(found.now, [c.fit for c in asked], held, self.case.noise)
+        asked = [c for c in candidates if self.case.held_out is not None and c.evidence > 0]
+        told = holdout.evidence(self.case, found.now, [c.fit for c in asked])
         others = [c for c in candidates if not any(c is one for one in asked)]
         return [
             *(replace(c, told=one.alone, told_compared=one.compared) for c, one in zip(asked, told, strict=True)),
@@ -119,24 +126,26 @@ class TorqueWorkflow:
                 continue
             steps.append(record_step(found, findings, compared, [*refused, *passed_over]))
             if compared.refusal is None:
+                self.rivals = (chosen, *rivals_of(found, findings, chosen, [*refused, *passed_over]))
                 return replace(found.take(chosen), steps=tuple(steps))
             refused.append(chosen)
         return replace(found, steps=tuple(steps))
 
     def _prune(self, latest: int) -> None:
-        """Take out effects of earlier steps that the latest one has made superfluous."""
+        """Takes out effects of earlier steps that the latest one has made superfluous."""
         for step in self.found.steps[:latest]:
             if not step.adopted or step.effect is None:
                 continue
             now, without = self.found.now, self.found.remove(step)
-            if evidence(without.now, now, now.noise.memory, len(step.parameters), 1) < 0:
+            if evidence(without.now, now, len(step.parameters), 1) < 0:
                 gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
                 self.found = replace(without, steps=tuple(gone if s is step else s for s in self.found.steps))
 
     def _withdraw_wrong_laws(self) -> None:
-        """Take back the first effect whose law is of another form than what is there, and all effects after it."""
+        """Takes back the first effect whose law is of another form than what is there, and all effects after it."""
         steps = self.found.steps
-        forms = ((k, has_another_form(self.found, step)) for k, step in enumerate(steps) if step.adopted)
+        self.left = self._joints_left()
+        forms = ((k, self.case.wrong_on(self.found.now, s, self.left)) for k, s in enumerate(steps) if s.adopted)
         first, wrong = next((found for found in forms if found[1]), (len(steps), ()))
         if not wrong:
             return
@@ -145,3 +154,7 @@ class TorqueWorkflow:
                 now = tuple(withdrawn(s, wrong) if s is step else s for s in self.found.steps)
                 self.found = replace(self.found.remove(step), steps=now)
         self.suspicion, self.tried = None, ()  # they were of the model with these effects
+        self.left = self._joints_left() or wrong
+
+    def _joints_left(self) -> tuple[int, ...]:
+        return self.case.joints_left(self.found.now, self.found.first, named=bool(self.found.adopted))

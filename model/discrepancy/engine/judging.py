@@ -8,15 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from model.arrays import Floats
-from model.discrepancy.diagnosis import CLEAR_SHAPE, Step, Suspicion
+from model.discrepancy.diagnosis import Suspicion
+from model.discrepancy.engine import holdout
+from model.discrepancy.engine.candidate import Fitted
+from model.discrepancy.engine.case import Case
+from model.discrepancy.engine.fitting import Fit, fit
+from model.discrepancy.engine.priors import prior_distance
+from model.discrepancy.engine.search import Findings
+from model.discrepancy.engine.standing import Standing
 from model.discrepancy.grounds import Refusal
-from model.discrepancy.inverse_dynamics import holdout
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, fit
-from model.discrepancy.inverse_dynamics.localisation import is_function_of, remaining_shapes
-from model.discrepancy.inverse_dynamics.search import Findings, Fitted
-from model.discrepancy.inverse_dynamics.standing import Standing
-from model.discrepancy.inverse_dynamics.tolerances import prior_distance
-from model.discrepancy.thresholds import CHANCES, LARGER_PART, THRESHOLDS, UNSURE_NOISE, WITHIN_NOISE
+from model.discrepancy.thresholds import CHANCES, LARGER_PART, THRESHOLDS
 from model.effects.library import find_named_effect
 from model.machine_model.record_verdict import FAR_OFF
 
@@ -25,15 +26,12 @@ from model.machine_model.record_verdict import FAR_OFF
 class Comparison:
     """What a candidate takes off the residual.
 
-    reference: the fit that it is held against. fitted_before, fitted_after: mean squares (n,), (N·m)² or N², that the
-    reference and the candidate leave on the records fitted to. before, after: those (n,) on records not fitted to.
-    least_share: of the mean square, that must be gone there.
+    reference: the fit that it is held against. before, after: mean squares (n,) that the reference and the candidate
+    leave on records not fitted to. least_share: of the mean square, that must be gone there.
     """
 
     chosen: Fitted
-    reference: BalanceFit
-    fitted_before: Floats
-    fitted_after: Floats
+    reference: Fit
     before: Floats
     after: Floats
     least_share: float
@@ -48,30 +46,25 @@ class Comparison:
     @property
     def removed(self) -> float:
         """Share of the mean square that is gone on records not fitted to."""
-        return holdout.share_removed(self.fitted_before, self.fitted_after, self.before, self.after)
+        return holdout.share_removed(self.reference.squares, self.chosen.fit.squares, self.before, self.after)
 
 
 def compare(standing: Standing, chosen: Fitted) -> Comparison | None:
     """The candidate beside its reference; None where there was no more than noise to explain."""
-    reference = _reference(standing, chosen)
-    fell, left = (standing.case.stretches.mean_squares(f.residual) for f in (reference, chosen.fit))
-    if not _is_beyond_noise(standing, chosen, fell, left):
+    case, reference = standing.case, _reference(standing, chosen)
+    if not _is_beyond_noise(standing, chosen, reference.squares, chosen.fit.squares):
         return None
-    held = standing.case.held_out  # else blocks of the records fitted to
-    before, after = (
-        holdout.held_out_squares(f.balance.model, f.values, held) if held else holdout.block_squares(f)
-        for f in (reference, chosen.fit)
-    )
-    return Comparison(chosen, reference, fell, left, before, after, standing.case.options.least_share)
+    before, after = (holdout.squares_unseen(case, f) for f in (reference, chosen.fit))
+    return Comparison(chosen, reference, before, after, case.options.least_share)
 
 
-def _reference(standing: Standing, chosen: Fitted) -> BalanceFit:
+def _reference(standing: Standing, chosen: Fitted) -> Fit:
     """The fit that a candidate is held against: the last one, within what the file allows.
 
     A number that is off by more than its file allows may have taken over what is missing. It is as the file expects it
     where the candidate names that number, or brings it back.
     """
-    case, now = standing.case, standing.now
+    now = standing.now
     held = {p.name: p.value for p in chosen.stated}
     for unknown in now.unknowns:
         after = chosen.fit.values.get(unknown.name)
@@ -81,9 +74,10 @@ def _reference(standing: Standing, chosen: Fitted) -> BalanceFit:
                 held[unknown.name] = unknown.expected
     if not held:
         return now
+    known = standing.model.by_name
+    compared = now.compared.of_model(standing.model.with_values({n: v for n, v in held.items() if n in known}))
     unknowns = [u for u in now.unknowns if u.name not in held]
-    balance = case.balance(standing.model.with_values({**now.model_values, **held}))
-    return fit(balance, unknowns, now.values, case.data, now.noise.memory, near=now.derivatives)
+    return fit(compared, unknowns, now.values, now.memory, now.known)
 
 
 def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Floats) -> bool:
@@ -107,7 +101,8 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Comp
     """
     if chosen.evidence <= 0:
         return None
-    if chosen.evidence + chosen.told + (UNSURE_NOISE - 1.0) * chosen.relieved < needed_evidence(standing, chosen):
+    unsure = standing.case.options.least_evidence / THRESHOLDS.significant - 1.0  # priors have no noise in them
+    if chosen.evidence + chosen.told + unsure * chosen.relieved < needed_evidence(standing, chosen):
         return None
     if any(chosen.rivals(one) and chosen.evidence < LARGER_PART * one.evidence for one in refused):
         return None
@@ -130,23 +125,20 @@ ROUNDED = 5.0
 """s to which the time that is still to be recorded is rounded up."""
 
 
-def suspect(standing: Standing, found: Findings) -> Suspicion | None:
+def suspect(standing: Standing, found: Findings, recorded: float) -> Suspicion | None:
     """The best candidate that was not named for want of evidence alone; None where there is none.
 
-    What speaks for it grows in proportion to the time recorded, and its cost hardly does.
+    What speaks for it grows in proportion to the time `recorded`, s, and its cost hardly does.
     """
     case = standing.case
     for chosen in found.fitted[:CHANCES]:
-        if chosen.evidence <= 0:
-            continue
         total = chosen.evidence + chosen.told
         needed = needed_evidence(standing, chosen)
-        if not THRESHOLDS.significant <= total < needed:
+        if chosen.evidence <= 0 or not THRESHOLDS.significant <= total < needed:
             continue
         comparison = compare(standing, chosen)
         if comparison is None or comparison.removed < max(SUSPECTED_SHARE, case.options.least_share):
             continue
-        recorded = sum(float(np.ptp(r.time)) for r in (*case.records, *case.held_out))
         seconds = recorded * ((needed + chosen.cost) / (total + chosen.cost) - 1)
         return Suspicion(
             effect=chosen.effect,
@@ -159,12 +151,9 @@ def suspect(standing: Standing, found: Findings) -> Suspicion | None:
 
 
 FAR_ABOVE_NOISE = 10.0
-"""Residual torque, in deviations of noise, that is taken for something missing even where no shape of it is found:
-friction at a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to
-2.6, where friction turns (docs/how-well.md)."""
-LONG_MEMORY = 4.0
-"""Memory of a residual, in samples, beyond which it is slower than noise. White noise of a drive comes to 1.9 behind
-the low-pass, that of accelerations to 2.7."""
+"""Residual, in deviations of noise, that is taken for something missing even where no shape of it is found: friction at
+a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to 2.6, where
+friction turns (docs/how-well.md)."""
 
 
 def is_left_beside(standing: Standing) -> bool:
@@ -172,45 +161,14 @@ def is_left_beside(standing: Standing) -> bool:
     adopted: its name is then not all of the answer."""
     own = {j for step in standing.steps if step.adopted for j in step.joints}
     joints = standing.model.machine.modelled_joints
-    far = _noises_left(standing) > FAR_ABOVE_NOISE
+    far = noises_left(standing.case, standing.now) > FAR_ABOVE_NOISE
     return any(is_far and (j in own or not own) for j, is_far in zip(joints, far, strict=True))
 
 
-def joints_left_over(standing: Standing) -> tuple[int, ...]:
-    """Joints whose residual is above noise on fitted and on held-out records, and is no noise: far above and slower, or
-    of a shape."""
-    case, now = standing.case, standing.now
-    least = _noises_left(standing)
-    shaped = {shape.joint for shape in remaining_shapes(now, case) if shape.explained >= CLEAR_SHAPE}
-    joints = standing.model.machine.modelled_joints
-    slow = (least > FAR_ABOVE_NOISE) & (now.noise.memory > LONG_MEMORY)
-    shapes = (least > WITHIN_NOISE) & np.array([j in shaped for j in joints])
-    return tuple(j for j, left in zip(joints, slow | shapes, strict=True) if left)
-
-
-def has_another_form(standing: Standing, step: Step) -> tuple[int, ...]:
-    """Joints on which what is left is a function of a step's own torque.
-
-    The numbers of a law are fitted. What is left as a function of the law's own torque is then something that the form
-    of the law has not: it is another law of the same quantity, as drag that grows with the square of speed is beside
-    viscous friction.
-    """
-    now, case = standing.now, standing.case
-    absent = {p.name: p.null for n in step.parameters if (p := now.balance.model.by_name[n]).null is not None}
-    left = set(joints_left_over(standing)) & set(step.joints)
-    if not left or not absent:
-        return ()
-    without = now.balance.residual({**now.values, **absent})
-    own = [less - all_of_it for less, all_of_it in zip(without, now.residual, strict=True)]
-    joints = standing.model.machine.modelled_joints
-    return tuple(j for k, j in enumerate(joints) if j in left and is_function_of(own, now, case, k))
-
-
-def _noises_left(standing: Standing) -> Floats:
+def noises_left(case: Case, now: Fit) -> Floats:
     """(n,) what fitted and held-out records leave at least, in noise floors: a record in which a joint rests says
     nothing of it."""
-    case, now = standing.case, standing.now
-    left = [np.sqrt(case.stretches.mean_squares(now.residual))]
-    if case.held_out:
-        left.append(np.sqrt(holdout.held_out_squares(standing.model, now.values, case.held_out)))
-    return np.asarray(np.fmin.reduce(left) / case.noise)
+    left = [np.sqrt(now.squares) / case.noise]
+    if case.held_out is not None:
+        left.append(np.sqrt(case.held_squares(now)) / case.noise_held)
+    return np.asarray(np.fmin.reduce(left))

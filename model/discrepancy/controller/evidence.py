@@ -18,14 +18,14 @@ from daq.contracts.machine import BoardPid, Machine, NoController, SampledPid, o
 from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
-from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
-from model.discrepancy.grounds import ControllerEffect, ControllerProof
-from model.discrepancy.output_error.sampled_controller import (
+from model.discrepancy.controller.sampled import (
     CLEAR,
     LEAST_SAMPLES,
     controller_numbers,
     with_errors,
 )
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Step, Where
+from model.discrepancy.grounds import ControllerEffect, ControllerProof
 from model.drives.controller import POWER_MAX
 from model.fitting.fit import INTERVAL
 from model.machine_model.model import Model

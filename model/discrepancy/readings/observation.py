@@ -11,20 +11,15 @@ closed loop.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
 
 import numpy as np
 
-from daq.contracts.errors import SpecError
 from daq.contracts.machine import BoardPid, Machine, PlainGain, SampledPid
 from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
-from model.discrepancy.diagnosis import SignalError
-from model.discrepancy.output_error.calibration import Calibration
 from model.discrepancy.thresholds import FEEDBACK_SHARE
 from model.drives import controller as pid
 from model.effects.effect import JointScale, Tone
@@ -48,9 +43,6 @@ Signals = tuple[Floats, ...]
 """One array (m, n) a record."""
 State = tuple[Floats, list[Floats]]
 """What a simulation begins with: the model's flat vector, and initial states (n, 2) of every record."""
-
-T = TypeVar("T")
-R = TypeVar("R")
 
 STEP, COARSE_STEP = 2e-3, 7e-3
 """Longest step of integration, s: ten steps per control period of 20 ms, and three for derivatives and probes, which
@@ -84,9 +76,6 @@ WHOLE = 1e-3
 of error are never more than some hundreds."""
 BATCH = 64
 """Simulations per call of the engine. It bounds the memory: 64 runs of 55 s take 26 MB."""
-AT_ONCE = 2
-"""Fits that run at the same time. Fixed, not the core count: the batch size affects which candidates are fitted, and
-results must not depend on the machine."""
 FAST = 0.99
 """Quantile of a joint's speed from reading to reading that it is said to reach: single readings are noise."""
 
@@ -145,7 +134,7 @@ class Observation:
         prepared = tuple(p.with_setting(at.DRIVE_RECORDED, int(recorded)) for p in self.prepared)
         return replace(self, prepared=prepared)
 
-    def imagined(self, truth: Calibration, noise: Sequence[Floats]) -> Observation:
+    def imagined(self, model: Model, state: State, noise: Sequence[Floats]) -> Observation:
         """The same experiments on an arm that is the model, in closed loop, with noise (k, n) of its readings, counts.
 
         Readings and drives take the place of the recorded ones. Not finite where the simulation is not.
@@ -156,7 +145,7 @@ class Observation:
             .with_setting(at.QUANTISE, at.DRIVE_ROUNDED if forms_rounded_drive(self.machine, p.gains) else 0)
             for p, own in zip(self.prepared, noise, strict=True)
         )
-        outputs = replace(self, prepared=alone).outputs(truth.model, [self.state(truth)])
+        outputs = replace(self, prepared=alone).outputs(model, [state])
         shown = [at_rows(out[0, OUT_READING], r.inputs.rows) for out, r in zip(outputs, self.records, strict=True)]
         records = tuple(replace(r, measured=own) for r, own in zip(self.records, shown, strict=True))
         prepared = tuple(
@@ -220,126 +209,18 @@ class Observation:
                 found[t].append(out[rows][:, list(columns), : len(record.inputs)])
         return [np.concatenate(parts) for parts in found]
 
-    def state(self, tried: Calibration) -> State:
-        """What a simulation with the values of a calibration begins with."""
-        vector = tried.model.vector.copy()
-        initials = [record.inputs.initial.copy() for record in self.records]
-        for value, unknown in zip(tried.values, tried.unknowns, strict=True):
-            place = unknown.parameter.initial
-            if place is None:
-                vector[list(tried.model.by_name.get(unknown.name, unknown.parameter).slots)] = value
-            else:
-                for t in range(len(initials)) if unknown.trace is None else (unknown.trace,):
-                    initials[t][place] += value
-        return vector, initials
-
-    def shown(self, tried: Calibration, longest_step: float = STEP) -> Signals:
-        """Simulated readings of a calibration, rad. Not finite where the simulation is not."""
-        readings = self.readings(tried.model, [self.state(tried)], longest_step)
-        return tuple(one[0] for one in readings)
-
-    def residuals(self, tried: Calibration) -> Signals:
-        """Measured − simulated, rad. Not finite where the simulation is not."""
-        shown = self.shown(tried)
-        return tuple(record.measured - one for record, one in zip(self.records, shown, strict=True))
-
-    def tangents(self, tried: Calibration, which: Sequence[int] | None = None) -> Floats:
-        """Derivatives (p, N) of the weighted readings by a calibration's unknowns `which` (indices; None: all).
-
-        They are finite differences over a small share of each unknown's expected deviation, at a third of the cost of
-        dual numbers. Raises SpecError when the simulation does not stay finite.
-        """
-        which = range(len(tried.unknowns)) if which is None else which
-        seconds = max(len(r.inputs) * r.inputs.period for r in self.records)
-        moves = [_difference(tried, k, seconds) for k in which]
-        states = [self.state(tried)]
-        for index, move in zip(which, moves, strict=True):
-            moved = tried.values.copy()
-            moved[index] += move
-            states.append(self.state(tried.at(moved)))
-        shown = self.readings(tried.model, states, step_of_derivatives(tried.model))
-        found = self.weighted([one[1:] - one[:1] for one in shown]) / np.array(moves)[:, None]
-        if not np.isfinite(found).all():
-            raise SpecError("the simulation does not stay finite: the control loop is unstable")
-        return found
-
     @property
     def units(self) -> tuple[str, ...]:
         """Of the joints' positions: rad or m."""
         kinds = [self.machine.joint(joint).kind for joint in self.machine.modelled_joints]
         return tuple("rad" if kind == "revolute" else "m" for kind in kinds)
 
-    def rms(self, signals: Signals) -> list[float]:
-        """Root mean square of every joint over all samples that are compared, in the signals' unit."""
-        return [
-            float(np.sqrt(np.mean(np.concatenate([s[run, column] for s, run in self._runs(signals)]) ** 2)))
-            for column in range(len(self.deviations))
-        ]
-
-    def _runs(self, signals: Signals) -> list[tuple[Floats, slice]]:
-        return [(s, run) for s, r in zip(signals, self.records, strict=True) for run in r.runs]
-
-    def errors(self, before: Signals, after: Signals, floor: Floats) -> tuple[SignalError, ...]:
-        """Root mean square of every joint's residual before and after, beside the floor (n,) rad."""
-        rows = zip(self.machine.modelled_joints, self.units, self.rms(before), self.rms(after), floor, strict=True)
-        return tuple(
-            SignalError(joint=joint, unit=unit, before=old, after=new, floor=float(least))
-            for joint, unit, old, new, least in rows
-        )
-
-    def in_deviations(self, signals: Sequence[Floats]) -> Floats:
-        """Signals (…, m, n) in stated standard deviations of a reading, all compared samples in one row: (…, N)."""
-        parts = []
-        for record, signal in zip(self.records, signals, strict=True):
-            chosen = np.concatenate([signal[..., run, :] for run in record.runs], axis=-2) / self.deviations
-            parts.append(chosen.reshape(*chosen.shape[:-2], -1))
-        return np.concatenate(parts, axis=-1)
-
-    def weighted(self, signals: Sequence[Floats]) -> Floats:
-        """The same in standard deviations of the noise that is reckoned with: where it is coloured, of what a sample
-        tells beyond those before it."""
-        found = self.in_deviations(signals)
-        if self.noise is not None:
-            n = len(self.deviations)
-            for column in range(n):
-                found[..., column::n] = self.whitened(column, found[..., column::n])
-        return found
-
-    def whitened(self, column: int, rows: Floats) -> Floats:
-        """Signals (…, N / n) of one joint's column, in stated deviations, as `weighted` weighs them."""
-        if self.noise is None:
-            return rows
-        whitener, found, done = self.noise.whiteners[column], np.empty_like(rows), 0
-        if whitener.order == 0:
-            return np.asarray(rows / whitener.deviations[-1])
-        for record in self.records:
-            for run in record.runs:
-                part = slice(done, done + run.stop - run.start)
-                found[..., part] = np.moveaxis(whitener.whitened(np.moveaxis(rows[..., part], -1, 0)), 0, -1)
-                done = part.stop
-        return found
-
-    def by_joint(self, weighted: Floats) -> list[list[Floats]]:
-        """A weighted row (…, N) split up: for every joint its uninterrupted runs (…, m)."""
-        n = len(self.deviations)
-        runs: list[list[Floats]] = [[] for _ in range(n)]
-        done = 0
-        for record in self.records:
-            for run in record.runs:
-                count = (run.stop - run.start) * n
-                part = weighted[..., done : done + count].reshape(*weighted.shape[:-1], -1, n)
-                done += count
-                for joint in range(n):
-                    runs[joint].append(part[..., joint])
-        return runs
-
 
 def observe(
     model: Model, traces: Sequence[Trace], feedback_share: float = FEEDBACK_SHARE, held_out: Sequence[str] = ()
-) -> tuple[Observation, Calibration]:
+) -> tuple[Observation, Model, tuple[Unknown, ...]]:
     """Traces ready for a diagnosis, and the model as it was given, with potentiometers that may bend within their
-    linearity. Its unknowns are the tolerance parameters, all numbers that may differ from the model's on a sound
-    machine: every number with an expected deviation, the potentiometers' bends, the form of friction near zero speed,
+    linearity, and its unknowns. These are the tolerance parameters, which may differ from the model's on a healthy machine: every number with an expected deviation, the potentiometers' bends, the form of friction near zero speed,
     and the initial postures.
 
     Args:
@@ -370,7 +251,7 @@ def observe(
     unknowns = tuple(_as_diagnosed(u, given, problem.model) for u in problem.unknowns)
     scales = _recorded_scales(model, problem.records)
     observation = Observation(model.machine, problem.records, problem.floor, unit, prepared, scales)
-    return observation, Calibration(problem.model, unknowns, np.array([u.start for u in unknowns]))
+    return observation, problem.model, unknowns
 
 
 def _recorded_scales(model: Model, records: Sequence[Record]) -> dict[int, JointScale]:
@@ -427,11 +308,10 @@ def step_of_derivatives(model: Model) -> float:
     return STEP if (model.flags & at.HAS_FLEXIBILITY).any() else COARSE_STEP
 
 
-def _difference(tried: Calibration, index: int, seconds: float) -> float:
-    """The step of the finite difference by the unknown of an index, away from its upper bound. seconds: length of the
-    longest record."""
-    unknown, value = tried.unknowns[index], float(tried.values[index])
-    parameter = tried.model.by_name.get(unknown.name)
+def difference(model: Model, unknown: Unknown, value: float, seconds: float) -> float:
+    """The step of the finite difference by an unknown, away from its upper bound. seconds: length of the longest
+    record."""
+    parameter = model.by_name.get(unknown.name)
     stated = None if parameter is None else parameter.deviation
     size = DIFFERENCE * (unknown.deviation or stated or unknown.scale)
     over = unknown.parameter.rate_of
@@ -461,10 +341,3 @@ def _as_diagnosed(unknown: Unknown, given: Mapping[str, float], model: Model) ->
         if sensor is not None and sensor.linearity is not None:
             return replace(unknown, deviation=BEND_SHARE * sensor.linearity.value * sensor.range.value)
     return unknown
-
-
-def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """`work` of every item, in their order, `AT_ONCE` at a time: simulations release Python's lock, so two fits take
-    little longer than one. Raises what the first item that fails raises."""
-    with ThreadPoolExecutor(AT_ONCE) as threads:
-        return list(threads.map(work, items))
