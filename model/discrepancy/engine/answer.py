@@ -9,7 +9,7 @@ import numpy as np
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import UNWRITTEN, Diagnosis, Gap, SignalError, Step
 from model.discrepancy.engine.case import Case
-from model.discrepancy.engine.fitting import Fit, evaluate, fit, found_values, standard_deviations
+from model.discrepancy.engine.fitting import Fit, evaluate, fit, found_values
 from model.discrepancy.engine.judging import is_left_beside
 from model.discrepancy.engine.standing import Standing
 from model.discrepancy.engine.step_record import signal_errors
@@ -135,7 +135,7 @@ def _of_model(standing: Standing) -> list[Unknown]:
 def _resulting_model(standing: Standing, traces: tuple[str, ...]) -> Model:
     """The model that comes out, and where it comes from."""
     given, known = standing.case.given, standing.now.model_values
-    estimates = ((name, known[name], d) for name, d in standard_deviations(standing.now).items() if name in known)
+    estimates = ((name, known[name], d) for name, d in standing.now.standard_deviations.items() if name in known)
     learnt = summarise_posterior(given.lineage, traces, estimates)
     record = {"fitted": [u.name for u in _of_model(standing)], **learnt}
     lineage = Lineage(parent=given.identity, traces=traces, fit=record, note="diagnosis")

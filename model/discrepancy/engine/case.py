@@ -12,7 +12,7 @@ import numpy as np
 from model.arrays import Floats
 from model.discrepancy.diagnosis import Candidate, RemainingShape, Step, Where
 from model.discrepancy.engine.candidate import Fitted
-from model.discrepancy.engine.fitting import Fit, Slopes, fit
+from model.discrepancy.engine.fitting import Fit, fit
 from model.discrepancy.engine.probing import Probe, Projection, Start, Trial
 from model.discrepancy.engine.residual import Residual, Signals, Values
 from model.discrepancy.grounds import Method
@@ -112,11 +112,9 @@ class Case(ABC):
     def take_back(self, effect: str, own: Sequence[Parameter], now: Fit) -> Start:
         """Values with which an effect has taken over what a fit has made of stated numbers, as stated again."""
 
-    def from_expected(
-        self, compared: Residual, unknowns: Sequence[Unknown], begin: Values, memory: Floats, known: Slopes
-    ) -> Fit:
+    def from_expected(self, compared: Residual, unknowns: Sequence[Unknown], begin: Values, memory: Floats) -> Fit:
         """A fit that begins where the file states its numbers, far from where they are."""
-        return fit(compared, unknowns, begin, memory, known)
+        return fit(compared, unknowns, begin, memory)
 
     def held(self, now: Fit) -> Signals:
         """What a fitted model leaves of the held-out records; empty where there are none."""

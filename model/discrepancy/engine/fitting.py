@@ -102,6 +102,11 @@ class Fit:
         """Rows (…, N) as this fit weighs them."""
         return self.compared.weighted(rows, self.deviations, self.memory)
 
+    @cached_property
+    def standard_deviations(self) -> dict[str, float]:
+        """Of the unknowns that change the residual at all, by name."""
+        return standard_deviations(self)
+
     def slopes(self) -> Slopes:
         """Derivatives by every unknown."""
         if self.known or not self.unknowns:
@@ -191,33 +196,37 @@ def descend(best: Fit, slopes: Slopes, rounds: int = ROUNDS, goal: float = math.
 def _step(now: Fit, J: Floats) -> tuple[Fit, Floats, bool]:
     """A step that descends, or the same fit; derivatives (p, N) corrected by what was tried; and whether they had said
     where it leads."""
-    at, low, high = (np.array([getattr(u, side) for u in now.unknowns]) for side in ("scale", "low", "high"))
-    scale, at = at, np.array([now.values[u.name] for u in now.unknowns])
+    scale, low, high = (np.array([getattr(u, side) for u in now.unknowns]) for side in ("scale", "low", "high"))
+    at = np.array([now.values[u.name] for u in now.unknowns])
     rows, aims = prior_rows(now.unknowns, at)
     rows = rows * scale
     left = now.weighted(now.row)
+    A = now.weighted(J) * scale[:, None]
+    seen = A @ A.T
     for share in SHARES:
-        A = now.weighted(J) * scale[:, None]
-        information = A @ A.T + rows.T @ rows
+        information = seen + rows.T @ rows
         descent = rows.T @ aims - A @ left
         curvature = information + DAMPING**2 * np.eye(len(at))
         step = share * bounded_step(curvature, descent, (low - at) / scale, (high - at) / scale)
+        if float(descent @ step) < 0.5 * SETTLED:
+            break
         values = np.clip(at + step * scale, low, high)
         named = {u.name: float(v) for u, v in zip(now.unknowns, values, strict=True)}
         tried = evaluate(now.compared, now.unknowns, named, now.memory)
         if not math.isfinite(tried.cost):
             continue
-        moved = values - at
-        missed = tried.row - now.row - moved @ J
-        metric = np.diag(information) / scale**2 * moved
-        length = float(metric @ moved)
-        if length > 0.0:
-            J = J + np.outer(metric / length, missed)
+        moved = (values - at) / scale
+        missed = tried.row - now.row - (moved * scale) @ J
+        wrong, whole = (now.weighted(part) for part in (missed, tried.row - now.row))
+        metric = np.diag(information) * moved
+        if (length := float(metric @ moved)) > 0.0:
+            metric /= length
+            crossed = np.outer(A @ wrong, metric)
+            seen = seen + crossed + crossed.T + float(wrong @ wrong) * np.outer(metric, metric)
+            A = A + np.outer(metric, wrong)
+            J = J + np.outer(metric / scale, missed)
         if tried.cost < now.cost:
-            wrong, whole = (now.weighted(part) for part in (missed, tried.row - now.row))
             return tried, J, float(wrong @ wrong) <= FORETOLD**2 * float(whole @ whole)
-        if float(descent @ step) < 0.5 * SETTLED:
-            break
     return now, J, False
 
 
@@ -252,7 +261,7 @@ def found_values(
 
     bias: by name, how far an estimate may be off beside what noise does; its square is added to the variance.
     """
-    deviations, result = standard_deviations(now), {}
+    deviations, result = now.standard_deviations, {}
     for p in parameters:
         value, deviation = now.values[p.name], deviations.get(p.name)
         if deviation is None or not np.isfinite(deviation):

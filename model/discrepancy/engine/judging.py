@@ -12,7 +12,7 @@ from model.discrepancy.diagnosis import Suspicion
 from model.discrepancy.engine import holdout
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case
-from model.discrepancy.engine.fitting import Fit, fit
+from model.discrepancy.engine.fitting import STEPS_APART, Fit, fit
 from model.discrepancy.engine.priors import prior_distance
 from model.discrepancy.engine.search import Findings
 from model.discrepancy.engine.standing import Standing
@@ -77,7 +77,7 @@ def _reference(standing: Standing, chosen: Fitted) -> Fit:
     known = standing.model.by_name
     compared = now.compared.of_model(standing.model.with_values({n: v for n, v in held.items() if n in known}))
     unknowns = [u for u in now.unknowns if u.name not in held]
-    return fit(compared, unknowns, now.values, now.memory, now.known)
+    return fit(compared, unknowns, now.values, now.memory, now.known, rounds=STEPS_APART)
 
 
 def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Floats) -> bool:

@@ -65,6 +65,11 @@ def prior_distance(u: Unknown, value: float) -> tuple[float, float]:
     return float(np.log(least / u.expected)) * per_share, per_share / least
 
 
+def strain(unknowns: Sequence[Unknown], values: Mapping[str, float]) -> float:
+    """The largest distance of a number from what is expected, in deviations."""
+    return max((abs(prior_distance(u, values[u.name])[0]) for u in unknowns), default=0.0)
+
+
 def prior_rows(unknowns: Sequence[Unknown], at: Floats) -> tuple[Floats, Floats]:
     """Rows (c, p) and right-hand sides (c,) that hold unknowns near their expected values, linearised at `at` (p,)."""
     magnets = _magnets(unknowns)

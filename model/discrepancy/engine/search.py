@@ -13,8 +13,8 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import Candidate
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case
-from model.discrepancy.engine.fitting import Fit, Slopes, evaluate, fit
-from model.discrepancy.engine.priors import free_unknown
+from model.discrepancy.engine.fitting import LONG, Fit, Slopes, fit
+from model.discrepancy.engine.priors import free_unknown, strain
 from model.discrepancy.engine.probing import Probe, Start, projection
 from model.discrepancy.thresholds import LARGER_PART, THRESHOLDS
 from model.effects.names import effect_on
@@ -27,8 +27,8 @@ REFINED = 6
 """Most candidates that are fitted with derivatives of their own."""
 OF_A_JOINT = 3
 """Most of these effects on one joint."""
-STRAINED = 50.0
-"""Cost of the tolerances, as χ², above which what is missing has driven them far off: one number by 7 deviations."""
+STRAINED = 7.0
+"""Deviations of a number from the file above which what is missing has driven it off."""
 RESOLVED_ODDS = 2
 """Decimals of evidence by which candidates are ordered."""
 LEADING = 8
@@ -153,17 +153,17 @@ class _Search:
         """The candidates, of which the first have also been begun from what the file states: where tolerances are far
         off without them, and the best of them does not bring the numbers back."""
         now, case = self.now, self.case
-        if now.prior <= STRAINED or not found or found[0].fit.prior <= STRAINED:
+        if not found or not _is_strained(now) or not _is_strained(found[0].fit):
             return list(found)
-        expected = _slopes_where_expected(now)
-        better = []
-        for one in found[:RESTARTED]:
-            last, free = one.fit, {p.name for p in one.parameters}
+        better = list(found)
+        for k, one in enumerate(found[:RESTARTED]):
+            last = one.fit
             begin = {**last.values, **{u.name: u.expected for u in last.unknowns if u.deviation is not None}}
-            known = {name: row for name, row in expected.items() if name not in free}
-            again = case.from_expected(last.compared, last.unknowns, begin, now.memory, known)
-            better.append(replace(one, fit=min(last, again, key=lambda f: f.cost)))
-        return self.weigh([*better, *found[RESTARTED:]])
+            again = case.from_expected(last.compared, last.unknowns, begin, now.memory)
+            better[k] = replace(one, fit=min(last, again, key=lambda f: f.cost))
+            if not _is_strained(better[k].fit):
+                break
+        return self.weigh(better)
 
     def slopes_without(self, free: set[str]) -> Slopes:
         """Derivatives but those by a candidate's own parameters."""
@@ -179,7 +179,7 @@ class _Search:
             stop_if(cancel)
             last = one.fit
             if one.log_odds >= min(best - THRESHOLDS.close, LARGER_PART * best) and one.evidence > -THRESHOLDS.close:
-                one = replace(one, fit=fit(last.compared, last.unknowns, last.values, last.memory, last.known))  # noqa: PLW2901
+                one = replace(one, fit=fit(last.compared, last.unknowns, last.values, last.memory, rounds=LONG))  # noqa: PLW2901
             refined.append(one)
         return [*refined, *found[REFINED:]]
 
@@ -261,11 +261,8 @@ def _shortlist(probes: Sequence[Probe], now: Fit, lead: float) -> tuple[list[lis
     return singles, wider
 
 
-def _slopes_where_expected(now: Fit) -> Slopes:
-    """Derivatives by all unknowns where the file states their values; none where a simulation runs away there."""
-    values = {**now.values, **{u.name: u.expected for u in now.unknowns if u.deviation is not None}}
-    there = evaluate(now.compared, now.unknowns, values, now.memory)
-    return there.slopes() if math.isfinite(there.cost) else {}
+def _is_strained(now: Fit) -> bool:
+    return strain(now.unknowns, now.values) > STRAINED
 
 
 def order_by_odds(found: Fitted) -> float:

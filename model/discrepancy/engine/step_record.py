@@ -11,7 +11,6 @@ from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Signal
 from model.discrepancy.engine import holdout
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case
-from model.discrepancy.engine.fitting import found_values
 from model.discrepancy.engine.judging import Comparison, compare, needed_evidence
 from model.discrepancy.engine.search import Findings, order_by_odds
 from model.discrepancy.engine.standing import Standing
@@ -37,7 +36,7 @@ def record_step(standing: Standing, found: Findings, compared: Comparison, refus
     return Step(
         effect=chosen.effect,
         joints=chosen.joints,
-        parameters=found_values(chosen.fit, chosen.parameters),
+        parameters={p.name: FoundValue.of(p, chosen.fit.values[p.name]) for p in chosen.parameters},
         evidence=chosen.evidence,
         evidence_held_out=chosen.told if held else None,
         margin=min([chosen.evidence, *(chosen.log_odds - r.log_odds for r in rivals)]),

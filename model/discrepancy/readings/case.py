@@ -16,11 +16,12 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import RemainingShape, SignalError, Step, Where
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case, Watch
-from model.discrepancy.engine.fitting import LONG, Fit, Slopes, evaluate, fit
+from model.discrepancy.engine.fitting import LONG, STEPS_APART, Fit, evaluate, fit
 from model.discrepancy.engine.lifted import is_far_everywhere
-from model.discrepancy.engine.priors import free_unknown, prior_distance
+from model.discrepancy.engine.priors import free_unknown, prior_distance, strain
 from model.discrepancy.engine.probing import Probe, Projection, Start, Trial
 from model.discrepancy.engine.residual import Residual, Signals, Values
+from model.discrepancy.engine.search import STRAINED
 from model.discrepancy.engine.step_record import signal_errors
 from model.discrepancy.grounds import Method
 from model.discrepancy.localisation.disagreement import locate
@@ -69,7 +70,6 @@ class ReadingCase(Case):
     base: tuple[Unknown, ...] = ()
     excluded: tuple[str, ...] = ()
     _responses: dict[tuple[str, tuple[int, ...], str], Floats] = field(default_factory=dict, init=False, repr=False)
-    _closed: dict[int, tuple[Fit, Slopes]] = field(default_factory=dict, init=False, repr=False)
 
     method: ClassVar[Method] = "output-error"
     measure = "closed-loop"
@@ -140,28 +140,13 @@ class ReadingCase(Case):
         squares, products = clear.products(clear.now.weighted(row)[None])
         return bool(products[0] ** 2 >= REMEMBERED * THRESHOLDS.interesting * squares[0, 0])
 
-    def from_expected(
-        self, compared: Residual, unknowns: Sequence[Unknown], begin: Values, memory: Floats, known: Slopes
-    ) -> Fit:
+    def from_expected(self, compared: Residual, unknowns: Sequence[Unknown], begin: Values, memory: Floats) -> Fit:
         """A fit that begins where the file states its numbers: in the closed loop first, which stays near the record
         whatever is missing."""
         assert isinstance(compared, ReadingResidual)
         closed = compared.on(compared.observation.with_feedback_share(0.0))
-        near = {n: row for n, row in self._closed_slopes(known).items() if n in known}
-        there = fit(closed, unknowns, begin, memory, near)
-        return fit(compared, unknowns, there.values if math.isfinite(there.cost) else begin, memory, known)
-
-    def _closed_slopes(self, known: Slopes) -> Slopes:
-        """Derivatives in the closed loop, of the given model where the file states its numbers."""
-        if 0 not in self._closed:
-            closed = self.compared.on(self.compared.observation.with_feedback_share(0.0)).of_model(self.given)
-            unknowns = [u for u in self.base if u.name in known or u.name in self.given.by_name]
-            values = {u.name: u.expected for u in self.base}
-            rows = closed.slopes(values, unknowns)
-            rows = np.where(np.isfinite(rows).all(axis=1, keepdims=True), rows, 0.0)
-            slopes = dict(zip((u.name for u in unknowns), rows, strict=True))
-            self._closed[0] = evaluate(closed, unknowns, values, np.ones(len(self.noise))), slopes
-        return self._closed[0][1]
+        there = fit(closed, unknowns, begin, memory, rounds=STEPS_APART)
+        return fit(compared, unknowns, there.values if math.isfinite(there.cost) else begin, memory)
 
     def take_back(self, effect: str, own: Sequence[Parameter], now: Fit) -> Start:
         """An effect that has all of the distance of a number far from its expectation, while that is as expected."""
@@ -341,7 +326,9 @@ def weighed_by_noise(case: ReadingCase) -> tuple[ReadingCase, Fit]:
         row = fitted.row
         stated = float(np.mean(np.concatenate([np.concatenate(runs) for runs in case.compared.by_joint(row)]) ** 2))
         shape = joints_with_structure(case.residuals(fitted, fitted.signals, case.compared.observation))
-        if stated < LARGER or shape:
+        # noise moves no number by many of its own deviations: what does is missing
+        driven_off = strain(fitted.unknowns, fitted.values) > STRAINED * math.sqrt(stated)
+        if stated < LARGER or shape or driven_off:
             break
         noise = shown_noise(case.compared.by_joint(row))
         compared = case.compared.on(replace(case.compared.observation, noise=noise))

@@ -219,9 +219,12 @@ class Observation:
 def observe(
     model: Model, traces: Sequence[Trace], feedback_share: float = FEEDBACK_SHARE, held_out: Sequence[str] = ()
 ) -> tuple[Observation, Model, tuple[Unknown, ...]]:
-    """Traces ready for a diagnosis, and the model as it was given, with potentiometers that may bend within their
-    linearity, and its unknowns. These are the tolerance parameters, which may differ from the model's on a healthy machine: every number with an expected deviation, the potentiometers' bends, the form of friction near zero speed,
-    and the initial postures.
+    """Traces ready for a diagnosis; the model as it was given, with potentiometers that may bend within their
+    linearity; and its unknowns.
+
+    These are the tolerance parameters, all numbers that may differ from the model's on a healthy machine: every number
+    with an expected deviation, the potentiometers' bends, the form of friction near zero speed, and the initial
+    postures.
 
     Args:
         held_out: identities of the traces that are not fitted to.

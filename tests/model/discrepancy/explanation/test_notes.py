@@ -17,8 +17,8 @@ from model.discrepancy.explanation.notes import (
     on_unfinished,
 )
 from model.discrepancy.grounds import Method, Note, NoteKind, RefusalKind
-from model.discrepancy.output_error.noise_model import note_on_noise
-from model.discrepancy.output_error.observation import observe
+from model.discrepancy.readings.noise_model import note_on_noise
+from model.discrepancy.readings.observation import observe
 from model.fitting.unknowns import Unknown
 from tests.model.fitting import imagined
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from model.discrepancy.inverse_dynamics.tolerances import SAME_MAGNET, prior_cost, prior_rows
+from model.discrepancy.engine.priors import SAME_MAGNET, prior_cost, prior_rows
 from model.fitting.unknowns import Unknown
 from model.machine_model.parameter import Kind, Parameter
 

@@ -5,21 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.controller.evidence import (
     check_controller,
     settled_by_records,
     with_used_set_points,
 )
-from model.discrepancy.output_error.observation import observe
 from model.discrepancy.controller.sampled import with_errors
-from model.discrepancy.output_error.search import point_at
-from model.discrepancy.selection.diagnose import _fit_tolerances, _given_point
+from model.discrepancy.engine.fitting import evaluate
+from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.workflow import diagnose
 from model.fitting.records import records_of
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind
 from tests.model.discrepancy import outside_arm
+from tests.model.discrepancy.readings.cases import case_of, fitted
 
 MACHINE = outside_arm.machine()
 BY_SIMULATION = DiagnosisOptions(method="output-error")
@@ -33,16 +32,18 @@ def sound() -> outside_arm.OutsideArm:
 @pytest.mark.slow
 def test_a_sound_arm_is_explained_to_the_noise_of_its_readings(sound: outside_arm.OutsideArm) -> None:
     """Its drive is rounded to 0.14 V and limited, which the record of the drive tells and no law needs to."""
-    given = _given_point(*observe(base_model(MACHINE), [outside_arm.record(sound, 11)]))
-    assert given.observation.drive_is_input
-    assert _fit_tolerances(given).misfit == pytest.approx(1.0, abs=0.08)
+    case = case_of(base_model(MACHINE), [outside_arm.record(sound, 11)])
+    assert case.compared.observation.drive_is_input
+    left = fitted(case)
+    assert np.mean(left.weighted(left.row) ** 2) == pytest.approx(1.0, abs=0.08)
 
 
 @pytest.mark.slow
 def test_sudden_friction_with_the_true_numbers_leaves_the_noise_of_readings() -> None:
     """The arm's friction is there at once: its model's must not need a distance to build up."""
     arm = outside_arm.drawn(106)
-    observation, given = observe(base_model(MACHINE), [outside_arm.record(arm, 1061)])
+    case = case_of(base_model(MACHINE), [outside_arm.record(arm, 1061)])
+    unknowns = case.unknowns(case.given, {})
     true = {"controller.delay": arm.delay}
     for joint in range(3):
         true[f"link{joint + 1}.mass"] = arm.mass[joint]
@@ -52,11 +53,11 @@ def test_sudden_friction_with_the_true_numbers_leaves_the_noise_of_readings() ->
         true[own + "coulomb_friction.torque"] = arm.coulomb[joint]
 
     def misfit(**forms: float) -> float:
-        values = [true.get(u.name, forms.get(u.kind.name, u.expected)) for u in given.unknowns]
-        point = point_at(observation, given.at(np.array(values)), np.zeros((len(values), observation.samples)))
-        return point.misfit
+        values = {u.name: true.get(u.name, forms.get(u.kind.name, u.expected)) for u in unknowns}
+        left = evaluate(case.compared, unknowns, values, np.ones(3))
+        return float(np.mean(left.weighted(left.row) ** 2))
 
-    shortest = min(u.low for u in given.unknowns if u.kind is Kind.PRESLIDING)
+    shortest = min(u.low for u in unknowns if u.kind is Kind.PRESLIDING)
     assert misfit(PRESLIDING=shortest, PRESLIDING_SHAPE=0.0) == pytest.approx(1.0, abs=0.06)
     assert misfit() > 3.0, "with the expected distance, half a count"
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from model.discrepancy.output_error.noise_model import LEAST_DEVIATION, fit_noise_model
+from model.discrepancy.readings.noise_model import LEAST_DEVIATION, fit_noise_model
 
 
 def coloured(count: int, pole: float, seed: int) -> np.ndarray:

@@ -5,22 +5,13 @@ from dataclasses import replace
 import pytest
 
 from daq.contracts.progress import Never
-from model.discrepancy.inverse_dynamics.fitting import fit
-from model.discrepancy.inverse_dynamics.judging import judge
-from model.discrepancy.inverse_dynamics.probing import Probe
-from model.discrepancy.inverse_dynamics.search import (
-    OF_A_JOINT,
-    REFINED,
-    SHORTLIST,
-    Fitted,
-    _refined,
-    _shortlist,
-    _weighted_squares,
-    search,
-)
-from model.discrepancy.inverse_dynamics.starts import Trial
-from model.discrepancy.inverse_dynamics.step_record import _cannot_be_told
-from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.discrepancy.engine.candidate import Fitted
+from model.discrepancy.engine.fitting import fit
+from model.discrepancy.engine.judging import judge
+from model.discrepancy.engine.probing import Probe, Trial
+from model.discrepancy.engine.search import OF_A_JOINT, REFINED, SHORTLIST, _Search, _shortlist, search
+from model.discrepancy.engine.step_record import _cannot_be_told
+from model.discrepancy.engine.workflow import Workflow
 from model.discrepancy.options import TorqueOptions
 from model.discrepancy.thresholds import LARGER_PART
 from tests.model.discrepancy.inverse_dynamics.searches import sliding
@@ -29,48 +20,49 @@ FRICTION = TorqueOptions(effects=("coulomb_friction", "viscous_friction"))
 
 
 @pytest.fixture(scope="module")
-def rubbing() -> TorqueWorkflow:
+def rubbing() -> Workflow:
     return sliding({"coulomb": 8.0}, FRICTION)
 
 
 @pytest.fixture(scope="module")
-def found(rubbing: TorqueWorkflow) -> tuple[Fitted, ...]:
-    return search(rubbing.model, rubbing.found.now, rubbing.case, lambda *_: None, Never()).fitted
+def found(rubbing: Workflow) -> tuple[Fitted, ...]:
+    return search(rubbing.found.now, rubbing.case, lambda *_: None, Never()).fitted
 
 
-def probe(workflow: TorqueWorkflow, effect: str, joint: int, gain: float) -> Probe:
-    return Probe(Trial(effect, (joint,), workflow.model, (), (), ({},)), gain, {})
+def probe(workflow: Workflow, effect: str, joint: int, gain: float) -> Probe:
+    return Probe(Trial(effect, (joint,), workflow.found.model, (), (), ({},)), gain, {})
 
 
 def test_of_a_joint_the_three_that_explain_most_of_it_are_fitted_beside_the_most_promising(
-    rubbing: TorqueWorkflow,
+    rubbing: Workflow,
 ) -> None:
     """Seven effects of another joint promise more; of joint 1, only what explains the larger part is fitted as well."""
-    (whole,) = _weighted_squares(rubbing.found.now)
+    left = rubbing.found.now.weighted(rubbing.found.now.row)
+    whole = float(left @ left)
     others = [probe(rubbing, f"other_{k}", 2, 10 * whole + k) for k in range(SHORTLIST)]
     own = [probe(rubbing, f"own_{k}", 1, (0.9 - 0.05 * k) * whole) for k in range(OF_A_JOINT + 2)]
     small = [probe(rubbing, "small", 1, 0.45 * whole)]
-    listed = [p[0].trial.effect for p in _shortlist([*others, *own, *small], rubbing.found.now)]
+    listed = [p[0].trial.effect for p in _shortlist([*others, *own, *small], rubbing.found.now, 12.0)[0]]
     assert set(listed[:SHORTLIST]) == {p.trial.effect for p in others}
     assert listed[SHORTLIST:] == ["own_0", "own_1", "own_2"]
-    assert "small" not in [p[0].trial.effect for p in _shortlist([*others, *small], rubbing.found.now)]
+    assert "small" not in [p[0].trial.effect for p in _shortlist([*others, *small], rubbing.found.now, 12.0)[0]]
 
 
-def test_the_first_candidates_are_fitted_to_their_ends(found: tuple[Fitted, ...]) -> None:
+def test_the_first_candidates_are_fitted_to_their_ends(rubbing: Workflow, found: tuple[Fitted, ...]) -> None:
     best = found[0]
     last = best.fit
     away = {name: value + 3.0 for name, value in last.values.items()}
-    begun = fit(last.balance, last.unknowns, away, last.data, last.noise.memory, rounds=0)
-    assert begun.criterion > last.criterion + 10.0
+    begun = fit(last.compared, last.unknowns, away, last.memory, rounds=0)
+    assert begun.cost > last.cost + 10.0
     some = [replace(best, fit=begun)] * (REFINED + 1)
-    refined = _refined(some, some, Never())
-    assert all(one.fit.criterion == pytest.approx(last.criterion, abs=0.1) for one in refined[:REFINED])
+    refined = _Search(rubbing.found.now, rubbing.case, {}).refined(some, Never())
+    assert all(one.fit.cost == pytest.approx(last.cost, abs=0.5) for one in refined[:REFINED])
     assert refined[REFINED].fit is begun
 
 
 @pytest.mark.parametrize(("share", "taken"), [(0.9, False), (1.1, True)])
 def test_an_effect_with_less_than_half_the_evidence_of_a_refused_rival_is_not_named(
-    rubbing: TorqueWorkflow, found: tuple[Fitted, ...], share: float, taken: bool
+    rubbing: Workflow, found: tuple[Fitted, ...], share: float, taken: bool
 ) -> None:
     chosen = next(f for f in found if f.effect == "coulomb_friction")
     rival = replace(chosen, effect="viscous_friction", evidence=chosen.evidence / (share * LARGER_PART))
