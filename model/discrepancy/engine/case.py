@@ -64,6 +64,10 @@ class Case(ABC):
         """
 
     @abstractmethod
+    def least_gain(self, trial: Trial) -> float:
+        """What a probe must promise for its trial to be fitted."""
+
+    @abstractmethod
     def is_resolved(self, found: Fitted, before: Fit) -> bool:
         """Whether the records can tell an effect, as it was fitted, from a healthy machine.
 

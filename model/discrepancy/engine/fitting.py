@@ -32,14 +32,14 @@ ROUNDS = 8
 """Most steps of a fit that begins near its end."""
 SHARES = (1.0, 1.0, 0.4, 0.1)
 """Shares of a step that are tried until one is downhill, each from derivatives that those before have corrected."""
-DAMPING = 0.03
+DAMPING = 0.01
 """Damping of a step, over the scales of its unknowns. It decides only what the records do not: a tilt about an axis
 along gravity would be thrown to its bound otherwise, and all other numbers would stay where they are, since the step as
 a whole leads uphill."""
-LONG = 20
+LONG = 32
 """Most steps of a fit that has to find its way."""
 STEPS_APART = 4
-"""Steps for which derivatives by all unknowns are corrected, on average, before they are computed anew."""
+"""Steps after which derivatives by all unknowns are computed anew, if corrected ones have led so far."""
 SETTLED = 0.3
 """Fall of −2 log posterior below which a fit has settled: one unit is one standard deviation of one parameter."""
 FORETOLD = 0.1
@@ -98,9 +98,9 @@ class Fit:
         """(n,) with which samples are weighed."""
         return self.compared.deviations(self.row)
 
-    def weighted(self, rows: Floats) -> Floats:
-        """Rows (…, N) as this fit weighs them."""
-        return self.compared.weighted(rows, self.deviations, self.memory)
+    def weighted(self, rows: Floats, joint: int | None = None) -> Floats:
+        """Rows (…, N) as this fit weighs them; of one joint (index) alone, where it is given."""
+        return self.compared.weighted(rows, self.deviations, self.memory, joint)
 
     @cached_property
     def standard_deviations(self) -> dict[str, float]:
@@ -173,21 +173,20 @@ def descend(best: Fit, slopes: Slopes, rounds: int = ROUNDS, goal: float = math.
     for k, name in enumerate(names):
         if name in slopes:
             J[k] = slopes[name]
-    due, left, begun = bool(own), rounds // STEPS_APART, best.cost
+    due, since, begun = bool(own), 0, best.cost
     for number in range(rounds):
         if due:
             which = own if partly else list(range(len(names)))
             rows = best.compared.slopes(best.values, [best.unknowns[k] for k in which])
             J[which] = np.where(np.isfinite(rows).all(axis=1, keepdims=True), rows, 0.0)  # none where it runs away
-            left -= not partly
-            begun = best.cost
+            since, begun = 0, best.cost
         following, J, foretold = _step(best, J)
         fell = 0.0 if following is best else best.cost - following.cost
         best = following
-        ends = fell < SETTLED
-        if ends and (partly or left == 0 or begun - best.cost < SETTLED or (due and foretold)):
+        since, ends = since + 1, fell < SETTLED
+        if ends and (partly or begun - best.cost < SETTLED or (due and foretold)):
             break
-        due = not foretold if partly else ends
+        due = not foretold if partly else ends or since == STEPS_APART
         if number > 0 and best.cost - fell * (rounds - number - 1) > goal:
             break
     return replace(best, known=dict(zip(names, J, strict=True)))
@@ -218,6 +217,9 @@ def _step(now: Fit, J: Floats) -> tuple[Fit, Floats, bool]:
         moved = (values - at) / scale
         missed = tried.row - now.row - (moved * scale) @ J
         wrong, whole = (now.weighted(part) for part in (missed, tried.row - now.row))
+        foretold = float(wrong @ wrong) <= FORETOLD**2 * float(whole @ whole)
+        if foretold and tried.cost < now.cost:
+            return tried, J, True
         metric = np.diag(information) * moved
         if (length := float(metric @ moved)) > 0.0:
             metric /= length
@@ -226,7 +228,7 @@ def _step(now: Fit, J: Floats) -> tuple[Fit, Floats, bool]:
             A = A + np.outer(metric, wrong)
             J = J + np.outer(metric / scale, missed)
         if tried.cost < now.cost:
-            return tried, J, float(wrong @ wrong) <= FORETOLD**2 * float(whole @ whole)
+            return tried, J, foretold
     return now, J, False
 
 

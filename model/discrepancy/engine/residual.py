@@ -118,8 +118,8 @@ class Residual(Protocol):
         """(n,) samples of a residual (N,) that count as one."""
         ...
 
-    def weighted(self, rows: Floats, deviations: Floats, memory: Floats) -> Floats:
-        """Rows (…, N), so that the sum of their squares counts what they tell."""
+    def weighted(self, rows: Floats, deviations: Floats, memory: Floats, joint: int | None = None) -> Floats:
+        """Rows (…, N), so that the sum of their squares counts what they tell; of one joint alone, if given."""
         ...
 
     def costs(self, row: Floats, memory: Floats) -> Floats:

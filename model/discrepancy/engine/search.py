@@ -62,7 +62,7 @@ def search(now: Fit, case: Case, progress: Progress, cancel: Cancel) -> Findings
         stop_if(cancel)
         progress(0.3, f"trying {effect_on(trial.effect, trial.joints)}")
         probes.append(clear.probe(trial))
-    probes.sort(key=lambda p: -p.gain)
+    probes = sorted((p for p in probes if p.gain > case.least_gain(p.trial)), key=lambda p: -p.gain)
     _tell(case, probes, ())
     work = _Search(now, case, now.slopes())
     singles, several = _shortlist(probes, now, case.options.least_margin)

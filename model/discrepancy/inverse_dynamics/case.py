@@ -81,6 +81,10 @@ class TorqueCase(Case):
         """Values with which an effect has taken over what a fit has made of stated numbers, as stated again."""
         return take_back(effect, own, now)
 
+    def least_gain(self, trial: Trial) -> float:  # noqa: ARG002 (of all)
+        """Nothing: on a joint whose residual is large and slow, no effect promises much before it is fitted."""
+        return 0.0
+
     def is_resolved(self, found: Fitted, before: Fit) -> bool:
         """Whether the records can tell an effect from a healthy machine."""
         return is_resolved(found, before, self.records, self.noise, self.options)

@@ -111,9 +111,10 @@ class TorqueResidual:
                 memory[j] = 1 + 2 * float(((covariance[1:] / max(covariance[0], 1e-300)) ** 2).sum())
         return memory
 
-    def weighted(self, rows: Floats, deviations: Floats, memory: Floats) -> Floats:
+    def weighted(self, rows: Floats, deviations: Floats, memory: Floats, joint: int | None = None) -> Floats:
         """Rows (…, N) in deviations with which the sum of their squares is the number of independent samples."""
-        return rows / np.repeat(deviations * np.sqrt(memory), self.samples.sizes)
+        size = deviations * np.sqrt(memory)
+        return rows / (np.repeat(size, self.samples.sizes) if joint is None else size[joint])
 
     def costs(self, row: Floats, memory: Floats) -> Floats:
         """(n,) (samples/memory) ln of the mean square, which is `floor`² at least; constants left out."""

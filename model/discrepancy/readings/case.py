@@ -34,7 +34,7 @@ from model.discrepancy.readings.observation import Observation, observe
 from model.discrepancy.readings.residual import ReadingResidual, samples_of
 from model.discrepancy.readings.tones import propose_tones
 from model.discrepancy.readings.trials import list_trials
-from model.discrepancy.thresholds import FEEDBACK_SHARE, THRESHOLDS
+from model.discrepancy.thresholds import FEEDBACK_SHARE, LARGER_PART, THRESHOLDS
 from model.discrepancy.verdict import Errors, unexplained
 from model.effects.library import effect
 from model.fitting.unknowns import Unknown
@@ -171,6 +171,11 @@ class ReadingCase(Case):
             distance /= -most.expected
         size = float(np.clip((main[0].null or 0.0) + distance, main[0].low, main[0].high))
         return {main[0].name: size, **{u.name: u.expected for u in near}}
+
+    def least_gain(self, trial: Trial) -> float:
+        """Half of what would make it significant."""
+        price = trial.size * math.log(float(self.compared.samples.told.sum())) + 2 * math.log(trial.places)
+        return LARGER_PART * (self.options.least_evidence + price)
 
     def is_resolved(self, found: Fitted, before: Fit) -> bool:  # noqa: ARG002 (the other kind asks)
         """Whether what the file states of it is really off."""

@@ -175,20 +175,23 @@ class ReadingResidual:
         """(n,) noise of readings is white, or whitened."""
         return np.ones(len(self.floor))
 
-    def weighted(self, rows: Floats, deviations: Floats, memory: Floats) -> Floats:
+    def weighted(self, rows: Floats, deviations: Floats, memory: Floats, joint: int | None = None) -> Floats:
         """Rows (…, N) in standard deviations of the noise that is reckoned with: where it is coloured, of what a sample
-        tells beyond those before it."""
+        tells beyond those before it. Of one joint alone, where it is given."""
         noise = self.observation.noise
         if noise is None:
-            return rows / np.repeat(deviations * np.sqrt(memory), self.samples.sizes)
-        found = np.empty_like(rows)
-        for j, columns in enumerate(self.samples.columns):
-            stated, whitener = self.observation.deviations[j], noise.whiteners[j]
-            runs = self.samples.split(rows / stated, j)
-            found[..., columns] = np.concatenate(
-                [np.moveaxis(whitener.whitened(np.moveaxis(run, -1, 0)), 0, -1) for run in runs], axis=-1
-            )
-        return found
+            size = deviations * np.sqrt(memory)
+            return rows / (np.repeat(size, self.samples.sizes) if joint is None else size[joint])
+        every = range(len(deviations)) if joint is None else (joint,)
+        found = []
+        for j in every:
+            own = rows[..., self.samples.columns[j]] if joint is None else rows
+            whitener, begin = noise.whiteners[j], 0
+            for _, run in self.samples.runs[j]:
+                part = own[..., begin : begin + run.stop - run.start] / self.observation.deviations[j]
+                found.append(np.moveaxis(whitener.whitened(np.moveaxis(part, -1, 0)), 0, -1))
+                begin += run.stop - run.start
+        return np.concatenate(found, axis=-1)
 
     def costs(self, row: Floats, memory: Floats) -> Floats:
         """(n,) sum of the squares of a joint's weighted residual."""

@@ -206,10 +206,8 @@ def _best_tone(
     best: tuple[float, float] | None = None
     for own in np.array_split(rates, math.ceil(len(rates) * count / BLOCK)) if len(rates) else ():
         waves = [_passed(now, observation, over, column, own, response, t) for t in range(len(observation.records))]
-        both = np.zeros((2 * len(own), len(now.row)))
         shown = np.concatenate(waves, axis=1)
-        both[:, columns] = -np.concatenate([shown.imag, shown.real])
-        sine, cosine = np.split(now.weighted(both)[:, columns], 2)
+        sine, cosine = (now.weighted(-part, column) for part in (shown.imag, shown.real))
         gains = _explained(clear, sine, cosine, columns)
         k = int(np.argmax(gains))
         if best is None or gains[k] > best[0]:
