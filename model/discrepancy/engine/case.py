@@ -12,7 +12,7 @@ import numpy as np
 from model.arrays import Floats
 from model.discrepancy.diagnosis import Candidate, RemainingShape, Step, Where
 from model.discrepancy.engine.candidate import Fitted
-from model.discrepancy.engine.fitting import Fit, fit
+from model.discrepancy.engine.fitting import Fit, evaluate, fit
 from model.discrepancy.engine.probing import Probe, Projection, Start, Trial
 from model.discrepancy.engine.residual import Residual, Signals, Values
 from model.discrepancy.grounds import Method
@@ -21,6 +21,12 @@ from model.discrepancy.verdict import Errors
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
+
+
+def expected_values(now: Fit) -> dict[str, float]:
+    """The values of a fit, with all numbers of which something is expected at that."""
+    return {**now.values, **{u.name: u.expected for u in now.unknowns if u.deviation is not None}}
+
 
 Watch = Callable[[tuple[Candidate, ...]], None]
 """Called with the leading candidates of a step, the best first, whenever one of them has been computed."""
@@ -115,6 +121,10 @@ class Case(ABC):
     @abstractmethod
     def take_back(self, effect: str, own: Sequence[Parameter], now: Fit) -> Start:
         """Values with which an effect has taken over what a fit has made of stated numbers, as stated again."""
+
+    def where_expected(self, now: Fit) -> Fit:
+        """The model of a fit where the file states its numbers."""
+        return evaluate(now.compared, now.unknowns, expected_values(now), now.memory)
 
     def from_expected(self, compared: Residual, unknowns: Sequence[Unknown], begin: Values, memory: Floats) -> Fit:
         """A fit that begins where the file states its numbers, far from where they are."""

@@ -30,8 +30,10 @@ Slopes = dict[str, Floats]
 
 ROUNDS = 8
 """Most steps of a fit that begins near its end."""
-SHARES = (1.0, 1.0, 0.4, 0.1)
-"""Shares of a step that are tried until one is downhill, each from derivatives that those before have corrected."""
+ATTEMPTS = ((1.0, 0.0), (1.0, 0.0), (0.4, 0.0), (1.0, 0.3), (0.12, 0.0), (1.0, 3.0))
+"""Steps that are tried until one is downhill, as a share of the whole one and a damping in shares of the information's
+diagonal (Marquardt 1963), each from derivatives that those before have corrected. A short step helps where the cost is
+strongly curved, a damped one where the records say little."""
 DAMPING = 0.01
 """Damping of a step, over the scales of its unknowns. It decides only what the records do not: a tilt about an axis
 along gravity would be thrown to its bound otherwise, and all other numbers would stay where they are, since the step as
@@ -202,10 +204,10 @@ def _step(now: Fit, J: Floats) -> tuple[Fit, Floats, bool]:
     left = now.weighted(now.row)
     A = now.weighted(J) * scale[:, None]
     seen = A @ A.T
-    for share in SHARES:
+    for share, damping in ATTEMPTS:
         information = seen + rows.T @ rows
         descent = rows.T @ aims - A @ left
-        curvature = information + DAMPING**2 * np.eye(len(at))
+        curvature = information + np.diag(DAMPING**2 + damping * np.diag(information))
         step = share * bounded_step(curvature, descent, (low - at) / scale, (high - at) / scale)
         if float(descent @ step) < 0.5 * SETTLED:
             break

@@ -15,13 +15,13 @@ from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case
 from model.discrepancy.engine.fitting import LONG, Fit, Slopes, fit
 from model.discrepancy.engine.priors import free_unknown, strain
-from model.discrepancy.engine.probing import Probe, Start, projection
+from model.discrepancy.engine.probing import Probe, Start, Trial, projection
 from model.discrepancy.thresholds import LARGER_PART, THRESHOLDS
 from model.effects.names import effect_on
 
 SHORTLIST = 7
 """Most effects that are fitted after probing."""
-RESTARTED = 3
+RESTARTED = 4
 """Most candidates that are begun from what the file states as well."""
 REFINED = 6
 """Most candidates that are fitted with derivatives of their own."""
@@ -72,7 +72,7 @@ def search(now: Fit, case: Case, progress: Progress, cancel: Cancel) -> Findings
         progress(0.6, f"fitting {effect_on(chosen[0].trial.effect, _joints(chosen))}")
         found = work.weigh([*found, work.fit_effect(chosen, work.goal(found))])
         _tell(case, probes, found)
-    found = work.from_expected(found)
+    found = work.from_expected(found, [p.trial for p in probes])
     for chosen in several:
         best = found[0].log_odds if found else 0.0
         own = max((f.log_odds for f in found if f.effect == chosen[0].trial.effect), default=-math.inf)
@@ -149,21 +149,31 @@ class _Search:
         places = max(p.trial.places for p in probes)
         return Fitted(effect, joints, wider, own, fitted, places, stated=stated)
 
-    def from_expected(self, found: Sequence[Fitted]) -> list[Fitted]:
-        """The candidates, of which the first have also been begun from what the file states: where tolerances are far
-        off without them, and the best of them does not bring the numbers back."""
+    def from_expected(self, found: Sequence[Fitted], tried: Sequence[Trial]) -> list[Fitted]:
+        """The candidates, and those that promise most where the file states its numbers, begun there: where tolerances
+        are far off without them, what they imitate is not seen from where they are, and the best of the candidates does
+        not bring them back."""
         now, case = self.now, self.case
-        if not found or not _is_strained(now) or not _is_strained(found[0].fit):
+        if not _is_strained(now) or (found and not _is_strained(found[0].fit)):
             return list(found)
-        better = list(found)
-        for k, one in enumerate(found[:RESTARTED]):
-            last = one.fit
-            begin = {**last.values, **{u.name: u.expected for u in last.unknowns if u.deviation is not None}}
-            again = case.from_expected(last.compared, last.unknowns, begin, now.memory)
-            better[k] = replace(one, fit=min(last, again, key=lambda f: f.cost))
-            if not _is_strained(better[k].fit):
-                break
-        return self.weigh(better)
+        there = case.where_expected(now)
+        if not math.isfinite(there.cost):
+            return list(found)
+        clear = projection(there.with_slopes())
+        probes = sorted((clear.probe(t) for t in tried if not t.stated), key=lambda p: -p.gain)
+        best: dict[tuple[str, tuple[int, ...]], Probe] = {}
+        for probe in probes:
+            if len(best) < RESTARTED:
+                best.setdefault((probe.trial.effect, probe.trial.joints), probe)
+        every = list(found)
+        for probe in best.values():
+            trial, own = probe.trial, {p.name for p in probe.trial.parameters}
+            kept = (u for u in case.kept(now, trial.model) if u.name not in own)
+            unknowns = (*kept, *(free_unknown(p) for p in trial.parameters))
+            compared = now.compared.of_model(trial.model)
+            fitted = case.from_expected(compared, unknowns, {**there.values, **probe.start}, now.memory)
+            every.append(Fitted(trial.effect, trial.joints, trial.model, trial.parameters, fitted, trial.places))
+        return _best_of_each(self.weigh(every))
 
     def slopes_without(self, free: set[str]) -> Slopes:
         """Derivatives but those by a candidate's own parameters."""
@@ -259,6 +269,14 @@ def _shortlist(probes: Sequence[Probe], now: Fit, lead: float) -> tuple[list[lis
         large = [p for p in probes if p.trial.joints == (joint,) and p.gain > LARGER_PART * whole]
         singles += [[p] for p in large[:OF_A_JOINT] if (p.trial.effect, p.trial.joints) not in listed]
     return singles, wider
+
+
+def _best_of_each(found: Sequence[Fitted]) -> list[Fitted]:
+    """Of several fits of one effect at one place, the best first: the first."""
+    kept: dict[tuple[str, tuple[int, ...]], Fitted] = {}
+    for one in found:
+        kept.setdefault((one.effect, one.joints), one)
+    return list(kept.values())
 
 
 def _is_strained(now: Fit) -> bool:

@@ -15,7 +15,7 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.diagnosis import RemainingShape, SignalError, Step, Where
 from model.discrepancy.engine.candidate import Fitted
-from model.discrepancy.engine.case import Case, Watch
+from model.discrepancy.engine.case import Case, Watch, expected_values
 from model.discrepancy.engine.fitting import LONG, STEPS_APART, Fit, evaluate, fit
 from model.discrepancy.engine.lifted import is_far_everywhere
 from model.discrepancy.engine.priors import free_unknown, prior_distance, strain
@@ -47,6 +47,8 @@ FLAGGED_SHARE = 0.1
 """A joint is flagged where its best probe promises this share of the best of all."""
 REMEMBERED = 0.3
 """A trial is probed again where what it changed before promises this share of an interesting gain."""
+NEARER = (0.0, 0.5)
+"""Shares of the record that the simulated controller is given in turn, before the usual one."""
 NOISE_ROUNDS = 2
 """Fits with the noise that the one before has left."""
 SHORT_DISTANCE = 0.3
@@ -87,8 +89,12 @@ class ReadingCase(Case):
         Raises SpecError where no simulation stays finite.
         """
         ones, given = np.ones(len(self.noise)), {u.name: u.start for u in unknowns}
-        closed = fit(self.compared.on(self.compared.observation.with_feedback_share(0.0)), unknowns, given, ones)
-        begun = [evaluate(self.compared, unknowns, values, ones) for values in (closed.values, given)]
+        values = given
+        for share in NEARER:
+            nearer = self.compared.on(self.compared.observation.with_feedback_share(share))
+            found = fit(nearer, unknowns, values, ones, rounds=STEPS_APART)
+            values = found.values if math.isfinite(found.cost) else values
+        begun = [evaluate(self.compared, unknowns, one, ones) for one in (values, given)]
         finite = [one for one in begun if math.isfinite(one.cost)]
         if not finite:
             raise SpecError("the simulation does not stay finite: the control loop is unstable")
@@ -139,6 +145,11 @@ class ReadingCase(Case):
             return True
         squares, products = clear.products(clear.now.weighted(row)[None])
         return bool(products[0] ** 2 >= REMEMBERED * THRESHOLDS.interesting * squares[0, 0])
+
+    def where_expected(self, now: Fit) -> Fit:
+        """The same, in the closed loop."""
+        closed = self.compared.on(self.compared.observation.with_feedback_share(0.0)).of_model(now.model)
+        return evaluate(closed, now.unknowns, expected_values(now), now.memory)
 
     def from_expected(self, compared: Residual, unknowns: Sequence[Unknown], begin: Values, memory: Floats) -> Fit:
         """A fit that begins where the file states its numbers: in the closed loop first, which stays near the record
