@@ -13,7 +13,7 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import Candidate
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case
-from model.discrepancy.engine.fitting import LONG, Fit, Slopes, fit
+from model.discrepancy.engine.fitting import LONG, Fit, Slopes, evaluate, fit
 from model.discrepancy.engine.priors import free_unknown, strain
 from model.discrepancy.engine.probing import Probe, Start, Trial, projection
 from model.discrepancy.thresholds import LARGER_PART, THRESHOLDS
@@ -62,10 +62,11 @@ def search(now: Fit, case: Case, progress: Progress, cancel: Cancel) -> Findings
         stop_if(cancel)
         progress(0.3, f"trying {effect_on(trial.effect, trial.joints)}")
         probes.append(clear.probe(trial))
-    probes = sorted((p for p in probes if p.gain > case.least_gain(p.trial)), key=lambda p: -p.gain)
+    probes.sort(key=lambda p: -p.gain)
+    hopeful = [p for p in probes if p.gain > case.least_gain(p.trial)]
     _tell(case, probes, ())
     work = _Search(now, case, now.slopes())
-    singles, several = _shortlist(probes, now, case.options.least_margin)
+    singles, several = _shortlist(hopeful, now, case.options.least_margin)
     found: list[Fitted] = []
     for chosen in singles:
         stop_if(cancel)
@@ -156,13 +157,20 @@ class _Search:
         now, case = self.now, self.case
         if not _is_strained(now) or (found and not _is_strained(found[0].fit)):
             return list(found)
-        there = case.where_expected(now)
+        every = self._begun_at(case.where_expected(now), found, tried)
+        if not every or _is_strained(every[0].fit):
+            return every
+        values = {u.name: every[0].fit.values.get(u.name, now.values[u.name]) for u in now.unknowns}
+        return self._begun_at(evaluate(now.compared, now.unknowns, values, now.memory), every, tried)
+
+    def _begun_at(self, there: Fit, found: Sequence[Fitted], tried: Sequence[Trial]) -> list[Fitted]:
+        """The candidates, and those that promise most from other numbers than the fit's, begun there."""
+        now, case = self.now, self.case
         if not math.isfinite(there.cost):
             return list(found)
         clear = projection(there.with_slopes())
-        probes = sorted((clear.probe(t) for t in tried if not t.stated), key=lambda p: -p.gain)
         best: dict[tuple[str, tuple[int, ...]], Probe] = {}
-        for probe in probes:
+        for probe in sorted((clear.probe(t) for t in tried if not t.stated), key=lambda p: -p.gain):
             if len(best) < RESTARTED:
                 best.setdefault((probe.trial.effect, probe.trial.joints), probe)
         every = list(found)
@@ -170,8 +178,11 @@ class _Search:
             trial, own = probe.trial, {p.name for p in probe.trial.parameters}
             kept = (u for u in case.kept(now, trial.model) if u.name not in own)
             unknowns = (*kept, *(free_unknown(p) for p in trial.parameters))
-            compared = now.compared.of_model(trial.model)
-            fitted = case.from_expected(compared, unknowns, {**there.values, **probe.start}, now.memory)
+            compared, begin = now.compared.of_model(trial.model), {**there.values, **probe.start}
+            if there.compared is now.compared:
+                fitted = fit(compared, unknowns, begin, now.memory, clear.now.known)
+            else:
+                fitted = case.from_expected(compared, unknowns, begin, now.memory)
             every.append(Fitted(trial.effect, trial.joints, trial.model, trial.parameters, fitted, trial.places))
         return _best_of_each(self.weigh(every))
 
