@@ -101,8 +101,8 @@ def test_a_note_reads_the_same_after_json() -> None:
 
 def test_noise_that_the_file_does_not_state_is_told_in_counts() -> None:
     arm = imagined.arm()
-    observation, _ = observe(arm, [imagined.trace(arm, seconds=3.0)])
-    rms = [3.0 * float(d) for d in observation.deviations]
+    observation, _, _ = observe(arm, [imagined.trace(arm, seconds=3.0)])
+    rms = 3.0 * observation.deviations
     assert note_on_noise(observation, rms, ()) == ()
     (note,) = note_on_noise(observation, rms, (2,))
     (joint,) = note.values["joints"]
