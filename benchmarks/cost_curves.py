@@ -1,0 +1,181 @@
+"""How time and memory of run, fit, validate, diagnose and serve grow: docs/images/cost-curves.svg.
+
+    python -m benchmarks cost_curves            measure, print and draw (20 minutes)
+    python -m benchmarks cost_curves --quick    three points a curve
+
+Every point is a process of its own: processor time, and how much its memory grows, after a small case has loaded the
+code. A curve's exponent is the slope of its logarithms over its upper half.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import multiprocessing
+import os
+import resource
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+import ma2000
+from benchmarks.service_clients import clients
+from benchmarks.service_process import ROBOT, started_service, sway
+from daq.contracts.processor import processor_time
+from daq.contracts.trace import Trace
+from model.machine_model.model import Model, base_model
+from model.simulation.prepared import Options
+from model.simulation.simulate import simulate, simulate_many
+
+HERE = Path(__file__).parent
+PICTURE = HERE.parent / "docs" / "images" / "cost-curves.svg"
+ARMS = {1: "single_axis", 2: "pan_tilt", 3: "ma2000", 6: "tx40", 7: "panda"}
+"""A machine file for each number of joints."""
+WATCHED = 20.0
+"""Time (s) for which a service is measured."""
+FITTED = ("joint2.motor.back_emf_constant", "joint2.viscous_friction.coefficient", "load.mass")
+Cost = tuple[float, float]
+"""Processor time (s) and memory (bytes)."""
+
+
+def record(folder: Path, seconds: float, seed: int = 0) -> Path:
+    """Records the mock's joints 1 to 3 at 50 Hz."""
+    trajectory = {"kind": "multisine", "duration": seconds, "seed": seed}
+    with ma2000.connect("mock://?lock_step=1") as arm:
+        return arm.run(ma2000.ExperimentSpec.model_validate({"trajectory": trajectory}), folder=folder).file
+
+
+def arm_of(joints: int) -> Model:
+    """The model of an arm with so many joints."""
+    places = (HERE.parent / "examples", HERE / "real_machines")
+    files = [file for place in places if (file := place / f"{ARMS[joints]}.toml").exists()]
+    return base_model(ma2000.load_machine(str(files[0]) if files else ARMS[joints]))
+
+
+def pushed(joints: int, traces: list[Trace]) -> None:
+    """A drive moves an arm for 10 s, in the recursive form that any arm has."""
+    model = arm_of(joints)
+    at = 0.02 * np.arange(500)
+    posture = np.tile(traces[0].position[0, :1], (500, joints))
+    drive = 0.01 * np.sin(at)[:, None] * np.ones(joints)
+    trace = Trace(traces[0].record, tuple(range(1, joints + 1)), at, position=posture, drive=drive)
+    simulate(model, trace, Options(loop="open", general=True))
+
+
+def studied(study: str, joints: int, traces: list[Trace]) -> None:
+    """One study of these records."""
+    if study == "run" and joints:
+        pushed(joints, traces)
+        return
+    model = arm_of(3)
+    if study == "run":
+        simulate_many(model, traces, {})
+    elif study == "fit":
+        ma2000.fit(model, traces, ma2000.FitOptions(parameters=FITTED), progress=False)
+    elif study == "validate":
+        ma2000.validate(model, traces, FITTED, progress=False)
+    else:
+        ma2000.diagnose(model, traces, progress=False)
+
+
+def measure(pipe: Connection, study: str, joints: int, files: list[Path]) -> None:
+    """In a process of its own: sends what a study costs, after it was done once with the shortest record."""
+    traces = [ma2000.read_trace(file) for file in files]
+    studied(study, joints, traces[:1])
+    resident = int(Path("/proc/self/statm").read_text("utf-8").split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    begun = time.process_time()
+    studied(study, joints, traces[1:])
+    took = time.process_time() - begun
+    pipe.send((took, max(0, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 - resident)))
+
+
+def cost(study: str, joints: int, files: list[Path]) -> Cost:
+    """What a study costs in a process of its own, the least of three."""
+    context = multiprocessing.get_context("spawn")
+    found = []
+    for _ in range(1 if study == "diagnose" else 3):
+        ours, theirs = context.Pipe()
+        process = context.Process(target=measure, args=(theirs, study, joints, files))
+        process.start()
+        theirs.close()
+        found.append(ours.recv())
+        process.join()
+    return min(took for took, _ in found), min(memory for _, memory in found)
+
+
+def watched(watchers: int) -> Cost:
+    """What a service takes to show a moving arm to so many watchers, a second; and its memory."""
+    with tempfile.TemporaryDirectory() as name, started_service(Path(name), "mock://") as service:
+        service.ask("POST", "/connect")
+        number = service.submit(sway(3 * WATCHED))
+        service.until_recording(number)
+        with clients(service.url, watchers, ("/healthz",), 1.0, f"/api/v1/robots/{ROBOT}/live"):
+            before = processor_time(service.process.pid)
+            time.sleep(WATCHED)
+            after = processor_time(service.process.pid)
+            assert before is not None
+            assert after is not None
+            status = Path(f"/proc/{service.process.pid}/status").read_text("utf-8")
+        service.ask("POST", "/stop")
+    resident = next(line for line in status.splitlines() if line.startswith("VmRSS")).split()[1]
+    return (after.ran - before.ran) / WATCHED, 1024.0 * int(resident)
+
+
+def curves(folder: Path, points: int) -> Iterator[tuple[str, str, list[tuple[float, Cost]]]]:
+    """Yields against what, of what, and the points of each curve."""
+    short = record(folder, 2.0)
+    lengths = {seconds: record(folder, seconds, 1) for seconds in (10.0, 20.0, 40.0, 80.0, 160.0)[:points]}
+    several = [record(folder, 10.0, seed) for seed in range(2, 2 + 2 ** (points - 1))]
+    for study in ("run", "fit", "validate", "diagnose"):
+        yield "s of record", study, [(s, cost(study, 0, [short, file])) for s, file in lengths.items()]
+        counts = [2**k for k in range(points)]
+        yield "traces of 10 s", study, [(n, cost(study, 0, [short, *several[:n]])) for n in counts]
+    yield "joints", "run", [(joints, cost("run", joints, [short, short])) for joints in ARMS]
+    yield "watchers", "serve", [(n, watched(n)) for n in (5, 10, 20, 40, 80)[:points]]
+
+
+def exponent(points: list[tuple[float, float]]) -> float:
+    """Slope of the logarithms over the upper half of a curve: below, what is constant hides it."""
+    upper = [(math.log(x), math.log(y)) for x, y in points[len(points) // 2 - 1 :] if y > 0]
+    return statistics.linear_regression(*zip(*upper, strict=True)).slope if len(upper) > 1 else math.nan
+
+
+def main() -> int:
+    """Measures, prints and draws; 0."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks cost_curves", description=__doc__)
+    parser.add_argument("--quick", action="store_true")
+    points = 3 if parser.parse_args().quick else 4
+    figure = Figure(figsize=(11, 5.2), layout="constrained")
+    axes = figure.subplots(2, 4, sharey="row")
+    columns: dict[str, int] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for against, what, found in curves(Path(folder), points):
+            column = columns.setdefault(against, len(columns))
+            for row, unit in ((0, 1.0), (1, 2.0**20)):
+                line = [(x, costs[row] / unit) for x, costs in found]
+                told = f"{what} ∝ x^{exponent(line):.1f}"
+                axes[row][column].loglog(*zip(*line, strict=True), "o-", label=told, markersize=4)
+                values = ", ".join(f"{x:g}: {y:.3g}" for x, y in line)
+                print(f"{('time (s)', 'memory (MB)')[row]} against {against}, {told}: {values}", flush=True)
+    for against, column in columns.items():
+        axes[1][column].set_xlabel(against)
+        for row in (0, 1):
+            axes[row][column].legend(fontsize=8)
+            axes[row][column].grid(alpha=0.3)
+    axes[0][0].set_ylabel("processor time, s (serve: a second)")
+    axes[1][0].set_ylabel("memory, MB (serve: whole)")
+    mpl.rcParams["svg.hashsalt"] = "cost curves"  # the same names in the file each time
+    figure.savefig(PICTURE, metadata={"Date": None})
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
