@@ -73,8 +73,9 @@ def load(path: Path, key: str) -> Trace | None:
 
 
 def store(path: Path, key: str, trace: Trace) -> bool:
-    """Writes the cache of a trace: checksum, a line of JSON, columns. Returns False if the folder cannot be written, which
-    is no error.
+    """Writes the cache of a trace: a checksum, a line of JSON, the columns.
+
+    Returns False if the folder cannot be written, which is no error.
     """
     columns = {name: getattr(trace, name) for name in layout.ALL_SIGNALS if getattr(trace, name) is not None}
     parts = [np.ascontiguousarray(column) for column in columns.values()]
