@@ -6106,6 +6106,13 @@ export interface components {
             unattended: boolean;
             /** Stop Port */
             stop_port: number;
+            /**
+             * Panels
+             * @default {}
+             */
+            panels?: {
+                [key: string]: string;
+            };
         };
         /**
          * TaughtPath
