@@ -1423,6 +1423,171 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/robots/{robot}/console/commands": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Console Commands
+         * @description Lists the commands of the console with their options, for completion and help.
+         */
+        get: operations["list_console_commands"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/console/read": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Read Console Line
+         * @description Returns what a line of the command line's language asks for. Carries out nothing.
+         */
+        post: operations["read_console_line"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/experiments/{experiment}/line": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Experiment Line
+         * @description Returns the line that runs this experiment once more: a start for a macro.
+         */
+        get: operations["get_experiment_line"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/macros": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Macros
+         * @description Lists the stored macros, most recently changed first, and examples.
+         */
+        get: operations["list_macros"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/macros/read": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Read Macro
+         * @description Checks a macro that is not stored, with the defaults of its parameters.
+         */
+        post: operations["read_macro"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/macros/{macro}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Put Macro
+         * @description Stores a macro, or a change to its `revision`. Its lines must be valid with its defaults. Moves nothing.
+         */
+        put: operations["put_macro_"];
+        post?: never;
+        /**
+         * Delete Macro
+         * @description Deletes a macro permanently.
+         */
+        delete: operations["delete_macro"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/macros/{macro}/read": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Read Kept Macro
+         * @description Returns the experiments of a macro with these values. Queues nothing: a client submits them.
+         */
+        post: operations["read_kept_macro"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/calendar": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Calendar
+         * @description Lists what will be due from `begin` until before `end`. A due run is submitted; it moves the arm only if the
+         *     queue may.
+         */
+        get: operations["get_calendar"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/robots/{robot}/hidden": {
         parameters: {
             query?: never;
@@ -2022,6 +2187,64 @@ export interface components {
              */
             kind: "compare";
             data: components["schemas"]["ComparisonData"];
+        };
+        /**
+         * ConsoleCommand
+         * @description A command of the console, such as `run ramp`.
+         */
+        ConsoleCommand: {
+            /** Words */
+            words: string[];
+            /** Help */
+            help: string;
+            /** Options */
+            options: components["schemas"]["ConsoleOption"][];
+        };
+        /**
+         * ConsoleLine
+         * @description A line, without `daq` at its beginning.
+         */
+        ConsoleLine: {
+            /** Line */
+            line: string;
+        };
+        /**
+         * ConsoleOption
+         * @description An option or an argument of a command.
+         */
+        ConsoleOption: {
+            /** Name */
+            name: string;
+            /** Flags */
+            flags: string[];
+            /** Takes Value */
+            takes_value: boolean;
+            /** Help */
+            help: string;
+            /** Default */
+            default: string;
+            /** Choices */
+            choices: string[];
+        };
+        /**
+         * ConsoleOrder
+         * @description What a line asks for. The client carries it out through the routes of the service.
+         */
+        ConsoleOrder: {
+            /** Words */
+            words: string[];
+            /** Values */
+            values: {
+                [key: string]: boolean | number | string | null;
+            };
+            spec?: components["schemas"]["ExperimentSpec"] | null;
+            /** Cron */
+            cron?: string | null;
+            /**
+             * Dry Run
+             * @default false
+             */
+            dry_run?: boolean;
         };
         /**
          * Control
@@ -3914,6 +4137,22 @@ export interface components {
             speed?: number | null;
         };
         /**
+         * KeptMacro
+         * @description A stored macro; a change states the `revision` that was edited.
+         */
+        KeptMacro: {
+            macro: components["schemas"]["Macro"];
+            /** Revision */
+            revision: number;
+            /**
+             * Changed
+             * Format: date-time
+             */
+            changed: string;
+            /** Changed By */
+            changed_by: string;
+        };
+        /**
          * KnownEffect
          * @description An effect of the library, which a fit may add and a diagnosis considers.
          */
@@ -4111,6 +4350,98 @@ export interface components {
             limits?: components["schemas"]["Limits"];
             /** Rest Posture */
             rest_posture?: number[] | null;
+        };
+        /**
+         * Macro
+         * @description A named sequence of experiments: lines of `run`, in which `{name}` stands for the value of a parameter.
+         */
+        Macro: {
+            /** Name */
+            name: string;
+            /**
+             * Description
+             * @default
+             */
+            description?: string;
+            /**
+             * Parameters
+             * @default []
+             */
+            parameters?: components["schemas"]["MacroParameter"][];
+            /** Lines */
+            lines: string[];
+        };
+        /**
+         * MacroParameter
+         * @description A parameter of a macro, with the type and the bounds that its form has.
+         */
+        MacroParameter: {
+            /** Name */
+            name: string;
+            /**
+             * Title
+             * @default
+             */
+            title?: string;
+            /**
+             * Unit
+             * @default
+             */
+            unit?: string;
+            /**
+             * Type
+             * @default number
+             * @enum {string}
+             */
+            type?: "number" | "integer" | "text";
+            /** Default */
+            default: number | string;
+            /** Minimum */
+            minimum?: number | null;
+            /** Maximum */
+            maximum?: number | null;
+            /**
+             * Choices
+             * @default []
+             */
+            choices?: string[];
+        };
+        /**
+         * MacroReading
+         * @description A macro with values in place of its parameters.
+         */
+        MacroReading: {
+            /** Parameters */
+            parameters: {
+                [key: string]: unknown;
+            };
+            /** Lines */
+            lines: string[];
+            /** Orders */
+            orders: components["schemas"]["ConsoleOrder"][];
+        };
+        /**
+         * MacroValues
+         * @description Values of a macro's parameters; those left out have their defaults.
+         */
+        MacroValues: {
+            /**
+             * Values
+             * @default {}
+             */
+            values?: {
+                [key: string]: boolean | number | string;
+            };
+        };
+        /**
+         * Macros
+         * @description The stored macros, most recently changed first, and examples to begin with.
+         */
+        Macros: {
+            /** Kept */
+            kept: components["schemas"]["KeptMacro"][];
+            /** Examples */
+            examples: components["schemas"]["Macro"][];
         };
         /**
          * Me
@@ -4926,6 +5257,30 @@ export interface components {
             kind: "gain";
             gain: components["schemas"]["Quantity"];
             inertia?: components["schemas"]["Quantity"] | null;
+        };
+        /**
+         * PlannedRun
+         * @description An experiment that will be submitted, or begin, at a time. Whether the arm then moves depends on the queue.
+         */
+        PlannedRun: {
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /** Name */
+            name: string;
+            /** Seconds */
+            seconds: number;
+            /** Joints */
+            joints: number[];
+            /** By */
+            by: string;
+            spec: components["schemas"]["ExperimentSpec"];
+            /** Schedule */
+            schedule?: string | null;
+            /** Experiment */
+            experiment?: string | null;
         };
         /**
          * PlayPath
@@ -6702,6 +7057,14 @@ export interface components {
              * @default false
              */
             whole_record?: boolean;
+        };
+        /**
+         * WrittenLine
+         * @description The line that asks for an experiment.
+         */
+        WrittenLine: {
+            /** Line */
+            line: string;
         };
         /**
          * JointResidual
@@ -9019,6 +9382,240 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Page_AuditEntry_"];
+                };
+            };
+        };
+    };
+    list_console_commands: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ConsoleCommand"][];
+                };
+            };
+        };
+    };
+    read_console_line: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ConsoleLine"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ConsoleOrder"];
+                };
+            };
+        };
+    };
+    get_experiment_line: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["WrittenLine"];
+                };
+            };
+        };
+    };
+    list_macros: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Macros"];
+                };
+            };
+        };
+    };
+    read_macro: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Macro"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MacroReading"];
+                };
+            };
+        };
+    };
+    put_macro_: {
+        parameters: {
+            query?: {
+                /** @description The revision that was changed. */
+                revision?: number | null;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the macro. */
+                macro: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Macro"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["KeptMacro"];
+                };
+            };
+        };
+    };
+    delete_macro: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the macro. */
+                macro: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+        };
+    };
+    read_kept_macro: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the macro. */
+                macro: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MacroValues"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MacroReading"];
+                };
+            };
+        };
+    };
+    get_calendar: {
+        parameters: {
+            query: {
+                begin: string;
+                end: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PlannedRun"][];
                 };
             };
         };
