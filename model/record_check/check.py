@@ -152,8 +152,7 @@ def turns_of(machine: Machine, joint: int) -> tuple[float, ...]:
 
 
 def _step(machine: Machine, joint: int) -> float:
-    sensor = machine.joint(joint).sensor
-    return 0.0 if sensor is None else sensor.range.value / 2**sensor.bits
+    return machine.joint(joint).count
 
 
 def _without_spikes(reading: Floats, found: FalseReadings) -> Floats:
@@ -177,7 +176,7 @@ def _on_machine(machine: Machine, traces: Sequence[Trace]) -> Iterator[RecordFin
             advice="State it in m/s², along the axes of the base.",
         )
     for joint in machine.modelled_joints:
-        if machine.joint(joint).sensor is None and all(joint in trace.joints for trace in traces):
+        if not machine.joint(joint).count and all(joint in trace.joints for trace in traces):
             sizes = [noise_of(trace.position[:, trace.column(joint)]) for trace in traces if len(trace) > 2]
             unit = machine.joint(joint).units.position
             size = float(np.median(sizes)) if sizes else 0.0

@@ -200,7 +200,7 @@ def _step_of(reading: Floats) -> float:
 def _on_machine(machine: Machine) -> Iterator[FieldReport]:
     """Yields what the machine file does not state."""
     for number_, joint in ((j, machine.joint(j)) for j in machine.modelled_joints):
-        if joint.sensor is None:
+        if not joint.count:
             yield FieldReport(
                 joint=number_,
                 name=joint.name,

@@ -237,7 +237,7 @@ def is_bridged(gap: float, usual: float) -> bool:
 def sensor_deviation(sensor: Sensor) -> float:
     """Returns the standard deviation (rad, m) of one reading: √(1/12 + noise²) counts."""
     noise = 0.0 if sensor.noise is None else sensor.noise.value
-    return float(np.sqrt(1.0 / 12.0 + noise**2)) * sensor.range.value / 2**sensor.bits
+    return float(np.sqrt(1.0 / 12.0 + noise**2)) * sensor.count
 
 
 def noise_of(reading: Floats, step: float = 0.0) -> float:
