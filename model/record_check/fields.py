@@ -13,7 +13,8 @@ from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
-from model.record_check.readings import find_gaps, noise_of
+from model.record_check.pieces import free_part
+from model.record_check.readings import find_bounds, find_gaps, noise_of
 from model.record_check.words import number, times_of
 
 FEW_LEVELS = 16
@@ -126,6 +127,11 @@ class _Record:
         if travel < LEAST_TRAVEL * max(noise, step):
             means = "It hardly moves: its inertia and friction stay as the machine file states them."
             return self._of("position", joint, there, means, "known")
+        part = free_part(self._trace, self._machine)
+        if part is not None and find_bounds(reading):
+            begin, end = self._trace.time[part.start], self._trace.time[part.stop - 1]
+            means = f"It stands at the end of its way: rows from {begin:.2f} to {end:.2f} s are used."
+            return self._of("position", joint, there, means, "known")
         if turns == 0:
             means = "It moves in one direction only: friction, an offset and weight look alike."
             return self._of("position", joint, there, means, "known")
@@ -200,7 +206,7 @@ def _step_of(reading: Floats) -> float:
 def _on_machine(machine: Machine) -> Iterator[FieldReport]:
     """Yields what the machine file does not state."""
     for number_, joint in ((j, machine.joint(j)) for j in machine.modelled_joints):
-        if joint.sensor is None:
+        if not joint.count:
             yield FieldReport(
                 joint=number_,
                 name=joint.name,

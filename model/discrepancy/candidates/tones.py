@@ -22,7 +22,7 @@ from model.discrepancy.output_error.observation import DIFFERENCE, Observation, 
 from model.discrepancy.output_error.search import Point
 from model.effects.effect import Tone
 from model.effects.library import effect, library
-from model.fitting.records import Record, resolution
+from model.fitting.records import Record
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.model import Model
 
@@ -81,8 +81,8 @@ def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
     if over is Tone.OVER_POSITION:
         travel = max(float(np.ptp(r.measured[:, column])) for r in observation.records)
         sensor = machine.joint(joint).sensor
-        if sensor is not None and sensor.measures == "position":
-            high = min(high, 2 * np.pi / (SHORTEST_WAVE * resolution(sensor)))
+        if sensor is not None and sensor.count and sensor.measures == "position":
+            high = min(high, 2 * np.pi / (SHORTEST_WAVE * sensor.count))
         alike = 2 * np.pi / travel if travel > 0 else math.inf
         low, step = alike / 2, alike / 8
     else:
