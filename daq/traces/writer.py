@@ -239,7 +239,7 @@ class TraceWriter:
             return self._sync()
         self._recording.finish(close.outcome, close.counters)
         disk.sync(self._stream)
-        disk.rename(self.part, self.path)
+        disk.rename(self.part, self.path, self._stream)
         self.synced_samples = self._recording.samples
         return None
 
