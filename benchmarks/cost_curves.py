@@ -1,7 +1,7 @@
 """How time and memory of run, fit, validate, diagnose and serve grow: docs/images/cost-curves.svg.
 
-    python -m benchmarks cost_curves            measure, print and draw (20 minutes)
-    python -m benchmarks cost_curves --quick    three points a curve
+    python -m benchmarks cost_curves               measure, print and draw (20 minutes)
+    python -m benchmarks cost_curves --points 3    the same with three points a curve
 
 Every point is a process of its own: processor time, and how much its memory grows, after a small case has loaded the
 code. A curve's exponent is the slope of its logarithms over its upper half.
@@ -28,17 +28,16 @@ from matplotlib.figure import Figure
 
 import ma2000
 from benchmarks.service_clients import clients
+from benchmarks.service_load import ProcessorTime
 from benchmarks.service_process import ROBOT, started_service, sway
-from daq.contracts.processor import processor_time
 from daq.contracts.trace import Trace
-from model.machine_model.model import Model, base_model
+from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate, simulate_many
 
-HERE = Path(__file__).parent
-PICTURE = HERE.parent / "docs" / "images" / "cost-curves.svg"
-ARMS = {1: "single_axis", 2: "pan_tilt", 3: "ma2000", 6: "tx40", 7: "panda"}
-"""A machine file for each number of joints."""
+PICTURE = Path(__file__).parents[1] / "docs" / "images" / "cost-curves.svg"
+ARMS = {1: "pendulum", 3: "ma2000", 6: "ur10e", 7: "panda"}
+"""A machine for each number of joints."""
 WATCHED = 20.0
 """Time (s) for which a service is measured."""
 FITTED = ("joint2.motor.back_emf_constant", "joint2.viscous_friction.coefficient", "load.mass")
@@ -53,16 +52,9 @@ def record(folder: Path, seconds: float, seed: int = 0) -> Path:
         return arm.run(ma2000.ExperimentSpec.model_validate({"trajectory": trajectory}), folder=folder).file
 
 
-def arm_of(joints: int) -> Model:
-    """The model of an arm with so many joints."""
-    places = (HERE.parent / "examples", HERE / "real_machines")
-    files = [file for place in places if (file := place / f"{ARMS[joints]}.toml").exists()]
-    return base_model(ma2000.load_machine(str(files[0]) if files else ARMS[joints]))
-
-
 def pushed(joints: int, traces: list[Trace]) -> None:
     """A drive moves an arm for 10 s, in the recursive form that any arm has."""
-    model = arm_of(joints)
+    model = base_model(ma2000.load_machine(ARMS[joints]))
     at = 0.02 * np.arange(500)
     posture = np.tile(traces[0].position[0, :1], (500, joints))
     drive = 0.01 * np.sin(at)[:, None] * np.ones(joints)
@@ -72,11 +64,10 @@ def pushed(joints: int, traces: list[Trace]) -> None:
 
 def studied(study: str, joints: int, traces: list[Trace]) -> None:
     """One study of these records."""
-    if study == "run" and joints:
+    model = base_model(ma2000.load_machine("ma2000"))
+    if joints:
         pushed(joints, traces)
-        return
-    model = arm_of(3)
-    if study == "run":
+    elif study == "run":
         simulate_many(model, traces, {})
     elif study == "fit":
         ma2000.fit(model, traces, ma2000.FitOptions(parameters=FITTED), progress=False)
@@ -118,15 +109,13 @@ def watched(watchers: int) -> Cost:
         number = service.submit(sway(3 * WATCHED))
         service.until_recording(number)
         with clients(service.url, watchers, ("/healthz",), 1.0, f"/api/v1/robots/{ROBOT}/live"):
-            before = processor_time(service.process.pid)
+            spent = ProcessorTime({"service": [service.process.pid]})
             time.sleep(WATCHED)
-            after = processor_time(service.process.pid)
-            assert before is not None
-            assert after is not None
+            share = spent.shares()["service"]
             status = Path(f"/proc/{service.process.pid}/status").read_text("utf-8")
         service.ask("POST", "/stop")
     resident = next(line for line in status.splitlines() if line.startswith("VmRSS")).split()[1]
-    return (after.ran - before.ran) / WATCHED, 1024.0 * int(resident)
+    return share, 1024.0 * int(resident)
 
 
 def curves(folder: Path, points: int) -> Iterator[tuple[str, str, list[tuple[float, Cost]]]]:
@@ -151,8 +140,8 @@ def exponent(points: list[tuple[float, float]]) -> float:
 def main() -> int:
     """Measures, prints and draws; 0."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks cost_curves", description=__doc__)
-    parser.add_argument("--quick", action="store_true")
-    points = 3 if parser.parse_args().quick else 4
+    parser.add_argument("--points", type=int, default=4)
+    points = parser.parse_args().points
     figure = Figure(figsize=(11, 5.2), layout="constrained")
     axes = figure.subplots(2, 4, sharey="row")
     columns: dict[str, int] = {}

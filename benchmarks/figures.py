@@ -24,11 +24,6 @@ def at_most(name: str, value: float, limit: float, unit: str, beside: str = "") 
     return Figure(name, f"{value:.3g} {unit}", f"≤ {limit:g} {unit}", value <= limit, beside)
 
 
-def at_least(name: str, value: float, limit: float, unit: str, beside: str = "") -> Figure:
-    """Returns a measurement that must reach a limit."""
-    return Figure(name, f"{value:.3g} {unit}", f"≥ {limit:g} {unit}", value >= limit, beside)
-
-
 def show(title: str, command: str, figures: Sequence[Figure]) -> int:
     """Prints the measurements as a table; returns the exit code: 1 when a target was missed."""
     rows = [("figure", "measured", "target", "met", "beside")]

@@ -32,7 +32,7 @@ from mcap.stream_reader import StreamReader
 
 from benchmarks.figures import Figure, show
 from benchmarks.mock_arm import Unheard
-from benchmarks.own_environment import environment_of
+from benchmarks.mock_process import environment_of
 from benchmarks.service_process import children, started_service
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine

@@ -139,7 +139,8 @@ class BatchRun:
         cores = available_cores() if cores is None else cores
         _make_ready(compiled, numbers, lambda: piece(slice(0, 0)))
         fitting = LARGEST_PIECE // (8 * math.prod((*shape, *tail)))
-        size = max(1, min(-(-len(which) // (cores * CHUNKS_A_CORE)), fitting))
+        share = -(-len(which) // (1 if cores == 1 else cores * CHUNKS_A_CORE))
+        size = max(1, min(share, fitting))
         pieces = [slice(a, min(a + size, len(which))) for a in range(0, len(which), size)]
         if cores == 1 or len(pieces) == 1:
             for part in pieces:

@@ -246,8 +246,8 @@ class Observation:
     def tangents(self, tried: Calibration, which: Sequence[int] | None = None) -> Floats:
         """Derivatives (p, N) of the weighted readings by a calibration's unknowns `which` (indices; None: all).
 
-        They are finite differences over a small share of each unknown's expected deviation, at a third of the cost of
-        dual numbers. Raises SpecError when the simulation does not stay finite.
+        They are finite differences over a small share of each unknown's expected deviation. Raises SpecError when the
+        simulation does not stay finite.
         """
         which = range(len(tried.unknowns)) if which is None else which
         seconds = max(len(r.inputs) * r.inputs.period for r in self.records)

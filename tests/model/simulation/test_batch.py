@@ -159,7 +159,7 @@ def test_runs_in_lanes_are_the_runs_one_by_one(
     monkeypatch.setattr(batch, "LANES_FROM", 1)
     lanes = simulate_many(arm, records, values, options, tuple(SIGNALS))
     for one, other in zip(alone, lanes, strict=True):
-        assert np.ptp(one[:, 1, -1, 2]) > 100 * COUNT, "the runs differ"
+        assert np.ptp(one[:, 0], axis=0).max() > COUNT, "the runs differ"
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-9)
 
 
