@@ -105,8 +105,8 @@ class Plugin:
     routes: tuple[str, ...] = ()
     """Routers below /api/v1, as "module:router": from `server.routes`, or FastAPI's."""
     panels: Mapping[str, str] = field(default_factory=dict)
-    """Panels for the Live page, by title: paths of ES modules that a route at the root serves. A module's default export
-    gets an HTML element and `{machine, sample}` (`PluginPanel.svelte`), draws, and may return what ends it."""
+    """Panels for the Live page, by title: paths of ES modules that a route at the root serves. A module's default
+    export gets an HTML element and `{machine, sample}` (`PluginPanel.svelte`), draws, and may return what ends it."""
 
 
 @cache
