@@ -32,8 +32,6 @@ from model.machine_model.model import base_model
 from model.record_check.check import check_records, repaired
 from model.record_check.finding import RecordFinding, doubts_in
 from model.record_check.readings import find_bounds, find_dead, find_jumps
-from model.reports.diagnosis_report import diagnosis_report
-from model.reports.page import html
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.record_check.faults import FAULTS, Faulty
 from tests.model.record_check.rigs import RIGS, ROOT, example, mock, world
@@ -102,7 +100,6 @@ def test_a_doubted_record_is_the_verdict_on_terminal_report_and_in_json(tmp_path
     assert says in headline(found)
     assert says in " ".join(answer_text(found).split())
     assert answer_text(found).startswith("CHECK THE RECORD")
-    assert says in html(diagnosis_report(found))
     assert found.model_dump(mode="json")["record"][0]["kind"] == "columns-swapped"
     assert trace.set_point is not None
     apart = replace(trace, set_point=trace.set_point + 100.0)

@@ -44,11 +44,13 @@ def test_a_layout_is_arranged_kept_shared_and_saved(dashboard: Dashboard, tmp_pa
     for key in ("ArrowRight", "ArrowRight", "Shift+ArrowRight", "Shift+ArrowDown"):
         page.keyboard.press(key)
     expect(page.get_by_role("status").filter(has_text="Number: column 3, row")).to_contain_text("3 wide, 4 high")
-    bar = _tile(page, "By hand").locator(".bar").bounding_box()
+    moved = _tile(page, "By hand").locator(".bar")
+    moved.evaluate("one => one.scrollIntoView({ block: 'center' })")
+    bar = moved.bounding_box()
     assert bar is not None
     page.mouse.move(bar["x"] + bar["width"] / 2, bar["y"] + bar["height"] / 2)
     page.mouse.down()
-    page.mouse.move(bar["x"] + bar["width"] / 2, bar["y"] + 400, steps=8)
+    page.mouse.move(bar["x"] + bar["width"] / 2, bar["y"] + 150, steps=8)
     page.mouse.up()
     page.get_by_role("button", name="Remove Link").click()
     assert all(page.locator(".body").evaluate_all("all => all.map((one) => one.inert)"))  # nothing moves the arm
