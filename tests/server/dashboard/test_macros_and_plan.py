@@ -63,7 +63,7 @@ def test_an_experiment_becomes_a_macro_whose_form_keeps_to_its_bounds(dashboard:
     lines.fill(f"{lines.input_value()}\nrun preset ramp")
     lines.blur()
     assert faults_of(page) == []
-    page.get_by_role("button", name="Keep").click()
+    page.get_by_role("button", name="Keep", exact=True).click()
     amplitude = page.get_by_role("textbox", name="Amplitude")
     expect(page.get_by_text("two-steps is kept")).to_be_visible()
     amplitude.fill("7")
