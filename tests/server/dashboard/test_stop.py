@@ -16,7 +16,7 @@ pytestmark = pytest.mark.browser
 CONFIRMED = "[role=alert] [data-stop=confirmed]"
 PAGES = (
     *("live", "experiments", "experiments/macros", "experiments/plan", "experiments/console"),
-    *("traces", "models", "diagnosis", "system"),
+    *("traces", "models", "diagnosis", "system", "kiosk"),
 )
 
 
