@@ -1423,6 +1423,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/robots/{robot}/camera": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Camera
+         * @description Returns what gives the pictures, and why there are none.
+         */
+        get: operations["get_camera"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/camera/picture": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Camera Picture
+         * @description Returns the newest picture, a JPEG, or nothing (204) if it is the one that the client has.
+         */
+        get: operations["get_camera_picture"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/robots/{robot}/console/commands": {
         parameters: {
             query?: never;
@@ -2063,6 +2103,21 @@ export interface components {
              *     ]
              */
             joints?: number[];
+        };
+        /**
+         * CameraStatus
+         * @description A robot's camera. `source`: `none`, `synthetic` (drawn from the mock's posture) or `mjpeg`.
+         */
+        CameraStatus: {
+            /**
+             * Source
+             * @enum {string}
+             */
+            source: "none" | "synthetic" | "mjpeg";
+            /** Records */
+            records: boolean;
+            /** Problem */
+            problem: string;
         };
         /**
          * CatalogueEntry
@@ -9383,6 +9438,62 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["Page_AuditEntry_"];
                 };
+            };
+        };
+    };
+    get_camera: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CameraStatus"];
+                };
+            };
+        };
+    };
+    get_camera_picture: {
+        parameters: {
+            query?: {
+                /** @description Number of the picture that the client has. */
+                after?: number;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/jpeg": unknown;
+                };
+            };
+            /** @description There is none newer. */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
         };
     };

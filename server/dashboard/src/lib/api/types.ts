@@ -15,6 +15,7 @@ export type Told<T> = T extends readonly (infer Item)[]
     : T;
 
 export type AuditEntry = Told<Schemas['AuditEntry']>;
+export type CameraStatus = Told<Schemas['CameraStatus']>;
 export type CatalogueEntry = Told<Schemas['CatalogueEntry']>;
 export type ComparisonData = Told<Schemas['ComparisonData']>;
 export type ConsoleCommand = Told<Schemas['ConsoleCommand']>;

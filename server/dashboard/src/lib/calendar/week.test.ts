@@ -1,18 +1,13 @@
 import { describe, expect, it } from 'vitest';
 import type { PlannedRun } from '../api/types';
-import { mondayOf, weekOf } from './week';
+import { laterDay, weekOf } from './week';
 
 const run = (at: Date, schedule: string | null): PlannedRun =>
   ({ at: at.toISOString(), schedule, experiment: null, name: 'ramp' }) as unknown as PlannedRun;
 
 describe('a week', () => {
-  it('begins on Monday, also seen from a Sunday', () => {
-    expect(mondayOf(new Date(2026, 10, 29, 23)).toDateString()).toBe('Mon Nov 23 2026');
-    expect(mondayOf(new Date(2026, 10, 30), 1).toDateString()).toBe('Mon Dec 07 2026');
-  });
-
   it('has each run on its day, in order, and frequent ones of a schedule as one line', () => {
-    const monday = mondayOf(new Date(2026, 10, 25));
+    const monday = laterDay(new Date(2026, 10, 25, 12), -2);
     const often = Array.from({ length: 24 }, (_, hour) => run(new Date(2026, 10, 24, hour), 'hourly'));
     const days = weekOf(monday, [
       ...often,

@@ -18,22 +18,16 @@ export interface Day {
   readonly entries: readonly Entry[];
 }
 
-/** The Monday of the week of a moment, at midnight, `weeks` later. */
-export function mondayOf(moment: Date, weeks = 0): Date {
-  const back = (moment.getDay() + 6) % DAYS;
-  return new Date(moment.getFullYear(), moment.getMonth(), moment.getDate() - back + weeks * DAYS);
-}
-
-/** The day after some days, at midnight: a day need not have 24 hours. */
-export function laterDay(day: Date, days: number): Date {
+/** Midnight at the beginning of a day, some days later: a day need not have 24 hours. */
+export function laterDay(day: Date, days = 0): Date {
   return new Date(day.getFullYear(), day.getMonth(), day.getDate() + days);
 }
 
-/** The days of the week from `monday`, each with what is due on it. */
-export function weekOf(monday: Date, runs: readonly PlannedRun[]): Day[] {
+/** Seven days from `first` (its midnight), each with what is due on it. */
+export function weekOf(first: Date, runs: readonly PlannedRun[]): Day[] {
   return Array.from({ length: DAYS }, (_, place) => {
-    const date = laterDay(monday, place);
-    const end = laterDay(monday, place + 1);
+    const date = laterDay(first, place);
+    const end = laterDay(first, place + 1);
     const due = runs.filter((run) => {
       const at = Date.parse(run.at);
       return at >= date.getTime() && at < end.getTime();

@@ -83,7 +83,7 @@ export interface Given {
 /** The values in a line of `run`, for those who want parameters in their place; those that have one already are left out. */
 export function givenIn(line: string): Given[] {
   return [...line.matchAll(/--([a-z][a-z-]*)[ =]([^\s{}'"]+)(?=\s|$)/g)]
-    .filter((found) => !found[2]!.startsWith('-') || /^-[\d.]/.test(found[2]!))
+    .filter((found) => found[1] !== 'name' && (!found[2]!.startsWith('-') || /^-[\d.]/.test(found[2]!)))
     .map((found) => ({
       name: found[1]!.replaceAll('-', '_'),
       value: found[2]!,

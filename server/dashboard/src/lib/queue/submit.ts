@@ -53,7 +53,11 @@ export function toldMotion(
   spec: ConsoleOrder['spec'],
   motion: MotionPreview,
 ): { text: string; violations: string[] } {
-  const joints = motion.moving.join(', ') || 'none';
-  const text = `${spec?.trajectory.kind ?? 'motion'}: ${duration(motion.duration)}, moves joints ${joints}`;
+  const kind = (spec?.trajectory.kind ?? 'motion').replaceAll('_', ' ');
+  const moving =
+    motion.moving.length > 0
+      ? `joint${motion.moving.length > 1 ? 's' : ''} ${motion.moving.join(', ')}`
+      : 'nothing';
+  const text = `${kind}: ${duration(motion.duration)}, moves ${moving}`;
   return { text, violations: motion.violations.map((one) => one.message) };
 }
