@@ -196,14 +196,15 @@ def _on_machine(machine: Machine, traces: Sequence[Trace]) -> Iterator[RecordFin
             sizes = [noise_of(trace.position[:, trace.column(joint)]) for trace in traces if len(trace) > 2]
             unit = machine.joint(joint).units.position
             size = float(np.median(sizes)) if sizes else 0.0
+            lacking = "`sensor`" if machine.joint(joint).sensor is None else "`sensor.bits`"
             yield RecordFinding(
                 kind="no-sensor",
                 consequence="note",
                 joint=joint,
                 value=size,
                 unit=unit,
-                says=f"the machine file states no `sensor`: noise is estimated from the record, {number(size)} {unit}.",
-                advice=f"State `sensor` under joint {joint} if it is known.",
+                says=f"the machine file states no {lacking}: the record shows noise of {number(size)} {unit}.",
+                advice=f"State {lacking} under joint {joint} if it is known.",
             )
 
 

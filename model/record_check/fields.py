@@ -10,6 +10,7 @@ import numpy as np
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.joint_matching import matched
 from daq.contracts.machine import Machine, NoController
+from daq.contracts.machine_form import defaults_of
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
@@ -19,6 +20,8 @@ from model.record_check.words import number, times_of
 
 FEW_LEVELS = 16
 """Number of different values up to which a signal counts as coarse: four bits."""
+DEFAULTS_SHOWN = 4
+"""Values that a machine file leaves out, in the table."""
 LEAST_TRAVEL = 20.0
 """Travel of a joint, in its noise or in steps of its sensor, below which it determines nothing."""
 UNEVEN = 0.2
@@ -215,5 +218,8 @@ def _on_machine(machine: Machine) -> Iterator[FieldReport]:
                 means="Its noise is estimated from the record.",
                 weight="known",
             )
+    if left_out := list(defaults_of(machine)):
+        there = ", ".join(left_out[:DEFAULTS_SHOWN]) + (", …" if len(left_out) > DEFAULTS_SHOWN else "")
+        yield FieldReport(field="defaults", there=there, means="Assumed, because the file leaves them out.")
     if isinstance(machine.controller, NoController):
         yield FieldReport(field="controller", there="none", means="Torques are compared; no control loop is simulated.")

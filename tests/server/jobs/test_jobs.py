@@ -84,7 +84,7 @@ def test_what_a_job_cannot_do_is_its_reason(service: Service, trace: str) -> Non
     job = _submitted(service, {"kind": "fit", "traces": [trace], "effects": [{"name": "no_such_effect"}]})
     ended = service.end_of(job, "jobs")
     assert ended["state"] == "failed"
-    assert ended["reason"].startswith("effects: 'no_such_effect': not in the library")
+    assert ended["reason"].startswith("effect 'no_such_effect': not in the library")
     assert service.robot.get(f"/jobs/{job}/result").status_code == 409
 
 
