@@ -32,7 +32,8 @@ def lerobot_robot(target: str, options: dict[str, str]) -> LeRobotDriver:
     try:
         from lerobot.robots import RobotConfig, make_robot_from_config
     except ModuleNotFoundError as error:
-        raise DriverError(f"lerobot:{target} {INSTALL}" if error.name == "lerobot" else f"lerobot: {error}") from error
+        lacking = (error.name or "").startswith("lerobot")
+        raise DriverError(f"lerobot:{target} {INSTALL}" if lacking else f"lerobot:{target}: {error}") from error
     kind = _configuration(RobotConfig, target)
     allowed = {field.name for field in fields(kind)}
     for name in options:
