@@ -105,7 +105,7 @@ class DriverLine:
     def connect(self) -> Self:
         """Connects the driver, on the thread that owns it from then on. Raises TransportError, DriverError."""
         self.close()
-        if self._device and (others := other_holders(self._device)):
+        if (self._device or "").startswith("/dev/") and (others := other_holders(str(self._device))):
             raise PortBusyError(f"{self._device} is in use by {' and '.join(others)}: end that program")
         result: list[BaseException | None] = []
         connected = threading.Event()
