@@ -3,8 +3,8 @@
     python -m benchmarks cost_curves               measure, print and draw (20 minutes)
     python -m benchmarks cost_curves --points 3    the same with three points a curve
 
-Every point is a process of its own: processor time, and how much its memory grows, after a small case has loaded the
-code. A curve's exponent is the slope of its logarithms over its upper half.
+Every point is a process of its own: processor time, after a small case has loaded the code, and the most memory of the
+process. A curve's exponent is the slope of its logarithms over its upper half.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import math
 import multiprocessing
-import os
 import resource
 import statistics
 import sys
@@ -81,18 +80,17 @@ def measure(pipe: Connection, study: str, joints: int, files: list[Path]) -> Non
     """In a process of its own: sends what a study costs, after it was done once with the shortest record."""
     traces = [ma2000.read_trace(file) for file in files]
     studied(study, joints, traces[:1])
-    resident = int(Path("/proc/self/statm").read_text("utf-8").split()[1]) * os.sysconf("SC_PAGE_SIZE")
     begun = time.process_time()
     studied(study, joints, traces[1:])
     took = time.process_time() - begun
-    pipe.send((took, max(0, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 - resident)))
+    pipe.send((took, 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
 
 
 def cost(study: str, joints: int, files: list[Path]) -> Cost:
-    """What a study costs in a process of its own, the least of three."""
+    """What a study costs in a process of its own, the least of two (of a diagnosis: one)."""
     context = multiprocessing.get_context("spawn")
     found = []
-    for _ in range(1 if study == "diagnose" else 3):
+    for _ in range(1 if study == "diagnose" else 2):
         ours, theirs = context.Pipe()
         process = context.Process(target=measure, args=(theirs, study, joints, files))
         process.start()
@@ -160,7 +158,7 @@ def main() -> int:
             axes[row][column].legend(fontsize=8)
             axes[row][column].grid(alpha=0.3)
     axes[0][0].set_ylabel("processor time, s (serve: a second)")
-    axes[1][0].set_ylabel("memory, MB (serve: whole)")
+    axes[1][0].set_ylabel("memory, MB")
     mpl.rcParams["svg.hashsalt"] = "cost curves"  # the same names in the file each time
     figure.savefig(PICTURE, metadata={"Date": None})
     return 0
