@@ -193,10 +193,10 @@ class _Worker:
         from model.discrepancy.explanation.answer_words import headline
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
+        from model.reports.saved_report import saved_report
         from server.jobs.diagnosis_data import leading, told
         from server.jobs.next_experiment import experiment_chooser
         from server.jobs.results import DiagnosisJobResult
-        from server.jobs.saved_report import saved_report
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
         begin = self._model(request.model)

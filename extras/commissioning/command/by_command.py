@@ -199,9 +199,9 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     from model.discrepancy.options import DiagnosisOptions
     from model.discrepancy.workflow import diagnose
     from model.reports.page import write_page
+    from model.reports.saved_report import saved_report
     from server.jobs.diagnosis_data import told
     from server.jobs.next_experiment import experiment_chooser
-    from server.jobs.saved_report import saved_report
 
     bench.operator.show(
         "The ramp differs from the machine file by more than noise. A diagnosis follows; it only computes."

@@ -13,21 +13,22 @@ from pydantic import TypeAdapter
 from daq.contracts.errors import SpecError
 from model.discrepancy.explanation.answer_words import headline
 from model.reports.page import section_html
-from server.jobs.results import DiagnosisData
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from model.blocks import Section
+    from model.discrepancy.diagnosis import Diagnosis
 
 PLACE = '<script id="data" type="application/json">{}</script>'
 """Where the program reads its data."""
 
 
-def saved_report(data: DiagnosisData, names: Mapping[str, str], sections: Iterable[Section] = ()) -> str:
+def saved_report(data: Diagnosis, names: Mapping[str, str], sections: Iterable[Section] = ()) -> str:
     """Returns the file as text.
 
     Args:
+        data: the answer with its data for plots, `server.jobs.results.DiagnosisData`.
         names: names of the traces by ID, if known.
         sections: of plug-ins (`daq.plugins.report_sections`).
 
