@@ -2454,7 +2454,7 @@ export interface components {
             rotor_inertia: components["schemas"]["Quantity"];
             gear_ratio: components["schemas"]["Quantity"];
             amplifier_gain: components["schemas"]["Quantity"];
-            dac_full_scale: components["schemas"]["Quantity"];
+            dac_full_scale?: components["schemas"]["Quantity"] | null;
             supply_limit?: components["schemas"]["Quantity"] | null;
         };
         /**
@@ -6194,7 +6194,7 @@ export interface components {
          */
         Sensor: {
             /** Bits */
-            bits: number;
+            bits?: number | null;
             range: components["schemas"]["Quantity"];
             at_zero: components["schemas"]["Quantity"];
             /**

@@ -23,6 +23,8 @@ export const KINDS = {
   table: { title: 'Numbers of all joints', w: 4, h: 6, least: [3, 3] },
   link: { title: 'Link', w: 4, h: 8, least: [3, 3] },
   hand: { title: 'By hand', w: 8, h: 3, least: [4, 2] },
+  camera: { title: 'Camera', w: 4, h: 7, least: [2, 3] },
+  console: { title: 'Console', w: 8, h: 8, least: [4, 6] },
   faults: { title: 'Faults', w: 4, h: 5, least: [3, 3] },
   notes: { title: 'Notes', w: 4, h: 4, least: [2, 2] },
   plugin: { title: 'Plug-in', w: 4, h: 5, least: [2, 2] },

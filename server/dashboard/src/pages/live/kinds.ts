@@ -27,6 +27,8 @@ export const LOADED: Readonly<Record<Kind, () => Loaded | Promise<Loaded>>> = {
   table: there(JointTable),
   link: there(LinkPanel),
   hand: there(HandPanel),
+  camera: later(() => import('./panels/CameraPanel.svelte')),
+  console: later(() => import('../console/ConsolePage.svelte')),
   faults: later(() => import('./panels/FaultList.svelte')),
   notes: later(() => import('./panels/NotesPanel.svelte')),
   plugin: later(() => import('./panels/PluginPanel.svelte')),
