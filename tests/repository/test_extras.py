@@ -24,7 +24,7 @@ from tests.repository.without_extras import packages_beyond, run_without
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 EXTRAS = {name: [Requirement(line) for line in lines] for name, lines in PROJECT["optional-dependencies"].items()}
 OTHER_NAMES = {"serial": "pyserial", "pydantic_settings": "pydantic-settings", "prometheus_client": "prometheus-client"}
-OTHER_NAMES |= {"google": "protobuf", "markdown_it": "markdown-it-py"}
+OTHER_NAMES |= {"google": "protobuf", "markdown_it": "markdown-it-py", "rerun": "rerun-sdk", "foxglove": "foxglove-sdk"}
 
 NO_TRACE: Any = None
 PULLED = {"starlette": "fastapi", "dask": "distributed"}
