@@ -3,8 +3,8 @@
     python -m benchmarks cost_curves               measure, print and draw (20 minutes)
     python -m benchmarks cost_curves --points 3    the same with three points a curve
 
-Every point is a process of its own: processor time, after a small case has loaded the code, and the most memory of the
-process. A curve's exponent is the slope of its logarithms over its upper half.
+Every point is a process of its own that has the code: processor time, and the most memory. A curve's exponent is the
+slope of its logarithms over its upper half.
 """
 
 from __future__ import annotations
@@ -76,23 +76,25 @@ def studied(study: str, joints: int, traces: list[Trace]) -> None:
         ma2000.diagnose(model, traces, progress=False)
 
 
-def measure(pipe: Connection, study: str, joints: int, files: list[Path]) -> None:
-    """In a process of its own: sends what a study costs, after it was done once with the shortest record."""
-    traces = [ma2000.read_trace(file) for file in files]
-    studied(study, joints, traces[:1])
+def measure(pipe: Connection, study: str, joints: int, traces: list[Trace]) -> None:
+    """Sends what a study costs in this process."""
     begun = time.process_time()
-    studied(study, joints, traces[1:])
+    studied(study, joints, traces)
     took = time.process_time() - begun
     pipe.send((took, 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
 
 
 def cost(study: str, joints: int, files: list[Path]) -> Cost:
-    """What a study costs in a process of its own, the least of two (of a diagnosis: one)."""
-    context = multiprocessing.get_context("spawn")
-    found = []
+    """What a study costs in a process of its own, the least of two (of a diagnosis: one).
+
+    The process is a copy of this one, which has the code and the traces.
+    """
+    context = multiprocessing.get_context("fork")
+    traces, found = [ma2000.read_trace(file) for file in files], []
+    studied(study, joints, traces[:1])
     for _ in range(1 if study == "diagnose" else 2):
         ours, theirs = context.Pipe()
-        process = context.Process(target=measure, args=(theirs, study, joints, files))
+        process = context.Process(target=measure, args=(theirs, study, joints, traces[1:]))
         process.start()
         theirs.close()
         found.append(ours.recv())
