@@ -36,7 +36,9 @@ def pictures(url: str) -> Iterator[bytes]:
 
 def boundary_of(content_type: str) -> bytes:
     """Returns the boundary of the parts. Raises CameraError for another type."""
-    found = re.fullmatch(r'multipart/[\w.-]+\s*;.*?\bboundary="?([^";,\s]{1,70})"?.*', content_type.strip(), re.IGNORECASE)
+    found = re.fullmatch(
+        r'multipart/[\w.-]+\s*;.*?\bboundary="?([^";,\s]{1,70})"?.*', content_type.strip(), re.IGNORECASE
+    )
     if found is None:
         raise CameraError(f"the camera sends {content_type[:60]!r}; needed is multipart/x-mixed-replace")
     return b"--" + found[1].encode("latin-1").removeprefix(b"--")

@@ -72,7 +72,8 @@ class Camera:
     def close(self) -> None:
         """Ends the thread soon; it may wait for a camera that is silent."""
         self._closing.set()
-        self._take_spool()
+        if (spool := self._take_spool()) is not None:
+            spool.close()
 
     def heard(self, sample: LiveSample) -> None:
         """Takes the newest sample, which a synthetic picture shows."""
@@ -111,18 +112,24 @@ class Camera:
             if not self._is_needed():
                 continue
             try:
-                for jpeg in self._source():
-                    self.problem = ""
-                    self._take(Picture(time.monotonic(), jpeg))
-                    if self._closing.is_set() or not self._is_needed():
-                        break
-                else:
-                    raise CameraError("the camera ended its stream")
-            except Exception as error:
-                self.problem = str(error) if isinstance(error, DaqError) else f"program fault: {error}"
-                if not isinstance(error, DaqError):
-                    log.exception("camera of %s", self._rig.robot.name)
+                self._watch()
+            except DaqError as error:
+                self.problem = str(error)
                 self._closing.wait(AGAIN)
+            except Exception as error:
+                self.problem = f"program fault: {error}"
+                log.exception("camera of %s", self._rig.robot.name)
+                self._closing.wait(AGAIN)
+
+    def _watch(self) -> None:
+        """Takes pictures as long as they are needed. Raises CameraError if the source ends."""
+        for jpeg in self._source():
+            self.problem = ""
+            self._take(Picture(time.monotonic(), jpeg))
+            if self._closing.is_set() or not self._is_needed():
+                return
+        if not self._closing.is_set():
+            raise CameraError("the camera ended its stream")
 
     def _is_needed(self) -> bool:
         return self.records or time.monotonic() - self._asked < WATCHED

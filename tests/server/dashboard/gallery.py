@@ -88,8 +88,8 @@ def show(page: Page, address: str, scene: str, width: int) -> None:
     page.evaluate("() => document.fonts.ready")
 
 
-def picture(page: Page, address: str, width: int) -> Image.Image:
-    """All scenes at a width, one below the other, at a reduced size."""
+def picture(page: Page, address: str, width: int) -> bytes:
+    """All scenes at a width, one below the other, at a reduced size, as they are kept."""
     tops = []
     for scene in SCENES:
         show(page, address, scene, width)
@@ -103,14 +103,14 @@ def picture(page: Page, address: str, width: int) -> Image.Image:
         whole.paste(one, (0, top))
         top += one.height
     small = whole.resize((whole.width // SCALE, whole.height // SCALE), Image.Resampling.BOX)
-    return Image.open(io.BytesIO(encoded(small))).convert("RGB")
-
-
-def encoded(image: Image.Image) -> bytes:
-    """As the pictures are kept."""
     stream = io.BytesIO()
-    image.save(stream, "WEBP", quality=QUALITY, method=6)
+    small.save(stream, "WEBP", quality=QUALITY, method=6)
     return stream.getvalue()
+
+
+def decoded(data: bytes) -> Image.Image:
+    """A picture that is kept, or would be."""
+    return Image.open(io.BytesIO(data)).convert("RGB")
 
 
 def difference(one: Image.Image, other: Image.Image) -> float:
@@ -136,7 +136,7 @@ def main() -> None:
             for scheme in SCHEMES:
                 with opened(browser, scheme) as page:
                     for width in WIDTHS:
-                        kept(width, scheme).write_bytes(encoded(picture(page, address, width)))
+                        kept(width, scheme).write_bytes(picture(page, address, width))
                         print(kept(width, scheme), kept(width, scheme).stat().st_size, file=sys.stderr)
 
 

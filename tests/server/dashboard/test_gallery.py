@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PIL import Image, ImageDraw
+from PIL import ImageDraw
 from playwright.sync_api import Browser, expect
 
 from tests.server.dashboard.faults import faults_of
@@ -15,8 +15,8 @@ from tests.server.dashboard.gallery import (
     SCHEMES,
     WIDTHS,
     build,
+    decoded,
     difference,
-    encoded,
     kept,
     opened,
     picture,
@@ -44,14 +44,14 @@ def test_every_component_looks_as_it_did(browser: Browser, address: str, scheme:
     with opened(browser, "dark" if scheme == "dark" else "light") as page:
         for width in WIDTHS:
             now = picture(page, address, width)
-            if (found := difference(now, Image.open(kept(width, scheme)).convert("RGB"))) > MOST:
-                (tmp_path / kept(width, scheme).name).write_bytes(encoded(now))
+            if (found := difference(decoded(now), decoded(kept(width, scheme).read_bytes()))) > MOST:
+                (tmp_path / kept(width, scheme).name).write_bytes(now)
                 changed.append(f"{width} px differ by {found:.0f} (allowed: {MOST:g}): look at {tmp_path}")
     assert not changed, f"{changed}; if it is meant, `python -m tests.server.dashboard.gallery`"
 
 
 def test_a_missing_word_or_another_colour_is_noticed_and_the_pictures_stay_small() -> None:
-    before = Image.open(kept(1280, "light")).convert("RGB")
+    before = decoded(kept(1280, "light").read_bytes())
     moved = before.copy()
     moved.paste(before.crop((20, 60, 80, 76)), (20, 62))
     painted = before.copy()
