@@ -7,6 +7,7 @@ after a fresh reading, which becomes the set points before the drives are switch
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 
 from daq.contracts.robot_driver import DriverError, Positions, RobotDriver
@@ -19,10 +20,10 @@ from firmware_protocol.wide import WideReading, WideStopped
 
 TICK_S = 0.001
 """Unit (s) of ticks, which count this computer's monotonic time: a driver has no control period."""
-STILL_WITHIN_RAD = 0.01
-"""Largest motion (rad) between two readings of a joint that counts as stopped (an assumption: half a degree)."""
-STILL_READINGS = 25
-"""Readings within which a stop must be confirmed by two that agree."""
+STILL_WITHIN_RAD = 0.005
+"""Largest spread (rad) of the newest readings of a joint that stands (an assumption: 0.3°, three counts of a servo)."""
+AGREEING, MOST_READINGS = 5, 30
+"""Readings that must agree to confirm a stop, and readings after which it is unconfirmed."""
 
 
 class DriverBoard:
@@ -137,19 +138,18 @@ class DriverBoard:
         self._stops += 1
         self._stopped = True
         self._keep_stop(True)
-        before = self._measured()
-        self._driver.stop(self._rad(before))
-        self._goals = before
+        here = self._measured()
+        self._driver.stop(self._rad(here))
+        self._goals, newest = here, deque([here], AGREEING)
         still = STILL_WITHIN_RAD / self._facts.range_rad * self._facts.counts
         moving: list[str] = []
-        for _ in range(STILL_READINGS):
+        for _ in range(MOST_READINGS):
             self._sleep(self._facts.period_s)
-            after = self._measured()
-            pairs = zip(self._facts.joints, before, after, strict=True)
-            moving = [joint for joint, was, one in pairs if abs(one - was) > still]
-            if not moving:
+            newest.append(self._measured())
+            by_joint = zip(self._facts.joints, zip(*newest, strict=True), strict=True)
+            moving = [joint for joint, seen in by_joint if max(seen) - min(seen) > still]
+            if not moving and len(newest) == AGREEING:
                 return WideStopped(self._tick, tuple(self._goals))
-            before = after
         return self._refused(request, Refusal.UNFIT, f"{', '.join(moving)} still moves: use the emergency stop")
 
     def _release(self, request: Release) -> Reply:

@@ -105,6 +105,9 @@ class DriverLine:
     def connect(self) -> Self:
         """Connects the driver, on the thread that owns it from then on. Raises TransportError, DriverError."""
         self.close()
+        if self._thread is not None and self._thread.is_alive():
+            raise TransportError(f"{self.url}: the robot's driver is still busy with its last call")
+        self.reset()
         if (self._device or "").startswith("/dev/") and (others := other_holders(str(self._device))):
             raise PortBusyError(f"{self._device} is in use by {' and '.join(others)}: end that program")
         result: list[BaseException | None] = []

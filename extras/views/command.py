@@ -49,7 +49,8 @@ def view(
 ) -> None:
     """Show a trace in Rerun, or the live samples of a service (--server) in Rerun or Foxglove.
 
-    Foxglove opens traces by itself: they are MCAP files with joint states. Live samples need Ctrl-C to end.
+    Foxglove opens traces by itself: they are MCAP files with joint states. Ctrl-C ends a live view. The viewer of Rerun
+    tells its makers how it is used, unless `rerun analytics disable` was run.
     """
     require_extra(to.value, f"--to {to.value}", "rerun" if to is Viewer.RERUN else "foxglove")
     call = invocation(context)

@@ -1,6 +1,6 @@
 """The adapter to lerobot's interface `Robot`, on a stand-in of that interface.
 
-`python -m benchmarks lerobot` does the same with lerobot itself, which needs too much for a test.
+`python -m tools.lerobot_robots` does the same with lerobot itself, which needs too much for a test.
 """
 
 from __future__ import annotations
