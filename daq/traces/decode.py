@@ -13,7 +13,7 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace import TraceEvent
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import cdr, layout, set_points_taken
-from daq.traces.scan import TOO_MANY, UNREADABLE, Place, Scan, alike, places, require
+from daq.traces.scan import TOO_MANY, UNREADABLE, Place, Scan, alike, fills, places, require
 
 Samples = NDArray[Any]
 """Samples of one joint, (n,) of `layout.JOINT_SAMPLE_DTYPE`."""
@@ -124,14 +124,15 @@ class _Decoder:
         return [found[number] for number in range(len(chunks))]
 
     def _of_one_size(self, chunks: list[bytes], numbers: list[int], found: dict[int, _Contents]) -> None:
-        channels = (*self._joints, self._taken)
-        while numbers:
-            first, others, numbers = numbers[0], numbers[1:TOGETHER], numbers[TOGETHER:]
+        channels, begin = (*self._joints, self._taken), 0
+        while begin < len(numbers):
+            first, others = numbers[begin], numbers[begin + 1 : begin + TOGETHER]
             at = self._places(chunks[first])
             found[first] = self._content(chunks[first], at)
-            if len(others) < FEW or not at or at[0].record or found[first].events:  # what differs is read alone
-                numbers = others + numbers
+            begin += 1
+            if len(others) < FEW or found[first].events or not fills(chunks[first], at):  # what differs is read alone
                 continue
+            begin += len(others)
             block = np.frombuffer(b"".join([chunks[k] for k in others]), np.uint8).reshape(len(others), -1)
             same = alike(chunks[first], block, at)
             self._count_records(len(at) * int(same.sum()))

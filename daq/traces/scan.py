@@ -179,6 +179,12 @@ def places(chunk: bytes, most: int) -> tuple[int, list[Place]]:
     return count, found
 
 
+def fills(chunk: bytes, at: list[Place]) -> bool:
+    """Whether a chunk has nothing but these messages."""
+    edges = [0, *(place.end for place in at)]
+    return bool(at) and edges[-1] == len(chunk) and all(p.record == edge for p, edge in zip(at, edges, strict=False))
+
+
 def alike(chunk: bytes, others: NDArray[np.uint8], at: list[Place]) -> NDArray[np.bool_]:
     """Returns which chunks of the same size, rows of `others`, have their messages at the same places as a chunk that
     has nothing else.
