@@ -1696,6 +1696,30 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/me/layouts": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Layouts
+         * @description Returns the caller's layouts.
+         */
+        get: operations["get_layouts"];
+        /**
+         * Put Layouts
+         * @description Keeps the caller's layouts in place of those kept before.
+         */
+        put: operations["put_layouts"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/notifications": {
         parameters: {
             query?: never;
@@ -4190,6 +4214,14 @@ export interface components {
             high?: number | null;
             /** Speed */
             speed?: number | null;
+        };
+        /**
+         * KeptLayouts
+         * @description All layouts of one person. `text`: as the page writes them; empty if none are kept.
+         */
+        KeptLayouts: {
+            /** Text */
+            text: string;
         };
         /**
          * KeptMacro
@@ -9829,6 +9861,50 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["FleetComparison"];
+                };
+            };
+        };
+    };
+    get_layouts: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["KeptLayouts"];
+                };
+            };
+        };
+    };
+    put_layouts: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["KeptLayouts"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["KeptLayouts"];
                 };
             };
         };
