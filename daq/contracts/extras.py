@@ -51,6 +51,7 @@ EXTRA_OF: dict[str, Extra] = {
     "serial": "robot",
     "typer": "robot",
     "numba": "model",
+    "PIL": "server",
     "cronsim": "server",
     "fastapi": "server",
     "httptools": "server",

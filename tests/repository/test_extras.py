@@ -25,6 +25,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 EXTRAS = {name: [Requirement(line) for line in lines] for name, lines in PROJECT["optional-dependencies"].items()}
 OTHER_NAMES = {"serial": "pyserial", "pydantic_settings": "pydantic-settings", "prometheus_client": "prometheus-client"}
 OTHER_NAMES |= {"google": "protobuf", "markdown_it": "markdown-it-py", "rerun": "rerun-sdk", "foxglove": "foxglove-sdk"}
+OTHER_NAMES["PIL"] = "pillow"
 
 NO_TRACE: Any = None
 PULLED = {"starlette": "fastapi", "dask": "distributed"}
