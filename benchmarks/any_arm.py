@@ -29,8 +29,7 @@ IN_PYTHON = """
 import ast, sys, ma2000
 record, parts, model = ast.literal_eval(sys.argv[1])
 traces = [ma2000.read_trace(file, map=record["map"], where=where or None) for file, where in parts]
-model = ma2000.base_model(ma2000.load_machine(model))
-print(ma2000.diagnose(model, traces[:1], traces[1:]).summary)
+print(ma2000.diagnose(ma2000.load_machine(model), traces[:1], traces[1:]).summary)
 """
 
 
