@@ -93,6 +93,8 @@ class DriverLine:
         self._due: deque[int] = deque()
         self._answered: dict[int, Reply] = {}
         self._spoken = b""
+        self._stop_waits = False
+        """Whether a stop was asked that the robot's driver has not begun."""
         self._open = False
         self._thread: threading.Thread | None = None
 
@@ -134,6 +136,8 @@ class DriverLine:
                     connected.set()
                     self._serve(board)
                 finally:
+                    if self._stop_waits:
+                        _keep(state, True)
                     with suppress(DriverError):
                         _called(self._driver.disconnect)
         except BaseException as error:  # noqa: BLE001 - the thread that connects raises it
@@ -152,6 +156,8 @@ class DriverLine:
                     return
                 number = self._due.popleft()
                 request = self._asked.get(number)
+                if isinstance(request, Stop):
+                    self._stop_waits = False
             if request is None:
                 continue  # a second copy, or given up
             try:
@@ -174,6 +180,7 @@ class DriverLine:
             self._check()
             for number in numbers:
                 if isinstance(self._asked.get(number), Stop):
+                    self._stop_waits = True
                     self._due.appendleft(number)
                 else:
                     self._due.append(number)

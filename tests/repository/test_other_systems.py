@@ -26,6 +26,7 @@ def test_records_are_imported_and_diagnosed_without_what_windows_lacks() -> None
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("system", ["win32", "darwin"])
 def test_types_are_right_there(system: str) -> None:
     packages = [word for package in OURS for word in ("-p", package)]

@@ -226,6 +226,24 @@ def test_a_stop_overtakes_what_waits_for_the_robot_and_outlasts_the_connection(r
         later.set_points({1: MIDDLE + 112})
 
 
+def test_a_stop_that_a_busy_driver_never_saw_is_found_by_the_next_connection(robot: Robot, tmp_path: Path) -> None:
+    line = robot.line(tmp_path)
+    line.connect()
+    robot.go_on.clear()
+    line.write(line.encode(1, Sample(0, 3)))
+    assert robot.reading.wait(10)
+    line.write(line.encode(2, Stop()))
+    line.forget(2)
+    closing = threading.Thread(target=line.close)
+    closing.start()
+    with line._changed:
+        assert line._changed.wait_for(lambda: not line._open, 10)
+    robot.go_on.set()
+    closing.join()
+    with Controller(Link(later := robot.line(tmp_path), later)) as controller:
+        assert StatusFlag.FROZEN in controller.status().flags
+
+
 def test_a_driver_that_cannot_connect_says_why(robot: Robot, tmp_path: Path) -> None:
     def connect() -> None:
         raise ConnectionError("no such\n port")
