@@ -146,7 +146,7 @@ def draw(found: Iterable[tuple[str, str, list[tuple[float, Cost]]]]) -> None:
         column = columns.setdefault(against, len(columns))
         for row, (named, unit) in enumerate((("time (s)", 1.0), ("memory (MB)", 2.0**20))):
             line = [(x, costs[row] / unit) for x, costs in points]
-            told = f"{what} ∝ x^{exponent(line):.1f}"
+            told = f"{what} ∝ x^{round(exponent(line), 1) + 0.0:.1f}"
             axes[row][column].loglog(*zip(*line, strict=True), "o-", label=told, markersize=4)
             axes[row][column].set_xticks([x for x, _ in line], [f"{x:g}" for x, _ in line])
             axes[row][column].minorticks_off()
