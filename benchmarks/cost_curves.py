@@ -17,7 +17,7 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -137,32 +137,36 @@ def exponent(points: list[tuple[float, float]]) -> float:
     return statistics.linear_regression(*zip(*upper, strict=True)).slope if len(upper) > 1 else math.nan
 
 
+def draw(found: Iterable[tuple[str, str, list[tuple[float, Cost]]]]) -> None:
+    """Prints the curves and draws them: a column for what the costs are taken against, a row for time and memory."""
+    figure = Figure(figsize=(11, 5), layout="constrained")
+    axes = figure.subplots(2, 4, sharex="col", sharey="row")
+    columns: dict[str, int] = {}
+    for against, what, points in found:
+        column = columns.setdefault(against, len(columns))
+        for row, (named, unit) in enumerate((("time (s)", 1.0), ("memory (MB)", 2.0**20))):
+            line = [(x, costs[row] / unit) for x, costs in points]
+            told = f"{what} ∝ x^{round(exponent(line), 1) + 0.0:.1f}"
+            axes[row][column].loglog(*zip(*line, strict=True), "o-", label=told, markersize=4)
+            axes[row][column].set_xticks([x for x, _ in line], [f"{x:g}" for x, _ in line])
+            axes[row][column].minorticks_off()
+            axes[row][column].legend(fontsize=7)
+            values = ", ".join(f"{x:g}: {y:.3g}" for x, y in line)
+            print(f"{named} against {against}, {told}: {values}", flush=True)
+        axes[1][column].set_xlabel(against)
+    axes[0][0].set_ylabel("processor time (s)")
+    axes[1][0].set_ylabel("memory (MB)")
+    axes[1][0].set_yticks([100, 200, 400], ["100", "200", "400"])
+    mpl.rcParams["svg.hashsalt"] = "cost curves"  # the same names in the file each time
+    figure.savefig(PICTURE, metadata={"Date": None})
+
+
 def main() -> int:
     """Measures, prints and draws; 0."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks cost_curves", description=__doc__)
     parser.add_argument("--points", type=int, default=4)
-    points = parser.parse_args().points
-    figure = Figure(figsize=(11, 5.2), layout="constrained")
-    axes = figure.subplots(2, 4, sharey="row")
-    columns: dict[str, int] = {}
     with tempfile.TemporaryDirectory() as folder:
-        for against, what, found in curves(Path(folder), points):
-            column = columns.setdefault(against, len(columns))
-            for row, unit in ((0, 1.0), (1, 2.0**20)):
-                line = [(x, costs[row] / unit) for x, costs in found]
-                told = f"{what} ∝ x^{exponent(line):.1f}"
-                axes[row][column].loglog(*zip(*line, strict=True), "o-", label=told, markersize=4)
-                values = ", ".join(f"{x:g}: {y:.3g}" for x, y in line)
-                print(f"{('time (s)', 'memory (MB)')[row]} against {against}, {told}: {values}", flush=True)
-    for against, column in columns.items():
-        axes[1][column].set_xlabel(against)
-        for row in (0, 1):
-            axes[row][column].legend(fontsize=8)
-            axes[row][column].grid(alpha=0.3)
-    axes[0][0].set_ylabel("processor time, s (serve: a second)")
-    axes[1][0].set_ylabel("memory, MB")
-    mpl.rcParams["svg.hashsalt"] = "cost curves"  # the same names in the file each time
-    figure.savefig(PICTURE, metadata={"Date": None})
+        draw(curves(Path(folder), parser.parse_args().points))
     return 0
 
 
