@@ -3,7 +3,7 @@
     python -m benchmarks feedforward --folder FOLDER              resumes where it was; one line of JSON an arm
     python -m benchmarks feedforward --first 101 --arms 8 …       seeds 101 to 108
     python -m benchmarks feedforward --friction 2 …               hidden frictions of twice the size; another FOLDER
-    python -m benchmarks feedforward --quick                      one arm
+    python -m benchmarks feedforward --arms 1                     one arm
 
 Every seed is an arm of its own: its parameters are drawn from what the machine file expects (value ± deviation), it
 carries a hidden load, and one joint has a hidden friction, of a kind and size that the seed draws. All of it is the
@@ -245,9 +245,8 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--arms", type=int, default=6, help="number of arms")
     parser.add_argument("--folder", type=Path, help="where results are kept and reused")
     parser.add_argument("--friction", type=float, default=1.0, help="factor of the hidden frictions' sizes")
-    parser.add_argument("--quick", action="store_true", help="one arm")
     chosen = parser.parse_args(arguments)
-    seeds = range(chosen.first, chosen.first + (1 if chosen.quick else chosen.arms))
+    seeds = range(chosen.first, chosen.first + chosen.arms)
     with tempfile.TemporaryDirectory() as name:
         folder = chosen.folder or Path(name)
         folder.mkdir(parents=True, exist_ok=True)

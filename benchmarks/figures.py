@@ -2,23 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import platform
-import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Protocol, TypeVar
-
-
-class Tallied(Protocol):
-    """Counts of a campaign, with examples of its faults."""
-
-    examples: list[str]
-
-
-Tally = TypeVar("Tally", bound=Tallied)
 
 
 @dataclass(frozen=True)
@@ -35,11 +22,6 @@ class Figure:
 def at_most(name: str, value: float, limit: float, unit: str, beside: str = "") -> Figure:
     """Returns a measurement that must not exceed a limit."""
     return Figure(name, f"{value:.3g} {unit}", f"≤ {limit:g} {unit}", value <= limit, beside)
-
-
-def at_least(name: str, value: float, limit: float, unit: str, beside: str = "") -> Figure:
-    """Returns a measurement that must reach a limit."""
-    return Figure(name, f"{value:.3g} {unit}", f"≥ {limit:g} {unit}", value >= limit, beside)
 
 
 def show(title: str, command: str, figures: Sequence[Figure]) -> int:
@@ -66,26 +48,3 @@ def quantile(values: Sequence[float], share: float) -> float:
     """Returns the smallest value that at least `share` of all values do not exceed."""
     ordered = sorted(values)
     return ordered[max(0, -(-int(share * 1e6) * len(ordered) // 1_000_000) - 1)]
-
-
-def show_campaign(
-    module: str,
-    title: str,
-    cases: int,
-    campaign: Callable[[int, int, Path], Tally],
-    figures: Callable[[Tally], list[Figure]],
-    description: str | None,
-) -> int:
-    """Runs a campaign of damaged files with the command line's options, and prints its examples of faults and its
-    measurements.
-
-    Returns the exit code, 1 when a target was missed. cases: the default number of files.
-    """
-    parser = argparse.ArgumentParser(prog=f"python -m benchmarks {module}", description=description)
-    parser.add_argument("--cases", type=int, default=cases, help=f"damaged files (default {cases})")
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        tally = campaign(given.cases, given.seed, Path(folder))
-    print("\n".join(tally.examples))
-    return show(title, f"python -m benchmarks {module}", figures(tally))

@@ -32,9 +32,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.figures import Figure, show
-from benchmarks.mock_control import MockControl
-from benchmarks.mock_process import RunningMock, started_mock
-from benchmarks.own_environment import environment_of
+from benchmarks.mock_process import MockControl, RunningMock, environment_of, started_mock
 from benchmarks.service_process import COMMAND, ENDS, RunningService, child, ramp, started_service
 from daq.contracts.errors import DaqError
 from daq.contracts.machine import Machine, load_machine
@@ -405,13 +403,12 @@ def main() -> int:
     parser.add_argument("--moments", type=int, default=100, help="times for each way to end a run")
     parser.add_argument("--kills", type=int, default=200, help="kills of the service's processes")
     parser.add_argument("--seed", type=int, default=1991)
-    parser.add_argument("--quick", action="store_true", help="five times, or ten kills")
     given = parser.parse_args()
     if given.service:
         with tempfile.TemporaryDirectory() as name:
-            findings = kill_service(10 if given.quick else given.kills, given.seed, Path(name))
+            findings = kill_service(given.kills, given.seed, Path(name))
     else:
-        findings = end_runs(5 if given.quick else given.moments, given.seed)
+        findings = end_runs(given.moments, given.seed)
     for line in findings.wrong:
         print(f"  {line}", file=sys.stderr)
     met = "; ".join(f"{what} {count}" for what, count in sorted(findings.met.items()))

@@ -23,8 +23,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.figures import Figure, quantile, show
-from benchmarks.mock_control import MockControl
-from benchmarks.mock_process import started_mock
+from benchmarks.mock_process import MockControl, started_mock
 from daq.contracts.experiment import ExperimentSpec, Sine
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
@@ -207,9 +206,7 @@ def main() -> int:
     """Returns the exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks long_run", description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--quick", action="store_true", help="half a minute")
-    given = parser.parse_args()
-    minutes = 0.5 if given.quick else given.minutes
+    minutes = parser.parse_args().minutes
     with tempfile.TemporaryDirectory() as folder:
         done = record(minutes, Path(folder))
     figures = accuracy_figures(done, load_machine("ma2000")) + timing_figures(done)

@@ -1,14 +1,19 @@
-"""Runs a mock controller as a separate process, outside the measured host."""
+"""Runs a mock controller as a separate process, outside the measured host, and asks it for data unseen by the host."""
 
 from __future__ import annotations
 
 import contextlib
 import json
+import os
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+from urllib.parse import urlsplit
 
 
 @dataclass(frozen=True)
@@ -21,13 +26,9 @@ class RunningMock:
 
 
 @contextlib.contextmanager
-def started_mock(*options: str, profile: Path | None = None) -> Iterator[RunningMock]:
-    """Yields a mock with these options of its command line; it ends with the block. Inherits this process's cores.
-
-    profile: file for the result of cProfile
-    """
-    profiler = [] if profile is None else ["-m", "cProfile", "-o", str(profile)]
-    command = [sys.executable, *profiler, "-m", "mock_controller", *options, "--owned"]
+def started_mock(*options: str) -> Iterator[RunningMock]:
+    """Yields a mock with these options of its command line; it ends with the block. Inherits this process's cores."""
+    command = [sys.executable, "-m", "mock_controller", *options, "--owned"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True) as process:
         assert process.stdin is not None
         assert process.stdout is not None
@@ -36,3 +37,40 @@ def started_mock(*options: str, profile: Path | None = None) -> Iterator[Running
             yield RunningMock(ready["url"], ready["control"], process.pid)
         finally:
             process.stdin.close()
+
+
+class MockControl:
+    """One connection to a control port, tcp://HOST:PORT."""
+
+    def __init__(self, url: str) -> None:
+        where = urlsplit(url)
+        self._socket = socket.create_connection((where.hostname or "", where.port or 0), timeout=10.0)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._lines = self._socket.makefile("rb")
+
+    def ask(self, command: str, **values: Any) -> dict[str, Any]:
+        """Returns the answer to one command. Raises RuntimeError if the mock refuses it."""
+        self._socket.sendall(json.dumps({"do": command, **values}).encode() + b"\n")
+        answer: dict[str, Any] = json.loads(self._lines.readline())
+        if not answer["ok"]:
+            raise RuntimeError(f"the mock refused {command}: {answer['error']}")
+        return answer
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._lines.close()
+        self._socket.close()
+
+
+def environment_of(folder: Path) -> dict[str, str]:
+    """Returns this process's environment without the caller's settings, token and server; with the stop sockets of
+    `folder`.
+
+    Run programs in it with `folder` as the working folder, so that they do not find a `daq.toml` of the caller.
+    """
+    kept = {key: value for key, value in os.environ.items() if not key.upper().startswith("DAQ_")}
+    return kept | {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}

@@ -15,7 +15,7 @@ from typing import Any
 
 import httpx
 
-from benchmarks.own_environment import environment_of
+from benchmarks.mock_process import environment_of
 
 ROBOT = "ma2000"
 ANSWER_WITHIN = 100.0

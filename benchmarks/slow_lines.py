@@ -55,9 +55,7 @@ def main() -> int:
     """Returns the exit code: 1 when a promised rate was not kept."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks slow_lines", description=__doc__)
     parser.add_argument("--samples", type=int, default=100, help="samples at each rate")
-    parser.add_argument("--quick", action="store_true", help="20 samples")
-    given = parser.parse_args()
-    samples = 20 if given.quick else given.samples
+    samples = parser.parse_args().samples
     for title, options in (("Slow lines", ""), ("The same with a bridge without COMPACT", "&no_compact=1")):
         figures = [figure(baud, URL + options, joints, samples) for baud in BAUD_RATES for joints in JOINTS]
         failed = show(title, "python -m benchmarks slow_lines", figures)

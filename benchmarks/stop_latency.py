@@ -30,8 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.figures import Figure, at_most, quantile, show
-from benchmarks.mock_control import MockControl
-from benchmarks.own_environment import environment_of
+from benchmarks.mock_process import MockControl, environment_of
 from daq.driver import Controller
 from daq.link import RequestRefusedError
 from daq.owner.guardian import Guardian
@@ -216,9 +215,7 @@ def main() -> int:
     """Returns the exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks stop_latency", description=__doc__)
     parser.add_argument("--repeats", type=int, default=300, help="stops of each kind")
-    parser.add_argument("--quick", action="store_true", help="30 stops of each kind")
-    given = parser.parse_args()
-    repeats = 30 if given.quick else given.repeats
+    repeats = parser.parse_args().repeats
     figures = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

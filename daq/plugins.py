@@ -82,6 +82,9 @@ class Plugin:
     dialects: Mapping[str, str] = field(default_factory=dict)
     """Line protocols by their name in port URLs. "module:function" gets the joints' IDs on the bus and returns a
     `firmware_protocol.dialect.LinkDialect`."""
+    drivers: Mapping[str, str] = field(default_factory=dict)
+    """Python drivers of robots by the scheme of their URLs. "module:function" gets what follows the scheme and the
+    URL's options (a dict of texts), and returns a `daq.contracts.robot_driver.RobotDriver`."""
     settings: Mapping[str, str] = field(default_factory=dict)
     """Sections of daq.toml by name: subclasses of `daq.config.section.Section`, as "module:Class"."""
     checks: tuple[str, ...] = ()
@@ -104,6 +107,9 @@ class Plugin:
     """Routers with paths at the root, as "module:router"."""
     routes: tuple[str, ...] = ()
     """Routers below /api/v1, as "module:router": from `server.routes`, or FastAPI's."""
+    panels: Mapping[str, str] = field(default_factory=dict)
+    """Panels for the Live page, by title: paths of ES modules that a route at the root serves. The default export
+    gets an HTML element and `{machine, sample}` (`PluginPanel.svelte`), draws, and may return what ends it."""
 
 
 @cache

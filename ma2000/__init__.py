@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from model.machine_model.model_file import save_model as save_model
     from model.simulation.simulate import Simulation as Simulation
     from model.simulation.simulate import simulate as simulate
+    from model.simulation.simulate import simulate_many as simulate_many
     from model.validation.criterion import Fidelity as Fidelity
 
 _HOME = {
@@ -120,6 +121,7 @@ _HOME = {
     "save_machine": "ma2000.machine_file",
     "save_model": "model.machine_model.model_file",
     "simulate": "model.simulation.simulate",
+    "simulate_many": "model.simulation.simulate",
     "validate": "ma2000.studies",
     "write_table": "ma2000.files",
     "write_trace": "ma2000.files",
@@ -142,6 +144,7 @@ _WITH_MODELS = {
     "fit_torques",
     "profile",
     "simulate",
+    "simulate_many",
     "validate",
 }
 _NEEDED: dict[Extra, tuple[str, ...]] = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 from starlette.types import Receive, Scope, Send
@@ -92,6 +93,9 @@ class Part:
 
     def experiment_ended(self, robot: str, identity: str, state: ExperimentState, reason: str) -> None:
         """Called at the end of an experiment."""
+
+    def trace_written(self, robot: str, path: Path) -> None:
+        """Called with the finished trace of an experiment, before it is in the catalogue: the part may add to it."""
 
     def queue_paused(self, robot: str, reason: str) -> None:
         """Called when a queue is paused until a person has looked."""

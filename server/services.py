@@ -295,7 +295,9 @@ class Services:
 
         def add_trace(answer: Answer) -> None:
             assert answer.finished is not None
-            catalogue.add(Path(answer.finished.trace))
+            path = Path(answer.finished.trace)
+            self.notify_parts(lambda part: part.trace_written(robot.name, path))
+            catalogue.add(path)
 
         queue = QueueService(
             QueueContext(

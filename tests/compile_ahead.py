@@ -14,8 +14,9 @@ import pytest
 
 from daq.contracts.machine import load_machine
 from model.machine_model.model import Model, base_model
+from model.simulation.batch import LANES_FROM
 from model.simulation.inputs import inputs_of
-from model.simulation.simulate import sensitivities, simulate
+from model.simulation.simulate import sensitivities, simulate, simulate_many
 from tests.model.simulation.records import ramp_trace, trace_of
 
 ROOT = Path(__file__).parents[1]
@@ -29,7 +30,7 @@ def models() -> list[Model]:
 
 
 def compile_simulation() -> None:
-    """Real and dual numbers of each."""
+    """Real and dual numbers of each, and lanes."""
     for model in models():
         trace = (
             ramp_trace(model.machine)
@@ -39,6 +40,7 @@ def compile_simulation() -> None:
         inputs = inputs_of(trace, model.machine)
         simulate(model, inputs)
         sensitivities(model, inputs, [model.parameters[0]])
+        simulate_many(model, [inputs], {model.parameters[0].name: np.full(LANES_FROM, model.parameters[0].value)})
 
 
 def main() -> int:

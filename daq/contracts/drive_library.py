@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache
 from importlib import resources
 from typing import Any
 
 from daq.contracts.documents import parse_toml
 from daq.contracts.errors import SpecError
+from daq.contracts.refused import nearest
 from daq.contracts.toml_places import Path, Places, places_of
 from daq.contracts.written_numbers import is_number
 
@@ -43,9 +43,9 @@ def library_drive(name: str) -> LibraryDrive:
     """Returns the drive of this name. Raises SpecError with the nearest names."""
     known = library_drives()
     if name not in known:
-        near = get_close_matches(name, known, n=3) or [n for n in known if name.lower() in n][:3]
-        meant = f"; did you mean {' or '.join(near)}?" if near else ""
-        raise SpecError(f"drive {name!r:.80} is not in the library{meant} (`daq machine drives` lists it)")
+        raise SpecError(
+            f"drive {name!r:.80} is not in the library{nearest(name, known)} (`daq machine drives` lists it)"
+        )
     return known[name]
 
 

@@ -13,13 +13,29 @@ from typing import Literal
 from daq.contracts.errors import DaqError
 from daq.contracts.exit_codes import WRONG_INPUT
 
-Extra = Literal["live", "robot", "model", "server", "tables", "ros", "cluster", "postgresql", "archive", "oidc", "mcp"]
+Extra = Literal[
+    "live",
+    "robot",
+    "model",
+    "server",
+    "tables",
+    "ros",
+    "cluster",
+    "postgresql",
+    "archive",
+    "oidc",
+    "mcp",
+    "rerun",
+    "foxglove",
+]
 
 CONTAINS: dict[Extra, tuple[Extra, ...]] = {
     "robot": ("live",),
     "model": ("robot", "live"),
     "server": ("robot", "live"),
     "mcp": ("robot", "live"),
+    "foxglove": ("robot", "live"),
+    "rerun": ("model", "robot", "live"),
 }
 """Extras that an extra includes."""
 EXTRA_OF: dict[str, Extra] = {
@@ -35,6 +51,7 @@ EXTRA_OF: dict[str, Extra] = {
     "serial": "robot",
     "typer": "robot",
     "numba": "model",
+    "PIL": "server",
     "cronsim": "server",
     "fastapi": "server",
     "httptools": "server",
@@ -55,6 +72,8 @@ EXTRA_OF: dict[str, Extra] = {
     "obstore": "archive",
     "authlib": "oidc",
     "mcp": "mcp",
+    "rerun": "rerun",
+    "foxglove": "foxglove",
 }
 """The smallest extra that installs each module."""
 

@@ -6,6 +6,7 @@ Every number has its unit and its source, and is marked if it is an assumption. 
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Iterator
 from functools import cache
@@ -137,15 +138,30 @@ class DcMotor(FrozenRecord):
     """Motor turns per joint turn."""
     amplifier_gain: Plain
     """Motor volts per volt of the board's output."""
-    dac_full_scale: Volt
-    """The board's output at 127 counts. With other controllers, this times `amplifier_gain` is the largest voltage."""
+    dac_full_scale: Volt | None = None
+    """The board's output at 127 counts. With other controllers, this times `amplifier_gain` is the largest voltage, and
+    none means no such limit."""
     supply_limit: Volt | None = None
     """Largest voltage at the motor, after the amplifier; none: no limit."""
 
     @property
     def scale(self) -> DriveScale:
-        """DAC counts ↔ volts at the motor."""
+        """DAC counts ↔ volts at the motor. Raises SpecError if `dac_full_scale` is not stated."""
+        if self.dac_full_scale is None:
+            raise SpecError("drive: dac_full_scale is not stated: counts of the drive have no volts")
         return DriveScale(self.dac_full_scale.value, self.amplifier_gain.value)
+
+    @property
+    def largest_output(self) -> float:
+        """The controller's largest output, in V at the motor; inf if it is not stated."""
+        if self.dac_full_scale is None:
+            return math.inf
+        return abs(self.dac_full_scale.value * self.amplifier_gain.value)
+
+    @property
+    def highest(self) -> float:
+        """Largest voltage at the motor, V; inf if none is stated."""
+        return min(self.largest_output, math.inf if self.supply_limit is None else self.supply_limit.value)
 
 
 class PlainGain(FrozenRecord):
@@ -189,8 +205,8 @@ class Sensor(FrozenRecord):
     """Position sensor: `range` of the joint over 2^bits counts, the joint's position at count 0, the sign of
     counting."""
 
-    bits: Annotated[int, Field(ge=1, le=32)]
-    """Resolution: the range has 2^bits counts."""
+    bits: Annotated[int, Field(ge=1, le=32)] | None = None
+    """Resolution: the range has 2^bits counts; none: noise is estimated from the record."""
     range: Annotated[JointValue, AfterValidator(_positive)]
     """Range of the joint over all counts."""
     at_zero: JointValue
@@ -203,6 +219,17 @@ class Sensor(FrozenRecord):
     """Standard deviation of the noise before rounding."""
     measures: Literal["position", "velocity"] = "position"
     """`velocity`: a tachometer, whose signal is integrated from 0."""
+
+    @model_validator(mode="after")
+    def _noise_has_counts(self) -> Self:
+        if self.noise is not None and self.bits is None:
+            raise ValueError("noise is stated in counts, so `bits` is needed")
+        return self
+
+    @property
+    def count(self) -> float:
+        """One count, rad or m; 0 if `bits` is not stated."""
+        return 0.0 if self.bits is None else self.range.value / 2**self.bits
 
 
 class Joint(FrozenRecord):
@@ -249,6 +276,11 @@ class Joint(FrozenRecord):
             stated = drive_unit_of(self.drive.gain, self.units)
             return RECORDED_IN if stated is None else (stated,)
         return ("V",) if isinstance(self.drive, DcMotor) else ("A",)
+
+    @property
+    def count(self) -> float:
+        """One count of the sensor, rad or m; 0 if it is not stated."""
+        return 0.0 if self.sensor is None else self.sensor.count
 
     @property
     def dc_motor(self) -> DcMotor:
@@ -350,6 +382,16 @@ class Machine(FrozenRecord):
     """Position of every joint at rest, rad or m, where springs are expected to be slack."""
 
     @model_validator(mode="after")
+    def _board_has_counts(self) -> Self:
+        for number, joint in enumerate(self.joints if isinstance(self.controller, BoardPid) else (), start=1):
+            drive, sensor = joint.drive, joint.sensor
+            if isinstance(drive, DcMotor) and drive.dac_full_scale is None:
+                raise ValueError(f"joints.{number}.drive.dac_full_scale: is missing; a board_pid works in its counts")
+            if sensor is not None and sensor.bits is None:
+                raise ValueError(f"joints.{number}.sensor.bits: is missing; a board_pid works in its counts")
+        return self
+
+    @model_validator(mode="after")
     def _consistent(self) -> Self:
         count = len(self.joints)
         if self.modelled_joints != tuple(range(1, len(self.modelled_joints) + 1)) or len(self.modelled_joints) > count:
@@ -410,8 +452,9 @@ class Machine(FrozenRecord):
         """Returns the conversion of counts and posture units to rad for joint `joint` (from 1). Raises SpecError if it
         has no sensor."""
         sensor = self.joint(joint).sensor
-        if sensor is None:
-            raise SpecError(f"machine {self.name}: joint {joint} has no sensor, so no calibration")
+        if sensor is None or sensor.bits is None:
+            lacking = "sensor" if sensor is None else "sensor.bits"
+            raise SpecError(f"machine {self.name}: joint {joint} has no {lacking}, so no calibration")
         step = of_joint(getattr(self.controller, "set_point_resolution", None), joint)
         units = POSTURE_UNITS if step is None else round(sensor.range.value / step.value)
         return JointCalibration(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from difflib import get_close_matches
 from typing import Any, Literal, get_args, get_origin
 
@@ -112,10 +112,15 @@ def _found(value: object) -> str:
     return "a list" if isinstance(value, list | tuple) else shown(value)
 
 
+def nearest(name: str, known: Iterable[str], most: int = 3) -> str:
+    """Returns a clause that asks for the known names most like this one; empty without any."""
+    names = list(known)
+    near = get_close_matches(name, names, n=most) or [one for one in names if name and name.lower() in one][:most]
+    return f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+
+
 def _unknown_field(name: str, fields: Sequence[str]) -> str:
-    near = get_close_matches(name, fields, n=1)
-    meant = f"; did you mean {near[0]!r}?" if near else ""
-    return f"there is no such field here{meant} (there are {', '.join(fields)})"
+    return f"there is no such field here{nearest(name, fields, 1)} (there are {', '.join(fields)})"
 
 
 def _length(first: Invalid) -> str:

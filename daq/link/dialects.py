@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from daq.plugins import named, plugins
-from daq.transport.url import FRAMED, SERVOS, PortUrl, PortUrlError, parse_port_url
+from daq.transport.url import FRAMED, SERVOS, DriverPort, PortUrl, PortUrlError, parse_port_url
 from firmware_protocol.dialect import FramedDialect, LinkDialect
 from firmware_protocol.dynamixel.dialect import DynamixelDialect
 from firmware_protocol.errors import ProtocolError
@@ -15,7 +15,7 @@ def dialect_of(url: str) -> LinkDialect:
     """Returns a new dialect for a connection to this URL. Raises PortUrlError for an unknown name, a dialect that
     cannot be loaded, or parameters that it rejects."""
     port: PortUrl = parse_port_url(url)
-    if port.dialect == FRAMED:
+    if port.dialect == FRAMED or isinstance(port, DriverPort):
         return FramedDialect()
     try:
         if port.dialect == SERVOS:

@@ -14,11 +14,12 @@ from typing import Protocol, Self, TypeVar
 from daq.link.connection import Connection
 from daq.link.counters import LinkCounters, Mark, Tally
 from daq.link.dialects import dialect_of
+from daq.link.driver_line import driver_line
 from daq.link.errors import LinkError, LinkLostError, RequestRefusedError
 from daq.link.timed_exchange import TimedExchange
 from daq.link.timing import CLEAN_TRANSACTIONS, LinkTiming
 from daq.link.turn_exchange import TurnExchange
-from daq.transport import Endpoint, ReconnectDelay, TransportError, open_endpoint
+from daq.transport import DriverPort, Endpoint, ReconnectDelay, TransportError, open_endpoint, parse_port_url
 from firmware_protocol.commands import (
     PROTOCOL_VERSION,
     Advance,
@@ -92,6 +93,10 @@ class Link:
     def open(cls, url: str, dialect: LinkDialect | None = None) -> Self:
         """Opens a link to the controller at a port URL, in the dialect that the URL names. Sends nothing. Raises
         TransportError."""
+        port = parse_port_url(url)
+        if isinstance(port, DriverPort):
+            line = driver_line(url, port)
+            return cls(line, line)
         dialect = dialect or dialect_of(url)
         endpoint = open_endpoint(url)
         try:

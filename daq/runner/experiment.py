@@ -141,6 +141,7 @@ def _record(run: RunSetup, prepared: Prepared, changes: tuple[GainChange, ...]) 
         record,
         prepared.joints,
         attachments={"experiment.json": run.spec.model_dump_json().encode()},
+        lacks=() if run.controller.link.scale.measures_drive else ("drive", "power_raw"),
         patience=PATIENCE_IN_LOCK_STEP if run.controller.link.lock_step else 0.0,
     )
     recorder = Recorder(writer, prepared.joints, run.listener, rate.every)

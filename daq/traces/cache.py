@@ -13,6 +13,7 @@ import json
 import os
 import tempfile
 import zlib
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ FOLDER = ".cache"
 WORTH_IT = 1_000_000
 """Size of a trace file (bytes) below which decoding is as fast as a cache."""
 
-_VERSION = 2
+_VERSION = 3
 """Format version. Increase it when a reader interprets files differently, to invalidate earlier caches."""
 _PIECE = 1 << 19
 """Size (bytes) of each read: small enough to stay in the processor's cache while its checksum is computed."""
@@ -33,7 +34,7 @@ _PIECE = 1 << 19
 
 def cache_path(path: Path) -> Path:
     """Path of the cache of a trace file."""
-    return path.parent / FOLDER / f"{path.name}.npz"
+    return path.parent / FOLDER / f"{path.name}.columns"
 
 
 def key_of(path: Path, limits: TraceLimits) -> str:
@@ -50,36 +51,58 @@ def key_of(path: Path, limits: TraceLimits) -> str:
 def load(path: Path, key: str) -> Trace | None:
     """Returns the cached trace; None if there is no cache with this key, or if it is damaged."""
     try:
-        with cache_path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            if str(stored["key"]) != key:
+        with cache_path(path).open("rb") as stream:
+            crc, line = int(stream.readline(), 16), stream.readline()
+            head = json.loads(line)
+            if head["key"] != key:
                 return None
-            head = json.loads(str(stored["head"]))
-            return Trace(
-                TraceRecord.model_validate_json(json.dumps(head["record"])),
-                tuple(head["joints"]),
-                events=tuple(TraceEvent.model_validate(event) for event in head["events"]),
-                **{name: stored[name] for name in layout.ALL_SIGNALS if name in stored},
-            )
-    except Exception:  # noqa: BLE001  # numpy and zipfile raise what they like on a damaged file
+            data = np.fromfile(stream, np.uint8)
+        if zlib.crc32(data.data, zlib.crc32(line)) != crc:
+            return None
+        columns = {}
+        for name, (kind, shape, begin, end) in head["columns"].items():
+            columns[name] = data[begin:end].view(kind).reshape(shape)
+        return Trace(
+            TraceRecord.model_validate_json(json.dumps(head["record"])),
+            tuple(head["joints"]),
+            events=tuple(TraceEvent.model_validate(event) for event in head["events"]),
+            **columns,
+        )
+    except Exception:  # noqa: BLE001  # a damaged file fails anywhere
         return None
 
 
 def store(path: Path, key: str, trace: Trace) -> bool:
-    """Writes the cache of a trace. Returns False if the folder is not writable, which is no error."""
+    """Writes the cache of a trace: a checksum, a line of JSON, the columns.
+
+    Returns False if the folder cannot be written, which is no error.
+    """
+    columns = {name: getattr(trace, name) for name in layout.ALL_SIGNALS if getattr(trace, name) is not None}
+    parts = [np.ascontiguousarray(column) for column in columns.values()]
+    ends = np.cumsum([0, *(part.nbytes for part in parts)]).tolist()
     head = {
+        "key": key,
+        "columns": {
+            name: (part.dtype.str, part.shape, *span)
+            for name, part, span in zip(columns, parts, pairwise(ends), strict=True)
+        },
         "record": trace.record.model_dump(mode="json"),
         "joints": trace.joints,
         "events": [event.model_dump(exclude_none=True) for event in trace.events],
     }
-    columns = {name: getattr(trace, name) for name in layout.ALL_SIGNALS if getattr(trace, name) is not None}
+    line = json.dumps(head).encode() + b"\n"
+    crc = zlib.crc32(line)
+    for part in parts:
+        crc = zlib.crc32(part.data, crc)
     target = cache_path(path)
     unfinished: Path | None = None
     try:
         target.parent.mkdir(exist_ok=True)
-        descriptor, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=".npz")
+        descriptor, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
         unfinished = Path(name)
         with os.fdopen(descriptor, "wb") as stream:
-            np.savez(stream, allow_pickle=False, key=np.array(key), head=np.array(json.dumps(head)), **columns)
+            stream.write(b"%08x\n" % crc + line)
+            stream.writelines(part.tobytes() for part in parts)
         unfinished.replace(target)
     except OSError:
         if unfinished is not None:

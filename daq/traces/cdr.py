@@ -42,6 +42,11 @@ class CdrWriter:
         self.number("I", len(data) + 1)
         self._body += data + b"\0"
 
+    def data(self, data: bytes) -> None:
+        """Appends a sequence of bytes."""
+        self.number("I", len(data))
+        self._body += data
+
     def texts(self, texts: Sequence[str]) -> None:
         """Appends a sequence of texts."""
         self.number("I", len(texts))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +13,30 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace import TraceEvent
 from daq.contracts.trace_limits import TraceLimits
 from daq.traces import cdr, layout, set_points_taken
-from daq.traces.scan import UNREADABLE, Scan, payloads, require
+from daq.traces.scan import TOO_MANY, UNREADABLE, Place, Scan, alike, fills, places, require
 
 Samples = NDArray[Any]
 """Samples of one joint, (n,) of `layout.JOINT_SAMPLE_DTYPE`."""
 
 
+FEW = 8
+"""Fewer chunks of one size are faster read one by one."""
+TOGETHER = 128
+"""Chunks that are read at once: they stay in the processor's cache."""
 _JOINT_TOPICS = (layout.JOINT_TOPIC, layout.FORMAT_1_JOINT_TOPIC)
 _EVENT_DECODERS: dict[tuple[str, str], Callable[[bytes], TraceEvent]] = {
     (layout.EVENT_SCHEMA, "cdr"): cdr.event_of,
     (layout.FORMAT_1_EVENT_SCHEMA, "json"): layout.event_of_format_1,
 }
 """Readers of events, by schema and encoding."""
+
+
+class _Contents(NamedTuple):
+    """The messages of a chunk: those of each joint and of set points joined, and the events."""
+
+    samples: tuple[Any, ...]
+    taken: Any
+    events: tuple[TraceEvent, ...]
 
 
 @dataclass(frozen=True)
@@ -45,12 +57,7 @@ class Decoded:
 def decode(found: Scan, joints: tuple[int, ...], limits: TraceLimits) -> Decoded:
     """Decodes all chunks of a scan. Raises ValueError or struct.error if they are not those of a trace."""
     decoder = _Decoder(found, joints, limits)
-    parts = [decoder.chunk(chunk) for chunk in found.chunks]
-    empty = np.empty(0, layout.JOINT_SAMPLE_DTYPE)
-    samples = tuple(np.concatenate([empty, *(part.samples[column] for part in parts)]) for column in range(len(joints)))
-    times = [part.taken for part in parts if part.taken is not None]
-    taken = np.concatenate([set_points_taken.read([]), *times]) if decoder.tells_taken else None
-    decoded = Decoded(samples, taken, tuple(event for part in parts for event in part.events))
+    decoded = decoder.joined(decoder.contents(found.chunks))
     _require_same_ticks(decoded.of_periods)
     return decoded
 
@@ -68,7 +75,7 @@ def cut_to_what_decodes(found: Scan, joints: tuple[int, ...], limits: TraceLimit
     last = -np.inf
     for number, chunk in enumerate(found.chunks):
         try:
-            decoded = decoder.chunk(chunk)
+            decoded = decoder.joined(decoder.contents([chunk]))
             _require_same_ticks(decoded.of_periods)
             time = decoded.samples[0]["time"]
             if not (np.diff(time, prepend=last) > 0).all():
@@ -95,26 +102,92 @@ class _Decoder:
         self._event_of = _event_decoder(found, self._events)
         self._taken = set_points_taken.channel_in(found)
 
-    @property
-    def tells_taken(self) -> bool:
-        """Whether the file contains when set points were used."""
-        return self._taken is not None
+    def joined(self, contents: list[_Contents]) -> Decoded:
+        """Returns the samples of successive chunks."""
+        joints = range(len(self._joints))
+        samples = (np.frombuffer(b"".join(c.samples[k] for c in contents), layout.JOINT_SAMPLE_DTYPE) for k in joints)
+        taken = None
+        if self._taken is not None:
+            taken = np.frombuffer(b"".join(c.taken for c in contents), set_points_taken.DTYPE)
+        return Decoded(tuple(samples), taken, tuple(event for c in contents for event in c.events))
 
-    def chunk(self, chunk: bytes) -> Decoded:
-        """Raises ValueError, struct.error."""
-        parts: dict[int, list[bytes]] = {
-            channel: [] for channel in (*self._joints, self._taken, self._events) if channel is not None
-        }
-        count, seen = payloads(chunk, parts, self._records_left)
+    def contents(self, chunks: list[bytes]) -> list[_Contents]:
+        """Returns what chunks contain. Those of one size that are laid out alike are read at once. Raises ValueError,
+        struct.error.
+        """
+        found: dict[int, _Contents] = {}
+        sizes: dict[int, list[int]] = {}
+        for number, chunk in enumerate(chunks):
+            sizes.setdefault(len(chunk), []).append(number)
+        for numbers in sizes.values():
+            self._of_one_size(chunks, numbers, found)
+        return [found[number] for number in range(len(chunks))]
+
+    def _of_one_size(self, chunks: list[bytes], numbers: list[int], found: dict[int, _Contents]) -> None:
+        channels, begin = (*self._joints, self._taken), 0
+        while begin < len(numbers):
+            first, others = numbers[begin], numbers[begin + 1 : begin + TOGETHER]
+            at = self._places(chunks[first])
+            found[first] = self._content(chunks[first], at)
+            begin += 1
+            if len(others) < FEW or found[first].events or not fills(chunks[first], at):  # what differs is read alone
+                continue
+            begin += len(others)
+            block = np.frombuffer(b"".join([chunks[k] for k in others]), np.uint8).reshape(len(others), -1)
+            same = alike(chunks[first], block, at)
+            self._count_records(len(at) * int(same.sum()))
+            whole = zip(*(_column(block, at, channel) for channel in channels), strict=True)
+            for k, is_same, (*samples, taken) in zip(others, same.tolist(), whole, strict=True):
+                if is_same:
+                    found[k] = _Contents(tuple(samples), taken, ())
+                else:
+                    found[k] = self._content(chunks[k], self._places(chunks[k]))
+
+    def _places(self, chunk: bytes) -> list[Place]:
+        count, at = places(chunk, self._records_left)
+        self._count_records(count)
+        unknown = {place.channel for place in at} - self._known
+        if unknown:
+            raise ValueError(f"channel {min(unknown)} is not defined")
+        return at
+
+    def _count_records(self, count: int) -> None:
         self._records_left -= count
-        if not seen <= self._known:
-            raise ValueError(f"channel {min(seen - self._known)} is not defined")
-        samples = tuple(_samples(parts[channel] if channel is not None else []) for channel in self._joints)
-        taken = None if self._taken is None else set_points_taken.read(parts[self._taken])
-        events = parts[self._events] if self._events is not None else []
+        if self._records_left < 0:
+            raise ValueError(TOO_MANY)
+
+    def _content(self, chunk: bytes, at: list[Place]) -> _Contents:
+        messages: dict[int | None, list[bytes]] = {}
+        for place in at:
+            messages.setdefault(place.channel, []).append(chunk[place.begin : place.end])
+        samples = tuple(
+            _whole(messages.get(channel, []), layout.JOINT_SAMPLE_BYTES, "a sample") for channel in self._joints
+        )
+        topic = f"a message of {set_points_taken.TOPIC}"
+        taken = _whole(messages.get(self._taken, []), set_points_taken.DTYPE.itemsize, topic)
+        events = [] if self._events is None else messages.get(self._events, [])
         self._event_count += len(events)
         require(self._event_count, self._most_events, "there are more than {} events", "events")
-        return Decoded(samples, taken, tuple(map(self._event_of, events)))
+        return _Contents(samples, taken, tuple(map(self._event_of, events)))
+
+
+def _whole(messages: list[bytes], size: int, what: str) -> bytes:
+    """Joins messages. Raises ValueError if one has another size."""
+    if any(len(message) != size for message in messages):
+        raise ValueError(f"{what} does not have {size} bytes")
+    return b"".join(messages)
+
+
+def _column(block: NDArray[np.uint8], at: list[Place], channel: int | None) -> NDArray[np.uint8]:
+    """Returns the data of a channel's messages, which have one size, in every row of a block, (rows, bytes)."""
+    own = [place for place in at if place.channel == channel]
+    if not own:
+        return block[:, :0]
+    begins = np.array([place.begin for place in own])
+    windows = np.lib.stride_tricks.sliding_window_view(block, own[0].end - own[0].begin, axis=1)
+    pitch = begins[1:] - begins[:-1]
+    even = slice(begins[0], begins[-1] + 1, pitch[0]) if len(own) > 1 and (pitch == pitch[0]).all() else begins
+    return windows[:, even].reshape(len(block), -1)
 
 
 def _require_same_ticks(samples: tuple[NDArray[Any], ...]) -> None:
@@ -152,12 +225,3 @@ def _event_decoder(found: Scan, channel: int | None) -> Callable[[bytes], TraceE
             f"topic {topic} has schema {named[0]!r} in {named[1]!r}, expected {layout.EVENT_SCHEMA!r} in CDR"
         )
     return decoder
-
-
-def _samples(parts: list[bytes]) -> Samples:
-    data = b"".join(parts)
-    if len(data) != len(parts) * layout.JOINT_SAMPLE_BYTES or any(
-        len(part) != layout.JOINT_SAMPLE_BYTES for part in parts
-    ):
-        raise ValueError(f"a sample does not have {layout.JOINT_SAMPLE_BYTES} bytes")
-    return np.frombuffer(data, layout.JOINT_SAMPLE_DTYPE)

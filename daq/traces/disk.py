@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+import sys
 from pathlib import Path
 from typing import IO
 
@@ -12,11 +13,16 @@ from daq.contracts.errors import TraceError
 from daq.contracts.file_lock import take_lock
 from daq.contracts.whole_file import sync_folder
 
+if sys.platform == "win32":
+    _WITHOUT_WAITING = 0
+else:
+    _WITHOUT_WAITING = os.O_NONBLOCK
+
 
 def open_regular(path: Path) -> IO[bytes]:
     """Opens a regular file for reading. Raises OSError, also for a pipe, since opening one would wait for its
     writer."""
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    descriptor = os.open(path, os.O_RDONLY | _WITHOUT_WAITING)
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):
         return os.fdopen(descriptor, "rb")
@@ -88,8 +94,11 @@ def sync(stream: IO[bytes]) -> None:
     os.fsync(stream.fileno())
 
 
-def rename(old: Path, new: Path) -> None:
-    """Renames a file to its final name, and syncs the name to the disk."""
+def rename(old: Path, new: Path, stream: IO[bytes] | None = None) -> None:
+    """Renames a file to its final name, and syncs the name to the disk. Windows renames no open file, so its `stream`
+    is closed there first."""
+    if sys.platform == "win32" and stream is not None:
+        stream.close()
     old.replace(new)
     sync_folder(new.parent)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 import zlib
+from functools import lru_cache
 
 import lz4.frame
 import zstandard
@@ -45,13 +47,19 @@ def _plain(chunk: CompressedChunk) -> bytes:
 
 
 def _zstd(chunk: CompressedChunk) -> bytes:
-    decompressor = zstandard.ZstdDecompressor(max_window_size=max(_LEAST_WINDOW, chunk.size))
+    decompressor = _decompressor(max(_LEAST_WINDOW, chunk.size), threading.get_ident())
     if chunk.size == 0:  # zstandard takes a limit of 0 as no limit
         return bytes(decompressor.stream_reader(chunk.data).read(1)) if len(chunk.data) else b""
     # zstandard prefers the size in the frame's header to the size it is given, so require that they agree.
     if zstandard.frame_content_size(chunk.data) not in (_SIZE_UNKNOWN, chunk.size):
         raise _other_size(chunk)
     return decompressor.decompress(chunk.data, max_output_size=chunk.size)
+
+
+@lru_cache(maxsize=4)
+def _decompressor(window: int, _thread: int) -> zstandard.ZstdDecompressor:
+    """Returns a thread's decompressor: to make one takes as long as to inflate a chunk."""
+    return zstandard.ZstdDecompressor(max_window_size=window)
 
 
 def _lz4(chunk: CompressedChunk) -> bytes:

@@ -5,6 +5,7 @@ A bad file does not prevent the salvage of the next one, and unreadable bytes ar
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -143,7 +144,7 @@ def _salvage_locked(part: Path, data: bytes, limits: TraceLimits) -> Salvaged:
     try:
         with unfinished.open("wb") as stream:
             writer = open_mcap(stream, profile_of(found))
-            _copy(found, writer)
+            copy_records(found, writer)
             remark = f"salvaged; {dropped} bytes at the end could not be read"
             end = outcome_metadata("interrupted", readable.counters, len(trace), duration, remark)
             writer.add_metadata(layout.END_METADATA, end)
@@ -217,8 +218,11 @@ def _refuse_another(path: Path, record: TraceRecord, limits: TraceLimits) -> Non
         raise TraceError(f"{path}: exists beside its part file, and is not its salvage; move one of them away")
 
 
-def _copy(found: Scan, writer: Writer) -> None:
-    """Copies everything but the end, message by message, so that the copy has an index, unlike the part file."""
+def copy_records(found: Scan, writer: Writer, after_chunk: Callable[[int], None] = lambda _time: None) -> None:
+    """Copies everything but the end, message by message, so that the copy has an index, unlike the part file.
+
+    after_chunk: called after each chunk with its last message's log time (ns).
+    """
     writer.add_metadata(layout.START_METADATA, found.metadata[layout.START_METADATA])
     for attachment in found.attachments:
         writer.add_attachment(
@@ -235,11 +239,14 @@ def _copy(found: Scan, writer: Writer) -> None:
         for number, channel in found.channels.items()
     }
     for chunk in found.chunks:
+        last = 0
         for message in messages(chunk):
             writer.add_message(
                 channels[message.channel], message.log_time, message.data, message.publish_time, message.sequence
             )
+            last = message.log_time
         writer.flush()  # type: ignore[no-untyped-call]
+        after_chunk(last)
 
 
 def _check_copy(path: Path, trace: Trace, limits: TraceLimits) -> None:

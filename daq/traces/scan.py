@@ -10,10 +10,13 @@ import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
+import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema
 from mcap.writer import MCAP0_MAGIC
+from numpy.typing import NDArray
 
 from daq.contracts.errors import TraceError
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
@@ -25,22 +28,27 @@ HEAD = struct.Struct("<BQ")
 UNREADABLE = (ValueError, struct.error, *INFLATE_ERRORS)
 """Errors raised for damaged bytes."""
 
+TOO_MANY = "there are more records than are read (traces.limits.records)"
 NOT_IN_CHUNKS = "a chunk contains more than schemas, channels and whole messages"
 
 _DEFINITIONS = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL)})
 _REBUILT = frozenset(
-    (
-        Opcode.HEADER,
-        Opcode.CHUNK_INDEX,
-        Opcode.MESSAGE_INDEX,
-        Opcode.ATTACHMENT_INDEX,
-        Opcode.METADATA_INDEX,
-        Opcode.SUMMARY_OFFSET,
+    map(
+        int,  # as read, so that none is compared with a member of an enumeration
+        (
+            Opcode.HEADER,
+            Opcode.CHUNK_INDEX,
+            Opcode.MESSAGE_INDEX,
+            Opcode.ATTACHMENT_INDEX,
+            Opcode.METADATA_INDEX,
+            Opcode.SUMMARY_OFFSET,
+        ),
     )
 )
 """Records whose content follows from other records."""
 _MESSAGE = struct.Struct("<BQHIQQ")
 _CRC = struct.Struct("<I")
+_CHANNEL = struct.Struct("<H")
 _OURS = (layout.START_METADATA, layout.END_METADATA)
 
 
@@ -109,7 +117,9 @@ def scan(data: bytes | memoryview, origin: str, limits: TraceLimits = DEFAULT_TR
             found.damage = "a record is cut off or not a record"
             return found
         try:
-            walk.take(opcode, view[start : start + length])
+            walk.count()
+            if opcode not in _REBUILT:
+                walk.take(opcode, view[start : start + length])
         except UNREADABLE as error:
             found.damage = f"a record cannot be read ({str(error) or type(error).__name__})"
             return found
@@ -130,23 +140,29 @@ def messages(chunk: bytes) -> Iterator[Message]:
         position = following
 
 
-def payloads(chunk: bytes, by_channel: dict[int, list[bytes]], most: int) -> tuple[int, set[int]]:
-    """Appends the data of each message to its channel's list, if there is one. This is the fast path to all samples.
+class Place(NamedTuple):
+    """Where a message stands in a chunk: its head from `record`, its data from `begin` to `end`."""
 
-    Returns the number of records, and the channels of the messages. Raises ValueError or struct.error if a record does
-    not end within the chunk, or there are more than `most`.
+    channel: int
+    record: int
+    begin: int
+    end: int
+
+
+def places(chunk: bytes, most: int) -> tuple[int, list[Place]]:
+    """Returns the number of a chunk's records, and the places of its messages. This is the fast path to all samples.
+
+    Raises ValueError or struct.error if a record does not end within the chunk, or there are more than `most`.
     """
     unpack, head, message = _MESSAGE.unpack_from, HEAD.size, _MESSAGE.size
     position, end, count = 0, len(chunk), 0
-    seen: set[int] = set()
+    found = []
     last = end - message
     while position <= last and count < most:
         opcode, length, channel, _, _, _ = unpack(chunk, position)
         following = position + head + length
         if opcode == Opcode.MESSAGE:
-            seen.add(channel)
-            if channel in by_channel:
-                by_channel[channel].append(chunk[position + message : following])
+            found.append(Place(channel, position, position + message, following))
         elif opcode not in _DEFINITIONS:
             raise ValueError(NOT_IN_CHUNKS)
         position = following
@@ -157,10 +173,25 @@ def payloads(chunk: bytes, by_channel: dict[int, list[bytes]], most: int) -> tup
             raise ValueError(NOT_IN_CHUNKS)
         count += 1
     if position < end:
-        raise ValueError("there are more records than are read (traces.limits.records)")
+        raise ValueError(TOO_MANY)
     if position > end:
         raise ValueError("a record is longer than its chunk")
-    return count, seen
+    return count, found
+
+
+def fills(chunk: bytes, at: list[Place]) -> bool:
+    """Whether a chunk has nothing but these messages."""
+    edges = [0, *(place.end for place in at)]
+    return bool(at) and edges[-1] == len(chunk) and all(p.record == edge for p, edge in zip(at, edges, strict=False))
+
+
+def alike(chunk: bytes, others: NDArray[np.uint8], at: list[Place]) -> NDArray[np.bool_]:
+    """Returns which chunks of the same size, rows of `others`, have their messages at the same places as a chunk that
+    has nothing else.
+    """
+    starts = np.array([place.record for place in at])
+    heads = (starts[:, None] + np.arange(HEAD.size + _CHANNEL.size)).ravel()
+    return np.asarray((others[:, heads] == np.frombuffer(chunk, np.uint8)[heads]).all(axis=1))
 
 
 def _record_at(chunk: bytes, position: int) -> tuple[int, int]:
@@ -178,16 +209,20 @@ class _Walk:
     def __init__(self, found: Scan, whole: memoryview, limits: TraceLimits) -> None:
         self._found = found
         self._whole = whole
-        self._limits = limits
+        self._limits, self._most = limits, limits.records
         self._inflated = 0
         self._attached = 0
         self._defined_in_chunks = 0
 
+    def count(self) -> None:
+        """Counts a record. Raises ValueError."""
+        self._found.records += 1
+        if self._found.records > self._most:
+            require(self._found.records, self._most, "there are more than {} records", "records")
+
     def take(self, opcode: int, body: memoryview) -> None:
         """Sorts one record into the scan. Raises one of UNREADABLE."""
         found = self._found
-        found.records += 1
-        require(found.records, self._limits.records, "there are more than {} records", "records")
         if opcode == Opcode.CHUNK:
             self._take_chunk(body)
         elif opcode == Opcode.METADATA:
@@ -205,7 +240,7 @@ class _Walk:
                 raise ValueError("the data section does not match its checksum")
         elif opcode == Opcode.FOOTER:
             self._check_footer(body)
-        elif opcode not in _REBUILT:
+        else:
             found.others += 1
 
     def _take_chunk(self, body: memoryview) -> None:

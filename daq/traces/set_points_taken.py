@@ -6,10 +6,8 @@ Only records of slow lines have it. On a fast line every period is sampled, and 
 from __future__ import annotations
 
 import struct
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.sample import SampleRow
 from daq.traces.cdr import HEADER
@@ -41,10 +39,3 @@ def channel_in(found: Scan) -> int | None:
     if (name, channel.message_encoding) != (SCHEMA, "cdr"):
         raise ValueError(f"topic {TOPIC} has schema {name!r}, expected {SCHEMA!r} in CDR")
     return channel.id
-
-
-def read(messages: list[bytes]) -> NDArray[Any]:
-    """Decodes messages of the topic, (n,) of `DTYPE`. Raises ValueError if one has another length."""
-    if any(len(message) != DTYPE.itemsize for message in messages):
-        raise ValueError(f"a message of {TOPIC} does not have {DTYPE.itemsize} bytes")
-    return np.frombuffer(b"".join(messages), DTYPE)

@@ -47,7 +47,7 @@ def write_trace(trace: Trace, path: Path, limits: TraceLimits = DEFAULT_TRACE_LI
                 recording.finish(trace.record.outcome, trace.record.counters)
                 disk.sync(stream)
                 _check_copy(part, trace, limits)
-                disk.rename(part, path)
+                disk.rename(part, path, stream)
             except BaseException:
                 part.unlink(missing_ok=True)
                 raise

@@ -198,5 +198,4 @@ def _rad_per_count(machine: Machine | None, joint: int) -> float | None:
     """Size of a sensor's count in rad (m); None if the sensor is unknown."""
     if machine is None or joint > len(machine.joints):
         return None
-    sensor = machine.joint(joint).sensor
-    return None if sensor is None else float(sensor.range.value) / 2**sensor.bits
+    return machine.joint(joint).count or None

@@ -44,7 +44,8 @@ class TraceWriter:
 
     `sample` and `event` only put data into a queue. If the disk is full, fails, or is a whole queue behind, the next
     call raises TraceError, which is also in `failure`. Everything synced before stays in the part file and can be
-    salvaged. `patience`: longest wait (s) of a call for room in the queue; 0 for acquisition in real time.
+    salvaged. `lacks`: signals that this robot does not measure. `patience`: longest wait (s) of a call for room in the
+    queue; 0 for acquisition in real time.
 
     Raises TraceError if the file cannot be made or exists. A `with` block that ends without `close` closes the trace as
     interrupted.
@@ -57,6 +58,7 @@ class TraceWriter:
         joints: tuple[int, ...],
         *,
         attachments: Mapping[str, bytes] | None = None,
+        lacks: Sequence[str] = (),
         sync_interval: float = SYNC_INTERVAL,
         queue_length: int = QUEUE_LENGTH,
         patience: float = 0.0,
@@ -83,7 +85,8 @@ class TraceWriter:
         except OSError as error:
             raise TraceError(f"{path}: cannot be made: {disk.reason(error)}") from error
         try:
-            signals = RECORDED_SIGNALS if record.every == 1 else SLOW_LINE_SIGNALS
+            recorded = RECORDED_SIGNALS if record.every == 1 else SLOW_LINE_SIGNALS
+            signals = tuple(name for name in recorded if name not in lacks)
             self._recording = Recording(self._stream, record, joints, signals, attachments or {})
             disk.sync(self._stream)
             sync_folder(path.parent)
@@ -239,7 +242,7 @@ class TraceWriter:
             return self._sync()
         self._recording.finish(close.outcome, close.counters)
         disk.sync(self._stream)
-        disk.rename(self.part, self.path)
+        disk.rename(self.part, self.path, self._stream)
         self.synced_samples = self._recording.samples
         return None
 

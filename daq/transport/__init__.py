@@ -5,11 +5,21 @@ from daq.transport.discovery import FoundPort, ports
 from daq.transport.endpoint import Endpoint, open_endpoint
 from daq.transport.pseudo_terminal import Terminal, require_same, terminal_at
 from daq.transport.reconnect import ReconnectDelay
-from daq.transport.url import MockPort, PortBusyError, PortUrl, SerialPort, TcpPort, TransportError, parse_port_url
+from daq.transport.url import (
+    DriverPort,
+    MockPort,
+    PortBusyError,
+    PortUrl,
+    SerialPort,
+    TcpPort,
+    TransportError,
+    parse_port_url,
+)
 
 __all__ = [
     "ByteChannel",
     "ChannelError",
+    "DriverPort",
     "Endpoint",
     "FoundPort",
     "MockPort",

@@ -15,6 +15,7 @@ from daq.transport.mock_process import MockProcess, start_mock
 from daq.transport.pseudo_terminal import Terminal, require_same, terminal_at
 from daq.transport.url import (
     BITS_PER_BYTE,
+    DriverPort,
     MockPort,
     PortBusyError,
     PortUrl,
@@ -72,6 +73,8 @@ def open_endpoint(url: str) -> Endpoint:
         if port.lock_step and not port.through_pty:
             return EmbeddedEndpoint(url, port)
         return MockEndpoint(url, port, start_mock(port, waits=not port.lock_step))
+    if isinstance(port, DriverPort):
+        raise TransportError(f"{url}: a Python driver has no bytes")
     return PortEndpoint(url, port)
 
 
@@ -134,7 +137,7 @@ def connect(port: PortUrl) -> ByteChannel:
             return _connect_serial(port)
         case TcpPort():
             return _connect_tcp(port)
-        case MockPort():
+        case MockPort() | DriverPort():
             raise TransportError("a mock is started with open_endpoint and has an address of its own")
 
 

@@ -5,6 +5,7 @@ serial:///dev/ttyUSB0?baud=1000000&dialect=dynamixel&ids=1,2
 tcp://192.168.1.20:4000
 mock://?lock_step=1&seed=3&fault=flip:rate=0.01
 mock://?dialect=dynamixel&ids=1,2
+lerobot:so101_follower?port=/dev/ttyACM0  (a Python driver, by the scheme of its plug-in)
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from urllib.parse import parse_qsl, quote, unquote, urlsplit
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
+from daq.plugins import plugins
 
 DEFAULT_BAUD = 115200
 """Line rate without `baud` in the URL (bits per second; ten bits per byte)."""
@@ -86,7 +88,19 @@ class MockPort:
     ids: tuple[int, ...] = ()
 
 
-PortUrl = SerialPort | TcpPort | MockPort
+@dataclass(frozen=True)
+class DriverPort:
+    """A robot with a Python driver of a plug-in. `target` and `options` are the driver's own."""
+
+    scheme: str
+    target: str
+    options: tuple[tuple[str, str], ...] = ()
+    baud: int = DEFAULT_BAUD
+    dialect: str = "python"
+    ids: tuple[int, ...] = ()
+
+
+PortUrl = SerialPort | TcpPort | MockPort | DriverPort
 
 _DIALECT_OPTIONS = ("dialect", "ids")
 _SERIAL_OPTIONS = ("baud", *_DIALECT_OPTIONS)
@@ -121,7 +135,9 @@ def serial_url(device: str) -> str:
 
 def parse_port_url(text: str) -> PortUrl:
     """Returns the port that a URL names. Raises TransportError with one line: what is wrong and what is allowed."""
-    if "://" not in text:
+    scheme = text.partition(":")[0]
+    drivers = {name for plugin in plugins() for name in plugin.drivers}
+    if "://" not in text and scheme not in drivers:
         hint = f"; for a device write {serial_url(text)}" if text.startswith("/") else ""
         raise PortUrlError(f"port {text!r}: must begin with serial://, tcp:// or mock://{hint}")
     try:
@@ -129,6 +145,10 @@ def parse_port_url(text: str) -> PortUrl:
         options = parse_qsl(parts.query, keep_blank_values=True)
     except ValueError as error:
         raise PortUrlError(f"port {text!r}: no URL: {error}") from error
+    if scheme in drivers:
+        known = tuple(name for name, _ in options)
+        given = _single(text, options, known)
+        return DriverPort(scheme, (parts.netloc + parts.path).strip("/"), tuple(given.items()))
     if parts.scheme == "serial":
         return _serial(text, unquote(parts.netloc + parts.path), _single(text, options, _SERIAL_OPTIONS))
     if parts.scheme == "tcp":
@@ -137,7 +157,8 @@ def parse_port_url(text: str) -> PortUrl:
         if parts.netloc or parts.path not in ("", "/"):
             raise PortUrlError(f"port {text!r}: mock:// takes no address, only options after '?'")
         return _mock_servos(text, options) if ("dialect", SERVOS) in options else _mock(text, options)
-    raise PortUrlError(f"port {text!r}: scheme {parts.scheme!r} is unknown: serial, tcp or mock")
+    others = f", or of a driver: {', '.join(sorted(drivers))}" if drivers else ""
+    raise PortUrlError(f"port {text!r}: scheme {parts.scheme!r} is unknown: serial, tcp or mock{others}")
 
 
 def _single(text: str, options: list[tuple[str, str]], known: tuple[str, ...]) -> dict[str, str]:

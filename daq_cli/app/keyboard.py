@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import select
 import sys
-import termios
-import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -23,13 +21,19 @@ def open_keyboard() -> Iterator[Keyboard]:
     """
     if not sys.stdin.isatty():
         raise SpecError("jogging needs a terminal: keys drive the arm; use `daq teach step` in scripts")
-    descriptor = sys.stdin.fileno()
-    before = termios.tcgetattr(descriptor)
-    try:
-        tty.setcbreak(descriptor)
-        yield Keyboard(descriptor)
-    finally:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+    if sys.platform == "win32":
+        raise SpecError("jogging by keys needs Linux or macOS; use `daq teach step`")
+    else:
+        import termios
+        import tty
+
+        descriptor = sys.stdin.fileno()
+        before = termios.tcgetattr(descriptor)
+        try:
+            tty.setcbreak(descriptor)
+            yield Keyboard(descriptor)
+        finally:
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
 
 
 class Keyboard:

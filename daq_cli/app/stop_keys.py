@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Self
 
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGTSTP)
-"""Signals that stop the arm. SIGTSTP is Ctrl-Z: an arm must not move on while its program is suspended."""
+STOP_SIGNALS = [signal.SIGINT, signal.SIGTERM]
+"""Signals that stop the arm."""
+if sys.platform != "win32":
+    STOP_SIGNALS.append(signal.SIGTSTP)  # Ctrl-Z: an arm must not move on while its program is suspended
 PRESSES_TO_LEAVE = 3
 """Presses of Ctrl-C that end the program even if the owner process does not answer."""
 

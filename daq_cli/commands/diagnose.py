@@ -139,7 +139,7 @@ def diagnose(
     else:
         found = once(fitted_to, experiment_chooser(begin.machine, design=design))
     _save(found, out, next_file)
-    page = None if report is None else _written(found, fitted_to, held, report)
+    page = None if report is None else _written(found, begin, [*fitted_to, *held], report)
     _print_result(found, out, page, next_file, as_json=json)
     if failure is not None:
         raise failure
@@ -203,21 +203,12 @@ def _beginning(
     return begin if load is None else with_load(begin, load)
 
 
-def _written(found: Diagnosis, traces: Sequence[Trace], held: Sequence[Trace], path: Path) -> Path:
-    """Writes the report. If the traces can be simulated, it compares the models before and after on every trace."""
-    from daq.contracts.machine import NoController
+def _written(found: Diagnosis, begin: Model, traces: Sequence[Trace], path: Path) -> Path:
+    """Writes the report, with the models before and after on every trace if these can be simulated."""
     from daq.plugins import report_sections
-    from model.comparison.compare import compare
-    from model.discrepancy.inverse_dynamics.efforts import recorded_and_predicted
-    from model.reports.diagnosis_report import LABELS, diagnosis_report
-    from model.reports.page import write_report
+    from model.reports.page import write_page
+    from model.reports.saved_report import saved_report
+    from server.jobs.diagnosis_data import told
 
-    simulated = found.computed and not isinstance(found.model_before.machine.controller, NoController)
-    comparison = None
-    if simulated and all(t.set_point is not None for t in (*traces, *held)):
-        models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
-        comparison = compare(models, [*traces, *held], found.holdout)
-    every = [*traces, *held]
-    efforts = recorded_and_predicted(found, every, found.holdout) if found.computed else ()
-    more = report_sections(found, every)
-    return write_report(diagnosis_report(found, comparison, files_of(every), efforts, more), path)
+    page = saved_report(told(found, begin, traces), files_of(traces), report_sections(found, traces))
+    return write_page(page, path)

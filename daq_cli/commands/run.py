@@ -152,8 +152,7 @@ def _trajectory(kind: type[BaseModel], values: dict[str, Any]) -> dict[str, Any]
     return data
 
 
-def spec_from_options(trajectory: dict[str, Any], values: dict[str, Any], operator: str | None) -> ExperimentSpec:
-    """Returns the experiment that the common options describe. Raises SpecError."""
+def _spec_from_options(trajectory: dict[str, Any], values: dict[str, Any], operator: str | None) -> ExperimentSpec:
     data: dict[str, Any] = {"trajectory": trajectory, "joints": parse_joints(values["joints"])}
     if values["start"] is not None:
         start = parse_per_joint_angles(values["start"], "start")
@@ -181,14 +180,23 @@ def _require_units(trajectory: dict[str, Any], start: str | None, machine: Machi
         require_units("start", parse_per_joint_angles(start, "start"), machine, joints)
 
 
+def spec_of(
+    kind: type[BaseModel], values: dict[str, Any], operator: str | None, machine: Callable[[], Machine]
+) -> ExperimentSpec:
+    """Returns the experiment that the options of `daq run KIND` describe. Raises SpecError, also for a typed unit that
+    is not that of the joint."""
+    trajectory = _trajectory(kind, values)
+    spec = _spec_from_options(trajectory, values, operator)
+    _require_units(trajectory, values["start"], machine(), spec.joints)
+    return spec
+
+
 def _command(kind: type[BaseModel]) -> Callable[..., None]:
     """Returns the function of `daq run KIND`. typer reads its signature, which is made from the kind's fields."""
 
     def command(context: typer.Context, **values: Any) -> None:
         operator = invocation(context).configuration.operator
-        trajectory = _trajectory(kind, values)
-        spec = spec_from_options(trajectory, values, operator)
-        _require_units(trajectory, values["start"], robot_of(context).machine, spec.joints)
+        spec = spec_of(kind, values, operator, lambda: robot_of(context).machine)
         cron = cron_of(values["daily"], values["cron"])
         options = RunOptions(values["folder"], values["dry_run"], values["yes"], values["json"], cron)
         carry_out(robot_of(context), spec, options)

@@ -71,7 +71,7 @@ def _joints_of(name: str, model: Model) -> tuple[int, ...]:
 
 def effect_name(text: str) -> str:
     """Returns the only effect whose name begins with `text`. Raises SpecError, which lists the possible effects."""
-    from model.effects.library import library
+    from model.effects.library import effect, library
 
     name = text.strip().replace("-", "_")
     if name in library():
@@ -81,7 +81,7 @@ def effect_name(text: str) -> str:
         return begun[0]
     if begun:
         raise SpecError(f"effect {text!r}: could be {', '.join(begun)}")
-    raise SpecError(f"effect {text!r}: not in the library; it has {', '.join(library())}")
+    return effect(name).name
 
 
 def effect_names(text: str) -> tuple[str, ...]:

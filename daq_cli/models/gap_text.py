@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from model.reports.gap import MEASURES
 from model.reports.numbers import column
 from model.units import shown_unit
 
 if TYPE_CHECKING:
     from model.discrepancy.diagnosis import Gap
 
+MEASURES = {"closed-loop": "rms error in closed loop", "torques": "rms error of the torque balance"}
+"""Origin of the errors, by `Gap.measure`."""
 COLUMN = 13
 WIDTH = 71
 """Columns of text: 80 minus the label before it."""

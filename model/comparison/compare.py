@@ -14,7 +14,7 @@ from daq.contracts.progress import Cancel, Never, Progress, silent, stop_if
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.comparison.agreement import JointAgreement, ModelAgreement, TraceAgreement, pooled
-from model.fitting.records import Record, Signal, noise_floor, records_of, resolution
+from model.fitting.records import Record, Signal, noise_floor, records_of
 from model.machine_model.model import Model
 from model.record_check.check import Loop, as_used, check_records, require_computable
 from model.record_check.replicas import noise_left
@@ -151,7 +151,6 @@ def _agreement(
     left, units = record.measured - simulated, _units(model, signal)
     joints = []
     for column, joint in enumerate(model.machine.modelled_joints):
-        sensor = model.machine.joint(joint).sensor
         square = float(np.mean(left[:, column] ** 2))
         motion = float(np.var(record.measured[:, column]))
         joints.append(
@@ -161,7 +160,7 @@ def _agreement(
                 rmse=float(np.sqrt(square)),
                 largest=float(np.abs(left[:, column]).max()),
                 floor=float(floor[column]),
-                count=resolution(sensor) if sensor is not None and signal == "position" else None,
+                count=(model.machine.joint(joint).count or None) if signal == "position" else None,
                 share=math.sqrt(square / motion) if motion > 9 * floor[column] ** 2 else None,
             )
         )

@@ -22,7 +22,6 @@ from model.fitting.covariance import inverse
 from model.fitting.fit import INTERVAL, fit_problem
 from model.fitting.options import FitOptions
 from model.fitting.problem import whitened
-from model.fitting.records import resolution
 from model.fitting.result import FitResult
 from model.fitting.simulated import SimulatedProblem
 from model.fitting.unknowns import Unknown, prior_precision, scales
@@ -176,13 +175,13 @@ def falls_behind(machine: Machine, set_points: Floats, error: Floats) -> str | N
         return None
     period = machine.controller.period.value
     for column, joint in enumerate(machine.modelled_joints):
-        sensor = machine.joint(joint).sensor
-        if sensor is None:
+        count = machine.joint(joint).count
+        if not count:
             continue
         speed = machine.limits.joint(joint).speed
-        smooth = FOLLOWING_SHARE / 2 * most if speed is None else speed * period / resolution(sensor)
-        counts = np.abs(error[:, column]) / resolution(sensor)
-        change = np.abs(np.diff(set_points[:, column], prepend=set_points[0, column])) / resolution(sensor)
+        smooth = FOLLOWING_SHARE / 2 * most if speed is None else speed * period / count
+        counts = np.abs(error[:, column]) / count
+        change = np.abs(np.diff(set_points[:, column], prepend=set_points[0, column])) / count
         if (worst := _falls_behind(counts, change, smooth, most)) is not None:
             return (
                 f"joint {joint} would fall {counts[worst]:.0f} counts behind; set points pause at {most}, and a margin "

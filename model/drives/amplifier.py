@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from model import layout as at
 from model.drives.magnet import back_emf_constant
 from model.drives.piecewise import clamped, outside, passed
 from model.dynamics.compilation import borrowing
+from model.dynamics.wide_numbers import exponential
 
 
 @borrowing
@@ -33,7 +33,7 @@ def warmed(
     back_emf = back_emf_constant(joint) * joint[at.GEAR]
     current = (volts - back_emf * mean) / resistance
     change = back_emf * (ended - begun) / resistance
-    kept = np.exp(-duration / joint[at.COOLING_TIME])
+    kept = exponential(-duration / joint[at.COOLING_TIME])
     heat = joint[at.HEATING] * (current * current + change * change / 12.0)
     return rise * kept + heat * joint[at.COOLING_TIME] * (1.0 - kept)
 
@@ -43,4 +43,4 @@ def risen(time: Any, joint: NDArray[Any]) -> Any:
     """Returns the relative rise of the winding's resistance over `time` s that does not depend on the current."""
     if joint[at.TIMED_RISE] == 0.0:
         return 0.0 * time
-    return joint[at.TIMED_RISE] * (1.0 - np.exp(-time / joint[at.RISING_TIME]))
+    return joint[at.TIMED_RISE] * (1.0 - exponential(-time / joint[at.RISING_TIME]))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from model import layout as at
-from model.drives.piecewise import clamped, rounded_half_up
+from model.drives.piecewise import clamped, magnitude, rounded_half_up
 from model.dynamics.compilation import compiled_borrowing
+from model.dynamics.wide_numbers import where, whole
 
 POWER_MAX = 127.0
 """Largest magnitude of the 8-bit DAC's signed input."""
@@ -35,14 +35,14 @@ def board_pid(error: complex, gains: NDArray[Any], joint: NDArray[Any], quantise
     proportional = gains[SCALE] * (1.0 + joint[at.GAIN_ERROR])
     share = memory[SUM] / INTEGRAL_SHARE
     if quantise:
-        share = np.floor(share.real) + 0.0 * share
+        share = whole(share) + 0.0 * share
     power = proportional * (gains[P] * error + share + gains[D] * (error - memory[LAST_ERROR]))
     if quantise:
         power = rounded_half_up(power)
     growth = gains[I] * error
-    into_limit = (power.real >= POWER_MAX and growth.real > 0.0) or (power.real <= -POWER_MAX and growth.real < 0.0)
-    if not into_limit:
-        memory[SUM] += growth
+    above = (power.real >= POWER_MAX) & (growth.real > 0.0)
+    below = (power.real <= -POWER_MAX) & (growth.real < 0.0)
+    memory[SUM] += where(above | below, 0.0 * growth, growth)
     memory[LAST_ERROR] = error
     return clamped(power, POWER_MAX + 0.0 * power)
 
@@ -59,7 +59,7 @@ def linear_board_pid(error: complex, gains: NDArray[Any], memory: NDArray[Any]) 
 @compiled_borrowing
 def outside_band(error: complex, gains: NDArray[Any]) -> Any:
     """Returns the error that a sampled controller uses: zero within its dead band."""
-    return 0.0 * error if abs(error.real) <= gains[DEAD_BAND].real else error
+    return where(magnitude(error).real <= gains[DEAD_BAND], 0.0 * error, error)
 
 
 @compiled_borrowing
@@ -101,6 +101,6 @@ def given_out(
     if quantise and resolution > 0.0:
         output = resolution * rounded_half_up(output / resolution)
     limit = joint[at.OUTPUT_LIMIT]
-    if abs(output.real) > limit.real and output.real * error.real > 0.0:
-        memory[SUM] -= error * period
+    beyond = (magnitude(output).real > limit.real) & (output.real * error.real > 0.0)
+    memory[SUM] -= where(beyond, error * period, 0.0 * error)
     return clamped(output, limit)

@@ -27,6 +27,7 @@ from typing import Any
 
 import numba
 import platformdirs
+from numba.core import dispatcher as dispatchers
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 
 from daq.contracts.file_lock import take_lock
@@ -207,6 +208,24 @@ def _tell_once(reason: str) -> None:
         )
 
 
+_numba_dispatchers: Any = dispatchers  # the class below has no types
+
+
+class _Compiler(_numba_dispatchers._FunctionCompiler):  # type: ignore[misc]
+    """Compiles no entry from Python where numbers have several parts (`wide_numbers`), which Python does not have."""
+
+    _hidden = False
+
+    def _compile_core(self, args: Any, return_type: Any) -> Any:
+        self._hidden = any("wide number" in str(kind) for kind in args)
+        return super()._compile_core(args, return_type)
+
+    def _customize_flags(self, flags: Any) -> Any:
+        if self._hidden:
+            flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
+        return flags
+
+
 def _compile(function: Callable[..., Any], *, cached: bool, **options: Any) -> Any:
     """Compiles so that division by zero gives inf or nan, and a product may be fused with a sum, as in C with
     -march=native.
@@ -214,7 +233,10 @@ def _compile(function: Callable[..., Any], *, cached: bool, **options: Any) -> A
     Results thus repeat exactly on one machine, but not across machines.
     """
     dispatcher: Any = numba.njit(error_model="numpy", fastmath={"contract"}, **options)(function)
-    if cached and not _numba_settings.DISABLE_JIT:
+    if _numba_settings.DISABLE_JIT:
+        return dispatcher
+    dispatcher._compiler.__class__ = _Compiler
+    if cached:
         dispatcher._cache = SharedCache(function)  # type: ignore[no-untyped-call]  # what its enable_caching does, with numba's own cache
     return dispatcher
 

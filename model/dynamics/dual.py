@@ -16,6 +16,7 @@ from numba import types
 from numba.extending import overload
 
 from model.dynamics.compilation import inlined
+from model.dynamics.wide_numbers import DUAL, LANES, chained, where, whole
 
 # numba requires that an overload and its implementations have equal annotations, hence Any throughout.
 _OPTIONS: Any = {"error_model": "numpy", "fastmath": {"contract"}}
@@ -33,14 +34,13 @@ _HALF_PI_LOW = 2.0222662487959506e-21
 
 
 @inlined
-def _sin_cos_real(x: float) -> tuple[float, float]:
-    """Sine and cosine together, by reduction to |r| ≤ π/4 and the Taylor series there.
+def _near_multiple(x: Any) -> Any:
+    """Returns sine and cosine of an angle without its quarter turns, by the Taylor series, and the number of these.
 
-    Written out because the library's function is a call, and a loop with a call in it cannot be vectorised:
-    independent evaluations of the arm's dynamics take 3 times less time with this one, dependent ones a tenth less
-    (`benchmarks/dynamics.py`). The terms left out are below 1e-17 of the result.
+    Written out because the library's function is a call, and a loop with a call in it cannot be vectorised. The terms
+    left out are below 1e-17 of the result.
     """
-    turns = np.floor(x * (2.0 / math.pi) + 0.5)
+    turns = whole(x * (2.0 / math.pi) + 0.5)
     r = ((x - turns * _HALF_PI_HIGH) - turns * _HALF_PI_MIDDLE) - turns * _HALF_PI_LOW
     z = r * r
     zz = z * z
@@ -56,9 +56,26 @@ def _sin_cos_real(x: float) -> tuple[float, float]:
     half = 0.5 * z
     near_one = 1.0 - half
     c = near_one + (((1.0 - near_one) - half) + zz * even)  # the rounding of 1 − z/2 is put back
+    return s, c, turns
+
+
+@inlined
+def _sin_cos_real(x: float) -> tuple[float, float]:
+    """Sine and cosine together, by reduction to |r| ≤ π/4."""
+    s, c, turns = _near_multiple(x)
     quadrant = np.int64(turns) & 3
     sine, cosine = (c, s) if quadrant & 1 else (s, c)
     return -sine if quadrant & 2 else sine, -cosine if (quadrant + 1) & 2 else cosine
+
+
+@inlined
+def _sin_cos_of_lanes(x: Any) -> Any:
+    s, c, turns = _near_multiple(x)
+    quadrant = turns - 4.0 * whole(0.25 * turns)
+    odd = quadrant - 2.0 * whole(0.5 * quadrant) > 0.5
+    sine, cosine = where(odd, c, s), where(odd, s, c)
+    below, left = quadrant > 1.5, (quadrant > 0.5) & (quadrant < 2.5)
+    return where(below, -sine, sine), where(left, -cosine, cosine)
 
 
 def sin_cos(x: float | complex) -> tuple[Any, Any]:
@@ -77,7 +94,7 @@ def reciprocal(x: float | complex) -> Any:
     return 1.0 / x
 
 
-@overload(sin_cos, jit_options=_OPTIONS)
+@overload(sin_cos, jit_options=_OPTIONS, strict=False)
 def _sin_cos(x: Any) -> Any:
     if isinstance(x, types.Complex):
 
@@ -87,13 +104,24 @@ def _sin_cos(x: Any) -> Any:
 
         return dual
 
+    if x == DUAL:
+
+        def with_derivatives(x: Any) -> Any:
+            s, c = _sin_cos_real(x.real)
+            return chained(s, c, x), chained(c, -s, x)
+
+        return with_derivatives
+
+    if x == LANES:
+        return _sin_cos_of_lanes.py_func
+
     def real(x: Any) -> Any:
         return _sin_cos_real(x)
 
     return real
 
 
-@overload(reciprocal, jit_options=_OPTIONS)
+@overload(reciprocal, jit_options=_OPTIONS, strict=False)
 def _reciprocal(x: Any) -> Any:
     if isinstance(x, types.Complex):
 
@@ -102,6 +130,14 @@ def _reciprocal(x: Any) -> Any:
             return complex(r, -x.imag * r * r)
 
         return dual
+
+    if x == DUAL:
+
+        def with_derivatives(x: Any) -> Any:
+            r = 1.0 / x.real
+            return chained(r, -r * r, x)
+
+        return with_derivatives
 
     def real(x: Any) -> Any:
         return 1.0 / x

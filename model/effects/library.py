@@ -6,6 +6,7 @@ from functools import cache
 
 from daq.contracts.effects import FORMER_EFFECTS, effect_names
 from daq.contracts.errors import SpecError
+from daq.contracts.refused import nearest
 from model.effects.controller import CONTROL
 from model.effects.effect import Effect, EffectFile
 from model.effects.external import EXTERNAL
@@ -69,7 +70,8 @@ def effect(name: str) -> Effect:
     if found is None and name in FORMER_EFFECTS:
         raise SpecError(f"effect {name}: no longer in the library: {FORMER_EFFECTS[name]}")
     if found is None:
-        raise SpecError(f"effect {name!r}: not in the library; available: {', '.join(library())}")
+        near = nearest(name, library())
+        raise SpecError(f"effect {name!r:.80}: not in the library{near} (docs/reference/mock-effects.md lists it)")
     return found
 
 

@@ -12,7 +12,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine
 from model import layout as at
 from model.fitting.options import FitOptions, Prior
-from model.fitting.records import Record, Signal, resolution
+from model.fitting.records import Record, Signal
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter, initial_position, presliding, presliding_shape
@@ -91,10 +91,10 @@ def start_postures(machine: Machine, records: Sequence[Record], bends: bool) -> 
     for t in range(len(records)):
         for joint in machine.modelled_joints:
             sensor = machine.joint(joint).sensor
-            if sensor is None:
+            if sensor is None or not sensor.count:
                 continue
             bend = (_linearity(machine, joint) or 0.0) * sensor.range.value if bends else 0.0
-            deviation = float(np.hypot(max(sensor_deviation(sensor), resolution(sensor)), bend))
+            deviation = float(np.hypot(max(sensor_deviation(sensor), sensor.count), bend))
             limit = 20 * deviation
             start = initial_position(joint, t + 1)
             found.append(Unknown(start, 0.0, -limit, limit, 0.0, deviation, nuisance=True, trace=t))

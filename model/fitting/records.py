@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from daq.contracts.errors import TraceError
-from daq.contracts.machine import Machine, NoController, Sensor
+from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.record_check.readings import noise_of, sensor_deviation
@@ -80,7 +80,7 @@ def noise_floor(records: Sequence[Record], machine: Machine, signal: Signal) -> 
     floor = []
     for column, joint in enumerate(machine.modelled_joints):
         sensor = machine.joint(joint).sensor
-        if sensor is not None and signal == "position":
+        if sensor is not None and sensor.count and signal == "position":
             floor.append(sensor_deviation(sensor))
             continue
         readings = [r.measured[run, column] for r in records for run in r.runs if run.stop - run.start > 2]
@@ -94,11 +94,6 @@ def noise_floor(records: Sequence[Record], machine: Machine, signal: Signal) -> 
         size = max(float(np.abs(r.measured[:, column]).max()) for r in records)
         floor.append(max(spread, 1e-6 * size, 1e-12))
     return np.array(floor)
-
-
-def resolution(sensor: Sensor) -> float:
-    """Returns one count, rad or m."""
-    return sensor.range.value / 2**sensor.bits
 
 
 def _record(trace: Trace, machine: Machine, signal: Signal) -> Record:
@@ -137,8 +132,7 @@ def _calm_start(inputs: RunInputs, trace: Trace, columns: list[int]) -> RunInput
 def _moves(record: Record, machine: Machine, signal: Signal) -> bool:
     """Whether a joint had moving set points and moved. An arm that only sags to its first set point does not count."""
     for column, joint in enumerate(machine.modelled_joints):
-        sensor = machine.joint(joint).sensor
-        least = LEAST_MOTION_COUNTS * resolution(sensor) if sensor is not None and signal == "position" else 0.0
+        least = LEAST_MOTION_COUNTS * machine.joint(joint).count if signal == "position" else 0.0
         asked = record.inputs.drive if isinstance(machine.controller, NoController) else record.inputs.set_points
         moved = float(np.ptp(record.measured[record.runs[0].start :, column]))
         if moved > least and np.ptp(asked[:, column]) > 0.0:

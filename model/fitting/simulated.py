@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from model.arrays import Floats
-from model.dynamics.dual import DUAL_STEP
 from model.fitting.problem import Evaluation
 from model.fitting.records import Record, Signal
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
-from model.simulation.batch import BatchRun, seed
+from model.simulation.batch import BatchRun
 from model.simulation.period import OUT_READING, OUT_SPEED
 from model.simulation.prepared import LONGEST_STEP, Options, Prepared, prepare
 from model.simulation.simulate import at_rows
@@ -108,46 +106,26 @@ class SimulatedProblem:
 
     def _simulate(self, values: Floats, derivatives: bool) -> list[_Simulated]:
         vector, initials = self._state(values)
-        which, seeds = self._rows(derivatives)
-        dtype = np.complex128 if derivatives else np.float64
-        vectors: NDArray[Any] = np.tile(vector.astype(dtype), (len(which), 1))
-        starts = np.array([initials[t] for t in which], dtype=dtype)
-        for row, unknown in enumerate(seeds):
-            if unknown >= 0:
-                seed(self.unknowns[unknown].parameter, vectors[row], starts[row])
-        out = BatchRun(self.model, self._prepared, np.array(which, dtype=np.int64), vectors, starts, self.step).run()
-        column = OUT_SPEED if self.signal == "velocity" else OUT_READING
-        return self._at_samples(out[:, column], which, seeds, derivatives)
-
-    def _at_samples(
-        self, signal: NDArray[Any], which: list[int], seeds: list[int], derivatives: bool
-    ) -> list[_Simulated]:
+        count, column = len(self.records), OUT_SPEED if self.signal == "velocity" else OUT_READING
+        vectors, starts = np.tile(vector, (count, 1)), np.array(initials)
+        batch = BatchRun(self.model, self._prepared, np.arange(count), vectors, starts, self.step, outputs=(column,))
+        free = [[k for k, u in enumerate(self.unknowns) if u.trace is None or u.trace == t] for t in range(count)]
+        if derivatives:
+            runs = batch.derivatives([[self.unknowns[k].parameter for k in own] for own in free])
+        else:
+            runs = [(out, np.zeros(0)) for out in batch.run()]
         found = []
-        for t, record in enumerate(self.records):
-            own = [row for row, trace in enumerate(which) if trace == t]
-            simulated = signal[own[0], : len(record.inputs)].real
+        for record, own, ((signal,), slopes) in zip(self.records, free, runs, strict=True):
+            simulated, rows = signal[: len(record.inputs)], record.inputs.rows
             if not np.isfinite(simulated).all():
                 raise SpecError(f"the simulation of {record.name} does not stay finite: the control loop is unstable")
             jacobian = None
             if derivatives:
                 jacobian = np.zeros((len(self.unknowns), *record.measured.shape))
-                for row in own:
-                    if seeds[row] >= 0:
-                        tangent = signal[row, : len(record.inputs)].imag / DUAL_STEP
-                        jacobian[seeds[row]] = at_rows(tangent, record.inputs.rows)
-            found.append(_Simulated(at_rows(simulated, record.inputs.rows), jacobian))
+                for k, slope in zip(own, slopes, strict=True):
+                    jacobian[k] = at_rows(slope[0, : len(record.inputs)], rows)
+            found.append(_Simulated(at_rows(simulated, rows), jacobian))
         return found
-
-    def _rows(self, derivatives: bool) -> tuple[list[int], list[int]]:
-        """Returns record and perturbed unknown (−1: none) of every run."""
-        if not derivatives:
-            return list(range(len(self.records))), [-1] * len(self.records)
-        which, seeds = [], []
-        for t in range(len(self.records)):
-            own = [k for k, u in enumerate(self.unknowns) if u.trace is None or u.trace == t] or [-1]
-            which += [t] * len(own)
-            seeds += own
-        return which, seeds
 
     def _state(self, values: Floats) -> tuple[Floats, list[Floats]]:
         """Returns the flat vector and initial states for values of the unknowns."""

@@ -33,7 +33,8 @@ from model.machine_model.parameter import Kind, Parameter
 NO_LIMIT = 1e9
 """Value in the vector for a limit that is not set."""
 SENSOR_COUNTS = 4096
-DAC_COUNTS = 127
+USUAL_DRIVE = 10.0
+"""Size of a drive, in its unit, whose largest value is not stated: natural sizes only."""
 PRESLIDING_COUNTS = 0.5
 """Distance, in counts of the sensor, over which friction builds up: an assumption, below the sensor's resolution."""
 
@@ -201,7 +202,7 @@ def _fill_joint(row: NDArray[np.float64], machine: Machine, number: int) -> None
     sensor = joint.sensor
     if sensor is not None:
         row[at.AT_ZERO] = sensor.at_zero.value
-        row[at.RAD_PER_COUNT] = sensor.direction * sensor.range.value / 2**sensor.bits
+        row[at.RAD_PER_COUNT] = sensor.direction * sensor.count
         row[at.RANGE] *= sensor.direction
     if isinstance(machine.controller, BoardPid):
         row[at.VOLTS_PER_COUNT] *= machine.drive_sign(number)
@@ -212,7 +213,7 @@ def _fill_drive(row: NDArray[np.float64], drive: DcMotor | CurrentDrive | PlainG
         row[at.RESISTANCE], row[at.INDUCTANCE] = drive.resistance.value, drive.inductance.value
         row[at.TORQUE_CONSTANT], row[at.BACK_EMF] = drive.torque_constant.value, drive.back_emf_constant.value
         row[at.ROTOR_INERTIA], row[at.GEAR] = drive.rotor_inertia.value, drive.gear_ratio.value
-        row[at.VOLTS_PER_COUNT] = drive.scale.counts_to_volts(1.0)
+        row[at.VOLTS_PER_COUNT] = 1.0 if drive.dac_full_scale is None else drive.scale.counts_to_volts(1.0)
         row[at.SUPPLY] = NO_LIMIT if drive.supply_limit is None else drive.supply_limit.value
     else:
         row[at.RESISTANCE] = row[at.GEAR] = row[at.VOLTS_PER_COUNT] = 1.0
@@ -231,11 +232,11 @@ def joint_scale(machine: Machine, number: int) -> JointScale:
     joint = machine.joint(number)
     drive = joint.drive
     range_ = 2 * math.pi if joint.sensor is None else joint.sensor.range.value
-    counts = SENSOR_COUNTS if joint.sensor is None else 2**joint.sensor.bits
-    speed = supply = 0.0
+    speed, supply, bounded = 0.0, NO_LIMIT, False
     if isinstance(drive, DcMotor):
         supply = NO_LIMIT if drive.supply_limit is None else drive.supply_limit.value
-        volts = min(supply, drive.scale.counts_to_volts(DAC_COUNTS))
+        bounded = math.isfinite(drive.highest)
+        volts = drive.highest if bounded else USUAL_DRIVE
         gear = abs(drive.gear_ratio.value)
         torque = gear * drive.torque_constant.value * volts / drive.resistance.value
         if drive.back_emf_constant.value > 0:
@@ -243,8 +244,7 @@ def joint_scale(machine: Machine, number: int) -> JointScale:
     else:
         gear = abs(drive.gear_ratio.value) if isinstance(drive, CurrentDrive) else 1.0
         gain = gear * drive.torque_constant.value if isinstance(drive, CurrentDrive) else drive.gain.value
-        supply, volts, torque = NO_LIMIT, 10.0, abs(gain) * 10.0
-    bounded = isinstance(drive, DcMotor)
+        volts, torque = USUAL_DRIVE, abs(gain) * USUAL_DRIVE
     friction = joint.friction.viscous_motor_side or joint.friction.viscous
     controller = machine.controller
     return JointScale(
@@ -253,8 +253,8 @@ def joint_scale(machine: Machine, number: int) -> JointScale:
         strongest=torque if bounded else math.inf,
         highest=volts if bounded else math.inf,
         speed=speed or 1.0,
-        fastest=speed or math.inf,
-        resolution=range_ / counts,
+        fastest=speed if bounded and speed else math.inf,
+        resolution=joint.count or range_ / SENSOR_COUNTS,
         range=range_,
         viscous=0.0 if friction is None else friction.value,
         inertia=_transmission_inertia(machine, number),

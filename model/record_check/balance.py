@@ -109,7 +109,7 @@ def motion_of(trace: Trace, model: Model) -> Motion | None:
     period = float(np.median(np.diff(trace.time)))
     time = np.arange(trace.time[0], trace.time[-1] + 0.5 * period, period)[: 20 * MOST_ROWS]
     sensors = [machine.joint(j).sensor for j in machine.modelled_joints]
-    step = np.array([0.0 if s is None else s.range.value / 2**s.bits for s in sensors])
+    step = np.array([machine.joint(j).count for j in machine.modelled_joints])
 
     def even(signal: Floats) -> Floats:
         return np.stack([np.interp(time, trace.time, signal[:, c]) for c in columns], axis=1)

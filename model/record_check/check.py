@@ -16,13 +16,14 @@ import numpy as np
 from daq.contracts.errors import TraceError
 from daq.contracts.joint_matching import matched
 from daq.contracts.machine import Machine, NoController
+from daq.contracts.quantity import Quantity
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
 from model.record_check.columns import column_findings
 from model.record_check.drives import drive_findings
 from model.record_check.finding import FindingKind, RecordFinding, doubts_in
-from model.record_check.pieces import SHORTEST, in_pieces
+from model.record_check.pieces import SHORTEST, free_part, in_pieces, measures_speed, part_of, reading_of
 from model.record_check.readings import (
     FalseReadings,
     Jump,
@@ -51,6 +52,9 @@ WILD_SHARE = 0.5
 """Distance between set point and position, as a share of the largest travel of any joint, that no controller leaves for
 half of a record, except on a joint that is still on its way. A joint that is held may sag by more than its own travel.
 """
+LOOP_SHARE = 0.125
+"""Share of the time between rows that a simulated period may take. A set point is known to act within one whole time
+between rows; a period holds a drive by half of itself."""
 ON_ITS_WAY = 0.5
 """Share of its motion, weighted by the remaining distance, that a following joint makes towards its set point rather
 than away from it. Set points with another zero or sign lie behind its motion as often as ahead of it.
@@ -78,7 +82,7 @@ def check_records(model: Model, traces: Sequence[Trace], *, torques: bool | None
             found += bursts or [
                 *_on_gaps(trace, cut=cut),
                 *_on_readings(trace, model.machine),
-                *_on_columns(max(in_pieces([repaired(trace, model.machine)]), key=len), model),
+                *_on_columns(max(in_pieces(as_used([trace], model.machine)), key=len), model),
             ]
     return tuple(found)
 
@@ -107,14 +111,34 @@ def repaired(trace: Trace, machine: Machine) -> Trace:
 
 
 def as_used(traces: Sequence[Trace], machine: Machine, loop: Loop = "open") -> list[Trace]:
-    """Returns traces in the form for all computations: repaired, unless the simulated controller reads them itself.
+    """Returns traces in the form for all computations: the longest part without cut-off readings (`free_part`), which
+    is repaired, unless the simulated controller reads it itself.
 
     Args:
         loop: `closed`: the machine's controller is simulated. `open`: the recorded drive is applied or balanced.
     """
+    parts = [_free(matched(trace, machine), machine) for trace in traces]
     if loop == "closed" and not isinstance(machine.controller, NoController):
-        return [matched(trace, machine) for trace in traces]
-    return [repaired(matched(trace, machine), machine) for trace in traces]
+        return [_looped(trace, machine.controller.period) for trace in parts]
+    return [repaired(trace, machine) for trace in parts]
+
+
+def _looped(trace: Trace, period: Quantity) -> Trace:
+    """Returns the trace with the period at which its loop is simulated.
+
+    Where the loop's own period is only assumed, as inside a servo, it is as many of these as take `LOOP_SHARE` of the
+    time between rows: what a faster loop does in between is not seen.
+    """
+    usual = float(np.median(np.diff(trace.time))) if len(trace) > 1 else 0.0
+    periods = int(LOOP_SHARE * usual / period.value)
+    if not period.assumed or trace.record.period is not None or periods < 2:
+        return trace
+    return replace(trace, record=trace.record.model_copy(update={"period": periods * period.value}))
+
+
+def _free(trace: Trace, machine: Machine) -> Trace:
+    part = free_part(trace, machine) if len(trace) >= FEWEST else None
+    return trace if part is None or part == slice(0, len(trace)) else part_of(trace, part)
 
 
 def require_computable(findings: Sequence[RecordFinding]) -> None:
@@ -126,9 +150,7 @@ def require_computable(findings: Sequence[RecordFinding]) -> None:
 
 def false_readings(trace: Trace, machine: Machine, joint: int) -> FalseReadings:
     """Returns the jumps in the readings of a joint's sensor."""
-    by_speed = measures_speed(machine, joint)
-    source = trace.velocity if by_speed and trace.velocity is not None else trace.position
-    reading = source[:, trace.column(joint)]
+    by_speed, reading = measures_speed(machine, joint), reading_of(trace, machine, joint)
     jumps = find_jumps(trace.time, reading, 0.0 if by_speed else _step(machine, joint))
     if by_speed:  # a tachometer's reading stops changing as soon as its drive does
         return sort_jumps(reading, jumps, ())
@@ -136,12 +158,6 @@ def false_readings(trace: Trace, machine: Machine, joint: int) -> FalseReadings:
     told = {jump.row for _, jump in found.stuck} | {last for _, last in find_bounds(reading)}
     dead = [one for one in find_dead(reading, _step(machine, joint)) if one[1].row not in told]
     return replace(found, stuck=(*found.stuck, *dead))
-
-
-def measures_speed(machine: Machine, joint: int) -> bool:
-    """Whether a joint's sensor is a tachometer."""
-    sensor = machine.joint(joint).sensor
-    return sensor is not None and sensor.measures == "velocity"
 
 
 def turns_of(machine: Machine, joint: int) -> tuple[float, ...]:
@@ -152,8 +168,7 @@ def turns_of(machine: Machine, joint: int) -> tuple[float, ...]:
 
 
 def _step(machine: Machine, joint: int) -> float:
-    sensor = machine.joint(joint).sensor
-    return 0.0 if sensor is None else sensor.range.value / 2**sensor.bits
+    return machine.joint(joint).count
 
 
 def _without_spikes(reading: Floats, found: FalseReadings) -> Floats:
@@ -177,18 +192,19 @@ def _on_machine(machine: Machine, traces: Sequence[Trace]) -> Iterator[RecordFin
             advice="State it in m/s², along the axes of the base.",
         )
     for joint in machine.modelled_joints:
-        if machine.joint(joint).sensor is None and all(joint in trace.joints for trace in traces):
+        if not machine.joint(joint).count and all(joint in trace.joints for trace in traces):
             sizes = [noise_of(trace.position[:, trace.column(joint)]) for trace in traces if len(trace) > 2]
             unit = machine.joint(joint).units.position
             size = float(np.median(sizes)) if sizes else 0.0
+            lacking = "`sensor`" if machine.joint(joint).sensor is None else "`sensor.bits`"
             yield RecordFinding(
                 kind="no-sensor",
                 consequence="note",
                 joint=joint,
                 value=size,
                 unit=unit,
-                says=f"the machine file states no `sensor`: noise is estimated from the record, {number(size)} {unit}.",
-                advice=f"State `sensor` under joint {joint} if it is known.",
+                says=f"the machine file states no {lacking}: the record shows noise of {number(size)} {unit}.",
+                advice=f"State {lacking} under joint {joint} if it is known.",
             )
 
 
@@ -291,8 +307,7 @@ def _on_jumps(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFind
 
 def _on_bounds(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFinding]:
     """Finds readings that are cut off at the end of a sensor's range, or of an amplifier's or a converter's."""
-    source = trace.velocity if measures_speed(machine, joint) and trace.velocity is not None else trace.position
-    reading = source[:, trace.column(joint)]
+    reading = reading_of(trace, machine, joint)
     bounds = find_bounds(reading)
     if not bounds:
         return
@@ -300,9 +315,15 @@ def _on_bounds(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFin
     longest = max(float(trace.time[last] - trace.time[first]) for first, last in bounds)
     unit = machine.joint(joint).units.position + ("/s" if measures_speed(machine, joint) else "")
     value = float(reading[bounds[0][0]])
+    part = free_part(trace, machine)
+    advice = "Is the sensor at the end of its range, or the joint at a stop? Use a piece without this."
+    if part is not None:
+        advice = (
+            f"Used: {trace.time[part.start]:.2f} to {trace.time[part.stop - 1]:.2f} s, the longest part without this."
+        )
     yield RecordFinding(
         kind="saturated",
-        consequence="doubt",
+        consequence="doubt" if part is None else "note",
         record=trace.called,
         joint=joint,
         times=tuple(times[:MOST_KEPT]),
@@ -311,7 +332,7 @@ def _on_bounds(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFin
         unit=unit,
         says=f"its reading reaches {number(value)} {unit} at full speed and stands there, {at_times(times)}, for "
         f"up to {number(longest)} s.",
-        advice="Is the sensor at the end of its range, or the joint at a stop? Use a piece without this.",
+        advice=advice,
     )
 
 

@@ -169,7 +169,7 @@ class _Witnesses:
 
     def _on_times(self, *, holds: bool) -> RecordFinding | None:
         trace, controller = self.trace, self.model.machine.controller
-        stated = None if isinstance(controller, NoController) else controller.period.value
+        stated = None if isinstance(controller, NoController) or controller.period.assumed else controller.period.value
         period = trace.record.period or stated
         if period is None:
             return None

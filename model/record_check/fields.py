@@ -10,14 +10,18 @@ import numpy as np
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.joint_matching import matched
 from daq.contracts.machine import Machine, NoController
+from daq.contracts.machine_form import defaults_of
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
-from model.record_check.readings import find_gaps, noise_of
+from model.record_check.pieces import free_part
+from model.record_check.readings import find_bounds, find_gaps, noise_of
 from model.record_check.words import number, times_of
 
 FEW_LEVELS = 16
 """Number of different values up to which a signal counts as coarse: four bits."""
+DEFAULTS_SHOWN = 4
+"""Values that a machine file leaves out, in the table."""
 LEAST_TRAVEL = 20.0
 """Travel of a joint, in its noise or in steps of its sensor, below which it determines nothing."""
 UNEVEN = 0.2
@@ -126,6 +130,11 @@ class _Record:
         if travel < LEAST_TRAVEL * max(noise, step):
             means = "It hardly moves: its inertia and friction stay as the machine file states them."
             return self._of("position", joint, there, means, "known")
+        part = free_part(self._trace, self._machine)
+        if part is not None and find_bounds(reading):
+            begin, end = self._trace.time[part.start], self._trace.time[part.stop - 1]
+            means = f"It stands at the end of its way: rows from {begin:.2f} to {end:.2f} s are used."
+            return self._of("position", joint, there, means, "known")
         if turns == 0:
             means = "It moves in one direction only: friction, an offset and weight look alike."
             return self._of("position", joint, there, means, "known")
@@ -200,7 +209,7 @@ def _step_of(reading: Floats) -> float:
 def _on_machine(machine: Machine) -> Iterator[FieldReport]:
     """Yields what the machine file does not state."""
     for number_, joint in ((j, machine.joint(j)) for j in machine.modelled_joints):
-        if joint.sensor is None:
+        if not joint.count:
             yield FieldReport(
                 joint=number_,
                 name=joint.name,
@@ -209,5 +218,8 @@ def _on_machine(machine: Machine) -> Iterator[FieldReport]:
                 means="Its noise is estimated from the record.",
                 weight="known",
             )
+    if left_out := list(defaults_of(machine)):
+        there = ", ".join(left_out[:DEFAULTS_SHOWN]) + (", …" if len(left_out) > DEFAULTS_SHOWN else "")
+        yield FieldReport(field="defaults", there=there, means="Assumed, because the file leaves them out.")
     if isinstance(machine.controller, NoController):
         yield FieldReport(field="controller", there="none", means="Torques are compared; no control loop is simulated.")

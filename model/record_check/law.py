@@ -128,7 +128,7 @@ def formed_drive(trace: Trace, machine: Machine, joint: int, reading: Reading, s
     if not isinstance(controller, BoardPid) or own.sensor is None or not isinstance(own.drive, DcMotor):
         return None
     p, i, d = (trace.record.gains or {}).get(joint, controller.gains[joint - 1])
-    counts = error / (own.sensor.direction * own.sensor.range.value / 2**own.sensor.bits)
+    counts = error / (own.sensor.direction * own.sensor.count)
     power = p * counts + i * np.cumsum(counts) / INTEGRAL_SHARE + d * np.diff(counts, prepend=counts[0])
     volts = machine.drive_sign(joint) * own.drive.scale.counts_to_volts(1.0)
     return np.asarray(controller.dac_counts_per_adc_count.value * volts * power)

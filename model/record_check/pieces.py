@@ -1,4 +1,4 @@
-"""Cuts a record at its gaps, for methods that need only a short motion at a time: a balance of torques."""
+"""Cuts a record at its gaps, for a balance of torques, and where a reading is cut off, for every use."""
 
 from __future__ import annotations
 
@@ -9,11 +9,44 @@ from typing import Any
 
 import numpy as np
 
+from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
-from model.record_check.readings import find_gaps, is_bridged
+from model.arrays import Floats
+from model.record_check.readings import ENTRY, find_bounds, find_gaps, is_bridged
 
 SHORTEST = 8.0
 """Shortest duration of a piece, s: it is enough for torques below 1 Hz, the lowest cutoff that is chosen."""
+
+
+def measures_speed(machine: Machine, joint: int) -> bool:
+    """Whether a joint's sensor is a tachometer."""
+    sensor = machine.joint(joint).sensor
+    return sensor is not None and sensor.measures == "velocity"
+
+
+def reading_of(trace: Trace, machine: Machine, joint: int) -> Floats:
+    """Returns what a joint's sensor reads (k,): rad or m, or the speed for a tachometer."""
+    by_speed = measures_speed(machine, joint) and trace.velocity is not None
+    source = trace.velocity if by_speed and trace.velocity is not None else trace.position
+    return np.asarray(source[:, trace.column(joint)])
+
+
+def free_part(trace: Trace, machine: Machine) -> slice | None:
+    """Returns the longest part in which no reading is cut off, as at a joint's stop; None if too little is left.
+
+    Too little is less than half of the record, if that is less than `SHORTEST`.
+    """
+    free = np.ones(len(trace) + 2, dtype=bool)
+    free[[0, -1]] = False
+    for joint in machine.modelled_joints:
+        for first, last in find_bounds(reading_of(trace, machine, joint)):
+            free[max(0, first - ENTRY) + 1 : last + ENTRY + 2] = False
+    begins, ends = (np.flatnonzero(np.diff(free.astype(int)) == edge) for edge in (1, -1))
+    begin, end = max(
+        zip(begins.tolist(), ends.tolist(), strict=True), key=lambda part: part[1] - part[0], default=(0, 0)
+    )
+    left = trace.time[end - 1] - trace.time[begin] if end > begin else 0.0
+    return slice(begin, end) if left >= min(SHORTEST, 0.5 * (trace.time[-1] - trace.time[0])) else None
 
 
 def in_pieces(traces: Sequence[Trace]) -> list[Trace]:
@@ -33,10 +66,11 @@ def _pieces(trace: Trace) -> list[Trace]:
     if not cuts:
         return [trace]
     spans = [slice(a, b) for a, b in pairwise([0, *cuts, len(trace)]) if trace.time[b - 1] - trace.time[a] >= SHORTEST]
-    return [_part(trace, span) for span in spans] or [trace]
+    return [part_of(trace, span) for span in spans] or [trace]
 
 
-def _part(trace: Trace, span: slice) -> Trace:
+def part_of(trace: Trace, span: slice) -> Trace:
+    """Returns a part of a trace's rows."""
     signals = {f.name: getattr(trace, f.name) for f in fields(trace)}
     rows: dict[str, Any] = {name: own[span] for name, own in signals.items() if isinstance(own, np.ndarray)}
     return replace(trace, **rows)

@@ -156,7 +156,7 @@ def unwrapped(reading: Floats, wraps: Sequence[Jump], turns: Sequence[float]) ->
 
 def find_bounds(reading: Floats) -> list[tuple[int, int]]:
     """Finds the first and last row of each stretch at the largest or smallest value that a reading reaches at full
-    speed.
+    speed, without slowing down before.
 
     A torque needs more than one sample to stop a joint.
     """
@@ -167,7 +167,9 @@ def find_bounds(reading: Floats) -> list[tuple[int, int]]:
         at = np.flatnonzero(np.diff(np.concatenate([[0], (reading == bound).astype(int), [0]])))
         for first, last in zip(at[::2], at[1::2] - 1, strict=True):
             before = towards[max(0, first - 1 - ENTRY) : max(0, first - 1)]  # the last step is cut short
-            if last - first + 1 >= STUCK and len(before) == ENTRY and before.min() > usual:
+            if last - first + 1 < STUCK or len(before) < ENTRY or before.min() <= usual:
+                continue
+            if before[-1] > before.max() / EVEN:
                 found.append((int(first), int(last)))
     return sorted(found)
 
@@ -237,7 +239,7 @@ def is_bridged(gap: float, usual: float) -> bool:
 def sensor_deviation(sensor: Sensor) -> float:
     """Returns the standard deviation (rad, m) of one reading: √(1/12 + noise²) counts."""
     noise = 0.0 if sensor.noise is None else sensor.noise.value
-    return float(np.sqrt(1.0 / 12.0 + noise**2)) * sensor.range.value / 2**sensor.bits
+    return float(np.sqrt(1.0 / 12.0 + noise**2)) * sensor.count
 
 
 def noise_of(reading: Floats, step: float = 0.0) -> float:

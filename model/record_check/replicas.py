@@ -78,7 +78,7 @@ def made_by(model: Model, trace: Trace, rng: np.random.Generator, loop: Loop = "
 def reading_noise(machine: Machine, joint: int, traces: Sequence[Trace]) -> float:
     """Returns the standard deviation of a reading, as its sensor states it; else as the records show it."""
     sensor = machine.joint(joint).sensor
-    if sensor is not None and sensor.measures == "position":
+    if sensor is not None and sensor.count and sensor.measures == "position":
         return sensor_deviation(sensor)
     return float(np.median([noise_of(trace.position[:, trace.column(joint)]) for trace in traces]))
 

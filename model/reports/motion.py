@@ -23,7 +23,6 @@ from model.reports.figures import (
     panels,
     thinned,
 )
-from model.reports.motion_closer import closer_picture, what_is_shown
 from model.reports.page import trace_names
 from model.units import shown_unit, with_unit
 
@@ -43,23 +42,24 @@ def motion_section(
     labels: Sequence[str],
     most: int = 8,
     *,
-    closer: bool = False,
     files: Mapping[str, str] | None = None,
 ) -> Section:
     """Returns a section with one figure for each of the first traces: position above, residual below, one column per
     joint.
 
     Args:
-        closer: also the part with the first model's largest error.
         files: names of the traces' files, by ID, if known.
     """
-    pictures: list[Picture] = []
-    for signal in signals[:most]:
-        one = replace(signal, trace=trace_names([signal.trace], files or {})[0])
-        pictures.append(_picture(one, labels))
-        if closer and (near := closer_picture(one, labels)) is not None:
-            pictures.append(near)
-    return Section("Traces", tuple(pictures))
+    named = [replace(one, trace=trace_names([one.trace], files or {})[0]) for one in signals[:most]]
+    return Section("Traces", tuple(_picture(one, labels) for one in named))
+
+
+def what_is_shown(one: TraceSignals) -> tuple[str, str]:
+    """Names the curves of a trace, and their residuals."""
+    measured, simulated = one.words
+    between = " and " if one.set_point is None else ", set point and "
+    quantity = f" {one.quantity}" if one.signal == "effort" else ""
+    return f"{measured}{between}{simulated}{quantity}", f"{measured} − {simulated}"
 
 
 def _picture(one: TraceSignals, labels: Sequence[str]) -> Picture:

@@ -6,12 +6,21 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from daq.contracts.errors import SpecError
-from model.blocks import Report
+from model.blocks import Report, Section
 from model.effects.names import effect_name
 
 
 def html(report: Report) -> str:
     """Returns the page as text; the same report gives the same text."""
+    return _rendered("report.html.j2", report=report)
+
+
+def section_html(section: Section) -> str:
+    """Returns one section, for a page that has others beside it."""
+    return _rendered("section.html.j2", section=section)
+
+
+def _rendered(template: str, **given: Report | Section) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -21,15 +30,20 @@ def html(report: Report) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template("report.html.j2").render(report=report)
+    return environment.get_template(template).render(**given)
 
 
 def write_report(report: Report, path: Path) -> Path:
     """Writes the page. Returns `path`. Raises SpecError if it is not an .html file or cannot be written."""
+    return write_page(html(report), path)
+
+
+def write_page(text: str, path: Path) -> Path:
+    """Writes a page that is already text. Returns `path`. Raises SpecError as `write_report`."""
     if path.suffix != ".html":
         raise SpecError(f"report {path}: must be an .html file")
     try:
-        path.write_text(html(report), "utf-8")
+        path.write_text(text, "utf-8")
     except OSError as error:
         raise SpecError(f"report {path}: cannot be written: {error.strerror}") from error
     return path

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import gc
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import pairwise
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,9 @@ from numba.core.event import Listener, install_listener
 from numpy.typing import NDArray
 
 from model import layout as at
-from model.arrays import Array
+from model.arrays import Floats
 from model.dynamics.compilation import one_process_at_a_time
-from model.dynamics.dual import DUAL_STEP
+from model.dynamics.wide_numbers import PARTS, WIDTH, Dual, Lanes, Plain
 from model.machine_model.model import Model
 from model.machine_model.nominal import is_rod_arm
 from model.machine_model.parameter import Parameter
@@ -29,47 +30,147 @@ from model.simulation.run_arrays import RecordArrays, RunArrays
 
 CHUNKS_A_CORE = 4
 """Pieces per core into which a batch is cut. Runs differ in length; small pieces keep all cores busy to the end."""
+LARGEST_PIECE = 2**22
+"""Most memory (bytes) for the outputs of a piece, so that large batches stay within the caches."""
+LANES_FROM = 256
+"""Least number of runs that go in lanes. Fewer are done before the compiled code for lanes is loaded."""
 
 
 @dataclass(frozen=True)
 class BatchRun:
     """Runs of one model: run r uses `prepared[which[r]]`, row r of `vectors` and row r of `initials`.
 
+    Many runs of the arm of rods with rigid transmissions go in lanes, `WIDTH` at once, if they share record and delays.
+    All others go one by one. The motion is the same.
+
     Args:
-        vectors: (r, layout size) flat vectors, real or dual (complex128). initials: (r, n, 2), of the same kind.
+        vectors: (r, layout size) flat vectors. initials: (r, n, 2).
         step: longest integration step, s.
         general: use the recursive dynamics even where there is a closed form.
+        outputs: those that are returned, as numbered in `model.simulation.period`.
     """
 
     model: Model
     prepared: Sequence[Prepared]
     which: NDArray[np.int64]
-    vectors: Array
-    initials: Array
+    vectors: Floats
+    initials: Floats
     step: float
     general: bool = False
+    outputs: Sequence[int] = range(OUTPUTS)
 
-    def run(self, cores: int | None = None) -> Array:
-        """Returns outputs (r, OUTPUTS, k, n) of all runs, in the order of `model.simulation.period`.
+    def run(self, cores: int | None = None) -> Floats:
+        """Returns the outputs (r, outputs, k, n) of all runs.
 
         k is that of the longest record; rows beyond the end of a shorter one are zero. Values are not finite where a
         run diverged. Threads share the work, because compiled code releases Python's lock. Results do not depend on
         `cores`.
         """
-        compiled = _compiled_run(self.model, self.general)
-        records, runs = self._records(), self._runs()
-        out: Array = np.zeros((len(self.which), OUTPUTS, *records.set_points.shape[1:]), dtype=self.vectors.dtype)
-        _make_ready(compiled, records, runs, out)
+        if len(self.which) >= LANES_FROM and self._compiled() is _kernel().run_closed_form:
+            groups = self._groups()
+            tag: Any = Lanes(0)
+        else:
+            groups, tag = np.arange(len(self.which))[:, None], Plain(0)
+        found = np.zeros((len(self.which), *self._shape(len(self.outputs))))
+
+        def arrays(own: slice) -> tuple[Floats, Floats]:
+            rows = groups[own]
+            if groups.shape[1] == 1:
+                return self.vectors[rows[:, 0]], self.initials[rows[:, 0]]
+            return _last(self.vectors[rows]), _last(self.initials[rows])
+
+        def place(own: slice, out: Floats) -> None:
+            found[groups[own]] = np.moveaxis(out, -1, 1) if groups.shape[1] > 1 else out[:, None]
+
+        self._run(tag, self.which[groups[:, 0]], arrays, place, cores)
+        return found
+
+    def derivatives(self, by: Sequence[Sequence[Parameter]], cores: int | None = None) -> list[tuple[Floats, Floats]]:
+        """Returns for each run its outputs (outputs, k, n) and their derivatives (p, outputs, k, n) by p parameters.
+
+        by: parameters of the model or of the initial state, for each run. A run in dual numbers carries `WIDTH`.
+        """
+        parts = [(r, own[i : i + WIDTH]) for r, own in enumerate(by) for i in range(0, max(1, len(own)), WIDTH)]
+        runs = np.array([r for r, _ in parts])
+        found = np.zeros((len(parts), *self._shape(len(self.outputs)), 1 + WIDTH))
+
+        def arrays(own: slice) -> tuple[Floats, Floats]:
+            vectors, initials = (
+                np.concatenate([a[runs[own], ..., None], np.zeros((*a[runs[own]].shape, WIDTH))], axis=-1)
+                for a in (self.vectors, self.initials)
+            )
+            for (_, parameters), vector, initial in zip(parts[own], vectors, initials, strict=True):
+                for k, parameter in enumerate(parameters, 1):
+                    seed(parameter, vector[:, k], initial[..., k])
+            return vectors, initials
+
+        def place(own: slice, out: Floats) -> None:
+            found[own] = out
+
+        self._run(Dual(0), self.which[runs], arrays, place, cores)
+        slopes: list[list[Floats]] = [[] for _ in by]
+        for (r, parameters), out in zip(parts, found, strict=True):
+            slopes[r].append(np.moveaxis(out[..., 1 : 1 + len(parameters)], -1, 0))
+        first = np.searchsorted(runs, np.arange(len(by)))
+        return [(found[i, ..., 0], np.concatenate(own)) for i, own in zip(first, slopes, strict=True)]
+
+    def _run(
+        self,
+        numbers: Any,
+        which: NDArray[np.int64],
+        arrays: Callable[[slice], tuple[Floats, Floats]],
+        place: Callable[[slice, Floats], None],
+        cores: int | None,
+    ) -> None:
+        """Runs in numbers of this kind, in pieces that fill the caches: threads take the next one when they are free.
+
+        arrays: returns vectors and initial states of a piece. place: takes its outputs.
+        """
+        compiled, records, shape = self._compiled(), self._records(), self._shape(OUTPUTS)
+        tail = (PARTS[type(numbers)],) if PARTS[type(numbers)] else ()
+        own, every = own_table_of(self.model, numbers), tuple(self.outputs) == tuple(range(OUTPUTS))
+
+        def piece(part: slice) -> None:
+            vectors, initials = arrays(part)
+            out = np.zeros((len(vectors), *shape, *tail))
+            compiled(numbers, 0, len(out), records, self._runs(which[part], vectors, initials, own), out)
+            place(part, out if every else out[:, list(self.outputs)])
+
         cores = available_cores() if cores is None else cores
-        if len(out) == 1 or cores == 1:
-            compiled(0, len(out), records, runs, out)
-            return out
-        edges = np.unique(np.linspace(0, len(out), min(len(out), cores * CHUNKS_A_CORE) + 1).astype(np.int64))
+        _make_ready(compiled, numbers, lambda: piece(slice(0, 0)))
+        fitting = LARGEST_PIECE // (8 * math.prod((*shape, *tail)))
+        share = -(-len(which) // (1 if cores == 1 else cores * CHUNKS_A_CORE))
+        size = max(1, min(share, fitting))
+        pieces = [slice(a, min(a + size, len(which))) for a in range(0, len(which), size)]
+        if cores == 1 or len(pieces) == 1:
+            for part in pieces:
+                piece(part)
+            return
         with ThreadPoolExecutor(cores) as pool:
-            pieces = [pool.submit(compiled, int(a), int(b), records, runs, out) for a, b in pairwise(edges)]
-        for piece in pieces:
-            piece.result()
-        return out
+            for done in [pool.submit(piece, part) for part in pieces]:
+                done.result()
+
+    def _groups(self) -> NDArray[np.int64]:
+        """Returns the runs (g, WIDTH) of every group in lanes; the last run of a kind fills the rest of its group."""
+        delays = [at.DELAY, *range(at.SHARED + at.EXTRA_DELAY, self.vectors.shape[1], at.PER_JOINT)]
+        kinds = np.column_stack([self.which, self.vectors[:, delays]])
+        _, kind = np.unique(kinds, axis=0, return_inverse=True)
+        groups = []
+        for k in range(kind.max() + 1):
+            runs = np.flatnonzero(kind == k)
+            groups.append(np.pad(runs, (0, -len(runs) % WIDTH), mode="edge").reshape(-1, WIDTH))
+        return np.concatenate(groups)
+
+    def _compiled(self) -> Callable[..., None]:
+        """Returns the closed form for the waist-shoulder-elbow arm of rods, else the recursive form."""
+        kernel = _kernel()
+        if self.general or not is_rod_arm(self.model.machine):
+            return kernel.run_chain
+        flexible = bool((self.model.flags & (at.HAS_FLEXIBILITY | at.HAS_USER_EFFECT)).any())
+        return kernel.run_flexible if flexible else kernel.run_closed_form
+
+    def _shape(self, outputs: int) -> tuple[int, ...]:
+        return outputs, max(len(p.set_points) for p in self.prepared), self.initials.shape[1]
 
     def _records(self) -> RecordArrays:
         prepared = self.prepared
@@ -85,27 +186,49 @@ class BatchRun:
             settings=np.array([p.settings for p in prepared]),
         )
 
-    def _runs(self) -> RunArrays:
-        from model.simulation.own_table import own_table  # imported here because numba's tools are slow to import
-
-        shares = self.vectors[:, : at.SHARED].copy()
-        shares[:, at.PERIOD] = np.array([p.period for p in self.prepared])[self.which]
+    def _runs(self, which: NDArray[np.int64], vectors: Floats, initials: Floats, own: NDArray[np.int64]) -> RunArrays:
+        """Packs runs in numbers of any kind: those of several parts have one dimension more."""
+        shares, parts = vectors[:, : at.SHARED].copy(), np.ascontiguousarray(vectors[:, at.SHARED :])
+        periods = np.array([p.period for p in self.prepared])[which]
+        if vectors.shape[2:] == (PARTS[Dual],):
+            shares[:, at.PERIOD, 0] = periods
+        else:
+            shares[:, at.PERIOD] = periods.reshape(-1, *([1] * (vectors.ndim - 2)))
         return RunArrays(
-            which=self.which,
-            initial=self.initials,
+            which=which,
+            initial=np.ascontiguousarray(initials),
             shares=shares,
-            parts=np.ascontiguousarray(self.vectors[:, at.SHARED :]).reshape(len(self.vectors), -1, at.PER_JOINT),
+            parts=parts.reshape(*initials.shape[:2], at.PER_JOINT, *vectors.shape[2:]),
             flags=self.model.flags,
-            own=own_table(self.model, self.vectors.dtype),
+            own=own,
             step=self.step,
         )
 
 
-def seed(parameter: Parameter, vector: Array, initial: Array) -> None:
-    """Sets the parameter's dual part in the vector and initial state of a run that is differentiated by it."""
-    vector[list(parameter.slots)] += 1j * DUAL_STEP
+def _kernel() -> ModuleType:
+    """Returns the compiled runs; imported here because they are slow to import."""
+    from model.simulation import kernel
+
+    return kernel
+
+
+def own_table_of(model: Model, numbers: Any) -> NDArray[np.int64]:
+    """Returns the table of users' effects for runs in numbers of this kind."""
+    from model.simulation.own_table import own_table  # slow to import
+
+    return own_table(model, np.complex128 if isinstance(numbers, Dual) else np.float64)
+
+
+def _last(grouped: Floats) -> Floats:
+    """Returns (g, WIDTH, …) as lanes, (g, …, WIDTH)."""
+    return np.ascontiguousarray(np.moveaxis(grouped, 1, -1))
+
+
+def seed(parameter: Parameter, vector: Floats, initial: Floats) -> None:
+    """Sets the derivatives of the vector and initial state of a run by the parameter to 1 in its places."""
+    vector[list(parameter.slots)] = 1.0
     if parameter.initial is not None:
-        initial[parameter.initial] += 1j * DUAL_STEP
+        initial[parameter.initial] = 1.0
 
 
 def available_cores() -> int:
@@ -113,23 +236,16 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _compiled_run(model: Model, general: bool) -> Callable[..., None]:
-    """Returns the closed form for the waist-shoulder-elbow arm of rods, else the recursive form."""
-    from model.simulation import kernel  # imported here because it is slow to import
+def _make_ready(compiled: Callable[..., None], numbers: Any, empty: Callable[[], None]) -> None:
+    """Compiles a run for numbers of this kind, or loads it from disk, once for all threads and processes.
 
-    if general or not is_rod_arm(model.machine):
-        return kernel.run_chain
-    flexible = bool((model.flags & (at.HAS_FLEXIBILITY | at.HAS_USER_EFFECT)).any())
-    return kernel.run_flexible if flexible else kernel.run_closed_form
-
-
-def _make_ready(compiled: Callable[..., None], records: RecordArrays, runs: RunArrays, out: Array) -> None:
-    """Compiles a run for numbers of this kind, or loads it from disk, once for all threads and processes."""
-    name = (compiled.__name__, out.dtype)
+    empty: runs nothing.
+    """
+    name = (compiled.__name__, type(numbers))
     if name not in _ready:
         announcement = install_listener("numba:compile", _Announcement(compiled))
         with one_process_at_a_time(compiled.__module__), announcement, _without_garbage_collection():
-            compiled(0, 0, records, runs, out)  # empty range of runs
+            empty()
         _ready.add(name)
 
 
@@ -149,7 +265,7 @@ def _without_garbage_collection() -> Iterator[None]:
 
 _announced: list[str] = []
 """The compiled run that this process announces. Functions that it calls are compiled without a line."""
-_ready: set[tuple[str, np.dtype[Any]]] = set()
+_ready: set[tuple[str, type]] = set()
 """Compiled runs, with their kind of numbers, that this process has compiled or loaded."""
 
 

@@ -17,6 +17,7 @@ from model.dynamics import recursive, three_joint
 from model.dynamics.compilation import borrowing, compiled, compiled_borrowing, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.three_joint_motion import accelerations
+from model.dynamics.wide_numbers import root
 from model.kinematics.chain import ChainArrays
 from model.simulation.bodies import chain_body, rod_arm_body
 from model.simulation.closed_form_motion import friction_levels
@@ -88,7 +89,7 @@ def _pressing_levels(q: NDArray[Any], joints: NDArray[Any], body: ChainArrays, o
     for j in range(n):
         beyond += body.inertial[j, 0]
     for j in range(n):
-        across = np.sqrt(x * x + y * y + 1e-30)  # gravity across the axis of joint j, in the preceding frame
+        across = root(x * x + y * y + 1e-30)  # gravity across the axis of joint j, in the preceding frame
         out[j] = joints[j, at.COULOMB] + joints[j, at.COULOMB_ARM] * beyond * across
         beyond -= body.inertial[j, 0]
         theta = body.geometry[j, 0] + (0.0 * q[j] if body.prismatic[j] else q[j])

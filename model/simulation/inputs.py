@@ -192,8 +192,7 @@ def _rest_posture(trace: Trace, measured: Floats, first: Floats, machine: Machin
         columns = [trace.column(j) for j in machine.modelled_joints]
         still &= (np.abs(trace.set_point[:, columns] - first) < 1e-9).all(axis=1)
     for k, joint in enumerate(machine.modelled_joints):
-        sensor = machine.joint(joint).sensor
-        near = 1e-9 if sensor is None else REST_COUNTS * sensor.range.value / 2**sensor.bits
+        near = REST_COUNTS * machine.joint(joint).count or 1e-9
         still &= np.abs(measured[:, k] - measured[0, k]) <= near
     until = int(np.argmin(still)) if not still.all() else len(still)
     return np.asarray(measured[: max(1, min(until, REST_PERIODS))].mean(axis=0))

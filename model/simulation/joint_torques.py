@@ -18,6 +18,7 @@ from model.drives.magnet import back_emf_constant, torque_constant
 from model.drives.piecewise import clamped, magnitude, outside
 from model.dynamics.compilation import borrowing, inlined
 from model.dynamics.dual import sin_cos
+from model.dynamics.wide_numbers import exponential, where
 
 RESTICK_SPEED = 1e-3
 """A sliding joint that is slower than this (rad/s, m/s) sticks again."""
@@ -46,7 +47,7 @@ def deflection(z: Any, displacement: Any, softness: Any, shape: Any) -> Any:
     rise = 1.0 + y * (0.5 + y * (1.0 / 6.0))
     kept = 1.0 / (1.0 + y * rise)
     gain = x * rise * kept
-    return clamped(z * kept + (gain if displacement.real >= 0.0 else -gain), 1.0 + 0.0 * z)
+    return clamped(z * kept + where(displacement.real >= 0.0, gain, -gain), 1.0 + 0.0 * z)
 
 
 @borrowing
@@ -84,13 +85,13 @@ def winding_functions(x: Any) -> Any:
     φ1 is the mean of e^(−xs) over 0 ≤ s ≤ 1, φ2 the mean weighted by 1 − s, and φ3 that weighted by (1 − s)²/2. A
     series replaces them for small x, where differences would cancel.
     """
-    if x.real < SMALL_TURNS:
-        third = 1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0 - x / 5040.0)))
-        second = 0.5 - x * third
-        return 1.0 - x * second, second, third
-    first = (1.0 - np.exp(-x)) / x
+    small = x.real < SMALL_TURNS
+    first = (1.0 - exponential(-x)) / x
     second = (1.0 - first) / x
-    return first, second, (0.5 - second) / x
+    series = 1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0 - x / 5040.0)))
+    third = where(small, series, (0.5 - second) / x)
+    second = where(small, 0.5 - x * third, second)
+    return where(small, 1.0 - x * second, first), second, third
 
 
 @inlined
@@ -103,7 +104,7 @@ def stage_current(joint: Array, rise: Any, current: Any, volts: Any, begun: Any,
     """
     turns = joint[at.RESISTANCE] * (1.0 + rise) / joint[at.INDUCTANCE] * h
     first, second, third = winding_functions(turns)
-    half = np.exp(-0.5 * turns)
+    half = exponential(-0.5 * turns)
     before = steady_current(joint, rise, volts, begun)
     settled = steady_current(joint, rise, volts, speed)
     excess, change = current - before, before - settled
@@ -137,22 +138,25 @@ def extra_torque(
     if flags & at.HAS_STICTION:
         torque -= z * stuck * joint[at.BREAKAWAY]
     if joint[at.STRIBECK] != 0.0:
-        torque -= z * joint[at.STRIBECK] * np.exp(-magnitude(speed) / joint[at.STRIBECK_SPEED])
-    if joint[at.DIRECTION].real * z.real > 0.0:
-        torque -= magnitude(joint[at.DIRECTION]) * z
-    if joint[at.VISCOUS_DIRECTION].real * speed.real > 0.0:
-        torque -= joint[at.GEAR] * joint[at.GEAR] * magnitude(joint[at.VISCOUS_DIRECTION]) * speed
+        torque -= z * joint[at.STRIBECK] * exponential(-magnitude(speed) / joint[at.STRIBECK_SPEED])
+    if joint[at.DIRECTION] != 0.0:
+        torque -= where(joint[at.DIRECTION].real * z.real > 0.0, magnitude(joint[at.DIRECTION]) * z, 0.0 * z)
+    if joint[at.VISCOUS_DIRECTION] != 0.0:
+        drag = joint[at.GEAR] * joint[at.GEAR] * magnitude(joint[at.VISCOUS_DIRECTION]) * speed
+        torque -= where(joint[at.VISCOUS_DIRECTION].real * speed.real > 0.0, drag, 0.0 * drag)
     if joint[at.GEAR_LOSS] != 0.0:
         torque -= z * joint[at.GEAR_LOSS] * magnitude(through)
-    if joint[at.GEAR_LOSS_DIRECTION].real * through.real * z.real > 0.0:
-        torque -= z * magnitude(joint[at.GEAR_LOSS_DIRECTION]) * magnitude(through)
+    if joint[at.GEAR_LOSS_DIRECTION] != 0.0:
+        loss = z * magnitude(joint[at.GEAR_LOSS_DIRECTION]) * magnitude(through)
+        torque -= where(joint[at.GEAR_LOSS_DIRECTION].real * through.real * z.real > 0.0, loss, 0.0 * loss)
     if joint[at.RIPPLE_SINE] != 0.0 or joint[at.RIPPLE_COSINE] != 0.0:
         s, c = sin_cos(joint[at.RIPPLE_CYCLES] * q)
         torque += joint[at.RIPPLE_SINE] * s + joint[at.RIPPLE_COSINE] * c
     if joint[at.SPRING] != 0.0:
         torque -= joint[at.SPRING] * (q - joint[at.SPRING_REST])
-    if joint[at.CABLE].real * (q - joint[at.CABLE_REST]).real > 0.0:
-        torque -= magnitude(joint[at.CABLE]) * (q - joint[at.CABLE_REST])
+    if joint[at.CABLE] != 0.0:
+        pull = magnitude(joint[at.CABLE]) * (q - joint[at.CABLE_REST])
+        torque -= where(joint[at.CABLE].real * (q - joint[at.CABLE_REST]).real > 0.0, pull, 0.0 * pull)
     torque += joint[at.CONSTANT_TORQUE]
     if joint[at.DISTURBANCE_SINE] != 0.0 or joint[at.DISTURBANCE_COSINE] != 0.0:
         s, c = sin_cos(TWO_PI * joint[at.DISTURBANCE_FREQUENCY] * time)
@@ -217,14 +221,12 @@ def still_stuck(joint: Array, level: complex, speed: complex, z: Array, stuck: A
 
     The torque does not jump when it sticks: the contact takes the smaller deflection that carries it.
     """
-    if stuck[0].real > 0.5:
-        if magnitude(z[0]).real >= 1.0:
-            stuck[0] = 0.0 * stuck[0]
-    elif magnitude(speed).real < RESTICK_SPEED or speed.real * z[0].real < 0.0:
-        whole = level + joint[at.BREAKAWAY]
-        if whole.real > 0.0:
-            z[0] = z[0] * level / whole
-        stuck[0] = 1.0 + 0.0 * stuck[0]
+    breaks = (stuck[0].real > 0.5) & (magnitude(z[0]).real >= 1.0)
+    still = (magnitude(speed).real < RESTICK_SPEED) | (speed.real * z[0].real < 0.0)
+    sticks = (stuck[0].real <= 0.5) & still
+    most = level + joint[at.BREAKAWAY]
+    z[0] = where(sticks & (most.real > 0.0), z[0] * level / most, z[0])
+    stuck[0] = where(breaks, 0.0 * stuck[0], where(sticks, 1.0 + 0.0 * stuck[0], stuck[0]))
 
 
 @inlined
@@ -233,10 +235,8 @@ def transmitted(joint: Array, twist: Any, twist_rate: Any) -> Any:
     joint.
     """
     stretched = outside(twist, 0.5 * joint[at.GAP])
-    if stretched.real == 0.0:
-        return 0.0 * (twist + twist_rate)
     torque = (
         stretched / (joint[at.COMPLIANCE] + joint[at.CONTACT_COMPLIANCE]) + joint[at.TRANSMISSION_DAMPING] * twist_rate
     )
     # damping must not pull parts together that have separated
-    return torque if torque.real * stretched.real > 0.0 else 0.0 * torque
+    return where(torque.real * stretched.real > 0.0, torque, 0.0 * torque)

@@ -18,8 +18,9 @@ from model import layout as at
 from model.arrays import Array
 from model.drives.amplifier import motor_volts
 from model.drives.controller import MEMORY
-from model.drives.piecewise import clamped
+from model.drives.piecewise import clamped, magnitude
 from model.dynamics.compilation import internal
+from model.dynamics.wide_numbers import seen_as, where
 from model.simulation import closed_form_motion, flexible_motion, general_motion
 from model.simulation.dynamics_of_run import body_of, friction_levels_of, gravity_of
 from model.simulation.joint_torques import (
@@ -84,27 +85,31 @@ def _advance_of(kind: Any, state: Any, volts: Any, start: Any, duration: Any, st
 
 
 @internal
-def batch(kind: Any, first: int, last: int, records: RecordArrays, runs: RunArrays, out: Array) -> None:
-    """Runs first … last − 1; `kind` is a tag that chooses the dynamics."""
+def batch(
+    kind: Any, numbers: Any, first: int, last: int, records: RecordArrays, runs: RunArrays, output: Array
+) -> None:
+    """Runs first … last − 1; `kind` is a tag that chooses the dynamics, `numbers` one that chooses the numbers."""
     n = runs.initial.shape[1]
-    state = np.zeros((n, STATE), dtype=runs.parts.dtype)
-    memory = np.zeros((n, 2 * MEMORY), dtype=runs.parts.dtype)
-    queue = np.zeros((QUEUE, n), dtype=runs.parts.dtype)
-    volts = np.zeros(n, dtype=runs.parts.dtype)
+    initial, shares = seen_as(numbers, runs.initial), seen_as(numbers, runs.shares)
+    parts, out = seen_as(numbers, runs.parts), seen_as(numbers, output)
+    state = np.zeros((n, STATE), dtype=parts.dtype)
+    memory = np.zeros((n, 2 * MEMORY), dtype=parts.dtype)
+    queue = np.zeros((QUEUE, n), dtype=parts.dtype)
+    volts = np.zeros(n, dtype=parts.dtype)
     order = np.zeros(n, dtype=np.int64)
-    times = np.zeros(n, dtype=runs.parts.dtype)
-    begun = np.zeros((BEGUN, n), dtype=runs.parts.dtype)
-    work = np.zeros((general_motion.WORK, n), dtype=runs.parts.dtype)
+    times = np.zeros(n, dtype=parts.dtype)
+    begun = np.zeros((BEGUN, n), dtype=parts.dtype)
+    work = np.zeros((general_motion.WORK, n), dtype=parts.dtype)
     for r in range(first, last):
         record = record_row(records, runs.which[r])
-        shared, joints = runs.shares[r], runs.parts[r]
+        shared, joints = shares[r], parts[r]
         modes = extra_flags(joints, runs.flags)
         arm = Arm(shared, joints, body_of(kind, shared, joints, modes), modes, record.settings, runs.own)
         period = shared[at.PERIOD]
         late = switching_times(shared, joints, order, times)
         posture = work[general_motion.Q]
         for j in range(n):
-            posture[j] = runs.initial[r, j, 0]
+            posture[j] = initial[r, j, 0]
             for i in range(2 * MEMORY):
                 memory[j, i] = 0.0 * posture[j]
             for i in range(STATE):
@@ -113,7 +118,7 @@ def batch(kind: Any, first: int, last: int, records: RecordArrays, runs: RunArra
                 queue[i, j] = record.first_drive[j]
             volts[j] = motor_volts(queue[0, j], joints[j])
         friction_levels_of(kind, posture, joints, arm.body, arm.settings, work[general_motion.LEVEL])
-        at_rest(state, runs.initial[r], volts, gravity_of(kind, posture, joints, arm.body), arm, work)
+        at_rest(state, initial[r], volts, gravity_of(kind, posture, joints, arm.body), arm, work)
         for k in range(records.lengths[runs.which[r]]):
             for j in range(n):
                 queue[k % QUEUE, j] = sample(k, j, state, record, arm, memory, out[r])
@@ -148,27 +153,27 @@ def at_rest(state: Array, initial: Array, volts: Array, weights: Array, arm: Arm
         level = work[general_motion.LEVEL, j]
         if flags[j] & at.HAS_STICTION:
             level += joints[j, at.BREAKAWAY]
-        if level.real > 0.0 and initial[j, 1].real == 0.0:
-            state[j, DEFLECTION] = clamped((pull - weights[j]) / level, 1.0 + 0.0 * pull)
+        rests = (level.real > 0.0) & (magnitude(initial[j, 1]).real <= 0.0)
+        state[j, DEFLECTION] = where(rests, clamped((pull - weights[j]) / level, 1.0 + 0.0 * pull), 0.0 * pull)
         if flags[j] & at.HAS_FLEXIBILITY:
             give = joints[j, at.COMPLIANCE] + joints[j, at.CONTACT_COMPLIANCE]
             slack = 0.5 * joints[j, at.GAP]
-            state[j, ROTOR_POSITION] += give * pull + (slack if pull.real >= 0.0 else -slack)
+            state[j, ROTOR_POSITION] += give * pull + where(pull.real >= 0.0, slack, -slack)
 
 
 @entry
-def run_closed_form(first: int, last: int, records: RecordArrays, runs: RunArrays, out: Array) -> None:
+def run_closed_form(numbers: Any, first: int, last: int, records: RecordArrays, runs: RunArrays, out: Array) -> None:
     """Runs the waist-shoulder-elbow arm of rods with rigid transmissions."""
-    batch(ClosedForm(0), first, last, records, runs, out)
+    batch(ClosedForm(0), numbers, first, last, records, runs, out)
 
 
 @entry
-def run_flexible(first: int, last: int, records: RecordArrays, runs: RunArrays, out: Array) -> None:
+def run_flexible(numbers: Any, first: int, last: int, records: RecordArrays, runs: RunArrays, out: Array) -> None:
     """Runs the same arm with a flexible transmission or backlash."""
-    batch(Flexible(0), first, last, records, runs, out)
+    batch(Flexible(0), numbers, first, last, records, runs, out)
 
 
 @entry
-def run_chain(first: int, last: int, records: RecordArrays, runs: RunArrays, out: Array) -> None:
+def run_chain(numbers: Any, first: int, last: int, records: RecordArrays, runs: RunArrays, out: Array) -> None:
     """Runs any machine."""
-    batch(AnyChain(0), first, last, records, runs, out)
+    batch(AnyChain(0), numbers, first, last, records, runs, out)

@@ -4,23 +4,28 @@ An address is a number, so the run that is cached on disk is the same for all ef
 the library of effects; otherwise each edit of the library would compile the runs again.
 """
 
+# ruff: noqa: ARG001 (implementations share an interface)
+
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
 from llvmlite import ir  # type: ignore[import-untyped]
+from numba import extending
 from numba.core import cgutils as builders
-from numba.extending import intrinsic
 from numba.np import arrayobj
 from numpy.typing import NDArray
 
 from model import layout as at
-from model.dynamics.compilation import internal
+from model.dynamics.compilation import inlined, internal
+from model.dynamics.dual import DUAL_STEP
+from model.dynamics.wide_numbers import DUAL, WIDTH, part, with_part
 
 # numba's tools for compiled code have no usable types
 cgutils: Any = builders
 make_array: Any = arrayobj.make_array
+intrinsic: Any = extending.intrinsic
 
 ADDRESS, BEYOND = range(2)
 """Columns of a table of own effects: address of the compiled torque (0: not on this joint), and the index of its first
@@ -61,4 +66,37 @@ def _call(_typing: Any, address: Any, motion: Any, parameters: Any) -> Any:
     return number(address, motion, parameters), generate
 
 
-called: Any = _call
+def called(address: int, motion: Any, parameters: Any) -> Any:
+    """Returns the torque at an address for a tuple of MOTION numbers and an array of parameters, all of one kind."""
+    raise NotImplementedError("only compiled code can call an address")
+
+
+@extending.overload(called, strict=False)
+def _called(address: Any, motion: Any, parameters: Any) -> Any:
+    if motion.dtype != DUAL:
+
+        def alone(address: Any, motion: Any, parameters: Any) -> Any:
+            return _call(address, motion, parameters)
+
+        return alone
+
+    def by_each_tangent(address: Any, motion: Any, parameters: Any) -> Any:
+        """Users' torques are compiled for duals of one derivative, in complex numbers."""
+        sent = np.empty(parameters.shape[0], np.complex128)
+        result = 0.0 * motion[0]
+        for k in range(WIDTH):
+            for i in range(parameters.shape[0]):
+                sent[i] = one_of(parameters[i], k)
+            q, speed, volts, load, time = motion
+            each = (one_of(q, k), one_of(speed, k), one_of(volts, k), one_of(load, k), one_of(time, k))
+            found = _call(address, each, sent)
+            result = with_part(result, found.real, found.imag / DUAL_STEP, k)
+        return result
+
+    return by_each_tangent
+
+
+@inlined
+def one_of(x: Any, k: int) -> complex:
+    """Returns a dual number's value with its derivative k, as a dual number of one derivative."""
+    return complex(x.real, part(x, k) * DUAL_STEP)

@@ -22,6 +22,7 @@ from model.drives.controller import (
 )
 from model.drives.sensor import reading
 from model.dynamics.compilation import borrowing, internal
+from model.dynamics.wide_numbers import first
 from model.simulation.joint_torques import POSITION, RISE, ROTOR_POSITION, ROTOR_SPEED, SPEED
 from model.simulation.run_arrays import Arm, RecordRow
 
@@ -121,7 +122,7 @@ def corrected(
     The correction is the controller's output for the distance (counts) from simulated to recorded reading, without
     rounding, limits or wrong gain.
     """
-    if np.isnan(apart.real):
+    if np.isnan(record.readings[k, j]):
         return drive
     kind, gains = record.settings[at.CONTROLLER], record.gains[j]
     if k == 0:
@@ -149,11 +150,11 @@ def switching_times(shared: Array, joints: Array, order: Array, times: Array) ->
     periods = np.zeros(n, dtype=np.int64)
     for j in range(n):
         delay = shared[at.DELAY] + joints[j, at.EXTRA_DELAY]
-        whole = int(np.floor(delay.real / shared[at.PERIOD].real + 1e-12))
+        whole = int(np.floor(first(delay) / first(shared[at.PERIOD]) + 1e-12))
         periods[j] = min(max(whole, 0), QUEUE - 2)
         times[j] = delay - periods[j] * shared[at.PERIOD]
         i = j
-        while i > 0 and times[order[i - 1]].real > times[j].real:
+        while i > 0 and first(times[order[i - 1]]) > first(times[j]):
             order[i] = order[i - 1]
             i -= 1
         order[i] = j
@@ -163,7 +164,7 @@ def switching_times(shared: Array, joints: Array, order: Array, times: Array) ->
 @borrowing
 def step_count(duration: complex, step: float) -> int:
     """Returns the number of equal steps of at most `step` s in a time; at least one."""
-    return max(1, int(np.ceil(duration.real / step - 1e-9)))
+    return max(1, int(np.ceil(first(duration) / step - 1e-9)))
 
 
 # State of each motor at the beginning of a time with constant volts.

@@ -164,7 +164,5 @@ def _counts(model: Model, set_points: Floats) -> Floats:
     for k, joint in enumerate(model.machine.modelled_joints):
         own = model.machine.calibration(joint)
         posture = np.floor((set_points[:, k] - own.angle_at_zero_rad) / own.rad_per_posture_unit + 0.5)
-        sensor = model.machine.joint(joint).sensor
-        bits = 12 if sensor is None else sensor.bits
-        counts[:, k] = np.floor(posture * 2**bits / POSTURE_UNITS + 0.5)
+        counts[:, k] = np.floor(posture * own.counts / POSTURE_UNITS + 0.5)
     return counts

@@ -41,12 +41,11 @@ def _speed(trace: Trace, machine: Machine, joint: int) -> float:
     count = max(LEAST_READINGS, int(np.searchsorted(time, LEAST_TIME, side="right")))
     if len(time) < 2 * count:
         return 0.0
-    count_size = 0.0 if sensor is None else sensor.range.value / 2**sensor.bits
     speed, error = _slope(time[:count], reading[:count])
     early, _ = _slope(time[: count // 2], reading[: count // 2])
     travels = np.abs(reading[count - 1 :] - reading[: 1 - count]) / (time[count - 1 :] - time[: 1 - count])
     moves = abs(speed) > max(SURE * error, SHARE * float(travels.max()))
-    seen = abs(speed) * time[count - 1] > COUNTS * count_size
+    seen = abs(speed) * time[count - 1] > COUNTS * machine.joint(joint).count
     agrees = abs(early - speed) <= AGREEMENT * abs(speed)
     return speed if moves and seen and agrees else 0.0
 

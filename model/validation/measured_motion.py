@@ -105,12 +105,11 @@ def position_noise(model: Model) -> Floats:
     deviations = []
     for number in model.machine.modelled_joints:
         sensor = model.machine.joint(number).sensor
-        if sensor is None:
+        if sensor is None or sensor.bits is None:
             deviations.append(1e-9)
             continue
-        count = sensor.range.value / 2**sensor.bits
         own = 0.0 if sensor.noise is None else sensor.noise.value
-        deviations.append(count * float(np.hypot(own, 1 / np.sqrt(12))))
+        deviations.append(sensor.count * float(np.hypot(own, 1 / np.sqrt(12))))
     return np.array(deviations)
 
 

@@ -12,9 +12,8 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
 from model.simulation.inputs import inputs_of
-from model.simulation.period import OUT_READING
 from model.simulation.prepared import Options
-from model.simulation.simulate import at_rows, parameter_vectors, simulate_many
+from model.simulation.simulate import at_rows, simulate_many
 
 
 @dataclass(frozen=True)
@@ -33,12 +32,11 @@ class SquaredError:
     def by_joint(self, values: Floats) -> Floats:
         """Returns (m, len(outputs)) rad² for parameter values (m, p); inf where a run diverged."""
         inputs = [inputs_of(t, self.model.machine) for t in self.traces]
-        vectors = parameter_vectors(self.model, self.names, values)
-        sums, samples = np.zeros((len(vectors), len(self.outputs))), 0
+        sums, samples = np.zeros((len(values), len(self.outputs))), 0
         modelled = [self.model.machine.modelled_joints.index(j) for j in self.outputs]
-        simulated = simulate_many(self.model, inputs, vectors, self.options)
+        simulated = simulate_many(self.model, inputs, dict(zip(self.names, values.T, strict=True)), self.options)
         for trace, run, out in zip(self.traces, inputs, simulated, strict=True):
-            readings = at_rows(np.moveaxis(out[:, OUT_READING][:, :, modelled], 1, 0), run.rows)
+            readings = at_rows(np.moveaxis(out[:, 0][:, :, modelled], 1, 0), run.rows)
             measured = trace.position[:, [trace.column(j) for j in self.outputs]]
             with np.errstate(over="ignore", invalid="ignore"):
                 sums += ((readings - measured[:, None, :]) ** 2).sum(axis=0)

@@ -67,8 +67,10 @@ def known_effects() -> tuple[KnownEffect, ...]:
 
 
 router = Router(prefix="/robots/{robot}", responses=PROBLEMS)
-REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
-"""A report is a single page with inline styles and no script."""
+REPORT_POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; sandbox allow-scripts"
+)
+"""A report is a single page with its styles and its script. It runs as if from elsewhere: it reaches nothing here."""
 MOST_OF_A_LINEAGE = 500
 """Most models, and most jobs, in a lineage."""
 _JSON_FILE = {"application/json": {"schema": {"type": "object"}}}

@@ -14,6 +14,7 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import SQLAlchemyError
 
 from daq.contracts.service.system import Health, Me, StorageStatus, SystemStatus
+from daq.plugins import plugins
 from daq.traces.room import RESERVE
 from server.access.caller import caller_of
 from server.api.dependencies import ServicesDep, Viewer
@@ -93,6 +94,7 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
         short_jobs_at_once=SHORT_LANE_WORKERS,
         unattended=any(rig.unattended for rig in services.robots()),
         stop_port=services.stop_port,
+        panels={title: path for plugin in plugins() for title, path in plugin.panels.items()},
     )
 
 

@@ -75,14 +75,15 @@ function offline(program: string, fileName: string): Plugin {
   };
 }
 
-export default defineConfig({
+/** `--mode gallery`: the page that shows every component in its states, for pictures that tests compare. */
+export default defineConfig(({ mode }) => ({
   // Relative addresses: a proxy may serve the page below a path of its own.
   base: './',
   plugins: [
     svelte(),
-    preloaded('/src/app.ts'),
-    taken('taken.json'),
-    offline('src/report/main.ts', 'report.html'),
+    ...(mode === 'gallery'
+      ? []
+      : [preloaded('/src/app.ts'), taken('taken.json'), offline('src/report/main.ts', 'report.html')]),
   ],
   build: {
     target: 'es2022',
@@ -92,7 +93,7 @@ export default defineConfig({
     reportCompressedSize: false,
     // The reference of the API comes as one large program, which only its own page loads.
     chunkSizeWarningLimit: 2000,
-    rolldownOptions: { input: ['index.html', 'reference.html'] },
+    rolldownOptions: { input: mode === 'gallery' ? ['gallery.html'] : ['index.html', 'reference.html'] },
   },
   test: { environment: 'node', include: ['src/**/*.test.ts'], isolate: false },
-});
+}));

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from daq.contracts.machine import NoController
 from daq.contracts.service.jobs import LeadingEffect
+from model.comparison.compare import compare
 from model.comparison.difference import differences
 from model.discrepancy.explanation.answer_words import not_a_finding
 from model.discrepancy.explanation.step_words import where_with_summary
+from model.discrepancy.inverse_dynamics.efforts import recorded_and_predicted
 from model.discrepancy.localisation.disagreement import locate
 from model.discrepancy.localisation.phases import Residuals
 from model.discrepancy.localisation.statistics import chance_significance
@@ -47,6 +51,37 @@ def leading(candidates: Sequence[Candidate]) -> tuple[LeadingEffect, ...]:
         for one in candidates
         if np.isfinite(one.evidence)
     )
+
+
+LABELS = ("before", "after")
+"""Labels of the two models of a diagnosis."""
+Compares = Callable[[list[tuple[str, "Model"]], "Sequence[Trace]", "Sequence[str]"], "Comparison"]
+
+
+def told(
+    found: Diagnosis,
+    begin: Model,
+    traces: Sequence[Trace],
+    compared: Compares = compare,
+    locating: Callable[[], None] = lambda: None,
+) -> DiagnosisData:
+    """Returns the answer with all data for plots.
+
+    Args:
+        begin: the model that was examined.
+        traces: those fitted to and those held out.
+        compared: compares the models before and after, if they can be simulated.
+        locating: called before the map of the given model is computed.
+    """
+    comparison, given = None, None
+    controlled = found.computed and not isinstance(begin.machine.controller, NoController)
+    if controlled and all(trace.set_point is not None for trace in traces):
+        pair = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
+        comparison = compared(pair, traces, found.holdout)
+        locating()
+        given = where_given(begin, [trace for trace in traces if trace.record.trace_id in found.traces])
+    efforts = recorded_and_predicted(found, traces, found.holdout) if found.computed else ()
+    return diagnosis_data(found, comparison, given, efforts)
 
 
 def diagnosis_data(

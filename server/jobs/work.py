@@ -189,14 +189,12 @@ class _Worker:
 
     def diagnose(self, request: DiagnoseRequest) -> Ended:
         """Computes the same as `daq diagnose`."""
-        from daq.contracts.machine import NoController
         from daq.plugins import report_sections
         from model.discrepancy.explanation.answer_words import headline
-        from model.discrepancy.inverse_dynamics.efforts import recorded_and_predicted
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
-        from model.reports.diagnosis_report import LABELS, diagnosis_report
-        from server.jobs.diagnosis_data import diagnosis_data, leading, where_given
+        from model.reports.saved_report import saved_report
+        from server.jobs.diagnosis_data import leading, told
         from server.jobs.next_experiment import experiment_chooser
         from server.jobs.results import DiagnosisJobResult
 
@@ -212,21 +210,22 @@ class _Worker:
             chooser=experiment_chooser(begin.machine, design=request.design),
             watch=lambda candidates: self.mailbox.tell_leading(leading(candidates)),
         )
-        comparison, given = None, None
-        controlled = found.computed and not isinstance(begin.machine.controller, NoController)
-        if controlled and all(trace.set_point is not None for trace in (*traces, *held)):
-            models = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
-            comparison = self._compared(models, [*traces, *held], found.holdout, DIAGNOSIS_SHARE, MAP_SHARE)
-            self.mailbox.report(MAP_SHARE, "locating where the model as given disagrees", at_once=True)
-            given = where_given(begin, [t for t in (*traces, *held) if t.record.trace_id in found.traces])
         before = found.model_before
         changed = found.model_after.with_lineage(before.lineage).identity != before.identity
         if changed:
             self._keep_model(found.model_after)
-        efforts = recorded_and_predicted(found, [*traces, *held], found.holdout) if found.computed else ()
-        result = DiagnosisJobResult(id=self._job, data=diagnosis_data(found, comparison, given, efforts))
-        report = diagnosis_report(found, comparison, None, efforts, report_sections(found, [*traces, *held]))
-        return self._done(result, report, headline(found), found.model_after if changed else None)
+        every = [*traces, *held]
+        data = told(
+            found,
+            begin,
+            every,
+            lambda pair, of, held_out: self._compared(pair, of, held_out, DIAGNOSIS_SHARE, MAP_SHARE),
+            lambda: self.mailbox.report(MAP_SHARE, "locating where the model as given disagrees", at_once=True),
+        )
+        files = {trace.record.trace_id: trace.file for trace in every if trace.file}
+        page = saved_report(data, files, report_sections(found, every))
+        model = found.model_after if changed else None
+        return self._done(DiagnosisJobResult(id=self._job, data=data), page, headline(found), model)
 
     def _compared(
         self,
@@ -278,11 +277,11 @@ class _Worker:
     def _keep_model(self, model: Model) -> None:
         self.mailbox.write_text(MODEL, model.model_dump_json(indent=1) + "\n")
 
-    def _done(self, result: JobResult, report: Report, headline: str, model: Model | None = None) -> Ended:
+    def _done(self, result: JobResult, report: Report | str, headline: str, model: Model | None = None) -> Ended:
         from model.reports.page import html
 
         self.mailbox.report(REPORT_SHARE, "writing the report", at_once=True)
-        self.mailbox.write_text(REPORT, html(report))
+        self.mailbox.write_text(REPORT, report if isinstance(report, str) else html(report))
         self.mailbox.write_text(RESULT, result.model_dump_json())
         return Ended(model=None if model is None else model.identity, headline=headline)
 

@@ -27,6 +27,15 @@ from tests.repository.tracked import ROOT, tracked_files
 PAGE = "server/dashboard/dist"
 EXAMPLE = ROOT / "examples" / "plugin"
 ROUTES = "import json; from server.app import bare_app; print(json.dumps(bare_app(None).openapi()))"
+PANELS = """
+import asyncio, httpx
+from daq.plugins import plugins
+from server.app import bare_app
+async def kind(path):
+    async with httpx.AsyncClient(transport=httpx.ASGITransport(bare_app(None)), base_url="http://here") as client:
+        return (await client.get(f"/{path}")).headers["content-type"]
+print(*(f"{title}: {asyncio.run(kind(path))}" for one in plugins() for title, path in one.panels.items()), sep="\\n")
+"""
 LOADED = "import sys; sys.argv = ['daq', '--help']; from daq_cli import main\ntry: main()\nexcept SystemExit: pass\n"
 LOADED += "print(*(name for name in sys.modules if name.startswith(('extras', 'trials'))), file=sys.stderr)"
 
@@ -60,7 +69,7 @@ def daq(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return python(folder, "-c", f"import sys; sys.argv = ['daq', *{words!r}]; from daq_cli import main; main()")
 
 
-def test_the_example_adds_a_command_an_importer_and_a_route(folder: Path) -> None:
+def test_the_example_adds_a_command_an_importer_a_route_and_a_panel(folder: Path) -> None:
     (folder / "a.log").write_text("lab log\n0 0\n0.5 90\n")
     assert re.search(r"\n  lab-log +Show the rows of a laboratory's log\.\n", daq(folder, "--help").stdout)
     assert daq(folder, "lab-log", "a.log").stdout == "a.log: 2 rows in 0.5 s\n"
@@ -68,6 +77,7 @@ def test_the_example_adds_a_command_an_importer_and_a_route(folder: Path) -> Non
     trace = read_trace(folder / json.loads(made.stdout)["file"])
     assert trace.position[:, 0] == pytest.approx([0.0, 1.5707963])
     assert "/api/v1/lab-log/robots" in json.loads(python(folder, "-c", ROUTES).stdout)["paths"]
+    assert "Largest error: text/javascript" in python(folder, "-c", PANELS).stdout  # its module is served
     (folder / "a.log").write_text("lab log\n0 zero\n")
     wrong = daq(folder, "traces", "import", "a.log")
     assert (wrong.returncode, len(wrong.stderr.splitlines())) == (2, 1)

@@ -88,3 +88,5 @@ class SystemStatus(Wire):
     unattended: bool
     stop_port: int
     """Port of the stop listener, which answers even if the service is too busy."""
+    panels: dict[str, str] = {}
+    """Panels of plug-ins for the Live page, by title: paths of modules."""

@@ -87,6 +87,8 @@ class Table:
 
         Raises TraceError if no column matches.
         """
+        if whole := tokens_in(pattern.strip(), self.columns):  # a column's own name may look like a sum
+            return whole
         terms = [_TERM.fullmatch(term) for term in re.split(r"\s+[+-]\s+", pattern.strip())]
         name = next((term[3] for term in terms if term is not None and "{}" in term[3]), pattern)
         name = name.removeprefix("int16(").removesuffix(")") if name.startswith("int16(") else name

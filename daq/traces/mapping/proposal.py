@@ -78,6 +78,8 @@ WORDS: dict[str, tuple[str, ...]] = {
     "drive": ("torque", "tau", "effort", "current", "voltage", "present_current", "joint_torque", "iq", "force"),
 }
 """Usual column names of a signal, alone or with a joint's name or number."""
+LEAST_LETTERS = 4
+"""Letters of an abbreviation of such a word, as in `velo`."""
 _FORMS = ("@[{}]", "@.{}", "@_{}", "{}.@", "{}_@", "{} @")
 """Position of a joint's name relative to such a word, @."""
 _STEPS = ((1e4, "ns"), (1e2, "µs"), (0.8, "ms"), (0.0, "s"))
@@ -150,7 +152,8 @@ def _question(table: Table, guess: Proposal, entries: Mapping[str, Said], units:
     options += [f"--map '{key}=COLUMN{'{}' if key in BY_JOINT else ''}'" for key in lacking]
     asked = [f"{key} ({', '.join(known_units(key)[:6])}{_range(key, guess)})" for key in units]
     said_of = f"; not stated: the unit of {' and of '.join(asked)}" if asked else ""
-    missing = f"; nothing looks like {' or '.join(lacking)}" if lacking else ""
+    looked_for = ["position or velocity" if key == "position" else key for key in lacking]
+    missing = f"; nothing looks like {' or '.join(looked_for)}" if lacking else ""
     rest = "" if units or lacking else "; --as-guessed accepts this guess"
     return (
         f"{table.origin}: {what}: {table.listed()}{missing}{said_of}. "
@@ -159,7 +162,11 @@ def _question(table: Table, guess: Proposal, entries: Mapping[str, Said], units:
 
 
 def _range(key: str, guess: Proposal) -> str:
-    return ", range of CALIBRATION.json" if "lerobot" in guess.format and key in ("position", "set_point") else ""
+    return (
+        "; for -100 to 100: range of CALIBRATION.json, range of MACHINE"
+        if "lerobot" in guess.format and key in ("position", "set_point")
+        else ""
+    )
 
 
 def _open(key: str, text: str, table: Table) -> Said:
@@ -175,7 +182,7 @@ def _guess(table: Table, signal: str) -> str | None:
     """Returns the first column or pattern with a usual name of the signal, whatever unit follows it."""
     bare = {_bare(signal, name): name for name in reversed(table.columns)}
     for word in WORDS[signal]:
-        for name in (word, f"{word}s"):
+        for name in (word, f"{word}s", *(one for one in bare if len(one) >= LEAST_LETTERS and word.startswith(one))):
             if name in bare:
                 return bare[name]
         if signal == "time":

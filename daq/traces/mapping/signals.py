@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +13,7 @@ from daq.contracts.documents import shown
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Floats
 from daq.traces.mapping.expression import Table
+from daq.traces.mapping.ranges import RANGE_OF, Range, ranges_of
 from daq.traces.mapping.units import DRIVES, NONE, factor, known_units, unit_in
 
 BY_JOINT = ("position", "set_point", "velocity", "drive")
@@ -24,10 +22,6 @@ SIGNALS = ("time", *BY_JOINT)
 KEY = re.compile(rf"time|({'|'.join(BY_JOINT)})(?:_([1-9][0-9]?))?")
 """Keys of a mapping: a signal of all joints, or of one joint by its number."""
 _IN = re.compile(r"(?:(.*?)\s+)?in\s+(range of .+|\S+)", re.DOTALL)
-GRIPPER = "gripper"
-"""The joint whose LeRobot range is 0 to 100, not -100 to 100."""
-COUNTS = 4095
-"""Counts per turn, in LeRobot's degrees and servo ranges."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +58,7 @@ def said(key: str, text: str, origin: str) -> Said:
     signal, unit = match[1] or "time", found[2]
     if unit in known_units(signal) or (signal == "drive" and unit == NONE):
         return Said((found[1] or "").strip(), unit)
-    if unit.startswith("range of ") and signal in ("position", "set_point"):
+    if unit.startswith(RANGE_OF) and signal in ("position", "set_point"):
         return Said((found[1] or "").strip(), unit)
     raise TraceError(f"{origin}: {key}: unit {shown(unit)} is unknown; write {', '.join(known_units(signal))}")
 
@@ -82,7 +76,7 @@ def signals_of(table: Table, entries: Mapping[str, Said], beside: Path) -> Signa
     tokens: tuple[str, ...] = ()
     drive_unit = None
     for signal in BY_JOINT:
-        items = _items(table, signal, entries)
+        items = _with_range(_items(table, signal, entries), beside)
         if not items:
             continue
         if not tokens:
@@ -112,13 +106,25 @@ def _of_joints(table: Table, signal: str, items: Mapping[str, Said], beside: Pat
     """Returns the values (n,) of each joint in the unit of a trace, and that unit. Raises TraceError if units
     differ."""
     units = {token: _unit(table, signal, entry) for token, entry in items.items()}
-    values = [
-        table.value(entry.expression) * _factor(signal, units[token], token, beside) for token, entry in items.items()
-    ]
+    scales = {token: _range(unit, token, beside) or (factor(signal, unit), 0.0) for token, unit in units.items()}
+    values = [scales[token][0] * table.value(entry.expression) + scales[token][1] for token, entry in items.items()]
     bases = sorted({DRIVES[unit][0] if signal == "drive" else known_units(signal)[0] for unit in units.values()})
     if len(bases) > 1:
         raise TraceError(f"{table.origin}: drive: units {' and '.join(bases)} differ; one is needed")
     return values, bases[0]
+
+
+def _range(unit: str | None, token: str, beside: Path) -> Range | None:
+    return ranges_of(unit, beside)(token) if unit is not None and unit.startswith(RANGE_OF) else None
+
+
+def _with_range(items: Mapping[str, Said], beside: Path) -> dict[str, Said]:
+    """Returns the items without joints that have no range in the machine file."""
+
+    def has_range(token: str, unit: str | None) -> bool:
+        return unit is None or not unit.startswith(RANGE_OF) or _range(unit, token, beside) is not None
+
+    return {token: entry for token, entry in items.items() if has_range(token, entry.unit)}
 
 
 def _of(signal: str, entries: Mapping[str, Said]) -> dict[str, Said]:
@@ -153,17 +159,3 @@ def _unit(table: Table, signal: str, entry: Said) -> str:
             f"{table.origin}: drive: its unit is not stated; give --drive-unit N·m, N, A or V, or none to leave it out"
         )
     return unit or known_units(signal)[0]
-
-
-def _factor(signal: str, unit: str, token: str, beside: Path) -> float:
-    if not unit.startswith("range of "):
-        return factor(signal, unit)
-    file = beside.parent / unit.removeprefix("range of ")
-    try:
-        known: Any = json.loads(file.read_text("utf-8"))[token]
-        span = float(known["range_max"]) - float(known["range_min"])
-    except (OSError, ValueError) as error:
-        raise TraceError(f"{file}: cannot be read as a LeRobot calibration: {error}") from error
-    except (KeyError, TypeError) as error:
-        raise TraceError(f"{file}: has no range_min and range_max of joint {shown(token)}") from error
-    return span / (100.0 if token == GRIPPER else 200.0) * 2 * math.pi / COUNTS

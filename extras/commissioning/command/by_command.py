@@ -195,12 +195,12 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     """Returns the diagnosis of the ramp, and its report."""
     from daq.contracts.machine import SampledPid
     from daq_cli.app.progress import shown_progress
-    from model.comparison.compare import compare
     from model.discrepancy.explanation.answer_words import headline
     from model.discrepancy.options import DiagnosisOptions
     from model.discrepancy.workflow import diagnose
-    from model.reports.diagnosis_report import LABELS, diagnosis_report
-    from model.reports.page import write_report
+    from model.reports.page import write_page
+    from model.reports.saved_report import saved_report
+    from server.jobs.diagnosis_data import told
     from server.jobs.next_experiment import experiment_chooser
 
     bench.operator.show(
@@ -210,8 +210,7 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     options = DiagnosisOptions(method="output-error" if simulated else None)
     with shown_progress("diagnosing") as progress:
         found = diagnose(begin, [trace], (), options, progress, chooser=experiment_chooser(begin.machine))
-    pair = list(zip(LABELS, (found.model_before, found.model_after), strict=True))
-    write_report(diagnosis_report(found, compare(pair, [trace])), bench.folder / DIAGNOSIS)
+    write_page(saved_report(told(found, begin, [trace]), {}), bench.folder / DIAGNOSIS)
     said = headline(found)
     bench.operator.show(said)
     asked = found.next_experiment

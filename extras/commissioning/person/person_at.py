@@ -20,11 +20,11 @@ def person_at(call: Invocation, mock_control: str | None) -> Iterator[TerminalOp
 
         yield TerminalOperator()
         return
-    from daq.transport.url import SerialPort, parse_port_url
+    from daq.transport.url import parse_port_url
     from daq_cli.app.context import console
     from extras.commissioning.person.mock_hand import mock_operator
 
     port = parse_port_url(call.port)
-    lock_step = not isinstance(port, SerialPort) and port.lock_step
+    lock_step = bool(getattr(port, "lock_step", False))
     with mock_operator(mock_control, call.settings.machine(), console().print, lock_step=lock_step) as operator:
         yield operator

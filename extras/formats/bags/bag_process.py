@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import resource
 import subprocess
 import sys
 from contextlib import suppress
@@ -67,9 +66,7 @@ def main() -> int:
     limits = TraceLimits(**order["limits"])
     from rosbags import rosbag1  # noqa: F401 - what loading takes is not the bag's memory
 
-    _limit(resource.RLIMIT_DATA, _own_memory() + memory_of(limits))
-    _limit(resource.RLIMIT_FSIZE, limits.file_bytes)
-    _limit(resource.RLIMIT_CORE, 0)
+    _confine(limits)
     given: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value for name, value in order["choice"].items()
     }
@@ -85,17 +82,23 @@ def main() -> int:
     return code
 
 
-def _limit(kind: int, most: int) -> None:
-    _, hard = resource.getrlimit(kind)
-    most = min(most, _UNLIMITED if hard == resource.RLIM_INFINITY else hard)
-    resource.setrlimit(kind, (most, most))
+def _confine(limits: TraceLimits) -> None:
+    """Limits the memory and the files of this process. Windows has no such limits."""
+    if sys.platform != "win32":
+        import resource
 
-
-def _own_memory() -> int:
-    """Returns the bytes of this process that RLIMIT_DATA counts; 0 if the system does not report them."""
-    with suppress(OSError, ValueError, IndexError):
-        return int(Path("/proc/self/statm").read_text("ascii").split()[5]) * resource.getpagesize()
-    return 0
+        own = 0  # bytes of this process that RLIMIT_DATA counts, if the system reports them
+        with suppress(OSError, ValueError, IndexError):
+            own = int(Path("/proc/self/statm").read_text("ascii").split()[5]) * resource.getpagesize()
+        for kind, wanted in (
+            (resource.RLIMIT_DATA, own + memory_of(limits)),
+            (resource.RLIMIT_FSIZE, limits.file_bytes),
+            (resource.RLIMIT_CORE, 0),
+        ):
+            _, hard = resource.getrlimit(kind)
+            most = min(wanted, _UNLIMITED if hard == resource.RLIM_INFINITY else hard)
+            with suppress(*((ValueError, OSError) if sys.platform == "darwin" else ())):  # macOS refuses some
+                resource.setrlimit(kind, (most, most))
 
 
 def _packed(trace: Trace) -> bytes:

@@ -50,7 +50,7 @@ def actuator_text(
     Raises SpecError where BAM lacks one of these, or a voltage with back-EMF to describe.
     """
     links = outgoing_arm(model).links
-    lost = [words for words in left_out(model, HELD[form]) if words != "controller"] + _of_controller(model)
+    lost = left_out(model, HELD[form], _of_controller(model.machine.controller))
     if form == "bam":
         return _bam(links, joint, actuator), [
             *lost,
@@ -81,13 +81,10 @@ _CLASSES: Mapping[Form, tuple[str, ...]] = {
 }
 
 
-def _of_controller(model: Model) -> list[str]:
-    """What a proportional-derivative loop in continuous time lacks of the machine's controller."""
-    controller = model.machine.controller
-    if isinstance(controller, NoController):
-        return []
+def _of_controller(controller: BoardPid | SampledPid | NoController) -> list[str]:
+    """What a proportional-derivative loop in continuous time lacks of this controller."""
     lost = ["the controller's sampling and delay"]
-    integrates = any(integral for _, integral, _ in controller.gains)
+    integrates = not isinstance(controller, NoController) and any(integral for _, integral, _ in controller.gains)
     lost += ["the controller's integral"] if integrates else []
     if isinstance(controller, SampledPid):
         stated = {

@@ -6,6 +6,7 @@ It reads the numbers of a model, and no code of its simulation: what MuJoCo make
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -149,16 +150,16 @@ def effects_left_out(model: Model, held: frozenset[int]) -> list[EffectUse]:
     ]
 
 
-def left_out(model: Model, held: frozenset[int]) -> list[str]:
-    """Returns the parts of a model that a format cannot hold, in words: effects, sensors, controller. held: columns
-    that it can.
+def left_out(model: Model, held: frozenset[int], controller: Sequence[str] = ("controller",)) -> list[str]:
+    """Returns the parts of a model that a format cannot hold, in words: effects, sensors, controller.
+
+    held:       columns that the format can hold
+    controller: what it lacks of the controller, if the machine has one
     """
     found = [effect_on(use.name, use.joints) for use in effects_left_out(model, held)]
     if any(joint.sensor is not None for joint in model.machine.joints):
         found.append("sensors")
-    if not isinstance(model.machine.controller, NoController):
-        found.append("controller")
-    return found
+    return found if isinstance(model.machine.controller, NoController) else [*found, *controller]
 
 
 def _body(joint: Floats) -> tuple[float, Floats, Floats]:

@@ -177,10 +177,9 @@ class _JointRecords:
     @cached_property
     def losses(self) -> _Losses | None:
         """None where a trace does not hold set points and errors."""
-        sensor = self.machine.joint(self.joint).sensor
-        if sensor is None:
+        tolerance = COUNTS_OF_ROUNDING * self.machine.joint(self.joint).count
+        if not tolerance:
             return None
-        tolerance = COUNTS_OF_ROUNDING * sensor.range.value / 2**sensor.bits
         moved = lost = total = clear = 0
         for trace in self.traces:
             if trace.error is None or trace.set_point is None:
@@ -230,7 +229,7 @@ class _JointRecords:
         if any(gains[1:]):
             return None
         column = trace.column(self.joint)
-        unit = sensor.direction * sensor.range.value / 2**sensor.bits
+        unit = sensor.direction * sensor.count
         wanted = gains[0] * controller.dac_counts_per_adc_count.value * trace.error[:, column] / unit
         power = trace.power_raw[:, column].astype(np.float64)
         free = (np.abs(power) < POWER_MAX - 1) & (np.abs(wanted) > CLEAR)

@@ -271,7 +271,7 @@ def _largest_output(machine: Machine, joint: int, recorded: Floats) -> float:
     stated = of_joint(controller.output_limit, joint) if isinstance(controller, SampledPid) else None
     if stated is not None:
         return stated.value
-    most = abs(drive.dac_full_scale.value * drive.amplifier_gain.value) if isinstance(drive, DcMotor) else np.inf
+    most = drive.largest_output if isinstance(drive, DcMotor) else np.inf
     sizes = np.abs(recorded)
     shown = sizes.any() and int((sizes >= (1 - AT_LIMIT) * sizes.max()).sum()) >= SHOWN_LIMIT
     return min(most, float(sizes.max())) if shown else most

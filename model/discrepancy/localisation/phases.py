@@ -12,7 +12,7 @@ import numpy as np
 from daq.contracts.machine import Machine, NoController, Sensor
 from model.arrays import Floats, Integers
 from model.discrepancy.diagnosis import Phase
-from model.fitting.records import Record, resolution
+from model.fitting.records import Record
 from model.machine_model.model import Model
 
 PHASES: tuple[Phase, ...] = get_args(Phase)
@@ -88,10 +88,10 @@ class AskedMotion:
         for column, sensor in enumerate(self._sensors):
             if self._is_controlled:
                 least.append(1e-6)  # set points have no noise: any step of them is motion
-            elif sensor is None:
+            elif sensor is None or not sensor.count:
                 least.append(1e-3 * float(np.ptp(measured[:, column])) / SPEED_WINDOW)
             else:
-                least.append(LEAST_COUNTS * resolution(sensor) / SPEED_WINDOW)
+                least.append(LEAST_COUNTS * sensor.count / SPEED_WINDOW)
         return np.array(least)
 
     @property

@@ -240,8 +240,7 @@ def observe(
     problem: SimulatedProblem = fit_problem(
         model, traces, FitOptions(parameters=chosen, bend_terms=BEND_TERMS, priors=priors)
     )
-    sensors = [model.machine.joint(j).sensor for j in model.machine.modelled_joints]
-    unit = np.array([1.0 if s is None else s.range.value / 2**s.bits for s in sensors])
+    unit = np.array([model.machine.joint(j).count or 1.0 for j in model.machine.modelled_joints])
     prepared = tuple(
         prepare(
             problem.model,

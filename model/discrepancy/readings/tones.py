@@ -25,7 +25,7 @@ from model.discrepancy.readings.residual import ReadingResidual
 from model.discrepancy.readings.trials import tone_trial
 from model.effects.effect import Tone
 from model.effects.library import effect, library
-from model.fitting.records import Record, resolution
+from model.fitting.records import Record
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.model import Model
 
@@ -78,8 +78,8 @@ def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
     if over is Tone.OVER_POSITION:
         travel = max(float(np.ptp(r.measured[:, column])) for r in observation.records)
         sensor = machine.joint(joint).sensor
-        if sensor is not None and sensor.measures == "position":
-            high = min(high, 2 * np.pi / (SHORTEST_WAVE * resolution(sensor)))
+        if sensor is not None and sensor.count and sensor.measures == "position":
+            high = min(high, 2 * np.pi / (SHORTEST_WAVE * sensor.count))
         alike = 2 * np.pi / travel if travel > 0 else math.inf
         low, step = alike / 2, alike / 8
     else:

@@ -44,7 +44,7 @@ def test_every_drive_of_the_library_has_numbers_with_source_and_deviation(known:
 
 def test_the_library_has_the_servos_that_people_have_and_its_numbers_give_way_to_the_files() -> None:
     assert len(library_drives()) >= 25
-    with pytest.raises(SpecError, match=r"did you mean feetech/sts3215-12V or feetech/sts3215-7.4V"):
+    with pytest.raises(SpecError, match=r"did you mean 'feetech/sts3215-12V' or 'feetech/sts3215-7.4V'"):
         library_drive("feetech/sts3215")
     text = PAN_TILT.replace('"feetech/sts3215-7.4V"', '{ model = "feetech/sts3215-7.4V", resistance = "2.5 Ω" }')
     motor = parse_machine(text).joint(2).dc_motor

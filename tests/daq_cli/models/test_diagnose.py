@@ -1,6 +1,7 @@
 """`daq diagnose`: the answer for people, the answer for programs, and one line for what cannot be answered."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from model.discrepancy.grounds import Note
 from model.discrepancy.options import DiagnosisOptions
 from model.fitting.unknowns import Unknown
 from model.machine_model.parameter import Kind, Parameter
+from server.jobs.diagnosis_data import diagnosis_data
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import write_csv
 from tests.model.discrepancy import steps
@@ -156,8 +158,7 @@ def test_json_is_the_answer_and_files_are_written(
         return answer
 
     monkeypatch.setattr("model.discrepancy.workflow.diagnose", imagined)
-    monkeypatch.setattr("model.comparison.compare.compare", lambda *_: None)
-    monkeypatch.setattr("model.reports.diagnosis_pictures.drawn", lambda *_: "<svg></svg>")
+    monkeypatch.setattr("server.jobs.diagnosis_data.told", lambda found, *_: diagnosis_data(found, None))
     first, second = write_csv(tmp_path / "first.csv"), write_csv(tmp_path / "second.csv")
     files = {"--out": tmp_path / "new.json", "--report": tmp_path / "page.html", "--next": tmp_path / "asked.json"}
     options = ("--effects", "backlash,coulomb", "--joints", 1, "--most", 2, "--json", *sum(files.items(), ()))
@@ -172,7 +173,9 @@ def test_json_is_the_answer_and_files_are_written(
     ), "it alone proposes the experiment that --next is to write"
     assert len(list(asked["holdout"])) == 1  # type: ignore[call-overload]
     assert json.loads((tmp_path / "new.json").read_text())["lineage"] is not None
-    assert "Where they disagree" in (tmp_path / "page.html").read_text()
+    page = (tmp_path / "page.html").read_text()
+    (data,) = re.findall(r'<script id="data" type="application/json">(.*?)</script>', page)
+    assert json.loads(data)["found"]["summary"] == answer.summary
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,14 @@
 import cmath
 import math
 from dataclasses import replace
+from typing import Any
 
 import numba
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from model.dynamics import recursive
 from model.dynamics.dual import DUAL_STEP, LARGEST_ANGLE, reciprocal, sin_cos
@@ -19,6 +21,7 @@ from model.dynamics.inertial_influence import (
     parameters_about_joint,
     torque_sensitivities,
 )
+from model.dynamics.wide_numbers import WIDTH, Dual, Lanes, Plain, exponential, root, seen_as, where, whole
 from model.kinematics.chain import Chain, ChainError, Joint, JointKind, Link
 from tests.model.dynamics.chains import OFFSET_ARM, TABLE_7_9, random_chain, random_link, random_state
 from tests.model.dynamics.oracles import MuJoCo, Pinocchio, Terms
@@ -138,6 +141,48 @@ def test_interpreted_functions_agree_with_compiled_ones(x: complex) -> None:
 def test_dual_reciprocal_carries_the_derivative(x: float) -> None:
     r = compiled_reciprocal(complex(x, DUAL_STEP))
     assert r.imag / DUAL_STEP == pytest.approx(-1 / x**2, rel=1e-14)
+
+
+@numba.njit
+def formula(x: Any, y: Any) -> Any:
+    """Every operation of numbers of several parts."""
+    s, c = sin_cos(x)
+    z = (x * y - 2.0 * c) / (2.5 + s) + exponential(-y) - y / 3.0
+    z += root(30.0 + x) * reciprocal(1.5 + y)
+    z -= 0.5
+    return where((z.real > 1.0) & (z.real <= 4.0), z - whole(z), -z)
+
+
+@numba.njit
+def along(tag: Any, numbers: Any, results: Any) -> None:
+    seen, found = seen_as(tag, numbers), seen_as(tag, results)
+    for k in range(seen.shape[0]):
+        found[k] = formula(seen[k, 0], seen[k, 1])
+
+
+def by_numpy(x: NDArray[Any], y: NDArray[Any]) -> NDArray[Any]:
+    z = (x * y - 2 * np.cos(x)) / (2.5 + np.sin(x)) + np.exp(-y) - y / 3 + np.sqrt(30 + x) / (1.5 + y) - 0.5
+    chosen = (z.real > 1) & (z.real <= 4)
+    return np.asarray(np.where(chosen, z - np.floor(z.real), -z))
+
+
+def test_numbers_of_several_parts_calculate_as_numpy_does() -> None:
+    """Lanes as arrays of real numbers, each derivative as a complex step, in numpy's functions."""
+    rng = np.random.default_rng(1)
+    points = np.stack([rng.uniform(-20.0, 20.0, (500, WIDTH)), rng.uniform(0.1, 3.0, (500, WIDTH))], axis=1)
+    lanes = np.zeros((500, WIDTH))
+    along(Lanes(0), points, lanes)
+    np.testing.assert_allclose(lanes, by_numpy(points[:, 0], points[:, 1]), rtol=0, atol=1e-12)
+    dual = np.concatenate([points[..., :1], rng.normal(size=(500, 2, WIDTH))], axis=-1)
+    found = np.zeros((500, 1 + WIDTH))
+    along(Dual(0), dual, found)
+    stepped = dual[..., :1] + 1j * DUAL_STEP * dual[..., 1:]
+    expected = by_numpy(stepped[:, 0], stepped[:, 1])
+    np.testing.assert_allclose(found[:, 0], expected[:, 0].real, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found[:, 1:], expected.imag / DUAL_STEP, rtol=1e-10, atol=1e-10)
+    plain = np.zeros(500)
+    along(Plain(0), points[..., 0].copy(), plain)
+    np.testing.assert_allclose(plain, lanes[:, 0], rtol=0, atol=1e-12)
 
 
 def test_an_angle_that_is_not_a_number_stays_so() -> None:

@@ -9,7 +9,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.quantity import Quantity
 from model.fitting.choice import chosen_unknowns, friction_forms, start_postures, with_bends
 from model.fitting.options import FitOptions, Prior
-from model.fitting.records import records_of, resolution
+from model.fitting.records import records_of
 from model.machine_model.model import base_model
 from model.record_check.readings import sensor_deviation
 from tests.model.fitting.imagined import arm, machine
@@ -149,7 +149,7 @@ def test_the_arm_may_start_off_the_posture_that_was_read_by_the_sensor_s_error()
     assert [(u.trace, u.joints) for u in found] == [(t, (j,)) for t in (0, 1) for j in (1, 2, 3)]
     sensor = machine().joint(1).sensor
     assert sensor is not None
-    assert found[0].deviation == pytest.approx(max(sensor_deviation(sensor), resolution(sensor)))
+    assert found[0].deviation == pytest.approx(max(sensor_deviation(sensor), sensor.count))
     assert found[0].deviation is not None
     assert (found[0].low, found[0].high) == pytest.approx((-20 * found[0].deviation, 20 * found[0].deviation))
     assert all((u.start, u.expected, u.nuisance) == (0.0, 0.0, True) for u in found)

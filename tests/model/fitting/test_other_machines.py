@@ -13,7 +13,6 @@ from daq.contracts.trace import Trace
 from model.fitting.fit import fit, fit_problem
 from model.fitting.noise import noise_effect
 from model.fitting.options import FitOptions, Prior
-from model.fitting.records import resolution
 from model.fitting.result import FitResult, is_result, load_result
 from model.fitting.simulated import SimulatedProblem
 from model.machine_model.model import Model, base_model
@@ -136,7 +135,7 @@ def test_what_the_noise_does_on_average_is_the_mean_over_replicas_of_the_model_a
 def resolution_of(problem: SimulatedProblem) -> float:
     sensor = problem.model.machine.joint(1).sensor
     assert sensor is not None
-    return resolution(sensor)
+    return sensor.count
 
 
 def test_a_model_that_does_not_stay_finite_is_told_with_its_record() -> None:

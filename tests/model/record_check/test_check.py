@@ -29,11 +29,9 @@ from model.fitting.options import FitOptions
 from model.fitting.records import noise_floor, records_of
 from model.inverse_dynamics.fit import fit_torques
 from model.machine_model.model import base_model
-from model.record_check.check import check_records, repaired
+from model.record_check.check import as_used, check_records, repaired
 from model.record_check.finding import RecordFinding, doubts_in
 from model.record_check.readings import find_bounds, find_dead, find_jumps
-from model.reports.diagnosis_report import diagnosis_report
-from model.reports.page import html
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.record_check.faults import FAULTS, Faulty
 from tests.model.record_check.rigs import RIGS, ROOT, example, mock, world
@@ -102,7 +100,6 @@ def test_a_doubted_record_is_the_verdict_on_terminal_report_and_in_json(tmp_path
     assert says in headline(found)
     assert says in " ".join(answer_text(found).split())
     assert answer_text(found).startswith("CHECK THE RECORD")
-    assert says in html(diagnosis_report(found))
     assert found.model_dump(mode="json")["record"][0]["kind"] == "columns-swapped"
     assert trace.set_point is not None
     apart = replace(trace, set_point=trace.set_point + 100.0)
@@ -129,6 +126,22 @@ def test_a_joint_that_rests_on_the_edge_of_a_count_is_at_no_bound() -> None:
     assert find_bounds(rests) == []
     comes = np.minimum(0.05 * np.arange(400.0), 10.0)
     assert find_bounds(comes) == [(200, 399)]
+    reached = np.cumsum([0.08, 0.13, 0.16, 0.065, 0.006, *[0.0] * 60])  # a servo that comes to its set point
+    assert find_bounds(reached) == []
+
+
+def test_a_record_is_used_where_no_joint_stands_at_its_stop(tmp_path: Path) -> None:
+    machine, trace = example("single_axis")(tmp_path)
+    swing = np.sin(2 * np.pi * (trace.time - trace.time[0]) / 3.0)
+    at_stop = np.where(trace.time < trace.time[0] + 3.0, np.minimum(swing, 0.6), 0.5 * swing)
+    stopped = replace(trace, position=at_stop[:, None])
+    (used,) = as_used([stopped], machine)
+    assert 1.19 < used.time[0] - trace.time[0] < 1.3
+    assert used.time[-1] == trace.time[-1]
+    (one,) = [one for one in check_records(base_model(machine), [stopped]) if one.kind == "saturated"]
+    assert (one.consequence, one.advice[:6]) == ("note", "Used: ")
+    (free,) = as_used([trace], machine)
+    assert len(free) == len(trace)
 
 
 def test_an_encoder_that_dies_for_good_or_wakes_up_late_is_stuck(tmp_path: Path) -> None:
@@ -349,7 +362,8 @@ def test_a_fault_is_said_with_its_place(name: str, kind: str, seed: int) -> None
     found = check_records(base_model(machine), [fault.trace])
     lines = [one.line for one in found]
     assert said(found, fault), lines
-    assert kind in ONLY_NOTED or doubts_in(found), lines
+    cut = kind == "saturated" and all(one.advice.startswith("Used: ") for one in said(found, fault))
+    assert cut or kind in ONLY_NOTED or doubts_in(found), lines
 
 
 @pytest.mark.parametrize("name", RIGS)

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from model import layout as at
 from model.arrays import Array
+from model.dynamics.wide_numbers import WIDTH
 from model.machine_model.model import Lineage, Model, base_model
 from model.machine_model.model_file import load_model, save_model
 from model.simulation import batch, kernel
@@ -22,7 +24,7 @@ from model.simulation.batch import BatchRun, available_cores
 from model.simulation.period import OUTPUTS
 from model.simulation.prepared import Options, prepare
 from model.simulation.run_arrays import RecordArrays, RunArrays
-from model.simulation.simulate import parameter_vectors, simulate, simulate_many
+from model.simulation.simulate import SIGNALS, simulate, simulate_many
 from model.simulation.specialised import AnyChain, ClosedForm, Flexible, uncompiled
 from tests.model.simulation.records import ramp_inputs
 
@@ -59,7 +61,7 @@ def test_a_run_that_has_to_be_compiled_is_announced_once(
     """In place of the arm's run stands one that has never been compiled."""
 
     @numba.njit
-    def numbered(first: int, last: int, _records: RecordArrays, _runs: RunArrays, out: Array) -> None:
+    def numbered(_numbers: Any, first: int, last: int, _records: RecordArrays, _runs: RunArrays, out: Array) -> None:
         for r in range(first, last):
             out[r] = r + 1.0
 
@@ -124,16 +126,49 @@ def test_steps_of_one_millisecond_follow_the_arm_as_its_machine_file_has_it(mode
 def test_runs_repeat_to_the_bit_and_do_not_depend_on_their_neighbours(model: Model) -> None:
     inputs = ramp_inputs(model.machine)
     once = simulate(model, inputs)
-    vectors = parameter_vectors(model, ["load.mass"], np.linspace(1.0, 1.5, 9)[:, None])
-    vectors[4] = model.vector
-    (many,) = simulate_many(model, [inputs], vectors)
-    assert np.array_equal(many[4, 0], once.position)
+    masses = np.linspace(1.0, 1.5, 9)
+    masses[4] = model.parameter("load.mass").value
+    (many,) = simulate_many(model, [inputs], {"load.mass": masses}, signals=("reading", "position"))
+    assert np.array_equal(many[4, 1], once.position)
+    assert np.array_equal(many[4, 0], once.reading)
     assert np.array_equal(simulate(model, inputs).power, once.power)
     assert not np.array_equal(many[0, 0], many[8, 0])
     short, long = ramp_inputs(model.machine, duration=1.0), ramp_inputs(model.machine, back=True)
-    first, second = simulate_many(model, [short, long], model.vector[None])
+    first, second = simulate_many(model, [short, long], {}, signals=("position",))
     assert np.array_equal(first[0, 0], simulate(model, short).position)
     assert np.array_equal(second[0, 0], simulate(model, long).position)
+
+
+@pytest.mark.parametrize("effects", [lambda model: model, loaded], ids=["plain", "every effect"])
+def test_runs_in_lanes_are_the_runs_one_by_one(
+    model: Model, effects: Callable[[Model], Model], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two records, two delays, and effects that only some of the runs have; groups do not come out even."""
+    arm = effects(model).with_effect("spring_torque", (2,))
+    records = [ramp_inputs(arm.machine, back=True), ramp_inputs(arm.machine, duration=0.6)]
+    count = 2 * WIDTH + 3
+    rng = np.random.default_rng(1)
+    values = {
+        "load.mass": rng.uniform(0.5, 2.0, count),
+        "joint2.spring_torque.stiffness": np.where(np.arange(count) % 3, 0.0, 0.7),
+        "joint3.load_dependent_friction.arm": rng.uniform(0.0, 0.1, count),
+        "controller.delay": np.where(np.arange(count) < 5, 0.006, 0.0071),
+    }
+    options = Options(step=2e-3)
+    alone = simulate_many(arm, records, values, options, tuple(SIGNALS))
+    monkeypatch.setattr(batch, "LANES_FROM", 1)
+    lanes = simulate_many(arm, records, values, options, tuple(SIGNALS))
+    for one, other in zip(alone, lanes, strict=True):
+        assert np.ptp(one[:, 0], axis=0).max() > COUNT, "the runs differ"
+        np.testing.assert_allclose(other, one, rtol=0, atol=1e-9)
+
+
+def test_unknown_signals_and_uneven_values_are_refused(model: Model) -> None:
+    inputs = ramp_inputs(model.machine, duration=0.3)
+    with pytest.raises(SpecError, match="signal 'torque': not one of a simulation; those are position, velocity"):
+        simulate_many(model, [inputs], {}, signals=("torque",))
+    with pytest.raises(SpecError, match=r"load.mass 2, link1.mass 3; each must have as many"):
+        simulate_many(model, [inputs], {"load.mass": np.ones(2), "link1.mass": np.ones(3)})
 
 
 # ---- A run without a compiler is the run that is compiled: for stepping through it, and for trying faults in it.

@@ -11,13 +11,13 @@ from daq.contracts.trace import Trace
 from model import layout as at
 from model.arrays import Floats
 from model.drives import controller as pid
-from model.dynamics.dual import DUAL_STEP
+from model.dynamics.wide_numbers import WIDTH
 from model.machine_model.model import base_model
 from model.machine_model.parameter import initial_position
 from model.simulation.batch import seed
 from model.simulation.inputs import inputs_of
 from model.simulation.prepared import Options, Prepared, prepare
-from model.simulation.simulate import parameter_vectors, sensitivities, simulate
+from model.simulation.simulate import sensitivities, simulate
 from tests.model.simulation.machines import SLIDE, pendulum, slide
 from tests.model.simulation.records import ramp_inputs, trace_of
 
@@ -220,29 +220,32 @@ def test_the_arm_begins_at_the_mean_of_what_it_read_at_rest(readings: list[float
 
 def test_a_parameter_is_differentiated_at_all_its_places_and_an_initial_posture_at_its_own() -> None:
     model = base_model(MA2000)
-    vector, initial = model.vector.astype(np.complex128), np.zeros((3, 2), dtype=np.complex128)
+    vector, initial = np.zeros(len(model.vector)), np.zeros((3, 2))
     mass = model.parameter("load.mass")
     seed(mass, vector, initial)
-    assert np.flatnonzero(vector.imag).tolist() == sorted(mass.slots)
-    assert (vector.imag[list(mass.slots)] == DUAL_STEP).all()
-    assert not initial.imag.any()
-    np.testing.assert_array_equal(vector.real, model.vector)
+    assert np.flatnonzero(vector).tolist() == sorted(mass.slots)
+    assert not initial.any()
     seed(initial_position(2), vector, initial)
-    assert np.flatnonzero(vector.imag).tolist() == sorted(mass.slots)
-    assert initial.imag[:, 0].tolist() == [0.0, DUAL_STEP, 0.0]
-    assert not initial.imag[:, 1].any()
+    assert np.flatnonzero(vector).tolist() == sorted(mass.slots)
+    assert initial[:, 0].tolist() == [0.0, 1.0, 0.0]
+    assert not initial[:, 1].any()
 
 
-def test_vectors_of_parameters_have_their_values_in_place() -> None:
-    model = base_model(MA2000)
-    names = ("load.mass", "link1.mass")
-    found = parameter_vectors(model, names, np.array([[1.0, 2.0], [3.0, 4.0]]))
-    for row, values in zip(found, ((1.0, 2.0), (3.0, 4.0)), strict=True):
-        for name, value in zip(names, values, strict=True):
-            assert (row[list(model.parameter(name).slots)] == value).all()
-    assert parameter_vectors(model, ("load.mass",), np.array([1.5])).shape == (1, len(model.vector))
-    rest = [k for k in range(len(model.vector)) if all(k not in model.parameter(name).slots for name in names)]
-    np.testing.assert_array_equal(found[1, rest], model.vector[rest])
+@pytest.mark.parametrize("general", [False, True], ids=["closed form", "recursive"])
+def test_derivatives_that_a_run_carries_together_are_those_that_it_carries_alone(general: bool) -> None:
+    model = base_model(MA2000).with_effect("joint_compliance", (1,), {"compliance": 1e-3})
+    free = [model.parameter(name) for name in CASES] + [initial_position(j) for j in (1, 2, 3)]
+    assert len(free) > WIDTH
+    options = Options(general=general)
+    inputs = ramp_inputs(model.machine, duration=0.6)
+    together = sensitivities(model, inputs, free, options)
+    for parameter, slope in zip(free, together.jacobian, strict=True):
+        alone = sensitivities(model, inputs, [parameter], options)
+        np.testing.assert_array_equal(alone.jacobian[0], slope)
+        assert np.abs(slope).max() > 0
+    assert together.simulation.position == pytest.approx(
+        simulate(model, inputs, replace(options, quantise=False)).position, abs=1e-12
+    )
 
 
 # ---- Exact derivatives against wide finite differences of the same loop without rounding

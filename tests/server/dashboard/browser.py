@@ -143,6 +143,7 @@ class Dashboard:
 
 def watched(context: BrowserContext, service: Service, mock: MockControl | None = None) -> Dashboard:
     """A new tab, with everything noted that the browser complains about."""
+    context.add_init_script("localStorage.setItem('ma2000-tour', 'seen')")  # the tour has a test of its own
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
     tab = Dashboard(service, mock, page)

@@ -73,7 +73,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Service, 
 @pytest.fixture
 def dashboard(browser: Browser, served: tuple[Service, MockControl]) -> Iterator[Dashboard]:
     """A tab on a service as every test wants to find it: not stopped, nobody in control, the queue open and empty, no
-    program kept."""
+    program kept. No layout is left behind."""
     service, mock = served
     service.until_connected()
     for one in service.robot.get("/queue/experiments").json():
@@ -86,6 +86,7 @@ def dashboard(browser: Browser, served: tuple[Service, MockControl]) -> Iterator
     tab = watched(context, service, mock)
     yield tab
     context.close()
+    service.client.put("/me/layouts", json={"text": ""})
     assert tab.complaints == []
 
 

@@ -122,7 +122,7 @@ def test_stop_is_whole_beside_every_badge(dashboard: Dashboard) -> None:
 def test_a_phone_has_state_arm_numbers_and_jogging_before_the_charts(dashboard: Dashboard) -> None:
     page = dashboard.until_live()
     page.set_viewport_size({"width": 390, "height": 844})
-    parts = [".now", ".side > :nth-child(1)", ".side > :nth-child(2)", ".hand", ".charts", ".link"]
+    parts = [".now", *(f"[data-kind={kind}]" for kind in ("arm", "table", "hand", "charts", "link")), ".menu"]
     top = "one => one.getBoundingClientRect().top"
     places = [page.locator(f"main .page {part}").first.evaluate(top) for part in parts]
     assert places == sorted(places)

@@ -14,7 +14,10 @@ from tests.server.polling import reset
 
 pytestmark = pytest.mark.browser
 CONFIRMED = "[role=alert] [data-stop=confirmed]"
-PAGES = ("live", "experiments", "traces", "models", "diagnosis", "system")
+PAGES = (
+    *("live", "experiments", "experiments/macros", "experiments/plan", "experiments/console"),
+    *("traces", "models", "diagnosis", "system", "kiosk"),
+)
 
 
 @contextmanager

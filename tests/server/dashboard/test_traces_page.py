@@ -83,11 +83,11 @@ def _box(page: Page, name: str) -> Locator:
 
 def test_traces_are_found_and_laid_over_each_other(dashboard: Dashboard, traces: tuple[str, str]) -> None:
     page = dashboard.open("traces")
-    page.get_by_role("searchbox").fill("large")
+    page.get_by_role("combobox", name="Search words").fill("large")
     expect(_box(page, "small")).not_to_be_attached()
     page.get_by_role("link", name="large").first.click()
     expect(_chart(page)).to_have_accessible_name(re.compile("of joint 1, 2, 3,"))
-    page.get_by_role("searchbox").fill("")
+    page.get_by_role("combobox", name="Search words").fill("")
     _box(page, "small").check()
     expect(page.get_by_role("list", name="Traces shown").get_by_role("listitem")).to_have_count(2)
     expect(_chart(page)).to_have_accessible_name(re.compile("of joint 1,"))
@@ -96,6 +96,12 @@ def test_traces_are_found_and_laid_over_each_other(dashboard: Dashboard, traces:
     assert re.search(f"{traces[1]}(,|%2C){traces[0]}", page.url)
     page.reload()
     expect(page.get_by_role("list", name="Traces shown").get_by_role("listitem")).to_have_count(2)
+    for name in ("Best shift", "Difference", "Spectrum"):
+        page.get_by_role("button", name=name).click()
+    expect(page.get_by_role("img", name="Difference of the positions of joint 1")).to_be_visible()
+    expect(page.get_by_role("img", name="Amplitude spectrum of the error of joint 1")).to_be_visible()
+    expect(page.get_by_text(re.compile(r"^rms 2: \d+\.\d+ °"))).to_be_visible()
+    assert faults_of(page) == []
 
 
 def test_the_chart_is_zoomed_by_buttons_and_by_dragging(dashboard: Dashboard, traces: tuple[str, str]) -> None:
@@ -155,14 +161,16 @@ def test_tags_and_notes_are_kept_and_searched(dashboard: Dashboard, traces: tupl
     expect(page.get_by_text("“bad/tag”: letters, digits")).to_be_visible()
     tags.fill("good, wear-study")
     page.get_by_role("textbox", name="Notes").fill("the belt was new")
-    page.get_by_role("button", name="Save tags and notes").click()
-    expect(page.get_by_role("button", name="Saved")).to_be_visible()
+    expect(page.get_by_role("form").get_by_text("Saved", exact=True)).to_be_visible()
     entry = dashboard.service.robot.get(f"/traces/{traces[0]}").json()["entry"]
     assert (entry["tags"], entry["notes"]) == (["good", "wear-study"], "the belt was new")
     page.get_by_role("button", name="wear-study").click()
     expect(page.get_by_role("list", name="Traces found").get_by_role("listitem")).to_have_count(1)
-    page.get_by_role("button", name="Any tag").click()
-    page.get_by_role("searchbox").fill("belt was")
+    line = page.get_by_role("combobox", name="Search words")
+    expect(line).to_have_value("tag:wear-study")
+    line.fill("source:moon")
+    expect(page.get_by_text("source: allowed are mock, real, imported")).to_be_visible()
+    line.fill("belt was source:mock")
     expect(page.get_by_role("list", name="Traces found").get_by_role("listitem")).to_have_count(1)
 
 

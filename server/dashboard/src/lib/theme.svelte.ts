@@ -3,6 +3,15 @@
 export type Choice = 'system' | 'light' | 'dark';
 const KEY = 'ma2000-theme';
 
+/** A report that is shown in a frame of its own may keep nothing. */
+function keptChoice(): string | null {
+  try {
+    return localStorage.getItem(KEY);
+  } catch {
+    return null;
+  }
+}
+
 class Theme {
   choice = $state<Choice>('system');
   private systemIsDark = $state(false);
@@ -20,7 +29,7 @@ class Theme {
       this.systemIsDark = event.matches;
       this.show();
     });
-    const kept = localStorage.getItem(KEY);
+    const kept = keptChoice();
     if (kept === 'light' || kept === 'dark') this.choice = kept;
     this.show();
   }

@@ -24,3 +24,6 @@ export const PAGES: readonly PageEntry[] = [
   { path: 'diagnosis', title: 'Diagnosis', load: () => import('./Diagnosis.svelte') },
   { path: 'system', title: 'System', load: () => import('./System.svelte') },
 ];
+
+/** The screen at the arm: a page without the header, since it has a Stop of its own. */
+export const KIOSK: PageEntry = { path: 'kiosk', title: 'At the arm', load: () => import('./Kiosk.svelte') };

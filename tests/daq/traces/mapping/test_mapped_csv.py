@@ -56,6 +56,9 @@ def test_what_is_guessed_is_shown_and_asked_for(tmp_path: Path) -> None:
         "position": "q{} [deg] in deg",
         "drive": "tau{} [Nm] in Nm",
     }
+    speed = file(tmp_path / "bench.csv", ["0,1", "1,2"], "Time,Velo")  # words that are cut short
+    with pytest.raises(TraceError, match=r"--map 'velocity=Velo in \?'"):
+        open_trace(speed)
     partly = open_trace(path, choice=Choice(map={"time": "stamp in ms", "position": "q{}"}))
     assert partly.drive is None
     assert "Not taken: drive = tau{} in ?." in partly.record.notes
@@ -71,12 +74,13 @@ def test_what_is_guessed_is_shown_and_asked_for(tmp_path: Path) -> None:
         ({"position": "#"}, [1]),
         ({"position": "other.csv:x"}, [5]),
         ({"position": "long[{}::2]"}, [3, 4]),
+        ({"position": "- q{}"}, [7]),
         ({"velocity": "q0 in deg/s"}, [0.5 * math.radians(21) * 0.01]),
     ],
 )
 def test_expressions(tmp_path: Path, given: dict[str, str], expected: list[float]) -> None:
-    rows = ["0,10,20,65534,1", "10,11,22,65535,2"]
-    path = file(tmp_path / "a.csv", rows, "stamp,q0,q1,big0,long")
+    rows = ["0,10,20,65534,1,6", "10,11,22,65535,2,7"]
+    path = file(tmp_path / "a.csv", rows, "stamp,q0,q1,big0,long,- q0")
     if "long" in given.get("position", ""):
         path = file(tmp_path / "a.csv", ["1", "2", "3", "4"], "long")
         file(tmp_path / "times.csv", ["0", "1"], "t")

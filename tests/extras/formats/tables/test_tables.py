@@ -11,7 +11,7 @@ import pyarrow.parquet
 import pytest
 from scipy.io import savemat
 
-from daq.contracts.errors import TraceError
+from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.import_choice import Choice
 from daq.traces.files import open_trace
 
@@ -70,6 +70,17 @@ def test_ranges_of_minus_100_to_100_are_angles_by_the_calibration(tmp_path: Path
     (tmp_path / "so101.json").write_text("{}")
     with pytest.raises(TraceError, match="has no range_min and range_max of joint 'shoulder_pan'"):
         open_trace(path, choice=Choice(map={"position": "in range of so101.json"}, where="episode_index=0"))
+
+
+def test_ranges_are_angles_by_the_limits_of_a_machine_too_and_joints_that_it_lacks_are_left_out(tmp_path: Path) -> None:
+    path = data_set(tmp_path / "pick")
+    trace = open_trace(path, choice=Choice(map={"position": "in range of so101"}, where="episode_index=0"))
+    assert trace.record.joint_names == ("shoulder_pan", "elbow_flex")
+    np.testing.assert_allclose(trace.position[2], [2 / 100 * 1.9199, 4 / 100 * 1.69], rtol=1e-6)
+    assert trace.set_point is not None
+    assert trace.set_point[0, 0] == pytest.approx(1 / 100 * 1.9199, rel=1e-6)
+    with pytest.raises(SpecError, match=r"machine '.*nobody.toml': no such file"):
+        open_trace(path, choice=Choice(map={"position": "in range of nobody.toml"}, where="episode_index=0"))
 
 
 def test_structures_of_matlab(tmp_path: Path) -> None:

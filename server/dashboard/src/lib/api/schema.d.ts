@@ -1423,6 +1423,211 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/robots/{robot}/camera": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Camera
+         * @description Returns what gives the pictures, and why there are none.
+         */
+        get: operations["get_camera"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/camera/picture": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Camera Picture
+         * @description Returns the newest picture, a JPEG, or nothing (204) if it is the one that the client has.
+         */
+        get: operations["get_camera_picture"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/console/commands": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Console Commands
+         * @description Lists the commands of the console with their options, for completion and help.
+         */
+        get: operations["list_console_commands"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/console/read": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Read Console Line
+         * @description Returns what a line of the command line's language asks for. Carries out nothing.
+         */
+        post: operations["read_console_line"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/experiments/{experiment}/line": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Experiment Line
+         * @description Returns the line that runs this experiment once more: a start for a macro.
+         */
+        get: operations["get_experiment_line"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/macros": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Macros
+         * @description Lists the stored macros, most recently changed first, and examples.
+         */
+        get: operations["list_macros"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/macros/read": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Read Macro
+         * @description Checks a macro that is not stored, with the defaults of its parameters.
+         */
+        post: operations["read_macro"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/macros/{macro}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Put Macro
+         * @description Stores a macro, or a change to its `revision`. Its lines must be valid with its defaults. Moves nothing.
+         */
+        put: operations["put_macro_"];
+        post?: never;
+        /**
+         * Delete Macro
+         * @description Deletes a macro permanently.
+         */
+        delete: operations["delete_macro"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/macros/{macro}/read": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Read Kept Macro
+         * @description Returns the experiments of a macro with these values. Queues nothing: a client submits them.
+         */
+        post: operations["read_kept_macro"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/calendar": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Calendar
+         * @description Lists what will be due from `begin` until before `end`. A due run is submitted; it moves the arm only if the
+         *     queue may.
+         */
+        get: operations["get_calendar"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/robots/{robot}/hidden": {
         parameters: {
             query?: never;
@@ -1484,6 +1689,30 @@ export interface paths {
          */
         get: operations["compare_fleet"];
         put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/me/layouts": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Layouts
+         * @description Returns the caller's layouts.
+         */
+        get: operations["get_layouts"];
+        /**
+         * Put Layouts
+         * @description Keeps the caller's layouts in place of those kept before.
+         */
+        put: operations["put_layouts"];
         post?: never;
         delete?: never;
         options?: never;
@@ -1900,6 +2129,21 @@ export interface components {
             joints?: number[];
         };
         /**
+         * CameraStatus
+         * @description A robot's camera. `source`: `none`, `synthetic` (drawn from the mock's posture) or `mjpeg`.
+         */
+        CameraStatus: {
+            /**
+             * Source
+             * @enum {string}
+             */
+            source: "none" | "synthetic" | "mjpeg";
+            /** Records */
+            records: boolean;
+            /** Problem */
+            problem: string;
+        };
+        /**
          * CatalogueEntry
          * @description One trace as the catalogue lists it.
          */
@@ -2022,6 +2266,64 @@ export interface components {
              */
             kind: "compare";
             data: components["schemas"]["ComparisonData"];
+        };
+        /**
+         * ConsoleCommand
+         * @description A command of the console, such as `run ramp`.
+         */
+        ConsoleCommand: {
+            /** Words */
+            words: string[];
+            /** Help */
+            help: string;
+            /** Options */
+            options: components["schemas"]["ConsoleOption"][];
+        };
+        /**
+         * ConsoleLine
+         * @description A line, without `daq` at its beginning.
+         */
+        ConsoleLine: {
+            /** Line */
+            line: string;
+        };
+        /**
+         * ConsoleOption
+         * @description An option or an argument of a command.
+         */
+        ConsoleOption: {
+            /** Name */
+            name: string;
+            /** Flags */
+            flags: string[];
+            /** Takes Value */
+            takes_value: boolean;
+            /** Help */
+            help: string;
+            /** Default */
+            default: string;
+            /** Choices */
+            choices: string[];
+        };
+        /**
+         * ConsoleOrder
+         * @description What a line asks for. The client carries it out through the routes of the service.
+         */
+        ConsoleOrder: {
+            /** Words */
+            words: string[];
+            /** Values */
+            values: {
+                [key: string]: boolean | number | string | null;
+            };
+            spec?: components["schemas"]["ExperimentSpec"] | null;
+            /** Cron */
+            cron?: string | null;
+            /**
+             * Dry Run
+             * @default false
+             */
+            dry_run?: boolean;
         };
         /**
          * Control
@@ -2176,7 +2478,7 @@ export interface components {
             rotor_inertia: components["schemas"]["Quantity"];
             gear_ratio: components["schemas"]["Quantity"];
             amplifier_gain: components["schemas"]["Quantity"];
-            dac_full_scale: components["schemas"]["Quantity"];
+            dac_full_scale?: components["schemas"]["Quantity"] | null;
             supply_limit?: components["schemas"]["Quantity"] | null;
         };
         /**
@@ -3914,6 +4216,30 @@ export interface components {
             speed?: number | null;
         };
         /**
+         * KeptLayouts
+         * @description All layouts of one person. `text`: as the page writes them; empty if none are kept.
+         */
+        KeptLayouts: {
+            /** Text */
+            text: string;
+        };
+        /**
+         * KeptMacro
+         * @description A stored macro; a change states the `revision` that was edited.
+         */
+        KeptMacro: {
+            macro: components["schemas"]["Macro"];
+            /** Revision */
+            revision: number;
+            /**
+             * Changed
+             * Format: date-time
+             */
+            changed: string;
+            /** Changed By */
+            changed_by: string;
+        };
+        /**
          * KnownEffect
          * @description An effect of the library, which a fit may add and a diagnosis considers.
          */
@@ -4111,6 +4437,98 @@ export interface components {
             limits?: components["schemas"]["Limits"];
             /** Rest Posture */
             rest_posture?: number[] | null;
+        };
+        /**
+         * Macro
+         * @description A named sequence of experiments: lines of `run`, in which `{name}` stands for the value of a parameter.
+         */
+        Macro: {
+            /** Name */
+            name: string;
+            /**
+             * Description
+             * @default
+             */
+            description?: string;
+            /**
+             * Parameters
+             * @default []
+             */
+            parameters?: components["schemas"]["MacroParameter"][];
+            /** Lines */
+            lines: string[];
+        };
+        /**
+         * MacroParameter
+         * @description A parameter of a macro, with the type and the bounds that its form has.
+         */
+        MacroParameter: {
+            /** Name */
+            name: string;
+            /**
+             * Title
+             * @default
+             */
+            title?: string;
+            /**
+             * Unit
+             * @default
+             */
+            unit?: string;
+            /**
+             * Type
+             * @default number
+             * @enum {string}
+             */
+            type?: "number" | "integer" | "text";
+            /** Default */
+            default: number | string;
+            /** Minimum */
+            minimum?: number | null;
+            /** Maximum */
+            maximum?: number | null;
+            /**
+             * Choices
+             * @default []
+             */
+            choices?: string[];
+        };
+        /**
+         * MacroReading
+         * @description A macro with values in place of its parameters.
+         */
+        MacroReading: {
+            /** Parameters */
+            parameters: {
+                [key: string]: unknown;
+            };
+            /** Lines */
+            lines: string[];
+            /** Orders */
+            orders: components["schemas"]["ConsoleOrder"][];
+        };
+        /**
+         * MacroValues
+         * @description Values of a macro's parameters; those left out have their defaults.
+         */
+        MacroValues: {
+            /**
+             * Values
+             * @default {}
+             */
+            values?: {
+                [key: string]: boolean | number | string;
+            };
+        };
+        /**
+         * Macros
+         * @description The stored macros, most recently changed first, and examples to begin with.
+         */
+        Macros: {
+            /** Kept */
+            kept: components["schemas"]["KeptMacro"][];
+            /** Examples */
+            examples: components["schemas"]["Macro"][];
         };
         /**
          * Me
@@ -4926,6 +5344,30 @@ export interface components {
             kind: "gain";
             gain: components["schemas"]["Quantity"];
             inertia?: components["schemas"]["Quantity"] | null;
+        };
+        /**
+         * PlannedRun
+         * @description An experiment that will be submitted, or begin, at a time. Whether the arm then moves depends on the queue.
+         */
+        PlannedRun: {
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /** Name */
+            name: string;
+            /** Seconds */
+            seconds: number;
+            /** Joints */
+            joints: number[];
+            /** By */
+            by: string;
+            spec: components["schemas"]["ExperimentSpec"];
+            /** Schedule */
+            schedule?: string | null;
+            /** Experiment */
+            experiment?: string | null;
         };
         /**
          * PlayPath
@@ -5784,7 +6226,7 @@ export interface components {
          */
         Sensor: {
             /** Bits */
-            bits: number;
+            bits?: number | null;
             range: components["schemas"]["Quantity"];
             at_zero: components["schemas"]["Quantity"];
             /**
@@ -6106,6 +6548,13 @@ export interface components {
             unattended: boolean;
             /** Stop Port */
             stop_port: number;
+            /**
+             * Panels
+             * @default {}
+             */
+            panels?: {
+                [key: string]: string;
+            };
         };
         /**
          * TaughtPath
@@ -6695,6 +7144,14 @@ export interface components {
              * @default false
              */
             whole_record?: boolean;
+        };
+        /**
+         * WrittenLine
+         * @description The line that asks for an experiment.
+         */
+        WrittenLine: {
+            /** Line */
+            line: string;
         };
         /**
          * JointResidual
@@ -9016,6 +9473,296 @@ export interface operations {
             };
         };
     };
+    get_camera: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CameraStatus"];
+                };
+            };
+        };
+    };
+    get_camera_picture: {
+        parameters: {
+            query?: {
+                /** @description Number of the picture that the client has. */
+                after?: number;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/jpeg": unknown;
+                };
+            };
+            /** @description There is none newer. */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+        };
+    };
+    list_console_commands: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ConsoleCommand"][];
+                };
+            };
+        };
+    };
+    read_console_line: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ConsoleLine"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ConsoleOrder"];
+                };
+            };
+        };
+    };
+    get_experiment_line: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                experiment: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["WrittenLine"];
+                };
+            };
+        };
+    };
+    list_macros: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Macros"];
+                };
+            };
+        };
+    };
+    read_macro: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Macro"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MacroReading"];
+                };
+            };
+        };
+    };
+    put_macro_: {
+        parameters: {
+            query?: {
+                /** @description The revision that was changed. */
+                revision?: number | null;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the macro. */
+                macro: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Macro"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["KeptMacro"];
+                };
+            };
+        };
+    };
+    delete_macro: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the macro. */
+                macro: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+        };
+    };
+    read_kept_macro: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the macro. */
+                macro: string;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MacroValues"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MacroReading"];
+                };
+            };
+        };
+    };
+    get_calendar: {
+        parameters: {
+            query: {
+                begin: string;
+                end: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PlannedRun"][];
+                };
+            };
+        };
+    };
     get_hiding_place: {
         parameters: {
             query?: never;
@@ -9114,6 +9861,50 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["FleetComparison"];
+                };
+            };
+        };
+    };
+    get_layouts: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["KeptLayouts"];
+                };
+            };
+        };
+    };
+    put_layouts: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["KeptLayouts"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["KeptLayouts"];
                 };
             };
         };

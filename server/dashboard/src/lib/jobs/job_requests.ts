@@ -1,6 +1,6 @@
 /** What is asked of the service about one job. */
 
-import { api, ask, download, here, saveAs, type Job } from '../api';
+import { api, ask, download, here, type Job } from '../api';
 import type { JobRequests, JobResult } from './opened.svelte';
 
 export const JOB_REQUESTS: JobRequests = {
@@ -13,5 +13,4 @@ export const JOB_REQUESTS: JobRequests = {
     return ask(api.GET('/api/v1/robots/{robot}/jobs/{job}/result', { params }));
   },
   save: download,
-  keep: (name, text) => saveAs(new Blob([text], { type: 'text/html' }), name),
 };

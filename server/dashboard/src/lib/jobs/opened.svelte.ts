@@ -17,8 +17,6 @@ export interface JobRequests {
   job(id: string): Promise<Job>;
   result(id: string): Promise<JobResult>;
   save(path: string, name: string): Promise<void>;
-  /** Saves a text as a file of this name. */
-  keep(name: string, text: string): void;
 }
 
 /** As much of a page's list of jobs as is needed. */
@@ -90,11 +88,6 @@ export class OpenedJob {
         `${this.job?.request.kind ?? 'job'}-${this.id}.${ending}`,
       ),
     );
-  }
-
-  /** Saves a file that is made here. */
-  async saveMade(name: string, make: () => Promise<string>): Promise<void> {
-    await this.tried(async () => this.requests.keep(name, await make()));
   }
 
   /** Takes it away. Whether it is gone. */

@@ -20,7 +20,6 @@ beforeEach(() => {
     job: vi.fn(() => Promise.resolve(job('done'))),
     result: vi.fn(() => Promise.resolve(FOUND)),
     save: vi.fn(() => Promise.resolve()),
-    keep: vi.fn(),
   };
 });
 

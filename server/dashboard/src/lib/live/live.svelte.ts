@@ -106,6 +106,9 @@ class Live {
   /** Whether something runs that is ended unless an operator says to be there. */
   needsAttendance: boolean = $derived(this.isRealArm && !this.isUnattended && !!this.queue?.running);
 
+  /** Panels of plug-ins: where the module of each title is. */
+  panels = $state.raw<Readonly<Record<string, string>>>({});
+
   readonly clock = new ServiceClock();
   recording: Recording | null = null;
   newest: SampleMessage | null = null;
@@ -181,6 +184,7 @@ class Live {
     try {
       const known = await system;
       stop.port = known.stop_port;
+      this.panels = known.panels;
       // Of several arms some may: to say to be there does no harm then.
       this.isUnattended = known.unattended && !isFleet();
     } catch {

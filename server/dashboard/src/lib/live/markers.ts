@@ -60,6 +60,11 @@ const UNUSUAL: readonly Kind[] = [
 ];
 const TICKS: Partial<Record<Kind, string>> = { missing: 'missing samples', retry: 'repeated requests' };
 
+/** The events of something that should not have happened, or held the arm up; repeated requests are left to the link. */
+export function unusualOf(events: readonly RecordEventMessage[]): RecordEventMessage[] {
+  return events.filter((event) => UNUSUAL.includes(event.kind) && !(event.kind in TICKS));
+}
+
 /** What the marks of unusual events within [from, to] mean, by name in the order in which they first came. */
 export function explanationsOf(
   events: readonly RecordEventMessage[],

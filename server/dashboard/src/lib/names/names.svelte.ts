@@ -14,6 +14,14 @@ export class Names {
     return this.known.get(id) ?? id;
   }
 
+  /** Takes names that came with what is shown: nobody is asked for them. */
+  take(ids: readonly string[], names: Readonly<Record<string, string>>): void {
+    for (const id of ids) {
+      this.asked.add(id);
+      this.known.set(id, names[id] ?? id);
+    }
+  }
+
   /** Asks for those that are not known: for an effect. */
   learn(ids: readonly string[]): void {
     for (const id of ids) {

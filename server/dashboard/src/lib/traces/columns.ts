@@ -82,6 +82,12 @@ export function wholeRange(all: readonly Signals[]): Range | null {
   return begins.length === 0 ? null : [Math.min(...begins), Math.max(...ends)];
 }
 
+/** Root mean square of what a column has. */
+export function rmsOf(column: readonly (number | null)[]): number {
+  const there = column.filter((value) => value !== null);
+  return Math.sqrt(there.reduce((sum, value) => sum + value ** 2, 0) / there.length);
+}
+
 /** Root mean square of the difference of two columns of the same moments. */
 export function rmsDifference(one: readonly number[], other: readonly number[]): number {
   const sum = one.reduce((total, value, index) => total + (value - other[index]!) ** 2, 0);

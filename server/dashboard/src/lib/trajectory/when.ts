@@ -24,22 +24,37 @@ export function interval(seconds: number): string {
   return `${Number((seconds / size).toFixed(1))} ${unit}`;
 }
 
-/** The cron expression of a time of day: `02:00`. */
-export function cronOf(time: string): string {
+/** Days of the week as cron numbers them, from Monday. */
+export const WEEKDAYS = [
+  [1, 'Mon'],
+  [2, 'Tue'],
+  [3, 'Wed'],
+  [4, 'Thu'],
+  [5, 'Fri'],
+  [6, 'Sat'],
+  [0, 'Sun'],
+] as const;
+
+/** The cron expression of a time of day: `02:00`. `days`: weekdays by cron's numbers; all of them is every day. */
+export function cronOf(time: string, days: readonly number[] = []): string {
   const [hour, minute] = time.split(':').map(Number);
-  return `${minute} ${hour} * * *`;
+  const isDaily = days.length === 0 || days.length === WEEKDAYS.length;
+  return `${minute} ${hour} * * ${isDaily ? '*' : days.toSorted().join(',')}`;
 }
 
-/** When a schedule runs: `every 30 min`, `daily 02:00 (Europe/London)`, or its cron expression. */
+/** When a schedule runs: `every 30 min`, `daily 02:00 (Europe/London)`, `Mon, Fri 02:00 (…)`, or its cron expression. */
 export function ruleOf(schedule: {
   every: number | null;
   cron?: string | null;
   zone?: string | null;
 }): string {
   if (schedule.every !== null) return `every ${interval(schedule.every)}`;
-  const [, minute = '', hour = ''] = /^(\d+) (\d+) \* \* \*$/.exec(schedule.cron ?? '') ?? [];
-  const rule = hour === '' ? schedule.cron : `daily ${hour.padStart(2, '0')}:${minute.padStart(2, '0')}`;
-  return `${rule} (${schedule.zone})`;
+  const found = /^(\d+) (\d+) \* \* (\*|[0-6](?:,[0-6])*)$/.exec(schedule.cron ?? '');
+  if (found === null) return `${schedule.cron} (${schedule.zone})`;
+  const [, minute = '', hour = '', on = ''] = found;
+  const days = WEEKDAYS.filter(([number]) => on.includes(String(number))).map(([, name]) => name);
+  const when = on === '*' ? 'daily' : days.join(', ');
+  return `${when} ${hour.padStart(2, '0')}:${minute.padStart(2, '0')} (${schedule.zone})`;
 }
 
 /** How long until a moment, or since: `in 5 min`, `2 h ago`, `now`. */

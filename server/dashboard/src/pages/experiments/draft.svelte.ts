@@ -9,6 +9,7 @@ import {
   type MotionPreview,
   type Problem,
 } from '../../lib/api';
+import { previewOf } from '../../lib/queue/submit';
 import { afterSeconds } from '../../lib/reload/reload';
 import { MotionCheck, type Check } from '../../lib/trajectory/check';
 import type { Schema } from '../../lib/trajectory/fields';
@@ -46,7 +47,7 @@ export class Draft {
     ...this.result.problems,
   }));
   private readonly checking = new MotionCheck<ExperimentSpec, MotionPreview>({
-    ask: previewed,
+    ask: previewOf,
     after: afterSeconds,
     told: (check) => this.hear(check),
   });
@@ -123,11 +124,6 @@ export class Draft {
     if (this.problem === null) return {};
     return Object.fromEntries(this.problem.fields.map((one) => [formField(one.field), one.message]));
   }
-}
-
-async function previewed(spec: ExperimentSpec): Promise<MotionPreview> {
-  const body = { spec, priority: 0 };
-  return ask(api.POST('/api/v1/robots/{robot}/experiments/preview', { params: { path: here() }, body }));
 }
 
 function written(spec: Partial<Spec>): string {

@@ -1,18 +1,9 @@
 /** When an experiment is to be run, and handing it to the service: once, however often the button is pressed. */
 
-import {
-  api,
-  ask,
-  asProblem,
-  here,
-  newKey,
-  type Experiment,
-  type ExperimentSpec,
-  type Problem,
-} from '../../lib/api';
-import { dayAndTime } from '../../lib/format';
+import { asProblem, newKey, type Experiment, type ExperimentSpec, type Problem } from '../../lib/api';
+import { addSchedule, addToQueue, toldQueued, toldScheduled } from '../../lib/queue/submit';
 import { typedNumber, type NumberRule } from '../../lib/trajectory/numbers';
-import { cronOf, localMoment, momentOf, ruleOf, UNITS, type Unit } from '../../lib/trajectory/when';
+import { cronOf, localMoment, momentOf, UNITS, type Unit, WEEKDAYS } from '../../lib/trajectory/when';
 
 export type When = 'now' | 'at' | 'daily' | 'every';
 
@@ -35,6 +26,8 @@ export class Sending {
   starts = $state('');
   /** Time of day, at the arm's computer. */
   daily = $state('02:00');
+  /** Weekdays by cron's numbers. */
+  days = $state<number[]>(WEEKDAYS.map(([number]) => number));
   every = $state('30');
   unit = $state<Unit>('min');
   count = $state('10');
@@ -76,23 +69,18 @@ export class Sending {
 
   private async submit(spec: ExperimentSpec): Promise<string> {
     const at = this.when === 'at' ? momentOf(this.at) : null;
-    const params = { path: here(), header: { 'idempotency-key': this.key } };
-    const body = { spec, priority: Number(this.priority), ...(at === null ? {} : { at }) };
-    const made = await ask(api.POST('/api/v1/robots/{robot}/experiments', { params, body }));
-    this.made = made;
-    return `${made.spec.name ?? made.spec.trajectory.kind} was added to the queue`;
+    const more = { priority: Number(this.priority), ...(at === null ? {} : { at }) };
+    this.made = await addToQueue(spec, this.key, more);
+    return toldQueued(this.made);
   }
 
   private async schedule(spec: ExperimentSpec): Promise<string> {
     const count = this.count.trim() === '' ? null : Number(this.count);
     const when =
       this.when === 'daily'
-        ? { cron: cronOf(this.daily) }
+        ? { cron: cronOf(this.daily, this.days) }
         : { every: this.seconds(), starts: momentOf(this.starts) };
-    const body = { spec, ...when, count, priority: Number(this.priority) };
-    const made = await ask(api.POST('/api/v1/robots/{robot}/schedules', { params: { path: here() }, body }));
-    const first = made.next ? `, first ${dayAndTime(made.next)}` : '';
-    return `scheduled: ${ruleOf(made)}${first}`;
+    return toldScheduled(await addSchedule(spec, { ...when, count, priority: Number(this.priority) }));
   }
 
   private seconds(): number {
@@ -105,6 +93,7 @@ export class Sending {
     if (problem) problems.priority = problem;
     if (this.when === 'at' && momentOf(this.at) === null) problems.at = 'a day and a time are needed';
     if (this.when === 'daily' && this.daily === '') problems.daily = 'a time is needed';
+    if (this.when === 'daily' && this.days.length === 0) problems.days = 'choose at least one day';
     if (this.isSchedule) {
       const every = this.seconds();
       if (this.when === 'every' && !(every >= SHORTEST && every <= LONGEST))

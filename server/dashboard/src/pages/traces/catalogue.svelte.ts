@@ -1,33 +1,38 @@
-/** The list of traces: searched, filtered, a part at a time, and followed as new ones are recorded. */
+/** The list of traces: those that a query line asks for, a part at a time, and followed as new ones are recorded. */
 
 import { untrack } from 'svelte';
 import { api, ask, asProblem, here, type CatalogueEntry, type Problem } from '../../lib/api';
 import { live } from '../../lib/live/live.svelte';
 import { afterSeconds, Reload } from '../../lib/reload/reload';
 import { Listing } from '../../lib/traces/listing';
+import { searchOf, type Known } from '../../lib/traces/query';
 
 /** s without a key before it is searched. */
 const QUIET = 0.2;
 
-export type Source = 'mock' | 'real' | 'imported';
-export type Outcome = 'complete' | 'stopped' | 'fault' | 'interrupted';
-
 export class Catalogue {
-  text = $state('');
-  tag = $state('');
-  source = $state<Source | ''>('');
-  outcome = $state<Outcome | ''>('');
+  /** The query line. */
+  line = $state('');
   items = $state.raw<readonly CatalogueEntry[]>([]);
   problem = $state.raw<Problem | null>(null);
   loaded = $state(false);
   busy = $state(false);
   next = $state<string | null>(null);
-  isFiltered: boolean = $derived(
-    this.text !== '' || this.tag !== '' || this.source !== '' || this.outcome !== '',
-  );
+  asked = $derived(searchOf(this.line));
+  isFiltered: boolean = $derived(this.line.trim() !== '');
+  /** What can be completed: of what is listed, or was. */
+  known: Known = $derived.by(() => {
+    for (const { tags, kind } of this.items) {
+      for (const tag of tags) this.tags.add(tag);
+      if (kind) this.kinds.add(kind);
+    }
+    return { tags: [...this.tags].sort(), kinds: [...this.kinds].sort() };
+  });
+  private readonly tags = new Set<string>();
+  private readonly kinds = new Set<string>();
   private readonly listing = new Listing<CatalogueEntry>();
   private readonly reload = new Reload({ load: () => void this.load(), after: afterSeconds });
-  private asked = 0;
+  private turn = 0;
 
   /** Follows the service: a new trace appears by itself. */
   follow(): () => void {
@@ -43,14 +48,14 @@ export class Catalogue {
 
   /** For an effect that follows the fields of the search. */
   searchSoon(): () => void {
-    void [this.text, this.tag, this.source, this.outcome];
+    void this.line;
     this.listing.beginAnew();
     this.reload.soon(untrack(() => this.loaded) ? QUIET : 0);
     return () => this.reload.leave();
   }
 
   clear(): void {
-    this.text = this.tag = this.source = this.outcome = '';
+    this.line = '';
   }
 
   async more(): Promise<void> {
@@ -60,25 +65,20 @@ export class Catalogue {
 
   /** Loads it anew, as far as it is shown. */
   async load(): Promise<void> {
-    const turn = ++this.asked;
+    const turn = ++this.turn;
     this.busy = true;
-    const search = {
-      ...(this.text === '' ? {} : { q: this.text }),
-      ...(this.tag === '' ? {} : { tag: this.tag }),
-      ...(this.source === '' ? {} : { source: this.source }),
-      ...(this.outcome === '' ? {} : { outcome: this.outcome }),
-    };
+    const { search } = this.asked;
     try {
       const page = await this.listing.load((limit, cursor) => {
         const query = { limit, ...search, ...(cursor === null ? {} : { cursor }) };
         return ask(api.GET('/api/v1/robots/{robot}/traces', { params: { path: here(), query } }));
       });
-      if (turn !== this.asked) return;
+      if (turn !== this.turn) return;
       this.items = page.items;
       this.next = page.next;
       this.problem = null;
     } catch (error) {
-      if (turn !== this.asked) return;
+      if (turn !== this.turn) return;
       this.problem = asProblem(error);
     }
     this.loaded = true;

@@ -3,11 +3,15 @@
 import { untrack } from 'svelte';
 import { router } from '../../lib/router.svelte';
 import { wholeRange, type Range, type Signals } from '../../lib/traces/columns';
+import { bestShift } from '../../lib/traces/compare';
 import { moved, within, zoomed } from '../../lib/traces/zoom';
 import { ShownTrace } from './shown_trace.svelte';
 
 export const SIGNALS = ['position', 'error', 'drive'] as const;
 export type ShownSignal = (typeof SIGNALS)[number];
+export const BESIDE = ['difference', 'spectrum'] as const;
+export type BesideName = (typeof BESIDE)[number];
+export type Alignment = 'none' | 'begin' | 'best';
 /** ms without a change of the zoom before details are asked for. */
 const QUIET = 120;
 
@@ -18,8 +22,10 @@ export class Comparison {
   signals = $state<ShownSignal[]>(['position', 'error']);
   /** Whether positions are shown less where the trace begins. */
   fromStart = $state(true);
-  /** Whether several traces are laid over each other by when their motions begin. */
-  aligned = $state(true);
+  /** How several traces are laid over each other: by the begins of their motions, or where they lie best. */
+  alignment = $state<Alignment>('begin');
+  /** What is drawn beside the overlay. */
+  beside = $state<readonly BesideName[]>([]);
   /** Chosen by hand; empty for those that moved. */
   chosenJoints = $state.raw<readonly number[]>([]);
   loaded: readonly ShownTrace[] = $derived(this.traces.filter((trace) => trace.signals !== null));
@@ -45,10 +51,16 @@ export class Comparison {
     });
   }
 
-  /** Several traces begin where their motions do: for an effect. */
+  /** Several traces begin where their motions do, or are moved to where they lie best: for an effect. */
   align(): void {
-    const isAligned = this.aligned && this.isOneJoint;
-    for (const trace of this.traces) trace.isAligned = isAligned;
+    const { traces, alignment, isOneJoint } = this;
+    const joint = this.shownJoints[0] ?? 1;
+    const [first] = traces;
+    for (const trace of traces) {
+      trace.isAligned = isOneJoint && alignment !== 'none';
+      const [one, other] = isOneJoint && alignment === 'best' ? [first?.whole, trace.whole] : [];
+      trace.shift = one && other && one !== other ? bestShift(one, other, joint) : 0;
+    }
   }
 
   isShown(id: string): boolean {

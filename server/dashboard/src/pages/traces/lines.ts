@@ -109,7 +109,7 @@ function simulatedRow(
 }
 
 /** What is taken off positions: where the joint is told to be at first, or is; 0 where positions are drawn as they are. */
-function beginOf({ fromStart, signals }: Drawn, joint: number): number {
+export function beginOf({ fromStart, signals }: Drawn, joint: number): number {
   if (!fromStart) return 0;
   const place = signals.joints.indexOf(joint);
   return signals.set_point?.[place]?.[0] ?? signals.position[place]?.[0] ?? 0;

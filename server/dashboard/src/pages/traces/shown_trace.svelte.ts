@@ -13,7 +13,7 @@ import { SIMULATING_REQUESTS } from './simulating_requests';
 /** Points of a plot. */
 const POINTS = 3000;
 /** Points between two cursors: measures are taken of every sample. */
-const EXACT = 20_000;
+export const EXACT = 20_000;
 
 export class ShownTrace {
   details = $state.raw<TraceDetails | null>(null);
@@ -23,13 +23,16 @@ export class ShownTrace {
   /** Set when nobody shows it any longer. */
   isClosed = false;
   readonly simulating: Simulating;
-  private whole = $state.raw<Signals | null>(null);
+  /** As it was recorded, thinned to what a picture shows. */
+  whole = $state.raw<Signals | null>(null);
   private part = $state.raw<Signals | null>(null);
   private asked: Range | null = null;
   private turn = 0;
   /** Whether its motion's begin is its time 0, so that traces lie over each other; else its first sample is. */
   isAligned = $state(false);
-  zero: number = $derived(this.isAligned && this.whole !== null ? motionBegin(this.whole) : 0);
+  /** s beyond that begin, at which its time 0 is. */
+  shift = $state(0);
+  zero: number = $derived(this.isAligned && this.whole !== null ? motionBegin(this.whole) + this.shift : 0);
   private own: Signals | null = $derived(
     this.whole && this.part ? refined(this.whole, this.part) : this.whole,
   );

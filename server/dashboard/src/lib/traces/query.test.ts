@@ -1,0 +1,52 @@
+import { expect, it } from 'vitest';
+import { completionsOf, searchOf, withFilter } from './query';
+
+const known = { tags: ['cold', 'cold start'], kinds: ['ramp', 'sine'] };
+
+it('free words are searched for, and filters are told apart from them', () => {
+  const { search, problem } = searchOf(
+    'dry friction tag:"cold start" source:real outcome:fault kind:ramp a:b',
+  );
+  expect(problem).toBe('');
+  expect(search).toEqual({
+    q: 'dry friction a:b',
+    tag: 'cold start',
+    source: 'real',
+    outcome: 'fault',
+    kind: 'ramp',
+  });
+});
+
+it('days are midnights here', () => {
+  const { search } = searchOf('after:2026-11-01 before:2026-12-01');
+  expect(search).toEqual({
+    since: new Date(2026, 10, 1).toISOString(),
+    until: new Date(2026, 11, 1).toISOString(),
+  });
+});
+
+it.each([
+  ['source:moon', 'source: allowed are mock, real, imported'],
+  ['after:yesterday', 'after: a day is allowed, as 2026-11-30'],
+  ['after:2026-13-01', 'after: a day is allowed'],
+  ['tag:a tag:b', 'tag: can be given once'],
+])('%s is refused in one line', (line, problem) => {
+  expect(searchOf(line).problem).toContain(problem);
+});
+
+it('a filter that is being typed filters nothing yet', () => {
+  expect(searchOf('cold tag:')).toEqual({ search: { q: 'cold' }, problem: '' });
+});
+
+it('the last word is completed: keys first, then what is known', () => {
+  expect(completionsOf('x so', known)).toEqual(['x source:']);
+  expect(completionsOf('x source:r', known)).toEqual(['x source:real']);
+  expect(completionsOf('tag:c', known)).toEqual(['tag:cold']);
+  expect(completionsOf('tag:"', known)).toEqual(['tag:"cold start"']);
+  expect(completionsOf('source:real ', known)).not.toContain('source:real source:');
+});
+
+it('one filter takes the place of another of its key', () => {
+  expect(withFilter('x tag:"a b" y', 'tag', 'c')).toBe('x y tag:c');
+  expect(withFilter('', 'tag', 'c d')).toBe('tag:"c d"');
+});

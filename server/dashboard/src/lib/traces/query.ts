@@ -1,0 +1,106 @@
+/**
+ * The query line of the list of traces: free words, and what the service can filter by, as `key:value`. Pure.
+ *
+ *   friction tag:"cold start" source:real outcome:fault kind:ramp after:2026-11-01 before:2026-12-01
+ */
+
+export const SOURCES = ['mock', 'real', 'imported'] as const;
+export const OUTCOMES = ['complete', 'stopped', 'fault', 'interrupted'] as const;
+
+/** As the service is asked. */
+export interface Search {
+  q?: string;
+  tag?: string;
+  source?: (typeof SOURCES)[number];
+  outcome?: (typeof OUTCOMES)[number];
+  kind?: string;
+  since?: string;
+  until?: string;
+}
+
+/** What is known and can be completed. */
+export interface Known {
+  tags: readonly string[];
+  kinds: readonly string[];
+}
+
+const KEYS = ['tag', 'source', 'outcome', 'kind', 'after', 'before'] as const;
+type Key = (typeof KEYS)[number];
+const WORD = /(?:(\w+):)?(?:"([^"]*)"?|(\S+))|(\w+):/g;
+const DAY = /^\d{4}-\d{2}-\d{2}$/;
+
+/** The search that a line asks for, or in one line what is wrong with it. */
+export function searchOf(line: string): { search: Search; problem: string } {
+  const search: Search = {};
+  const words: string[] = [];
+  const given = new Set<string>();
+  let problem = '';
+  for (const [whole, key, quoted, plain] of line.matchAll(WORD)) {
+    const value = quoted ?? plain ?? '';
+    if (key === undefined || !isKey(key)) {
+      if (!KEYS.some((one) => whole === `${one}:`)) words.push(whole.replaceAll('"', ''));
+      continue;
+    }
+    if (given.has(key)) problem ||= `${key}: can be given once`;
+    given.add(key);
+    problem ||= taken(search, key, value);
+  }
+  if (words.length > 0) search.q = words.join(' ');
+  return { search, problem };
+}
+
+function isKey(key: string): key is Key {
+  return (KEYS as readonly string[]).includes(key);
+}
+
+/** Adds one filter to `search`. What is wrong with it, if anything. */
+function taken(search: Search, key: Key, value: string): string {
+  const oneOf = <T extends string>(allowed: readonly T[], set: (one: T) => void): string => {
+    const found = allowed.find((one) => one === value);
+    if (found === undefined) return `${key}: allowed are ${allowed.join(', ')}`;
+    set(found);
+    return '';
+  };
+  switch (key) {
+    case 'source':
+      return oneOf(SOURCES, (one) => (search.source = one));
+    case 'outcome':
+      return oneOf(OUTCOMES, (one) => (search.outcome = one));
+    case 'after':
+    case 'before': {
+      const moment = new Date(`${value}T00:00:00`);
+      if (!DAY.test(value) || Number.isNaN(moment.getTime()))
+        return `${key}: a day is allowed, as 2026-11-30`;
+      search[key === 'after' ? 'since' : 'until'] = moment.toISOString();
+      return '';
+    }
+    default:
+      search[key] = value;
+      return '';
+  }
+}
+
+/** Whole lines that complete the last word of a line. */
+export function completionsOf(line: string, known: Known): string[] {
+  const start = /\S*$/.exec(line)!.index;
+  const [before, word] = [line.slice(0, start), line.slice(start)];
+  const [key = '', begun] = word.split(':') as [string, string?];
+  const values: Partial<Record<string, readonly string[]>> = {
+    tag: known.tags,
+    source: SOURCES,
+    outcome: OUTCOMES,
+    kind: known.kinds,
+  };
+  const found =
+    begun === undefined
+      ? KEYS.filter((one) => !line.includes(`${one}:`)).map((one) => `${one}:`)
+      : (values[key] ?? []).map((one) => withFilter('', key, one));
+  return found.filter((one) => one.startsWith(word) && one !== word).map((one) => before + one);
+}
+
+/** The line with another filter of this key. */
+export function withFilter(line: string, key: string, value: string): string {
+  const rest = line.replace(new RegExp(`(^|\\s)${key}:(?:"[^"]*"?|\\S*)`, 'g'), '').trim();
+  const filter = `${key}:${/\s/.test(value) ? `"${value}"` : value}`;
+  return rest === '' ? filter : `${rest} ${filter}`;
+}
