@@ -102,7 +102,8 @@ def share_of_rest(standing: Standing, step: Step) -> float:
 def _squares_not_fitted(standing: Standing, fitted: BalanceFit) -> Floats:
     """(n,) mean squares on the held-out records, or on blocks of the fitted ones, each predicted from the others."""
     held = standing.case.held_out
-    return holdout.held_out_squares(fitted.balance.model, fitted.values, held) if held else holdout.block_squares(fitted)
+    model, values = fitted.balance.model, fitted.values
+    return holdout.held_out_squares(model, values, held) if held else holdout.block_squares(fitted)
 
 
 def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Floats) -> bool:

@@ -125,6 +125,7 @@ def test_times_in_another_unit_are_said_to_be_that() -> None:
 
 # ---- When an effect that has the evidence is taken, and when it is not.
 
+
 def test_an_effect_that_explains_less_than_half_of_what_stays_unexplained_is_taken_back() -> None:
     """A force in proportion to position times speed is no known law. A disturbance in time takes a little of it off
     both records, with evidence in plenty."""
