@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from model.discrepancy.inverse_dynamics.standing import Standing
 from model.discrepancy.inverse_dynamics.tolerances import prior_distance
 from model.discrepancy.thresholds import CHANCES, LARGER_PART, THRESHOLDS, UNSURE_NOISE, WITHIN_NOISE
 from model.effects.library import find_named_effect
+from model.machine_model.parameter import Parameter
 from model.machine_model.record_verdict import FAR_OFF
 
 
@@ -53,30 +54,26 @@ class Comparison:
 
 def compare(standing: Standing, chosen: Fitted) -> Comparison | None:
     """The candidate beside its reference; None where there was no more than noise to explain."""
-    reference = _reference(standing, chosen)
+    reference = _reference(standing, chosen.fit.values, chosen.stated)
     fell, left = (standing.case.stretches.mean_squares(f.residual) for f in (reference, chosen.fit))
     if not _is_beyond_noise(standing, chosen, fell, left):
         return None
-    held = standing.case.held_out  # else blocks of the records fitted to
-    before, after = (
-        holdout.held_out_squares(f.balance.model, f.values, held) if held else holdout.block_squares(f)
-        for f in (reference, chosen.fit)
-    )
+    before, after = (_squares_not_fitted(standing, f) for f in (reference, chosen.fit))
     return Comparison(chosen, reference, fell, left, before, after, standing.case.options.least_share)
 
 
-def _reference(standing: Standing, chosen: Fitted) -> BalanceFit:
-    """The fit that a candidate is held against: the last one, within what the file allows.
+def _reference(standing: Standing, after: Mapping[str, float], stated: Sequence[Parameter]) -> BalanceFit:
+    """The fit that an effect is held against: the last one, within what the file allows.
 
     A number that is off by more than its file allows may have taken over what is missing. It is as the file expects it
-    where the candidate names that number, or brings it back.
+    where the effect names that number (`stated`), or the values with the effect (`after`) bring it back.
     """
     case, now = standing.case, standing.now
-    held = {p.name: p.value for p in chosen.stated}
+    held = {p.name: p.value for p in stated}
     for unknown in now.unknowns:
-        after = chosen.fit.values.get(unknown.name)
-        if unknown.deviation is not None and after is not None:
-            far, near = (abs(prior_distance(unknown, value)[0]) for value in (now.values[unknown.name], after))
+        value = after.get(unknown.name)
+        if unknown.deviation is not None and value is not None:
+            far, near = (abs(prior_distance(unknown, v)[0]) for v in (now.values[unknown.name], value))
             if near < FAR_OFF <= far:
                 held[unknown.name] = unknown.expected
     if not held:
@@ -84,6 +81,29 @@ def _reference(standing: Standing, chosen: Fitted) -> BalanceFit:
     unknowns = [u for u in now.unknowns if u.name not in held]
     balance = case.balance(standing.model.with_values({**now.model_values, **held}))
     return fit(balance, unknowns, now.values, case.data, now.noise.memory, near=now.derivatives)
+
+
+def share_of_rest(standing: Standing, step: Step) -> float:
+    """What an adopted effect explains beside all others, over what stays unexplained beyond noise: mean squares of
+    records not fitted to, on the joints on which it acts. Infinite where nothing stays, or where it takes nothing off
+    the torques and only brings numbers back to what the file states."""
+    case, now = standing.case, standing.now
+    stated = [p for name, p in standing.stated.items() if name in step.parameters]
+    reference = _reference(standing.remove(step), now.values, stated)
+    fell, left = (case.stretches.mean_squares(f.residual) for f in (reference, now))
+    before, after = (_squares_not_fitted(standing, f) for f in (reference, now))
+    with np.errstate(invalid="ignore"):
+        own = (left < (1 - holdout.AFFECTED) * fell) & (before > 0.0) & np.isfinite(after)
+        rest = np.maximum(after - case.noise**2, 0.0) / before
+    explained, unexplained = float(np.sum(1 - (after / before)[own])), float(np.sum(rest[own]))
+    return explained / unexplained if unexplained > 0.0 else np.inf
+
+
+def _squares_not_fitted(standing: Standing, fitted: BalanceFit) -> Floats:
+    """(n,) mean squares on the held-out records, or on blocks of the fitted ones, each predicted from the others."""
+    held = standing.case.held_out
+    model, values = fitted.balance.model, fitted.values
+    return holdout.held_out_squares(model, values, held) if held else holdout.block_squares(fitted)
 
 
 def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Floats) -> bool:

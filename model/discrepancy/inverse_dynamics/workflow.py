@@ -10,7 +10,7 @@ from model.discrepancy.diagnosis import Candidate, Suspicion
 from model.discrepancy.grounds import Note, Refusal
 from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.fitting import TorqueCase
-from model.discrepancy.inverse_dynamics.judging import has_another_form, judge, suspect
+from model.discrepancy.inverse_dynamics.judging import has_another_form, judge, share_of_rest, suspect
 from model.discrepancy.inverse_dynamics.resolution import is_resolved
 from model.discrepancy.inverse_dynamics.search import (
     Findings,
@@ -24,7 +24,7 @@ from model.discrepancy.inverse_dynamics.search import (
 from model.discrepancy.inverse_dynamics.standing import Standing, begin
 from model.discrepancy.inverse_dynamics.step_record import list_tried, record_step
 from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
-from model.discrepancy.thresholds import CHANCES
+from model.discrepancy.thresholds import CHANCES, LARGER_PART
 from model.discrepancy.verdict import withdrawn
 from model.effects.names import effect_on
 from model.machine_model.model import Model
@@ -52,6 +52,7 @@ class TorqueWorkflow:
     def run(self) -> None:
         """Take steps until nothing more is significant or holds."""
         self._take_steps()
+        self._withdraw_lesser_ones()
         self._withdraw_wrong_laws()
         self.notes += [
             Note(kind="taken-out-again", values={"effect": step.effect, "step": number})
@@ -132,6 +133,23 @@ class TorqueWorkflow:
             if evidence(without.now, now, now.noise.memory, len(step.parameters), 1) < 0:
                 gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
                 self.found = replace(without, steps=tuple(gone if s is step else s for s in self.found.steps))
+
+    def _withdraw_lesser_ones(self) -> None:
+        """Take back, the least first, effects that explain less than half of what stays unexplained beside them.
+
+        A law that is not in the library is as large as what is left. It resembles one or another law of the library to
+        a part of its size, on every record, so that evidence does not tell: what it looks like is no name.
+        """
+        while self.found.adopted:
+            shares = [(share_of_rest(self.found, step), step) for step in self.found.adopted]
+            share, least = min(shares, key=lambda one: one[0])
+            if share >= LARGER_PART:
+                return
+            why = Refusal(kind="less-than-rest", numbers={"share": share})
+            gone = least.model_copy(update={"adopted": False, "refusal": why})
+            without = self.found.remove(least)
+            self.found = replace(without, steps=tuple(gone if s is least else s for s in without.steps))
+            self.suspicion, self.tried = None, ()  # they were of the model with this effect
 
     def _withdraw_wrong_laws(self) -> None:
         """Take back the first effect whose law is of another form than what is there, and all effects after it."""
