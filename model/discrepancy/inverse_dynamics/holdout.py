@@ -38,6 +38,12 @@ def held_out_squares(model: Model, values: Mapping[str, float], records: tuple[R
     return stretches_of(records).mean_squares(_residuals(model, values, records))
 
 
+def squares_between(one: BalanceFit, other: BalanceFit, records: tuple[RecordedMotion, ...]) -> Floats:
+    """Mean squares (n,) of the torque by which two fits differ on other records."""
+    first, second = (_residuals(f.balance.model, f.values, records) for f in (one, other))
+    return stretches_of(records).mean_squares([a - b for a, b in zip(first, second, strict=True)])
+
+
 @dataclass(frozen=True)
 class Told:
     """What held-out records say for a fit, as evidence.

@@ -84,18 +84,28 @@ def _reference(standing: Standing, after: Mapping[str, float], stated: Sequence[
 
 
 def share_of_rest(standing: Standing, step: Step) -> float:
-    """What an adopted effect explains beside all others, over what stays unexplained beyond noise: mean squares of
-    records not fitted to, on the joints on which it acts. Infinite where nothing stays, or where it takes nothing off
-    the torques and only brings numbers back to what the file states."""
+    """What an adopted effect explains beside all others, over what stays unexplained beyond noise: mean squares on the
+    joints on which it acts. Infinite where nothing stays, or where it takes nothing off the torques and only brings
+    numbers back to what the file states.
+
+    Records that were not fitted to decide, unless they cannot show it: where the effect's own torque is too small
+    beside what stays there, whatever its law.
+    """
     case, now = standing.case, standing.now
     stated = [p for name, p in standing.stated.items() if name in step.parameters]
     reference = _reference(standing.remove(step), now.values, stated)
-    fell, left = (case.stretches.mean_squares(f.residual) for f in (reference, now))
+    fitted = [case.stretches.mean_squares(f.residual) for f in (reference, now)]
+    own = fitted[1] < (1 - holdout.AFFECTED) * fitted[0]
     before, after = (_squares_not_fitted(standing, f) for f in (reference, now))
-    with np.errstate(invalid="ignore"):
-        own = (left < (1 - holdout.AFFECTED) * fell) & (before > 0.0) & np.isfinite(after)
-        rest = np.maximum(after - case.noise**2, 0.0) / before
-    explained, unexplained = float(np.sum(1 - (after / before)[own])), float(np.sum(rest[own]))
+    seen = own & (before > 0.0) & np.isfinite(after)
+    if case.held_out and seen.any():
+        size = holdout.squares_between(reference, now, case.held_out)
+        rest = np.maximum(after - case.noise**2, 0.0)
+        if np.sum((size / before)[seen]) < LARGER_PART * np.sum((rest / before)[seen]):
+            before, after, seen = *fitted, own
+    with np.errstate(invalid="ignore", divide="ignore"):
+        explained = float(np.sum(1 - (after / before)[seen]))
+        unexplained = float(np.sum((np.maximum(after - case.noise**2, 0.0) / before)[seen]))
     return explained / unexplained if unexplained > 0.0 else np.inf
 
 
