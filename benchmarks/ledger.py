@@ -134,6 +134,10 @@ def starts(times: int) -> Iterator[Entry]:
         ("daq --help", command.format(["--help"])),
         ("daq stop --help", command.format(["stop", "--help"])),
         ("daq run ramp --help", command.format(["run", "ramp", "--help"])),
+        (
+            "a ramp in lock-step, with its start",
+            command.format(["--port", "mock://?lock_step=1", "run", "ramp", "--json"]),
+        ),
         ("daq stop, until it is sent", "from daq_cli.app import early_stop; early_stop.ask()"),
         ("import ma2000", "import ma2000"),
         ("an owner's imports", "import daq.owner.process"),
