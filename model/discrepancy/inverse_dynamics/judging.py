@@ -137,20 +137,11 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Comp
     """
     if chosen.evidence <= 0:
         return None
-    if chosen.evidence + chosen.told + (UNSURE_NOISE - 1.0) * chosen.relieved < needed_evidence(standing, chosen):
+    if chosen.evidence + chosen.told + (UNSURE_NOISE - 1.0) * chosen.relieved < standing.case.options.least_evidence:
         return None
     if any(chosen.rivals(one) and chosen.evidence < LARGER_PART * one.evidence for one in refused):
         return None
     return compare(standing, chosen)
-
-
-def needed_evidence(standing: Standing, chosen: Fitted) -> float:
-    """Evidence from which a candidate is named, beside what steps have brought on its joints (on any, for an effect of
-    the whole machine)."""
-    options, own = standing.case.options, set(chosen.joints)
-    near = (s for s in standing.adopted if not own or not s.joints or own & set(s.joints))
-    collected = sum(max(0.0, s.evidence + (s.evidence_held_out or 0.0)) for s in near)
-    return options.least_evidence + options.echo * collected
 
 
 SUSPECTED_SHARE = 0.05
@@ -170,7 +161,7 @@ def suspect(standing: Standing, found: Findings) -> Suspicion | None:
         if chosen.evidence <= 0:
             continue
         total = chosen.evidence + chosen.told
-        needed = needed_evidence(standing, chosen)
+        needed = case.options.least_evidence
         if not THRESHOLDS.significant <= total < needed:
             continue
         comparison = compare(standing, chosen)

@@ -15,7 +15,6 @@ from model.discrepancy.inverse_dynamics.fitting import TorqueCase
 from model.discrepancy.inverse_dynamics.judging import (
     Comparison,
     compare,
-    needed_evidence,
 )
 from model.discrepancy.inverse_dynamics.localisation import locate
 from model.discrepancy.inverse_dynamics.resolution import OF_CHANGES
@@ -80,8 +79,7 @@ def list_tried(standing: Standing, found: Findings) -> tuple[Candidate, ...]:
     if not found.fitted:
         return listed
     best = max(range(min(len(found.fitted), SHOWN)), key=lambda k: listed[k].total)
-    chosen = found.fitted[best]
-    needed = needed_evidence(standing, chosen)
+    chosen, needed = found.fitted[best], standing.case.options.least_evidence
     told = {"evidence_held_out": chosen.told} if standing.case.held_out else {}
     return (*listed[:best], listed[best].model_copy(update={"needed": needed, **told}), *listed[best + 1 :])
 
