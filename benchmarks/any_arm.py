@@ -55,7 +55,7 @@ def steps(record: dict[str, Any], parts: Sequence[tuple[str, str]], model: str) 
         known = file in dict(parts[:k])  # the answers are kept beside the file
         imports.append(["traces", "import", file, *([] if known else options), *(["--where", where] if where else [])])
     new = [["machine", "new", *shlex.split(record["new"])]] if "new" in record else []
-    ends = (["check", "#0"], ["diagnose", "#0", "--holdout", "#1"])
+    ends = (["check", "#0"], ["diagnose", "#0", "--holdout", "#1", *record.get("asked", [])])
     return [*imports, *new, *([*words, "--model", model] for words in ends)]
 
 

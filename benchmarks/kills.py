@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.figures import Figure, show
-from benchmarks.mock_process import MockControl, RunningMock, environment_of, started_mock
+from benchmarks.mock_process import MockControl, RunningMock, environment_of, is_kept, started_mock
 from benchmarks.service_process import COMMAND, ENDS, RunningService, child, ramp, started_service
 from daq.contracts.errors import DaqError
 from daq.contracts.machine import Machine, load_machine
@@ -244,25 +244,13 @@ def wrong_samples(trace: Trace, whole: Trace, kept: dict[int, dict[str, Any]], m
     rows, wrong = {int(tick): row for row, tick in enumerate(whole.tick)}, 0
     for row, tick in enumerate(map(int, trace.tick)):
         if not (tick in rows and _same(trace, row, whole, rows[tick])):
-            wrong += not (tick in kept and _is_kept(trace, row, kept[tick], machine))
+            wrong += not (tick in kept and is_kept(trace, row, kept[tick], machine))
     return wrong
 
 
 def _same(one: Trace, row: int, other: Trace, there: int) -> bool:
     columns = ((one.set_point, other.set_point), (one.position, other.position), (one.error, other.error))
     return all(a is not None and b is not None and np.array_equal(a[row], b[there]) for a, b in columns)
-
-
-def _is_kept(trace: Trace, row: int, kept: dict[str, Any], machine: Machine) -> bool:
-    assert trace.position is not None
-    assert trace.set_point is not None
-    for column, joint in enumerate(trace.joints):
-        own = machine.calibration(joint)
-        posture = own.rad_to_posture(float(trace.set_point[row, column]))
-        count = round(own.rad_to_counts(float(trace.position[row, column])))
-        if (posture, count) != (kept["set_points"][joint - 1], kept["positions"][joint - 1]):
-            return False
-    return True
 
 
 def _port_and_arm(url: str) -> list[str]:

@@ -31,7 +31,7 @@ import numpy as np
 from mcap.stream_reader import StreamReader
 
 from benchmarks.figures import Figure, show
-from benchmarks.mock_arm import Unheard
+from benchmarks.mock_arm import record
 from benchmarks.mock_process import environment_of
 from benchmarks.service_process import children, started_service
 from daq.contracts.experiment import ExperimentSpec
@@ -40,9 +40,6 @@ from daq.contracts.processor import added, processor_time
 from daq.contracts.sample import SampleRow
 from daq.contracts.trace import TraceRecord
 from daq.driver import Controller
-from daq.runner.arm_control import ArmControl
-from daq.runner.experiment import RunSetup, StopRequests, run_experiment
-from daq.runner.preparation import Consent
 from daq.traces.layout import RECORDED_SIGNALS
 from daq.traces.naming import new_trace_id
 from daq.traces.reader import read_trace
@@ -137,6 +134,10 @@ def starts(times: int) -> Iterator[Entry]:
         ("daq --help", command.format(["--help"])),
         ("daq stop --help", command.format(["stop", "--help"])),
         ("daq run ramp --help", command.format(["run", "ramp", "--help"])),
+        (
+            "a ramp in lock-step, with its start",
+            command.format(["--port", "mock://?lock_step=1", "run", "ramp", "--json"]),
+        ),
         ("daq stop, until it is sent", "from daq_cli.app import early_stop; early_stop.ask()"),
         ("import ma2000", "import ma2000"),
         ("an owner's imports", "import daq.owner.process"),
@@ -155,20 +156,10 @@ def a_ramp(times: int, periods: list[float]) -> Iterator[Path]:
     machine = load_machine("ma2000")
     with Controller.connect("mock://?lock_step=1") as controller, tempfile.TemporaryDirectory() as folder:
         for _ in range(1 + times):
-            run = RunSetup(
-                controller,
-                ArmControl(controller),
-                ExperimentSpec(),
-                machine,
-                machine.limits,
-                Path(folder),
-                Unheard(),
-                StopRequests(),
-            )
             tick, begun = controller.status().tick, time.process_time()
-            result = run_experiment(run, Consent())
+            trace = record(controller, ExperimentSpec(), machine, Path(folder))
             periods.append((time.process_time() - begun) / (controller.status().tick - tick))
-        yield result.trace
+        yield trace
 
 
 def simulated(times: int) -> Iterator[Entry]:
@@ -229,7 +220,7 @@ def read(times: int) -> Iterator[Entry]:
     samples = rows(60.0, 3)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trace.mcap"
-        record = TraceRecord(
+        about = TraceRecord(
             trace_id=new_trace_id(),
             created=datetime.now(UTC),
             software="benchmark",
@@ -241,7 +232,7 @@ def read(times: int) -> Iterator[Entry]:
 
         def record_all() -> None:
             with path.open("xb") as stream:
-                recording = Recording(stream, record, (1, 2, 3), RECORDED_SIGNALS, {})
+                recording = Recording(stream, about, (1, 2, 3), RECORDED_SIGNALS, {})
                 for row in samples:
                     recording.row(row)
                     if row.tick % 40 == 0:  # as often as in real time

@@ -13,7 +13,7 @@ import argparse
 import statistics
 import sys
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from benchmarks.figures import Figure, at_most, show
 from daq.driver import Controller
@@ -38,58 +38,28 @@ class Passed:
     into: int = 0
 
 
-@dataclass
-class CountedChannel:
-    """A channel whose bytes are counted."""
+def counted(endpoint: Endpoint) -> Passed:
+    """Counts the bytes of every channel that the endpoint opens from now on."""
+    passed, connect = Passed(), endpoint.connect
 
-    inner: ByteChannel
-    passed: Passed
+    def opened() -> ByteChannel:
+        channel = connect()
+        read, write = channel.read, channel.write
 
-    @property
-    def description(self) -> str:
-        """Returns the channel's address."""
-        return self.inner.description
+        def counting_read(timeout_s: float) -> bytes:
+            data = read(timeout_s)
+            passed.into += len(data)
+            return data
 
-    def read(self, timeout_s: float) -> bytes:
-        """Returns the bytes that have arrived."""
-        data = self.inner.read(timeout_s)
-        self.passed.into += len(data)
-        return data
+        def counting_write(data: bytes) -> None:
+            passed.out += len(data)
+            write(data)
 
-    def write(self, data: bytes) -> None:
-        """Writes all of `data`."""
-        self.passed.out += len(data)
-        self.inner.write(data)
+        vars(channel).update(read=counting_read, write=counting_write)
+        return channel
 
-    def close(self) -> None:
-        """Ends the connection."""
-        self.inner.close()
-
-
-@dataclass
-class CountedEndpoint:
-    """An endpoint of a controller that counts the bytes."""
-
-    inner: Endpoint
-    passed: Passed = field(default_factory=Passed)
-
-    def __post_init__(self) -> None:
-        self.url = self.inner.url
-        self.lock_step = self.inner.lock_step
-        self.bytes_per_second = self.inner.bytes_per_second
-        self.control = self.inner.control
-
-    def waited(self) -> float:
-        """Returns the wrapped endpoint's value."""
-        return self.inner.waited()
-
-    def connect(self) -> ByteChannel:
-        """Returns a counted channel."""
-        return CountedChannel(self.inner.connect(), self.passed)
-
-    def close(self) -> None:
-        """Releases its resources."""
-        self.inner.close()
+    vars(endpoint).update(connect=opened)
+    return passed
 
 
 def share_of_line(controller: Controller, passed: Passed, periods: int, moving: bool) -> tuple[float, float]:
@@ -131,10 +101,11 @@ def main() -> int:
     parser.add_argument("--trips", type=int, default=1000, help="round trips of each kind")
     given = parser.parse_args()
     periods, repeats = given.periods, given.trips
-    endpoint = CountedEndpoint(open_endpoint(URL))
+    endpoint = open_endpoint(URL)
+    passed = counted(endpoint)
     with Controller(Link(endpoint)) as controller:
-        alone, _ = share_of_line(controller, endpoint.passed, periods, moving=False)
-        both, busier = share_of_line(controller, endpoint.passed, periods, moving=True)
+        alone, _ = share_of_line(controller, passed, periods, moving=False)
+        both, busier = share_of_line(controller, passed, periods, moving=True)
         kept = Sample(controller.status().tick - 1, mask_of(JOINTS))
         figures = [
             at_most("a sample of 3 joints every 20 ms", alone, SHARE_TARGET, "% of the line", "both directions added"),

@@ -20,14 +20,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from benchmarks.figures import Figure, quantile, show
-from benchmarks.mock_process import MockControl, started_mock
+from benchmarks.figures import Figure, show
+from benchmarks.mock_process import MockControl, is_kept, started_mock
 from daq.contracts.experiment import ExperimentSpec, Sine
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
-from daq.driver.tick_time import TickTime
 from daq.owner.client import OwnerOnDemand
 from daq.owner.messages import Finished, Open
 from daq.traces.reader import read_trace
@@ -74,7 +71,6 @@ class Recorded:
     report: Finished
     board: dict[int, dict[str, Any]]
     counts: dict[str, Any]
-    clock: dict[str, Any]
 
 
 def record(minutes: float, folder: Path) -> Recorded:
@@ -91,8 +87,8 @@ def record(minutes: float, folder: Path) -> Recorded:
             last = owner.run(spec)
         board.over()
         fetching.join()
-        counts, clock = control.ask("counts"), control.ask("state")["clock"]
-    return Recorded(read_trace(last.trace), last, board.periods, counts, clock)
+        counts = control.ask("counts")
+    return Recorded(read_trace(last.trace), last, board.periods, counts)
 
 
 def wrong_samples(trace: Trace, board: dict[int, dict[str, Any]], machine: Machine) -> tuple[int, int]:
@@ -100,27 +96,13 @@ def wrong_samples(trace: Trace, board: dict[int, dict[str, Any]], machine: Machi
     a record.
     """
     assert trace.tick is not None
-    assert trace.set_point is not None
-    assert trace.error is not None
-    assert trace.power_raw is not None
     wrong = unknown = 0
     for row, tick in enumerate(trace.tick.tolist()):
         kept = board.get(tick)
         if kept is None:
             unknown += 1
             continue
-        same = True
-        for column, joint in enumerate(trace.joints):
-            own = machine.calibration(joint)
-            there = (kept["set_points"], kept["positions"], kept["errors"], kept["powers"])
-            here = (
-                own.rad_to_posture(float(trace.set_point[row, column])),
-                round(own.rad_to_counts(float(trace.position[row, column]))),
-                round(float(trace.error[row, column]) / own.rad_per_count),
-                int(trace.power_raw[row, column]),
-            )
-            same = same and here == tuple(register[joint - 1] for register in there)
-        wrong += not same
+        wrong += not is_kept(trace, row, kept, machine)
     return wrong, unknown
 
 
@@ -166,42 +148,6 @@ def accuracy_figures(done: Recorded, machine: Machine) -> list[Figure]:
     ]
 
 
-def timing_figures(done: Recorded) -> list[Figure]:
-    """Returns times from a tick, by the mock's own clock, to the sample's arrival and to the estimated time stamp."""
-    trace = done.trace
-    assert trace.tick is not None
-    assert trace.host_time is not None
-    zero_us = done.clock["monotonic_us_at_zero"]
-    estimate = TickTime(trace.record.period or 0.02)
-    arrival, stamp = [], []
-    for tick, host_time in zip(trace.tick.tolist(), trace.host_time.tolist(), strict=True):
-        stamped = estimate.arrived(tick, host_time)
-        if tick in done.board:
-            true = (zero_us + done.board[tick]["time_us"]) * 1e-6
-            arrival.append(1e3 * (host_time - true))
-            stamp.append(1e3 * (stamped - true))
-    quickest, usual = min(arrival), float(np.median(stamp))
-    jitter = [value - quickest for value in arrival]
-    wander = [abs(value - usual) for value in stamp]
-
-    def three(values: list[float]) -> str:
-        return f"{quantile(values, 0.5):.2f} / {quantile(values, 0.99):.2f} / {max(values):.2f} ms"
-
-    return [
-        Figure(
-            "tick to arrival, jitter: p50 / p99 / max",
-            three(jitter),
-            beside=f"the quickest {quickest:.2f} ms after its tick: 6.3 ms of the board, 3.1 ms of line",
-        ),
-        Figure("tick to time stamp, jitter: p50 / p99 / max", three(wander), beside=f"stamps are {usual:.2f} ms late"),
-        Figure(
-            "mock behind its clock by over 2 ms",
-            f"{done.clock['late_ticks']} periods",
-            beside=f"worst {done.clock['worst_late_us'] / 1e3:.1f} ms",
-        ),
-    ]
-
-
 def main() -> int:
     """Returns the exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks long_run", description=__doc__)
@@ -209,7 +155,7 @@ def main() -> int:
     minutes = parser.parse_args().minutes
     with tempfile.TemporaryDirectory() as folder:
         done = record(minutes, Path(folder))
-    figures = accuracy_figures(done, load_machine("ma2000")) + timing_figures(done)
+    figures = accuracy_figures(done, load_machine("ma2000"))
     title = f"{minutes:g} minutes at 50 Hz, 1 % of frames damaged"
     return show(title, f"python -m benchmarks long_run --minutes {minutes:g}", figures)
 

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from urllib.parse import urlencode
@@ -73,71 +72,35 @@ def hidden_parameters(machine: Machine, seed: int) -> dict[str, float]:
 
 def plant_text(hidden: Mapping[str, float]) -> str:
     """Returns the mock's own plant file with these values."""
-    text = _shipped("mock_controller.plant", "ma2000_plant.toml")
+    text = resources.files("mock_controller.plant").joinpath("ma2000_plant.toml").read_text("utf-8")
     for name, value in hidden.items():
         for place in PLANT_NAMES[name]:
             text = _replaced(text, place, value)
     return text
 
 
-def board_text(linearity: float) -> str:
-    """Returns the mock's own board file with potentiometers of this linearity."""
-    return _replaced(_shipped("mock_controller.board", "ma2000_board.toml"), "converter.linearity", linearity)
-
-
 def recorded(
-    specs: Sequence[ExperimentSpec],
-    machine: Machine,
-    seed: int,
-    plant: str | None = None,
-    board: str | None = None,
-    modify: Sequence[str] = (),
-    *,
-    baud: int = 115_200,
+    specs: Sequence[ExperimentSpec], machine: Machine, seed: int, plant: str | None = None, modify: Sequence[str] = ()
 ) -> list[Trace]:
     """Returns traces of experiments, one after the other on one mock in lock-step, with these hidden effects."""
+    options: dict[str, str | list[str]] = {"lock_step": "1", "seed": str(seed), "modify": list(modify)}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        with connected(folder, seed, plant, board, modify, baud=baud) as controller:
-            return [_recorded(controller, spec, machine, folder) for spec in specs]
+        if plant is not None:
+            (folder / "plant.toml").write_text(plant, "utf-8")
+            options["plant"] = str(folder / "plant.toml")
+        with Controller.connect(f"mock://?{urlencode(options, doseq=True)}") as controller:
+            return [read_trace(record(controller, spec, machine, folder)) for spec in specs]
 
 
-@contextmanager
-def connected(
-    folder: Path,
-    seed: int,
-    plant: str | None = None,
-    board: str | None = None,
-    modify: Sequence[str] = (),
-    *,
-    baud: int = 115_200,
-) -> Iterator[Controller]:
-    """Yields a new mock in lock-step with these hidden effects, with its files in a folder."""
-    options: dict[str, str | list[str]] = {
-        "lock_step": "1",
-        "seed": str(seed),
-        "baud": str(baud),
-        "modify": list(modify),
-    }
-    for kind, text in (("plant", plant), ("board", board)):
-        if text is not None:
-            (folder / f"{kind}.toml").write_text(text, "utf-8")
-            options[kind] = str(folder / f"{kind}.toml")
-    with Controller.connect(f"mock://?{urlencode(options, doseq=True)}") as controller:
-        yield controller
-
-
-def _recorded(controller: Controller, spec: ExperimentSpec, machine: Machine, folder: Path) -> Trace:
+def record(controller: Controller, spec: ExperimentSpec, machine: Machine, folder: Path) -> Path:
+    """Returns the trace of an experiment. Raises RuntimeError if it is not complete."""
     control = ArmControl(controller)
     run = RunSetup(controller, control, spec, machine, machine.limits, folder, Unheard(), StopRequests())
     result = run_experiment(run, Consent())
     if result.outcome != "complete":
         raise RuntimeError(f"{spec.name or spec.trajectory.kind} ended {result.outcome}: {result.reason}")
-    return read_trace(result.trace)
-
-
-def _shipped(package: str, file: str) -> str:
-    return resources.files(package).joinpath(file).read_text("utf-8")
+    return result.trace
 
 
 def _replaced(text: str, place: str, value: float) -> str:

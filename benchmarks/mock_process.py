@@ -15,6 +15,9 @@ from types import TracebackType
 from typing import Any, Self
 from urllib.parse import urlsplit
 
+from daq.contracts.machine import Machine
+from daq.contracts.trace import Trace
+
 
 @dataclass(frozen=True)
 class RunningMock:
@@ -66,11 +69,31 @@ class MockControl:
         self._socket.close()
 
 
+def is_kept(trace: Trace, row: int, kept: dict[str, Any], machine: Machine) -> bool:
+    """Whether a sample has the counts of every joint that the mock's own record of its tick has."""
+    assert trace.set_point is not None
+    assert trace.error is not None
+    assert trace.power_raw is not None
+    for column, joint in enumerate(trace.joints):
+        own = machine.calibration(joint)
+        here = (
+            own.rad_to_posture(float(trace.set_point[row, column])),
+            round(own.rad_to_counts(float(trace.position[row, column]))),
+            round(float(trace.error[row, column]) / own.rad_per_count),
+            int(trace.power_raw[row, column]),
+        )
+        if here != tuple(kept[register][joint - 1] for register in ("set_points", "positions", "errors", "powers")):
+            return False
+    return True
+
+
 def environment_of(folder: Path) -> dict[str, str]:
     """Returns this process's environment without the caller's settings, token and server; with the stop sockets of
     `folder`.
 
-    Run programs in it with `folder` as the working folder, so that they do not find a `daq.toml` of the caller.
+    Python keeps its bytecode, as it does for users. Run programs in it with `folder` as the working folder, so that
+    they do not find a `daq.toml` of the caller.
     """
     kept = {key: value for key, value in os.environ.items() if not key.upper().startswith("DAQ_")}
+    kept.pop("PYTHONDONTWRITEBYTECODE", None)
     return kept | {"DAQ_RUNTIME_FOLDER": str(folder / "run"), "XDG_CONFIG_HOME": str(folder / "configuration")}

@@ -12,6 +12,7 @@ gc.disable()  # collections would take a third of the imports' time, and find no
 from mock_controller.options import read_options  # noqa: E402 - after that
 from mock_controller.server import Server  # noqa: E402
 
+gc.freeze()  # nor would later ones, nor the one at the end
 gc.enable()
 
 

@@ -6,6 +6,7 @@ gc.disable()  # garbage collection would take a third of the import time, and fi
 
 from daq.owner.process import main  # noqa: E402 - imported after gc.disable()
 
+gc.freeze()  # nor would later ones, nor the one at the end
 gc.enable()
 
 raise SystemExit(main())

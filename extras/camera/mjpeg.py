@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-import httpx
-
 from daq.contracts.errors import DaqError
 
 MOST = 8 << 20
@@ -24,6 +22,8 @@ class CameraError(DaqError):
 
 def pictures(url: str) -> Iterator[bytes]:
     """Yields JPEGs as they come, until the camera ends the stream. Raises CameraError."""
+    import httpx  # slow to import, and few services have a camera
+
     limits = httpx.Timeout(SILENCE, connect=CONNECT)
     try:
         with httpx.stream("GET", url, timeout=limits, follow_redirects=False) as answer:

@@ -7,7 +7,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from PIL import Image, ImageDraw
 
 from daq.contracts.machine import Machine
 from daq.trajectories.kinematics import link_ends
@@ -23,6 +22,8 @@ BACK, GROUND, ARM, JOINT, INK = (38, 46, 56), (58, 68, 80), (232, 170, 66), (250
 
 def picture(machine: Machine, position: Sequence[float], label: str) -> bytes:
     """Returns a JPEG of the arm at a posture (rad, m), with a label."""
+    from PIL import Image, ImageDraw  # slow to import, and not every service shows a camera
+
     angles = np.zeros((1, len(machine.joints)))
     angles[0, : len(position)] = position
     ends = link_ends(machine, angles)[0]

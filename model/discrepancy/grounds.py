@@ -61,6 +61,7 @@ RefusalKind = Literal[
     "error-grows",
     "error-rises",
     "falls-too-little",
+    "less-than-rest",
     "only-resembles",
     "superfluous",
 ]

@@ -72,8 +72,6 @@ class TorqueOptions(FrozenRecord):
     most_steps: most effects that are added, one after the other.
     least_evidence: least fall of −2 log posterior by an effect, after the cost of its parameters and of the places
         searched.
-    echo: share of the evidence from earlier steps on the same joints, which a further effect must bring in addition:
-        where the law of an effect is not exactly the rig's, what is left is no effect of its own.
     least_margin: least lead in evidence over every other answer, for an effect to be named alone.
     least_share: least share by which the mean square of the torque on held-out records must fall.
     """
@@ -83,7 +81,6 @@ class TorqueOptions(FrozenRecord):
     joints: tuple[int, ...] | None = None
     most_steps: Annotated[int, Field(ge=1, le=20)] = 8
     least_evidence: FiniteFloat = UNSURE_NOISE * THRESHOLDS.significant
-    echo: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.02
     least_margin: FiniteFloat = TORQUE_LEAD
     least_share: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.01
 
@@ -105,5 +102,4 @@ def reading_options(options: DiagnosisOptions) -> TorqueOptions:
         most_steps=options.most_steps,
         least_evidence=THRESHOLDS.significant,
         least_margin=THRESHOLDS.margin,
-        echo=THRESHOLDS.echo,
     )

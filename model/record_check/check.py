@@ -23,11 +23,10 @@ from model.machine_model.model import Model
 from model.record_check.columns import column_findings
 from model.record_check.drives import drive_findings
 from model.record_check.finding import FindingKind, RecordFinding, doubts_in
-from model.record_check.pieces import SHORTEST, free_part, in_pieces, measures_speed, part_of, reading_of
+from model.record_check.pieces import SHORTEST, cut_off, free_part, in_pieces, measures_speed, part_of, reading_of
 from model.record_check.readings import (
     FalseReadings,
     Jump,
-    find_bounds,
     find_bursts,
     find_dead,
     find_gaps,
@@ -155,7 +154,7 @@ def false_readings(trace: Trace, machine: Machine, joint: int) -> FalseReadings:
     if by_speed:  # a tachometer's reading stops changing as soon as its drive does
         return sort_jumps(reading, jumps, ())
     found = sort_jumps(reading, jumps, turns_of(machine, joint))
-    told = {jump.row for _, jump in found.stuck} | {last for _, last in find_bounds(reading)}
+    told = {jump.row for _, jump in found.stuck} | {last for _, last in cut_off(trace, machine, joint)}
     dead = [one for one in find_dead(reading, _step(machine, joint)) if one[1].row not in told]
     return replace(found, stuck=(*found.stuck, *dead))
 
@@ -308,7 +307,7 @@ def _on_jumps(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFind
 def _on_bounds(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFinding]:
     """Finds readings that are cut off at the end of a sensor's range, or of an amplifier's or a converter's."""
     reading = reading_of(trace, machine, joint)
-    bounds = find_bounds(reading)
+    bounds = cut_off(trace, machine, joint)
     if not bounds:
         return
     times = [float(trace.time[first]) for first, _ in bounds]

@@ -14,8 +14,8 @@ from daq.contracts.machine_form import defaults_of
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
-from model.record_check.pieces import free_part
-from model.record_check.readings import find_bounds, find_gaps, noise_of
+from model.record_check.pieces import cut_off, free_part
+from model.record_check.readings import find_gaps, noise_of
 from model.record_check.words import number, times_of
 
 FEW_LEVELS = 16
@@ -131,7 +131,7 @@ class _Record:
             means = "It hardly moves: its inertia and friction stay as the machine file states them."
             return self._of("position", joint, there, means, "known")
         part = free_part(self._trace, self._machine)
-        if part is not None and find_bounds(reading):
+        if part is not None and cut_off(self._trace, self._machine, joint):
             begin, end = self._trace.time[part.start], self._trace.time[part.stop - 1]
             means = f"It stands at the end of its way: rows from {begin:.2f} to {end:.2f} s are used."
             return self._of("position", joint, there, means, "known")

@@ -31,6 +31,19 @@ def reading_of(trace: Trace, machine: Machine, joint: int) -> Floats:
     return np.asarray(source[:, trace.column(joint)])
 
 
+def cut_off(trace: Trace, machine: Machine, joint: int) -> list[tuple[int, int]]:
+    """Returns the first and last row of each stretch in which a joint's reading is cut off (`find_bounds`).
+
+    A joint that stands exactly where its set point is was not stopped by anything else.
+    """
+    reading, set_point = reading_of(trace, machine, joint), trace.set_point
+    bounds = find_bounds(reading)
+    if set_point is None or measures_speed(machine, joint):
+        return bounds
+    wanted = set_point[:, trace.column(joint)]
+    return [(first, last) for first, last in bounds if reading[last] != wanted[last]]
+
+
 def free_part(trace: Trace, machine: Machine) -> slice | None:
     """Returns the longest part in which no reading is cut off, as at a joint's stop; None if too little is left.
 
@@ -39,7 +52,7 @@ def free_part(trace: Trace, machine: Machine) -> slice | None:
     free = np.ones(len(trace) + 2, dtype=bool)
     free[[0, -1]] = False
     for joint in machine.modelled_joints:
-        for first, last in find_bounds(reading_of(trace, machine, joint)):
+        for first, last in cut_off(trace, machine, joint):
             free[max(0, first - ENTRY) + 1 : last + ENTRY + 2] = False
     begins, ends = (np.flatnonzero(np.diff(free.astype(int)) == edge) for edge in (1, -1))
     begin, end = max(

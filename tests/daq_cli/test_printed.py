@@ -25,7 +25,7 @@ from tests.daq.traces.samples import write
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.test_documentation import COMMANDS
 
-WITHOUT = {"serve", "mock", "demo", "docs", "mcp"} | {
+WITHOUT = {"serve", "mock", "demo", "docs", "mcp", "view"} | {
     f"{group} {command}"
     for group, commands in {
         "gains": "set",

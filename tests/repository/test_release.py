@@ -98,11 +98,17 @@ EXTRAS = [
     for line in extra
     if not line.startswith("ma2000-daq[")
 ]
-FOR_USE = [*PYPROJECT["project"]["dependencies"], *EXTRAS, *PYPROJECT["dependency-groups"]["build"]]
+NOT_IN_ALL = {"rerun-sdk"}
+FOR_USE = [
+    *PYPROJECT["project"]["dependencies"],
+    *(line for line in EXTRAS if Requirement(line).name not in NOT_IN_ALL),
+    *PYPROJECT["dependency-groups"]["build"],
+]
 FOR_INSTALLING = PYPROJECT["dependency-groups"]["installer"]
 FOR_A_RELEASE = PYPROJECT["dependency-groups"]["release"]
 FOR_DEVELOPMENT = [
     *FOR_USE,
+    *EXTRAS,
     *FOR_INSTALLING,
     *(line for name in ("dev", "docs") for line in PYPROJECT["dependency-groups"][name] if isinstance(line, str)),
 ]

@@ -69,6 +69,13 @@ def _block_squares(now: Fit) -> Floats:
     return np.asarray(np.where(counts > 0.0, sums / np.maximum(counts, 1.0), np.nan))
 
 
+def squares_between(case: Case, one: Fit, other: Fit) -> Floats:
+    """(n,) mean squares of that by which two fits differ on held-out records."""
+    assert case.held_out is not None
+    between = [a - b for a, b in zip(case.held(one), case.held(other), strict=True)]
+    return case.held_out.samples.mean_squares(between)
+
+
 def share_removed(fitted_before: Floats, fitted_after: Floats, before: Floats, after: Floats) -> float:
     """Share of the mean square that is gone on records not fitted to, over the joints whose mean square fell in the
     fit; 0 where nothing is known of these joints there, as where their drives are at limits all the time."""

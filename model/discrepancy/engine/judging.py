@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from model.arrays import Floats
-from model.discrepancy.diagnosis import Suspicion
+from model.discrepancy.diagnosis import Step, Suspicion
 from model.discrepancy.engine import holdout
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case
@@ -19,6 +19,7 @@ from model.discrepancy.engine.standing import Standing
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.thresholds import CHANCES, LARGER_PART, THRESHOLDS
 from model.effects.library import find_named_effect
+from model.machine_model.parameter import Parameter
 from model.machine_model.record_verdict import FAR_OFF
 
 
@@ -51,25 +52,25 @@ class Comparison:
 
 def compare(standing: Standing, chosen: Fitted) -> Comparison | None:
     """The candidate beside its reference; None where there was no more than noise to explain."""
-    case, reference = standing.case, _reference(standing, chosen)
+    case, reference = standing.case, _reference(standing, chosen.fit.values, chosen.stated)
     if not _is_beyond_noise(standing, chosen, reference.squares, chosen.fit.squares):
         return None
     before, after = (holdout.squares_unseen(case, f) for f in (reference, chosen.fit))
     return Comparison(chosen, reference, before, after, case.options.least_share)
 
 
-def _reference(standing: Standing, chosen: Fitted) -> Fit:
-    """The fit that a candidate is held against: the last one, within what the file allows.
+def _reference(standing: Standing, after: Mapping[str, float], stated: Sequence[Parameter]) -> Fit:
+    """The fit that an effect is held against: the last one, within what the file allows.
 
     A number that is off by more than its file allows may have taken over what is missing. It is as the file expects it
-    where the candidate names that number, or brings it back.
+    where the effect names that number (`stated`), or the values with the effect (`after`) bring it back.
     """
     now = standing.now
-    held = {p.name: p.value for p in chosen.stated}
+    held = {p.name: p.value for p in stated}
     for unknown in now.unknowns:
-        after = chosen.fit.values.get(unknown.name)
-        if unknown.deviation is not None and after is not None:
-            far, near = (abs(prior_distance(unknown, value)[0]) for value in (now.values[unknown.name], after))
+        value = after.get(unknown.name)
+        if unknown.deviation is not None and value is not None:
+            far, near = (abs(prior_distance(unknown, v)[0]) for v in (now.values[unknown.name], value))
             if near < FAR_OFF <= far:
                 held[unknown.name] = unknown.expected
     if not held:
@@ -78,6 +79,35 @@ def _reference(standing: Standing, chosen: Fitted) -> Fit:
     compared = now.compared.of_model(standing.model.with_values({n: v for n, v in held.items() if n in known}))
     unknowns = [u for u in now.unknowns if u.name not in held]
     return fit(compared, unknowns, now.values, now.memory, now.known, rounds=STEPS_APART)
+
+
+def share_of_rest(standing: Standing, step: Step) -> float:
+    """What an adopted effect explains beside all others, over what stays unexplained beyond noise: mean squares on the
+    joints on which it acts. Infinite where nothing stays, or where it takes nothing off the residual and only brings
+    numbers back to what the file states.
+
+    Records that were not fitted to decide, unless they cannot show it: where what the effect itself changes is too
+    small beside what stays there, whatever its law.
+    """
+    case, now = standing.case, standing.now
+    stated = [p for name, p in standing.stated.items() if name in step.parameters]
+    reference = _reference(standing.remove(step), now.values, stated)
+    fitted = [f.squares for f in (reference, now)]
+    own = fitted[1] < (1 - holdout.AFFECTED) * fitted[0]
+    before, after = (holdout.squares_unseen(case, f) for f in (reference, now))
+    seen = own & (before > 0.0) & np.isfinite(after)
+    noise = case.noise
+    if case.held_out is not None:
+        noise = case.noise_held
+        if seen.any():
+            size = holdout.squares_between(case, reference, now)
+            rest = np.maximum(after - noise**2, 0.0)
+            if np.sum((size / before)[seen]) < LARGER_PART * np.sum((rest / before)[seen]):
+                before, after, seen, noise = *fitted, own, case.noise
+    with np.errstate(invalid="ignore", divide="ignore"):
+        explained = float(np.sum(1 - (after / before)[seen]))
+        unexplained = float(np.sum((np.maximum(after - noise**2, 0.0) / before)[seen]))
+    return explained / unexplained if unexplained > 0.0 else np.inf
 
 
 def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Floats) -> bool:
@@ -102,20 +132,11 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Comp
     if chosen.evidence <= 0:
         return None
     unsure = standing.case.options.least_evidence / THRESHOLDS.significant - 1.0  # priors have no noise in them
-    if chosen.evidence + chosen.told + unsure * chosen.relieved < needed_evidence(standing, chosen):
+    if chosen.evidence + chosen.told + unsure * chosen.relieved < standing.case.options.least_evidence:
         return None
     if any(chosen.rivals(one) and chosen.evidence < LARGER_PART * one.evidence for one in refused):
         return None
     return compare(standing, chosen)
-
-
-def needed_evidence(standing: Standing, chosen: Fitted) -> float:
-    """Evidence from which a candidate is named, beside what steps have brought on its joints (on any, for an effect of
-    the whole machine)."""
-    options, own = standing.case.options, set(chosen.joints)
-    near = (s for s in standing.adopted if not own or not s.joints or own & set(s.joints))
-    collected = sum(max(0.0, s.evidence + (s.evidence_held_out or 0.0)) for s in near)
-    return options.least_evidence + options.echo * collected
 
 
 SUSPECTED_SHARE = 0.05
@@ -133,7 +154,7 @@ def suspect(standing: Standing, found: Findings, recorded: float) -> Suspicion |
     case = standing.case
     for chosen in found.fitted[:CHANCES]:
         total = chosen.evidence + chosen.told
-        needed = needed_evidence(standing, chosen)
+        needed = case.options.least_evidence
         if chosen.evidence <= 0 or not THRESHOLDS.significant <= total < needed:
             continue
         comparison = compare(standing, chosen)

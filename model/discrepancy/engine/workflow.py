@@ -11,7 +11,7 @@ from model.discrepancy.engine import holdout
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case
 from model.discrepancy.engine.fitting import Fit
-from model.discrepancy.engine.judging import judge, suspect
+from model.discrepancy.engine.judging import judge, share_of_rest, suspect
 from model.discrepancy.engine.search import (
     Findings,
     evidence,
@@ -23,7 +23,7 @@ from model.discrepancy.engine.search import (
 from model.discrepancy.engine.standing import Standing, begin
 from model.discrepancy.engine.step_record import list_tried, record_step, rivals_of
 from model.discrepancy.grounds import Note, Refusal
-from model.discrepancy.thresholds import CHANCES
+from model.discrepancy.thresholds import CHANCES, LARGER_PART
 from model.discrepancy.verdict import withdrawn
 from model.effects.names import effect_on
 
@@ -55,6 +55,7 @@ class Workflow:
     def run(self) -> None:
         """Takes steps until nothing more is significant or holds."""
         self._take_steps()
+        self._withdraw_lesser_ones()
         self._withdraw_wrong_laws()
         self.notes += [
             Note(kind="taken-out-again", values={"effect": step.effect, "step": number})
@@ -140,6 +141,23 @@ class Workflow:
             if evidence(without.now, now, len(step.parameters), 1) < 0:
                 gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
                 self.found = replace(without, steps=tuple(gone if s is step else s for s in self.found.steps))
+
+    def _withdraw_lesser_ones(self) -> None:
+        """Takes back, the least first, effects that explain less than half of what stays unexplained beside them.
+
+        A law that is not in the library is as large as what is left. It resembles one or another law of the library to
+        a part of its size, on every record, so that evidence does not tell: what it looks like is no name.
+        """
+        while self.found.adopted:
+            shares = [(share_of_rest(self.found, step), step) for step in self.found.adopted]
+            share, least = min(shares, key=lambda one: one[0])
+            if share >= LARGER_PART:
+                return
+            why = Refusal(kind="less-than-rest", numbers={"share": share})
+            gone = least.model_copy(update={"adopted": False, "refusal": why})
+            without = self.found.remove(least)
+            self.found = replace(without, steps=tuple(gone if s is least else s for s in without.steps))
+            self.suspicion, self.tried = None, ()  # they were of the model with this effect
 
     def _withdraw_wrong_laws(self) -> None:
         """Takes back the first effect whose law is of another form than what is there, and all effects after it."""

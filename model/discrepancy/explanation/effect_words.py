@@ -27,12 +27,6 @@ def plain(value: float, digits: int = 2) -> str:
     return f"−{text}" if value < 0 and text != "0" else text
 
 
-def from_to(first: float, last: float) -> tuple[str, str]:
-    """Two numbers with enough digits to tell them apart: 1.54 and 1.46, where both round to 1.5."""
-    digits = 2 if plain(first) != plain(last) else 3
-    return plain(first, digits), plain(last, digits)
-
-
 _ALL = tomllib.loads(resources.files("model.discrepancy.explanation").joinpath("phrases.toml").read_text("utf-8"))
 PHASES: Mapping[str, str] = _ALL["phases"]
 REFUSALS: Mapping[str, str] = _ALL["refusals"]

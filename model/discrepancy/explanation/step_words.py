@@ -7,7 +7,7 @@ import math
 from daq.contracts.joint_text import slides
 from daq.contracts.machine import Machine
 from model.discrepancy.diagnosis import UNWRITTEN, FoundValue, Step, Where
-from model.discrepancy.explanation.effect_words import PHASES, REFUSALS, from_to, plain, shape_of
+from model.discrepancy.explanation.effect_words import PHASES, REFUSALS, plain, shape_of
 from model.discrepancy.grounds import ControllerEffect, Refusal
 from model.effects.names import capitalised, joints_in_words
 from model.units import shown_unit, with_unit
@@ -15,8 +15,6 @@ from model.units import shown_unit, with_unit
 NOISE_UNKNOWN = 1e6
 """Ratio of a residual to its noise, above which that noise is none: the machine file takes positions for exact, as one
 made of a URDF does, and what rounding leaves is no measure."""
-NOTICEABLE = 0.98
-"""Ratio of the errors with and without an effect, above which the effect hardly changes the error."""
 LEAST_SHOWN = 5e-4
 """Least share of a mean square that is not shown as 0.0 %."""
 
@@ -80,7 +78,7 @@ def reason_text(step: Step, machine: Machine) -> str:
     place = f"{joints_in_words(step.joints)}: " if step.joints else ""
     sizes = (_size(v, several=len(step.joints) > 1, sliding=sliding) for v in step.parameters.values())
     seen = f"{place}{shape_of(step.effect or '', sliding=sliding)} ({', '.join(sizes)})"
-    taken = _taken_off(step) if reason.removed is None else _removed(reason.removed)
+    taken = "" if reason.removed is None else _removed(reason.removed)
     return sentence(f"{seen}{taken}")
 
 
@@ -106,20 +104,6 @@ def _size(value: FoundValue, *, several: bool, sliding: bool) -> str:
 
 def _removed(share: float) -> str:
     return f"; it takes {percent_gone(share, 0)} off the mean square on records not fitted to"
-
-
-def _taken_off(step: Step) -> str:
-    """How far the error falls on the joint of the effect on which it falls most."""
-    own = [e for e in step.rmse_fit if e.before > 0.0 and (not step.joints or e.joint in step.joints)]
-    if not own:
-        return ""
-    most = min(own, key=lambda e: e.after / e.before)
-    factor, unit = shown_unit(most.unit)
-    before, after = from_to(most.before * factor, most.after * factor)
-    named = f"; the rms error of joint {most.joint}"
-    if most.after > NOTICEABLE * most.before:
-        return f"{named} hardly changes: it stays near {with_unit(after, unit)}"
-    return f"{named} falls from {with_unit(before, unit)} to {with_unit(after, unit)}"
 
 
 def refusal_words(refusal: Refusal) -> str:

@@ -209,6 +209,33 @@ class Observation:
                 found[t].append(out[rows][:, list(columns), : len(record.inputs)])
         return [np.concatenate(parts) for parts in found]
 
+    def derivatives(
+        self, model: Model, state: State, unknowns: Sequence[Unknown], longest_step: float = STEP
+    ) -> list[Floats]:
+        """Exact derivatives (p, m, n), rad by each unknown's unit, of the simulated readings of every record; not finite
+        where a run diverged. longest_step: of the integration, s."""
+        vector, initials = state
+        count = len(self.records)
+        step = min(longest_step, longest_step_of(model), _step_of_contacts(model, vector[None], longest_step))
+        batch = BatchRun(
+            model,
+            self.prepared,
+            np.arange(count),
+            np.tile(vector, (count, 1)),
+            np.stack(initials),
+            step,
+            outputs=(OUT_READING,),
+        )
+        own = [[k for k, u in enumerate(unknowns) if u.trace is None or u.trace == t] for t in range(count)]
+        runs = batch.derivatives([[unknowns[k].parameter for k in one] for one in own])
+        found = []
+        for record, free, (_, slopes) in zip(self.records, own, runs, strict=True):
+            rows = np.zeros((len(unknowns), *record.measured.shape))
+            for k, slope in zip(free, slopes, strict=True):
+                rows[k] = at_rows(slope[0, : len(record.inputs)], record.inputs.rows)
+            found.append(rows)
+        return found
+
     @property
     def units(self) -> tuple[str, ...]:
         """Of the joints' positions: rad or m."""

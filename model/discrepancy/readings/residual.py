@@ -161,11 +161,9 @@ class ReadingResidual:
         return self.samples.flat([y0 - y for y, y0 in zip(shown, first, strict=True)])
 
     def slopes(self, values: Values, unknowns: Sequence[Unknown]) -> Floats:
-        """(k, N) derivatives: differences over a small share of each unknown's expected deviation."""
-        seconds = max(len(r.inputs) * r.inputs.period for r in self.observation.records)
-        moves = [difference(self.model, u, values[u.name], seconds) for u in unknowns]
-        moved = [{**values, u.name: values[u.name] + m} for u, m in zip(unknowns, moves, strict=True)]
-        return self.changes(values, moved) / np.array(moves)[:, None]
+        """(k, N) derivatives, exact."""
+        found = self.observation.derivatives(self.model, self.state(values), unknowns)
+        return -self.samples.flat(found)
 
     def deviations(self, row: Floats) -> Floats:  # noqa: ARG002 (those of readings are known)
         """(n,) of the noise of a reading."""

@@ -54,7 +54,14 @@ def test_every_operation_says_what_it_does_and_what_it_answers(described: dict[s
 
 def test_everything_of_a_robot_names_it(described: dict[str, Any]) -> None:
     of_no_robot = {f"/api/v1/{name}" for name in ("robots", "tickets", "me", "login", "logout", "system")}
-    parts = ("/api/v1/robots/{robot}", "/api/v1/fleet", "/api/v1/notifications", "/api/v1/audit", "/metrics")
+    parts = (
+        "/api/v1/robots/{robot}",
+        "/api/v1/me/",
+        "/api/v1/fleet",
+        "/api/v1/notifications",
+        "/api/v1/audit",
+        "/metrics",
+    )
     for path in described["paths"]:
         assert path in of_no_robot | {"/healthz", "/readyz"} or path.startswith(parts), path
 

@@ -29,6 +29,8 @@ SCENES = ("parts", "ready", "running", "stopped", "fault", "stale", "link", "los
 WIDTHS = (360, 768, 1280, 1920)
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 HEIGHT = 800
+BAR = 140
+"""px at the lower edge of a phone."""
 GAP = 16
 """px of the page below the shell of a scene."""
 NOON = datetime(2026, 1, 1, 12, tzinfo=UTC)
@@ -97,6 +99,8 @@ def picture(page: Page, address: str, width: int) -> bytes:
         image = Image.open(io.BytesIO(shot)).convert("RGB")
         shell = round(page.evaluate("document.querySelector('main').getBoundingClientRect().top"))
         tops.append(image if scene == "parts" else image.crop((0, 0, width, shell + GAP)))
+        if scene != "parts" and width == min(WIDTHS):  # a phone has the pages and Stop at the lower edge
+            tops.append(image.crop((0, HEIGHT - BAR, width, HEIGHT)))
     whole = Image.new("RGB", (width, sum(one.height for one in tops)))
     top = 0
     for one in tops:

@@ -5,7 +5,7 @@ from typing import Literal
 import pytest
 
 from model.discrepancy.diagnosis import FoundValue
-from model.discrepancy.explanation.effect_words import from_to, plain
+from model.discrepancy.explanation.effect_words import plain
 from model.discrepancy.explanation.step_words import step_with_sentences
 from model.discrepancy.grounds import Reason
 from tests.model.discrepancy.steps import step
@@ -18,11 +18,6 @@ from tests.model.fitting import imagined
 )
 def test_a_number_has_no_exponent(value: float, said: str) -> None:
     assert plain(value) == said
-
-
-def test_two_numbers_that_differ_are_told_apart() -> None:
-    assert from_to(1.54, 1.46) == ("1.54", "1.46")
-    assert from_to(3.2, 0.621) == ("3.2", "0.62")
 
 
 def torque_reason(kind: Literal["revolute", "prismatic"], values: dict[str, FoundValue]) -> str:

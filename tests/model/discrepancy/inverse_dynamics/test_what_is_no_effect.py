@@ -125,6 +125,23 @@ def test_times_in_another_unit_are_said_to_be_that() -> None:
 
 # ---- When an effect that has the evidence is taken, and when it is not.
 
+
+def test_an_effect_that_explains_less_than_half_of_what_stays_unexplained_is_taken_back() -> None:
+    """A force in proportion to position times speed is no known law. A disturbance in time takes a little of it off
+    both records, with evidence in plenty."""
+
+    def drag(trace: Trace) -> Floats:
+        middle = trace.position - trace.position.mean()
+        return np.asarray(1.3 * middle * np.gradient(trace.position[:, 0], trace.time)[:, None])
+
+    records = [rigs.slide_trace(seed, {}) for seed in (1, 2)]
+    found = of_slide(*(replace(trace, drive=trace.drive + drag(trace)) for trace in records))
+    assert not any(step.adopted for step in found.steps)
+    (refusal,) = (step.refusal for step in found.steps)
+    assert refusal is not None
+    assert (refusal.kind, refusal.numbers["share"] < 0.5) == ("less-than-rest", True)
+
+
 FRICTION = ("coulomb_friction",)
 
 

@@ -5742,7 +5742,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "only-resembles" | "superfluous";
+            kind: "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "less-than-rest" | "only-resembles" | "superfluous";
             /**
              * Numbers
              * @default {}

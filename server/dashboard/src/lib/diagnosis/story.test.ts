@@ -22,12 +22,12 @@ describe('candidates', () => {
   } as unknown as DiagnosisStep;
 
   it('share the posterior of those that were fitted, and each has one sentence for and against it', () => {
-    const [best, next] = toldOf(step);
+    const [best, next] = toldOf(step, 10);
     expect(best!.share).toBeCloseTo(1 / (1 + Math.exp(-2)));
     expect([best!.named, next!.named]).toEqual([true, false]);
-    expect(best!.speaksAgainst).toBe('Nothing found: the next best is behind by 4.');
-    expect(next!.speaksFor).toBe('Explains 96 more than its numbers cost.');
-    expect(next!.speaksAgainst).toBe('Explains 4 less than the best, and leaves 1.40 times the noise.');
+    expect(best!.speaksAgainst).toBe('Nothing found: the next best has 4 less.');
+    expect(next!.speaksFor).toBe('Evidence 96; 10 is enough for a name.');
+    expect(next!.speaksAgainst).toBe('Evidence 4 below the best, and leaves 1.40 times the noise.');
   });
 });
 
@@ -45,6 +45,7 @@ it('the error shrinks on held-out traces where there are any, in degrees', () =>
   };
   const { joints, isHeldOut } = shrunkOf({ gap } as never);
   expect(isHeldOut).toBe(true);
+  expect([joints[0]!.was, joints[0]!.left]).toEqual([1, expect.closeTo(0.15)]);
   expect([joints[0]!.before, joints[0]!.after, joints[0]!.unit]).toEqual(['0.20', '0.030', '°']);
   expect(shrunkOf({ gap: null }).joints).toEqual([]);
 });

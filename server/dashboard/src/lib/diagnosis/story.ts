@@ -16,9 +16,10 @@ export interface Told {
   speaksAgainst: string;
 }
 
-/** The first `most` fitted candidates of a step, the best first. */
+/** The first `most` fitted candidates of a step, the best first. `needed`: evidence from which an effect is named. */
 export function toldOf(
   step: Pick<DiagnosisStep, 'candidates' | 'group' | 'effect' | 'joints'>,
+  needed: number | null,
   most = 4,
 ): Told[] {
   const fitted = step.candidates
@@ -39,7 +40,7 @@ export function toldOf(
       named: named.has(key(one)),
       speaksFor:
         total(one) > 0
-          ? `Explains ${fixed(total(one), 0)} more than its numbers cost.`
+          ? `Evidence ${fixed(total(one), 0)}${needed === null ? '' : `; ${fixed(needed, 0)} is enough for a name`}.`
           : 'Nothing: it explains less than its numbers cost.',
       speaksAgainst: against(one, fitted, place, lead),
     };
@@ -51,10 +52,10 @@ function against(one: TriedEffect, fitted: readonly TriedEffect[], place: number
     one.misfit === null || one.misfit < 1.1 ? '' : `leaves ${fixed(one.misfit, 2)} times the noise`;
   if (place === 0) {
     if (fitted.length < 2) return left ? `It ${left}.` : 'No other candidate was worth a fit.';
-    const next = `the next best is behind by ${fixed(lead, 0)}`;
+    const next = `the next best has ${fixed(lead, 0)} less`;
     return left ? `It ${left}; ${next}.` : `Nothing found: ${next}.`;
   }
-  const behind = lead < 1 ? 'Explains as much as the best' : `Explains ${fixed(lead, 0)} less than the best`;
+  const behind = lead < 1 ? 'As much evidence as the best' : `Evidence ${fixed(lead, 0)} below the best`;
   return left ? `${behind}, and ${left}.` : `${behind}.`;
 }
 
@@ -64,7 +65,8 @@ export interface Shrunk {
   before: string;
   after: string;
   noise: string;
-  /** Of the given error: 0 to 1. */
+  /** Of the largest error of all joints in this unit: 0 to 1. */
+  was: number;
   left: number;
   floor: number;
 }
@@ -76,16 +78,21 @@ export function shrunkOf(found: Pick<DiagnosisData, 'gap'>): { joints: Shrunk[];
   if (!gap || !first || !last) return { joints: [], isHeldOut: false };
   const isHeldOut = first.held_out.length > 0;
   const [before, after] = isHeldOut ? [first.held_out, last.held_out] : [first.fitted, last.fitted];
+  const errors = gap.joints.map(
+    (_, place) => [before[place] ?? null, after[place] ?? null, gap.noise[place] ?? 0] as const,
+  );
   const joints = gap.joints.map((joint, place) => {
     const [factor, unit] = shownUnit(gap.units[place] ?? 'rad');
-    const [from, to, noise] = [before[place] ?? null, after[place] ?? null, gap.noise[place] ?? 0];
-    const most = Math.max(from ?? 0, to ?? 0, noise) || 1;
+    const [from, to, noise] = errors[place]!;
+    const alike = errors.filter((_, other) => gap.units[other] === gap.units[place]);
+    const most = Math.max(...alike.flat().map((one) => one ?? 0)) || 1;
     return {
       joint,
       unit,
       before: significant(from === null ? null : from * factor, 2),
       after: significant(to === null ? null : to * factor, 2),
       noise: significant(noise * factor, 2),
+      was: (from ?? 0) / most,
       left: (to ?? 0) / most,
       floor: noise / most,
     };

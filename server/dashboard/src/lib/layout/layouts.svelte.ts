@@ -36,6 +36,11 @@ class Layouts {
     this.key = key;
     this.keeper = keeper;
     this.take(localStorage.getItem(key) ?? '');
+    if (localStorage.getItem(this.untold) !== null) {
+      // The page was left, or there was no connection, before the service was told.
+      void this.tell();
+      return;
+    }
     void keeper.get().then(
       (text) => {
         // What was changed meanwhile is told to the service soon.
@@ -95,14 +100,27 @@ class Layouts {
     this.problem = '';
     try {
       localStorage.setItem(this.key, this.text);
+      localStorage.setItem(this.untold, 'yes');
     } catch {
       this.problem = 'This browser keeps nothing for this page: save the layout as a file.';
     }
     if (this.timer !== null) clearTimeout(this.timer);
-    this.timer = setTimeout(() => {
-      this.timer = null;
-      this.keeper?.put(this.text).catch((error: Error) => (this.problem = `${error.message}.`));
-    }, QUIET);
+    this.timer = setTimeout(() => void this.tell(), QUIET);
+  }
+
+  private get untold(): string {
+    return `${this.key}:untold`;
+  }
+
+  private async tell(): Promise<void> {
+    this.timer = null;
+    const [text, untold] = [this.text, this.untold];
+    try {
+      await this.keeper?.put(text);
+      if (text === this.text) localStorage.removeItem(untold);
+    } catch (error) {
+      this.problem = `${(error as Error).message}.`;
+    }
   }
 }
 

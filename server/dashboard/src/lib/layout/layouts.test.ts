@@ -10,6 +10,7 @@ beforeEach(() => {
   vi.stubGlobal('localStorage', {
     getItem: (key: string) => kept.get(key) ?? null,
     setItem: (key: string, value: string) => kept.set(key, value),
+    removeItem: (key: string) => kept.delete(key),
   });
   return () => {
     vi.useRealTimers();
@@ -51,6 +52,21 @@ it('on another computer the service has them; without the service this browser h
   layouts.follow('emma', { ...keeper(null), get: () => Promise.reject(new Error('no connection')) });
   await vi.advanceTimersByTimeAsync(0);
   expect(layouts.shown.name).toBe('Bench');
+});
+
+it('what was changed and not told yet is told, and not lost, when the page is opened again', async () => {
+  layouts.follow('gil', keeper(null));
+  layouts.save(bench, null);
+  const [text, untold] = [kept.get('ma2000-layouts:gil')!, kept.get('ma2000-layouts:gil:untold')];
+  expect(untold).toBe('yes');
+  kept.set('ma2000-layouts:hal', text);
+  kept.set('ma2000-layouts:hal:untold', 'yes');
+  const service = keeper('{}');
+  layouts.follow('hal', service);
+  await vi.advanceTimersByTimeAsync(0);
+  expect(layouts.shown.name).toBe('Bench');
+  expect(service.put.mock.calls).toEqual([[text]]);
+  expect(kept.has('ma2000-layouts:hal:untold')).toBe(false);
 });
 
 it('what cannot be read is said in one line, and the standard is shown', () => {
