@@ -13,6 +13,7 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import Candidate, RemainingShape, Step, Where
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.fitting import Fit, evaluate, fit
+from model.discrepancy.engine.priors import strain
 from model.discrepancy.engine.probing import Probe, Projection, Start, Trial
 from model.discrepancy.engine.residual import Residual, Signals, Values
 from model.discrepancy.grounds import Method
@@ -21,11 +22,17 @@ from model.discrepancy.verdict import Errors
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
+from model.machine_model.record_verdict import FAR_OFF
 
 
 def expected_values(now: Fit) -> dict[str, float]:
     """The values of a fit, with all numbers of which something is expected at that."""
     return {**now.values, **{u.name: u.expected for u in now.unknowns if u.deviation is not None}}
+
+
+def is_strained(now: Fit) -> bool:
+    """Whether a number is far from what is expected of it: what is missing has driven it off."""
+    return strain(now.unknowns, now.values) > FAR_OFF
 
 
 Watch = Callable[[tuple[Candidate, ...]], None]
@@ -53,6 +60,10 @@ class Case(ABC):
 
     method: ClassVar[Method]
     measure: ClassVar[Literal["closed-loop", "torques"]]
+    noise_error: ClassVar[float]
+    """Share by which the noise of a residual may be larger than `noise`."""
+    law_error: ClassVar[float]
+    """Share of what an effect explains that is explained by its law alone being not exactly the machine's."""
 
     @abstractmethod
     def unknowns(self, model: Model, added: Mapping[str, Parameter]) -> tuple[Unknown, ...]:
@@ -129,6 +140,14 @@ class Case(ABC):
     def from_expected(self, compared: Residual, unknowns: Sequence[Unknown], begin: Values, memory: Floats) -> Fit:
         """A fit that begins where the file states its numbers, far from where they are."""
         return fit(compared, unknowns, begin, memory)
+
+    def or_from_expected(self, ended: Fit) -> Fit:
+        """The fit; if it has left numbers far from what the file states, a better one that begins with them as
+        stated."""
+        if not is_strained(ended):
+            return ended
+        again = self.from_expected(ended.compared, ended.unknowns, expected_values(ended), ended.memory)
+        return min(ended, again, key=lambda one: one.cost)
 
     def held(self, now: Fit) -> Signals:
         """What a fitted model leaves of the held-out records; empty where there are none."""

@@ -10,6 +10,7 @@ import numpy as np
 from model.arrays import Floats
 from model.discrepancy.engine.case import Case
 from model.discrepancy.engine.fitting import Fit, fit
+from model.discrepancy.verdict import LEAST_EXCESS
 
 FOLDS = 4
 """Blocks into which the fitted records are cut where none are held out; each is predicted from the others."""
@@ -17,8 +18,6 @@ BLOCK_ROUNDS = 2
 """Rounds of the fit to all blocks but one."""
 AFFECTED = 0.01
 """Share by which a joint's mean square must have fallen in the fit to count as one on which the effect acts."""
-MORE_THAN_NOISE = 1.1
-"""Least residual, in noise floors, of a joint on which something may be missing."""
 
 
 @dataclass(frozen=True)
@@ -86,10 +85,10 @@ def share_removed(fitted_before: Floats, fitted_after: Floats, before: Floats, a
     return float(1 - np.mean(after[affected] / before[affected]))
 
 
-def is_beyond_noise(before: Floats, after: Floats, floor: Floats) -> bool:
-    """Whether any joint whose mean square fell in the fit had more to explain than the noise of its readings."""
+def is_beyond_noise(before: Floats, after: Floats, noise: Floats) -> bool:
+    """Whether any joint whose mean square fell in the fit had more to explain than noise, (n,) at most."""
     with np.errstate(invalid="ignore"):
-        return bool(((after < (1 - AFFECTED) * before) & (before > (MORE_THAN_NOISE * floor) ** 2)).any())
+        return bool(((after < (1 - AFFECTED) * before) & (before > noise**2)).any())
 
 
 def excess_removed(noise: Floats, fitted: tuple[Floats, Floats], before: Floats, after: Floats) -> float | None:
@@ -103,7 +102,7 @@ def excess_removed(noise: Floats, fitted: tuple[Floats, Floats], before: Floats,
     variance = noise**2
     excess = np.maximum(before - variance, 1e-300)
     fell = fitted[1] < (1 - AFFECTED) * fitted[0]
-    usable = np.isfinite(before) & np.isfinite(after) & (before > MORE_THAN_NOISE**2 * variance) & fell
+    usable = np.isfinite(before) & np.isfinite(after) & (before > (1 + LEAST_EXCESS) * variance) & fell
     if not usable.any():
         return None
     weight = np.where(usable, 1 / np.maximum(fitted[0], 1e-300), 0.0)

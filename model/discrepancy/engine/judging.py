@@ -119,7 +119,7 @@ def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Flo
     if chosen.joints and find_named_effect(chosen.effect).shared_name.acts_on == "joint torque":
         elsewhere = np.array([j not in chosen.joints for j in standing.model.machine.modelled_joints])
         fell = np.where(elsewhere, np.nan, fell)
-    return holdout.is_beyond_noise(fell, left, standing.case.noise)
+    return holdout.is_beyond_noise(fell, left, standing.case.noise * (1.0 + standing.case.noise_error))
 
 
 def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Comparison | None:
@@ -132,11 +132,20 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Comp
     if chosen.evidence <= 0:
         return None
     unsure = standing.case.options.least_evidence / THRESHOLDS.significant - 1.0  # priors have no noise in them
-    if chosen.evidence + chosen.told + unsure * chosen.relieved < standing.case.options.least_evidence:
+    if chosen.evidence + chosen.told + unsure * chosen.relieved < needed_evidence(standing, chosen):
         return None
     if any(chosen.rivals(one) and chosen.evidence < LARGER_PART * one.evidence for one in refused):
         return None
     return compare(standing, chosen)
+
+
+def needed_evidence(standing: Standing, chosen: Fitted) -> float:
+    """Evidence from which a candidate is named: what counts as found, and a share of what effects have explained on its
+    joints (on any, for an effect of the whole machine), since no law is exactly the machine's."""
+    own = set(chosen.joints)
+    near = (s for s in standing.adopted if not own or not s.joints or own & set(s.joints))
+    explained = sum(max(0.0, s.evidence + (s.evidence_held_out or 0.0)) for s in near)
+    return standing.case.options.least_evidence + standing.case.law_error * explained
 
 
 SUSPECTED_SHARE = 0.05
@@ -154,7 +163,7 @@ def suspect(standing: Standing, found: Findings, recorded: float) -> Suspicion |
     case = standing.case
     for chosen in found.fitted[:CHANCES]:
         total = chosen.evidence + chosen.told
-        needed = case.options.least_evidence
+        needed = needed_evidence(standing, chosen)
         if chosen.evidence <= 0 or not THRESHOLDS.significant <= total < needed:
             continue
         comparison = compare(standing, chosen)

@@ -12,9 +12,9 @@ from daq.contracts.progress import Cancel, Progress, stop_if
 from model.arrays import Floats
 from model.discrepancy.diagnosis import Candidate
 from model.discrepancy.engine.candidate import Fitted
-from model.discrepancy.engine.case import Case
+from model.discrepancy.engine.case import Case, is_strained
 from model.discrepancy.engine.fitting import LONG, Fit, Slopes, evaluate, fit
-from model.discrepancy.engine.priors import free_unknown, strain
+from model.discrepancy.engine.priors import free_unknown
 from model.discrepancy.engine.probing import Probe, Start, Trial, projection
 from model.discrepancy.thresholds import LARGER_PART, THRESHOLDS
 from model.effects.names import effect_on
@@ -27,8 +27,7 @@ REFINED = 6
 """Most candidates that are fitted with derivatives of their own."""
 OF_A_JOINT = 3
 """Most of these effects on one joint."""
-STRAINED = 7.0
-"""Deviations of a number from the file above which what is missing has driven it off."""
+
 RESOLVED_ODDS = 2
 """Decimals of evidence by which candidates are ordered."""
 LEADING = 8
@@ -73,6 +72,7 @@ def search(now: Fit, case: Case, progress: Progress, cancel: Cancel) -> Findings
         progress(0.6, f"fitting {effect_on(chosen[0].trial.effect, _joints(chosen))}")
         found = work.weigh([*found, work.fit_effect(chosen, work.goal(found))])
         _tell(case, probes, found)
+    found = work.weigh(work.refined(found, cancel))
     found = work.from_expected(found, [p.trial for p in probes])
     for chosen in several:
         best = found[0].log_odds if found else 0.0
@@ -155,10 +155,10 @@ class _Search:
         are far off without them, what they imitate is not seen from where they are, and the best of the candidates does
         not bring them back."""
         now, case = self.now, self.case
-        if not _is_strained(now) or (found and not _is_strained(found[0].fit)):
+        if not is_strained(now) or (found and not is_strained(found[0].fit)):
             return list(found)
         every = self._begun_at(case.where_expected(now), found, tried)
-        if not every or _is_strained(every[0].fit):
+        if not every or is_strained(every[0].fit):
             return every
         values = {u.name: every[0].fit.values.get(u.name, now.values[u.name]) for u in now.unknowns}
         return self._begun_at(evaluate(now.compared, now.unknowns, values, now.memory), every, tried)
@@ -195,12 +195,14 @@ class _Search:
         are of another place, and a number that the tolerances had taken far off does not come back by them. Those that
         cannot catch up with the best of all are left as they are."""
         best = max((f.log_odds for f in (*found, *every)), default=0.0)
-        refined = []
+        refined: list[Fitted] = []
         for one in found[:REFINED]:
             stop_if(cancel)
             last = one.fit
             if one.log_odds >= min(best - THRESHOLDS.close, LARGER_PART * best) and one.evidence > -THRESHOLDS.close:
-                one = replace(one, fit=fit(last.compared, last.unknowns, last.values, last.memory, rounds=LONG))  # noqa: PLW2901
+                goal = self.goal([*every, *refined])
+                ended = fit(last.compared, last.unknowns, last.values, last.memory, rounds=LONG, goal=goal)
+                one = replace(one, fit=self.case.or_from_expected(ended))  # noqa: PLW2901
             refined.append(one)
         return [*refined, *found[REFINED:]]
 
@@ -288,10 +290,6 @@ def _best_of_each(found: Sequence[Fitted]) -> list[Fitted]:
     for one in found:
         kept.setdefault((one.effect, one.joints), one)
     return list(kept.values())
-
-
-def _is_strained(now: Fit) -> bool:
-    return strain(now.unknowns, now.values) > STRAINED
 
 
 def order_by_odds(found: Fitted) -> float:

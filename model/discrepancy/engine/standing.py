@@ -69,7 +69,8 @@ class Standing:
 
     def _fit(self, model: Model, begun: Fit, added: Mapping[str, Parameter]) -> Fit:
         unknowns = self.case.unknowns(model, added)
-        return fit(begun.compared.of_model(model), unknowns, begun.values, known=begun.known or None)
+        fitted = fit(begun.compared.of_model(model), unknowns, begun.values, known=begun.known or None)
+        return self.case.or_from_expected(fitted)
 
 
 def begin(case: Case, first: Fit | None = None) -> Standing:

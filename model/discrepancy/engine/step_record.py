@@ -11,7 +11,7 @@ from model.discrepancy.diagnosis import UNWRITTEN, Candidate, FoundValue, Signal
 from model.discrepancy.engine import holdout
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case
-from model.discrepancy.engine.judging import Comparison, compare
+from model.discrepancy.engine.judging import Comparison, compare, needed_evidence
 from model.discrepancy.engine.search import Findings, order_by_odds
 from model.discrepancy.engine.standing import Standing
 from model.discrepancy.grounds import Reason
@@ -90,7 +90,8 @@ def list_tried(standing: Standing, found: Findings) -> tuple[Candidate, ...]:
     if not found.fitted:
         return listed
     best = max(range(min(len(found.fitted), SHOWN)), key=lambda k: listed[k].total)
-    chosen, needed = found.fitted[best], standing.case.options.least_evidence
+    chosen = found.fitted[best]
+    needed = needed_evidence(standing, chosen)
     told = {"evidence_held_out": chosen.told} if standing.case.held_out is not None else {}
     return (*listed[:best], listed[best].model_copy(update={"needed": needed, **told}), *listed[best + 1 :])
 

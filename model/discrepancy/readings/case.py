@@ -21,7 +21,6 @@ from model.discrepancy.engine.lifted import is_far_everywhere
 from model.discrepancy.engine.priors import free_unknown, prior_distance, strain
 from model.discrepancy.engine.probing import Probe, Projection, Start, Trial
 from model.discrepancy.engine.residual import Residual, Signals, Values
-from model.discrepancy.engine.search import STRAINED
 from model.discrepancy.engine.step_record import signal_errors
 from model.discrepancy.grounds import Method
 from model.discrepancy.localisation.disagreement import locate
@@ -75,6 +74,8 @@ class ReadingCase(Case):
 
     method: ClassVar[Method] = "output-error"
     measure = "closed-loop"
+    law_error = 0.03
+    noise_error = 0.0  # the file states it, or the records show it
     unresolved_kind = frozenset()
 
     def unknowns(self, model: Model, added: Mapping[str, Parameter]) -> tuple[Unknown, ...]:
@@ -343,7 +344,7 @@ def weighed_by_noise(case: ReadingCase) -> tuple[ReadingCase, Fit]:
         stated = float(np.mean(np.concatenate([np.concatenate(runs) for runs in case.compared.by_joint(row)]) ** 2))
         shape = joints_with_structure(case.residuals(fitted, fitted.signals, case.compared.observation))
         # noise moves no number by many of its own deviations: what does is missing
-        driven_off = strain(fitted.unknowns, fitted.values) > STRAINED * math.sqrt(stated)
+        driven_off = strain(fitted.unknowns, fitted.values) > FAR_OFF * math.sqrt(stated)
         if stated < LARGER or shape or driven_off:
             break
         noise = shown_noise(case.compared.by_joint(row))

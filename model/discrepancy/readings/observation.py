@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -120,6 +121,11 @@ class Observation:
         """(n,) rad, standard deviation of the noise of a reading: as the records show it, or as the file states it."""
         return self.deviations if self.noise is None else self.deviations * self.noise.sizes
 
+    @cached_property
+    def range_of_motion(self) -> float:
+        """rad or m, the longest way between two readings of a joint."""
+        return max(float(np.max(np.nanmax(r.measured, axis=0) - np.nanmin(r.measured, axis=0))) for r in self.records)
+
     def with_feedback_share(self, share: float) -> Observation:
         """The same with another share of the recorded readings that the simulated controller is given."""
         return replace(self, prepared=tuple(replace(p, following=share) for p in self.prepared))
@@ -212,7 +218,7 @@ class Observation:
     def derivatives(
         self, model: Model, state: State, unknowns: Sequence[Unknown], longest_step: float = STEP
     ) -> list[Floats]:
-        """Exact derivatives (p, m, n), rad by each unknown's unit, of the simulated readings of every record; not finite
+        """Exact derivatives (p, m, n) of the simulated readings of every record, rad by each unknown's unit; not finite
         where a run diverged. longest_step: of the integration, s."""
         vector, initials = state
         count = len(self.records)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from model import layout as at
 from model.arrays import Floats
 from model.discrepancy.engine.fitting import fit
 from model.discrepancy.engine.residual import Samples, Signals, Values
@@ -161,9 +162,20 @@ class ReadingResidual:
         return self.samples.flat([y0 - y for y, y0 in zip(shown, first, strict=True)])
 
     def slopes(self, values: Values, unknowns: Sequence[Unknown]) -> Floats:
-        """(k, N) derivatives, exact."""
-        found = self.observation.derivatives(self.model, self.state(values), unknowns)
-        return -self.samples.flat(found)
+        """(k, N) derivatives: exact ones. Where a loop swings up or parts knock in their play, a derivative grows along
+        the record beyond anything that a change does; differences over a small share of each unknown's expected
+        deviation tell more there."""
+        rows = np.full((len(unknowns), sum(self.samples.sizes)), np.inf)
+        if not (self.model.flags & at.HAS_FLEXIBILITY).any():
+            rows = -self.samples.flat(self.observation.derivatives(self.model, self.state(values), unknowns))
+        seconds = max(len(r.inputs) * r.inputs.period for r in self.observation.records)
+        moves = np.array([difference(self.model, u, values[u.name], seconds) for u in unknowns])
+        largest = np.abs(rows).max(axis=1, initial=0.0) * np.abs(moves)
+        wild = [k for k, size in enumerate(largest) if not size < self.observation.range_of_motion]
+        if wild:
+            moved = [{**values, unknowns[k].name: values[unknowns[k].name] + moves[k]} for k in wild]
+            rows[wild] = self.changes(values, moved) / moves[wild, None]
+        return rows
 
     def deviations(self, row: Floats) -> Floats:  # noqa: ARG002 (those of readings are known)
         """(n,) of the noise of a reading."""
