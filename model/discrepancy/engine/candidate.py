@@ -42,6 +42,8 @@ class Fitted:
     """What held-out records say for it, as evidence; 0 where there are none."""
     told_compared: float = 0.0
     """The same, counted as for all other candidates (`holdout.Told`)."""
+    ended: bool = False
+    """Whether its fit has derivatives of its own to its end."""
 
     @property
     def log_odds(self) -> float:

@@ -66,8 +66,9 @@ class Trial:
 
     @property
     def null(self) -> Start:
-        """The sizes at which it does nothing."""
-        return {p.name: float(p.null) for p in self.parameters if p.null is not None} | dict(self.origin)
+        """The sizes at which it does nothing, as far as bounds allow."""
+        known = {p.name: float(np.clip(p.null, p.low, p.high)) for p in self.parameters if p.null is not None}
+        return known | dict(self.origin)
 
 
 @dataclass(frozen=True)
@@ -188,9 +189,3 @@ def projection(now: Fit) -> Projection:
     information = tangents @ tangents.T + rows.T @ rows
     information[np.diag_indices_from(information)] *= 1 + 1e-9
     return Projection(now, tangents, inverse(information), left, tangents @ left - rows.T @ aims)
-
-
-def all_probes(now: Fit, trials: Sequence[Trial]) -> list[Probe]:
-    """Every trial at its best start, the most promising first."""
-    clear = projection(now)
-    return sorted((clear.probe(t) for t in trials if t.starts), key=lambda p: -p.gain)

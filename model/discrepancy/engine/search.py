@@ -198,11 +198,14 @@ class _Search:
         refined: list[Fitted] = []
         for one in found[:REFINED]:
             stop_if(cancel)
-            last = one.fit
-            if one.log_odds >= min(best - THRESHOLDS.close, LARGER_PART * best) and one.evidence > -THRESHOLDS.close:
-                goal = self.goal([*every, *refined])
-                ended = fit(last.compared, last.unknowns, last.values, last.memory, rounds=LONG, goal=goal)
-                one = replace(one, fit=self.case.or_from_expected(ended))  # noqa: PLW2901
+            last, ended = one.fit, [f for f in (*found, *every, *refined) if f.ended]
+            near = one.log_odds >= min(best - THRESHOLDS.close, LARGER_PART * best)
+            if near and one.evidence > -THRESHOLDS.close and not one.ended:
+                goal = self.goal(ended)
+                now = fit(last.compared, last.unknowns, last.values, last.memory, rounds=LONG, goal=goal)
+                if all(is_strained(f.fit) for f in ended):
+                    now = self.case.or_from_expected(now)
+                one = replace(one, fit=now, ended=True)  # noqa: PLW2901
             refined.append(one)
         return [*refined, *found[REFINED:]]
 

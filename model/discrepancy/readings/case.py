@@ -158,7 +158,8 @@ class ReadingCase(Case):
         assert isinstance(compared, ReadingResidual)
         closed = compared.on(compared.observation.with_feedback_share(0.0))
         there = fit(closed, unknowns, begin, memory, rounds=STEPS_APART)
-        return fit(compared, unknowns, there.values if math.isfinite(there.cost) else begin, memory)
+        begun = there.values if math.isfinite(there.cost) else begin
+        return fit(compared, unknowns, begun, memory, rounds=LONG)
 
     def take_back(self, effect: str, own: Sequence[Parameter], now: Fit) -> Start:
         """An effect that has all of the distance of a number far from its expectation, while that is as expected."""
