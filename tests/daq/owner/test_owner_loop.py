@@ -376,3 +376,26 @@ def test_a_reader_that_does_not_read_costs_no_time(pipe: tuple[int, int], monkey
             speaker.progress(0.5, text)
         assert speaker.dropped > 0
         os.close(reader)
+
+
+def test_watchers_get_every_period_that_passes_between_two_activities() -> None:
+    """While a move is planned or a file is opened, nobody asks for samples; the bridge keeps 64 of them."""
+    controller = WatchedController(Link(cast(Any, InProcess(Bridge, sample=True))))
+    ticks: list[int] = []
+    lost: list[tuple[int, int]] = []
+    controller.listener = lambda snapshot: ticks.append(snapshot.tick)
+    controller.lost = lambda count, tick: lost.append((count, tick))
+
+    def pass_periods(count: int) -> None:
+        controller.clock.sleep_until(controller.clock.now() + count * controller.period_s)
+        controller.next_snapshot()
+
+    for _ in range(3):
+        pass_periods(5)
+    assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
+    assert (controller.counters.late, controller.counters.missing_samples, lost) == (0, 0, [])
+    until = ticks[-1]
+    pass_periods(100)
+    ((count, tick),) = lost
+    assert ticks[ticks.index(until) + 1 :] == list(range(tick, ticks[-1] + 1))
+    assert tick - until - 1 == count > 0
