@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 from daq.contracts.machine import Machine
@@ -47,11 +48,12 @@ class WatchedController(Controller):
 
     def _caught_up(self, newest: BoardSnapshot, joints: Sequence[int] | None) -> BoardSnapshot:
         """Passes on what is kept by now, so that hardly anything is left to read after set points have been sent."""
-        while (begun := int((self.clock.now() - newest.tick_time) / self.period_s)) > 0:
-            passed_on = self._pass_on_kept(newest, newest.tick + begun + 1, joints)
-            if passed_on is newest:
-                break
-            newest = passed_on
+        if self.clock.now() - newest.tick_time < self.period_s:
+            return newest
+        behind, before = self.status().tick - newest.tick, math.inf
+        while 0 < behind < before:  # on a slow line as many periods pass as are read
+            newest = self._pass_on_kept(newest, newest.tick + behind + 1, joints)
+            behind, before = self.status().tick - newest.tick, behind
         return newest
 
     def _pass_on_kept(self, newest: BoardSnapshot, before: int, joints: Sequence[int] | None) -> BoardSnapshot:

@@ -21,7 +21,7 @@ from daq.link import Link, LinkState
 from daq.owner import long_orders, stop_socket
 from daq.owner import speaker as module
 from daq.owner.guardian import EndCause, Guardian
-from daq.owner.loop import serve
+from daq.owner.loop import _watch, serve
 from daq.owner.messages import BEGINS_WITHIN, REPORT, Answer, MoveGripper, Open, Reset, RunProgram
 from daq.owner.owned_robot import OwnedRobot
 from daq.owner.quick_orders import carry_out
@@ -376,6 +376,21 @@ def test_a_reader_that_does_not_read_costs_no_time(pipe: tuple[int, int], monkey
             speaker.progress(0.5, text)
         assert speaker.dropped > 0
         os.close(reader)
+
+
+def test_a_period_that_began_before_the_reset_is_no_new_stop(scene: Scene) -> None:
+    """The board computes for a while in each period, and then tells whether it was stopped when the period began."""
+    controller, board = scene.robot.controller, scene.endpoint.board
+    begun = board.tick
+    while board.tick == begun:
+        controller.clock.sleep_until(controller.clock.now() + 1e-3)
+    scene.reset(here=False)
+    assert board.snapshots.newest().tick < board.tick
+    _watch(scene.robot, None)
+    assert scene.control.arm.state is State.IDLE
+    board.freeze()
+    _watch(scene.robot, _watch(scene.robot, None))
+    assert scene.control.arm.state is State.STOPPED
 
 
 def test_watchers_get_every_period_that_passes_between_two_activities() -> None:
