@@ -10,10 +10,10 @@ PROGRAM = (sys.executable, "-m", "daq.owner")
 _early: list[subprocess.Popen[bytes]] = []
 
 
-def start_owner(program: Sequence[str] = PROGRAM) -> subprocess.Popen[bytes]:
+def start_owner(program: Sequence[str] = ()) -> subprocess.Popen[bytes]:
     """Starts a process that loads its modules and waits for the order `Open`. It ends with its standard input."""
     # in a session of its own, since Ctrl-C in the terminal is the client's to handle
-    return subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
+    return subprocess.Popen(program or PROGRAM, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
 
 
 def start_early() -> None:
