@@ -214,7 +214,8 @@ class Follower:
     def _tell_retries(self) -> None:
         retries = self._controller.counters.retries
         if retries != self._retries:
-            self.report("retry", f"{retries - self._retries} requests had to be repeated")
+            repeated = retries - self._retries
+            self.report("retry", f"{repeated} {'request' if repeated == 1 else 'requests'} had to be repeated")
             self._retries = retries
 
     def _judge(self, verdict: Verdict, row: SampleRow) -> Ending | None:
