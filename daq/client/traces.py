@@ -47,8 +47,11 @@ class Traces:
         kind: str | None = None,
         since: datetime | None = None,
         until: datetime | None = None,
+        joint: int | None = None,
+        effect: str | None = None,
     ) -> Iterator[CatalogueEntry]:
-        """Yields traces, the newest first; `text` is searched in ID, file, name, kind, operator, notes and tags."""
+        """Yields traces, the newest first; `text` is searched in ID, file, name, kind, operator, notes and tags.
+        `joint` moved; `effect` was named by the newest diagnosis that used the trace."""
         return self._connection.every(
             CatalogueEntry,
             self._path,
@@ -59,6 +62,8 @@ class Traces:
             kind=kind,
             since=None if since is None else since.isoformat(),
             until=None if until is None else until.isoformat(),
+            joint=joint,
+            effect=effect,
         )
 
     def get(self, trace: str) -> TraceDetails:

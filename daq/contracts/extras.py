@@ -26,6 +26,7 @@ Extra = Literal[
     "oidc",
     "mcp",
     "rerun",
+    "webrtc",
     "foxglove",
 ]
 
@@ -36,6 +37,7 @@ CONTAINS: dict[Extra, tuple[Extra, ...]] = {
     "mcp": ("robot", "live"),
     "foxglove": ("robot", "live"),
     "rerun": ("model", "robot", "live"),
+    "webrtc": ("server", "robot", "live"),
 }
 """Extras that an extra includes."""
 EXTRA_OF: dict[str, Extra] = {
@@ -73,6 +75,7 @@ EXTRA_OF: dict[str, Extra] = {
     "authlib": "oidc",
     "mcp": "mcp",
     "rerun": "rerun",
+    "aiortc": "webrtc",
     "foxglove": "foxglove",
 }
 """The smallest extra that installs each module."""

@@ -11,6 +11,13 @@ from daq.contracts.trace import Floats, Trace
 
 RISE_FROM, RISE_TO = 0.1, 0.9
 """Shares of the step between which rise time is measured, as usual in control."""
+AT_REST = 0.01
+"""Largest change (rad, m) of a position at rest, an assumption: noise, and bending under load."""
+
+
+def joints_moved(trace: Trace) -> tuple[int, ...]:
+    """Returns the joints that moved: those whose set point changes; without set points, whose position does."""
+    return tuple(joint for joint in trace.joints if _moved(trace, trace.column(joint))) if len(trace) else ()
 
 
 def joint_figures(trace: Trace) -> list[JointFigureSet]:
@@ -26,12 +33,11 @@ def _figures(trace: Trace, joint: int, column: int) -> JointFigureSet:
     set_point = None if trace.set_point is None else trace.set_point[:, column] * scale
     error = None if set_point is None else set_point - position
     drive = None if trace.drive is None else trace.drive[:, column]
-    moved = bool(np.ptp(position if set_point is None else set_point) > 0)
     way = 0.0 if set_point is None else float(set_point[-1] - set_point[0])
     return JointFigureSet(
         joint=joint,
         unit="mm" if prismatic else "°",
-        moved=moved,
+        moved=_moved(trace, column),
         start=float(position[0]),
         end=float(position[-1]),
         overshoot=None if set_point is None or way == 0 else _overshoot(position, float(set_point[-1]), way),
@@ -40,6 +46,12 @@ def _figures(trace: Trace, joint: int, column: int) -> JointFigureSet:
         final_error=None if error is None else float(error[-1]),
         largest_drive=None if drive is None else float(np.abs(drive).max()),
     )
+
+
+def _moved(trace: Trace, column: int) -> bool:
+    if trace.set_point is not None:
+        return bool(np.ptp(trace.set_point[:, column]) > 0)
+    return bool(np.ptp(trace.position[:, column]) > AT_REST)
 
 
 def _overshoot(position: Floats, target: float, way: float) -> float:

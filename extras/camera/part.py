@@ -8,7 +8,8 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO, Literal
+from typing import IO, Literal, TypeVar
+from urllib.parse import urlsplit
 
 from daq.contracts.errors import DaqError
 from daq.contracts.service.base import Wire
@@ -19,6 +20,7 @@ from extras.camera.mjpeg import CameraError, pictures
 from extras.camera.recorded import Picture, add_pictures
 from extras.camera.settings import SYNTHETIC, CameraSettings
 from extras.camera.synthetic import picture
+from extras.camera.webrtc import SCHEMES, frames, jpeg
 from server.parts import Part
 from server.problems import not_found
 from server.robot_services import RobotServices
@@ -30,13 +32,16 @@ WATCHED = 3.0
 """Time (s) after a request for a picture for which somebody still watches."""
 LOOK = 0.2
 """Longest time (s) until an idle camera notices that it is needed."""
+Source = Literal["none", "synthetic", "mjpeg", "webrtc"]
+Item = TypeVar("Item")
 log = logging.getLogger("server.camera")
 
 
 class CameraStatus(Wire):
-    """A robot's camera. `source`: `none`, `synthetic` (drawn from the mock's posture) or `mjpeg`."""
+    """A robot's camera."""
 
-    source: Literal["none", "synthetic", "mjpeg"]
+    source: Source
+    """`synthetic`: drawn from the mock's posture."""
     records: bool
     """Whether its pictures are recorded into the traces of experiments."""
     problem: str
@@ -52,6 +57,7 @@ class Camera:
         name = rig.robot.place.name
         is_mock = isinstance(parse_port_url(rig.robot.place.url), MockPort)
         self.url = settings.url.replace("{robot}", name) if settings.url else SYNTHETIC if is_mock else ""
+        self._kind = _kind_of(self.url)
         self.records = settings.url is not None and settings.record
         self.problem = ""
         self.newest: Picture | None = None
@@ -82,10 +88,7 @@ class Camera:
     def status(self) -> CameraStatus:
         """Returns the state, and counts as watching."""
         self._asked = time.monotonic()
-        source: Literal["none", "synthetic", "mjpeg"] = "mjpeg" if self.url else "none"
-        return CameraStatus(
-            source="synthetic" if self.url == SYNTHETIC else source, records=self.records, problem=self.problem
-        )
+        return CameraStatus(source=self._kind, records=self.records, problem=self.problem)
 
     def after(self, number: int) -> tuple[int, Picture] | None:
         """Returns the newest picture and its number, if that is not `number`. Counts as watching."""
@@ -123,9 +126,9 @@ class Camera:
 
     def _watch(self) -> None:
         """Takes pictures as long as they are needed. Raises CameraError if the source ends."""
-        for jpeg in self._source():
+        for one in self._source():
             self.problem = ""
-            self._take(Picture(time.monotonic(), jpeg))
+            self._take(Picture(time.monotonic(), one))
             if self._closing.is_set() or not self._is_needed():
                 return
         if not self._closing.is_set():
@@ -137,19 +140,17 @@ class Camera:
     def _source(self) -> Iterator[bytes]:
         """Yields pictures at the configured rate at most."""
         period = 1.0 / self._settings.rate
-        if self.url == SYNTHETIC:
+        if self._kind == "synthetic":
             while not self._closing.wait(period):
                 sample = self._sample
                 if sample is None:
                     raise CameraError("the mock gives no samples, so there is nothing to draw")
                 yield picture(self._rig.robot.machine, sample.position, f"tick {sample.tick}")
             return
-        last = -period
-        for jpeg in pictures(self.url):
-            now = time.monotonic()
-            if now - last >= 0.9 * period:  # a source of just this rate, which jitters, is not halved
-                last = now
-                yield jpeg
+        if self._kind == "webrtc":
+            yield from map(jpeg, _thinned(frames(self.url), period))
+        else:
+            yield from _thinned(pictures(self.url), period)
 
     def _take(self, one: Picture) -> None:
         with self._lock:
@@ -168,6 +169,22 @@ class Camera:
         with self._lock:
             spool, self._spool = self._spool, None
         return spool
+
+
+def _kind_of(url: str) -> Source:
+    if url in ("", SYNTHETIC):
+        return "synthetic" if url else "none"
+    return "webrtc" if urlsplit(url).scheme in SCHEMES else "mjpeg"
+
+
+def _thinned(items: Iterator[Item], period: float) -> Iterator[Item]:
+    """Yields items at least `period` s apart, leaving the others out."""
+    last = -period
+    for one in items:
+        now = time.monotonic()
+        if now - last >= 0.9 * period:  # a source of just this rate, which jitters, is not halved
+            last = now
+            yield one
 
 
 class _Spool:

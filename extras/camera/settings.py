@@ -8,8 +8,10 @@ from urllib.parse import urlsplit
 from pydantic import Field, field_validator
 
 from daq.config.section import Section
+from extras.camera.webrtc import SCHEMES
 
 SYNTHETIC = "synthetic"
+ALLOWED = "is not a URL of a camera; write http://host/stream, whep://host/camera/whep, or synthetic"
 
 
 class CameraSettings(Section):
@@ -18,7 +20,8 @@ class CameraSettings(Section):
     SHOWN = frozenset(["rate", "most_size"])
 
     url: Annotated[str, Field(max_length=500)] | None = None
-    """URL of an MJPEG stream (`http://host/stream`), or `synthetic`. `{robot}` stands for the arm's name."""
+    """URL of an MJPEG stream (`http://host/stream`) or of one by WebRTC (`whep://host/camera/whep`), or `synthetic`.
+    `{robot}` stands for the arm's name."""
     record: bool = True
     """Whether pictures are recorded into the traces of experiments, if there is a `url`."""
     rate: Annotated[float, Field(gt=0, le=60)] = 10.0
@@ -36,7 +39,7 @@ class CameraSettings(Section):
             parts = urlsplit(url)
             _ = parts.port
         except ValueError:
-            raise ValueError("is not a URL; write http://host/stream, or synthetic") from None
-        if parts.scheme not in ("http", "https") or not parts.hostname:
-            raise ValueError("is not a URL; write http://host/stream, or synthetic")
+            raise ValueError(ALLOWED) from None
+        if parts.scheme not in ("http", "https", *SCHEMES) or not parts.hostname:
+            raise ValueError(ALLOWED)
         return url

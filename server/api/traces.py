@@ -11,8 +11,10 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
+from daq.contracts.experiment import JointNumber
 from daq.contracts.labels import Outcome, Source
 from daq.contracts.service.base import Moment, Page
+from daq.contracts.service.jobs import EffectName
 from daq.contracts.service.traces import CatalogueEntry, TraceChange, TraceDetails, TraceSignals
 from daq.traces.csv_table import export_csv
 from daq.traces.reader import read_trace
@@ -62,11 +64,13 @@ async def list_traces(
     kind: Annotated[str | None, Query(max_length=32)] = None,
     since: Moment | None = None,
     until: Moment | None = None,
+    joint: Annotated[JointNumber | None, Query(description="A joint that moved.")] = None,
+    effect: Annotated[EffectName | None, Query(description="Named by its newest diagnosis.")] = None,
     limit: Limit = 50,
     cursor: CursorOf = None,
 ) -> Page[CatalogueEntry]:
     """Lists traces, the newest first."""
-    search = TraceSearch(q, tag, source, outcome, kind, since, until)
+    search = TraceSearch(q, tag, source, outcome, kind, since, until, joint, effect)
     if q is None:
         return await run_in_threadpool(traces.page, rig.robot.name, search, cursor, limit)
     let_others_ask(connection)

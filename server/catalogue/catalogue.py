@@ -13,12 +13,15 @@ from typing import Protocol
 
 from sqlalchemy.exc import OperationalError
 
+from daq.contracts.errors import TraceError
 from daq.contracts.service.archive import Transfer
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.contracts.whole_file import sync_folder
 from daq.traces import disk, layout
 from daq.traces.catalogue import TraceSummary, summary_of
+from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage_folder
+from daq.traces.summary import joints_moved
 from server.problems import ProblemError, conflict, not_found
 from server.store.experiments import ExperimentStore
 from server.store.traces import NewTrace, TraceStore
@@ -256,6 +259,10 @@ class Catalogue:
     def _insert(self, path: Path, summary: TraceSummary) -> bool:
         assert summary.trace_id is not None
         assert summary.created is not None
+        moved = summary.moved
+        if moved is None:  # no experiment says it; samples that cannot be read say so when the trace is opened
+            with suppress(TraceError):
+                moved = joints_moved(read_trace(path, self.limits))
         try:
             self._traces.insert(
                 NewTrace(
@@ -267,6 +274,7 @@ class Catalogue:
                     kind=summary.kind,
                     name=summary.name,
                     joints=summary.joints,
+                    moved=moved or (),
                     outcome=summary.outcome,
                     samples=summary.samples,
                     duration=summary.duration,

@@ -321,7 +321,7 @@ class JobService:
 
     def _end(self, identity: str, lane: Lane, future: Future[Ended]) -> None:
         context = self._context
-        event, reason, model, headline = Event.COMPLETED, "", None, ""
+        event, reason, model, told = Event.COMPLETED, "", None, Ended()
         try:
             ended = future.result()
         except BrokenExecutor:
@@ -338,13 +338,14 @@ class JobService:
             else:
                 try:
                     model = None if ended.model is None else self._keep_model(identity)
-                    headline = ended.headline
+                    told = ended
                 except (OSError, OperationalError):
                     raise
                 except Exception as error:
                     log.exception("job %s: its model", identity)
                     event, reason = Event.FAULT, _fault(error)
-        self._tell(context.jobs.change(context.robot, identity, event, context.clock.utc(), reason, model, headline))
+        answer = reason, model, told.headline, told.effects
+        self._tell(context.jobs.change(context.robot, identity, event, context.clock.utc(), *answer))
         (self._folder(identity) / MODEL).unlink(missing_ok=True)  # not earlier: writing the end may have to be repeated
 
     def _keep_model(self, identity: str) -> str:

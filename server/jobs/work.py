@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,12 +51,13 @@ class Task(FrozenRecord):
 
 @dataclass(frozen=True)
 class Ended:
-    """How a job ended. `problem` is empty if it is done."""
+    """How a job ended. `problem` is empty if it is done. `effects`: those that a diagnosis named."""
 
     problem: str = ""
     cancelled: bool = False
     model: str | None = None
     headline: str = ""
+    effects: tuple[str, ...] = ()
 
 
 def carry_out(folder: Path) -> Ended:
@@ -225,7 +226,9 @@ class _Worker:
         files = {trace.record.trace_id: trace.file for trace in every if trace.file}
         page = saved_report(data, files, report_sections(found, every))
         model = found.model_after if changed else None
-        return self._done(DiagnosisJobResult(id=self._job, data=data), page, headline(found), model)
+        named = {one.effect for step in found.steps if step.adopted for one in step.group or (step,) if one.effect}
+        done = self._done(DiagnosisJobResult(id=self._job, data=data), page, headline(found), model)
+        return replace(done, effects=tuple(sorted(named)))
 
     def _compared(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from datetime import datetime
 
 from pydantic import TypeAdapter
@@ -27,7 +27,7 @@ from server.store.engine import Store
 from server.store.labels import job_label
 from server.store.pages import newest_first
 from server.store.submitted import digest_of, made_before, new_columns
-from server.store.tables import JobRow, TraceRow, TraceUseRow
+from server.store.tables import JobRow, TraceRow, TraceUseRow, spaced
 
 _FAILURES: dict[Event, JobFailure] = {
     Event.REFUSED: "refused",
@@ -137,6 +137,7 @@ class JobStore:
         reason: str = "",
         model: str | None = None,
         headline: str = "",
+        effects: Iterable[str] = (),
     ) -> Job:
         """Changes a job's state by an event. Raises a 409 if its state does not allow the event."""
         with self._store.writing() as session:
@@ -150,7 +151,7 @@ class JobStore:
                 row.started = now
             else:
                 row.ended, row.reason, row.model, row.headline = now, reason, model, headline
-                row.failure = _FAILURES.get(event)
+                row.failure, row.effects = _FAILURES.get(event), spaced(effects)
             session.flush()
             return as_job(row)
 

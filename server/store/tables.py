@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from typing import Any
 
@@ -38,6 +39,11 @@ class Utc(TypeDecorator[datetime]):
         """Converts a value from the database."""
         del dialect
         return None if value is None else value.replace(tzinfo=UTC)
+
+
+def spaced(values: Iterable[object]) -> str:
+    """Returns words as a column stores them: it contains ` word ` if the word is among them."""
+    return "".join(f" {one}" for one in values) + " "
 
 
 class Table(DeclarativeBase):
@@ -156,6 +162,8 @@ class TraceRow(Table):
     kind: Mapped[str | None] = mapped_column(String(32))
     name: Mapped[str | None] = mapped_column(String(64))
     joints: Mapped[list[Any]]
+    moved: Mapped[str] = mapped_column(Text)
+    """Joints that moved (`spaced`)."""
     outcome: Mapped[str | None] = mapped_column(String(16))
     samples: Mapped[int | None]
     duration: Mapped[float | None]
@@ -191,6 +199,8 @@ class JobRow(Submitted, Table):
     request: Mapped[dict[str, Any]]
     headline: Mapped[str] = mapped_column(Text, default="", server_default="")
     """The job's result in one line."""
+    effects: Mapped[str] = mapped_column(Text, default="")
+    """Effects that a diagnosis named, alone or in a group (`spaced`)."""
     model: Mapped[str | None] = mapped_column(String(64))
     """The model that the job made."""
     failure: Mapped[str | None] = mapped_column(String(32))

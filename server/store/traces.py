@@ -17,7 +17,7 @@ from server.problems import conflict, not_found
 from server.store.engine import Store
 from server.store.labels import label_of_row, trace_label, user_label
 from server.store.pages import Cursor, page_of
-from server.store.tables import TraceRow, TraceTagRow, TraceUseRow
+from server.store.tables import JobRow, TraceRow, TraceTagRow, TraceUseRow, spaced
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class NewTrace:
     kind: str | None
     name: str | None
     joints: tuple[int, ...]
+    moved: tuple[int, ...]
     outcome: Outcome | None
     samples: int | None
     duration: float | None
@@ -49,7 +50,7 @@ class NewTrace:
 @dataclass(frozen=True)
 class TraceSearch:
     """The filters of a list; None and empty do not filter. `text` is searched in ID, file, name, kind, operator, notes
-    and tags, ignoring case."""
+    and tags, ignoring case. `joint` moved; `effect` was named by the newest diagnosis that used the trace."""
 
     text: str | None = None
     tag: str | None = None
@@ -58,6 +59,8 @@ class TraceSearch:
     kind: str | None = None
     since: datetime | None = None
     until: datetime | None = None
+    joint: int | None = None
+    effect: str | None = None
 
 
 class ArchiveIndex(Protocol):
@@ -84,7 +87,7 @@ class TraceStore:
     def insert(self, new: NewTrace, file_exists: Callable[[str], bool] = lambda _file: True) -> None:
         """Adds a trace. If its row exists and the row's file is gone, the row gets the new file, and keeps its tags and
         notes. Raises a 409 if the row already refers to another existing file."""
-        columns = {**new.__dict__, "joints": list(new.joints), "missing": False}
+        columns = {**new.__dict__, "joints": list(new.joints), "moved": spaced(new.moved), "missing": False}
         with self._store.writing() as session:
             row = session.get(TraceRow, new.id)
             tags: tuple[str, ...] = ()
@@ -233,6 +236,13 @@ def _query(robot: str, search: TraceSearch, place: Cursor | None) -> Select[Trac
     if search.tag is not None:
         tagged = select(TraceTagRow.tag).where(TraceTagRow.trace == TraceRow.id, TraceTagRow.tag == search.tag)
         query = query.where(tagged.exists())
+    if search.joint is not None:
+        query = query.where(TraceRow.moved.contains(f" {search.joint} "))
+    if search.effect is not None:
+        done = select(JobRow.effects).join(TraceUseRow, TraceUseRow.used_by == "job " + JobRow.id)
+        done = done.where(TraceUseRow.trace == TraceRow.id, JobRow.kind == "diagnose", JobRow.state == "done")
+        newest = done.order_by(JobRow.sequence.desc()).limit(1).scalar_subquery()
+        query = query.where(newest.contains(f" {search.effect} ", autoescape=True))
     if search.since is not None:
         query = query.where(TraceRow.created >= search.since)
     if search.until is not None:
@@ -250,9 +260,9 @@ def _searched(row: TraceRow, tags: Iterable[str]) -> str:
 
 
 def _entry(row: TraceRow, tags: tuple[str, ...], *, archived: bool) -> CatalogueEntry:
-    own = CatalogueEntry.model_fields.keys() - {"tags", "joints", "missing", "archived", "local"}
+    own = CatalogueEntry.model_fields.keys() - {"tags", "joints", "moved", "missing", "archived", "local"}
     return CatalogueEntry.model_validate(
         {name: getattr(row, name) for name in own}
-        | {"tags": tags, "joints": tuple(row.joints)}
+        | {"tags": tags, "joints": tuple(row.joints), "moved": tuple(map(int, row.moved.split()))}
         | {"missing": row.missing and not archived, "archived": archived, "local": not row.missing}
     )

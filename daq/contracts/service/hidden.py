@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AwareDatetime, Field
+from pydantic import AwareDatetime
 
 from daq.contracts.experiment import JointNumber
 from daq.contracts.service.base import Wire
+from daq.contracts.service.jobs import EffectName
 
 HiddenState = Literal["recording", "diagnosing", "opened", "failed"]
 Outcome = Literal["named", "among", "joint", "missed", "wrong"]
@@ -18,7 +19,7 @@ Outcome = Literal["named", "among", "joint", "missed", "wrong"]
 class HideRequest(Wire):
     """The request to hide an effect. Without `effect` or `joint`, the mock draws them at random, unseen by anybody."""
 
-    effect: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")] | None = None
+    effect: EffectName | None = None
     joint: JointNumber | None = None
 
 

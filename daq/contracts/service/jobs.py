@@ -23,6 +23,7 @@ TraceNumbers = Annotated[tuple[TraceNumber, ...], Field(min_length=1, max_length
 ModelNumber = Annotated[str, Field(pattern=r"^(machine|[0-9a-f]{12})$")]
 Pattern = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.*+?\[\]-]{1,100}$")]
 """Name of a parameter, or a pattern such as `*.mass` and `joint2.*`."""
+EffectName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")]
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]{0,63}$")]
 Bound = FiniteFloat | None
 
@@ -30,7 +31,7 @@ Bound = FiniteFloat | None
 class EffectChoice(Wire):
     """An effect of the model; on all joints if none are named."""
 
-    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")]
+    name: EffectName
     joints: tuple[JointNumber, ...] = ()
 
 
@@ -67,7 +68,7 @@ class DiagnoseStudy(UserWire):
     """Options of a search for a missing effect; those of `daq diagnose`."""
 
     kind: Literal["diagnose"] = "diagnose"
-    effects: tuple[Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,63}$")], ...] | None = None
+    effects: tuple[EffectName, ...] | None = None
     """Candidate effects; None for all known ones."""
     joints: tuple[JointNumber, ...] | None = None
     most_steps: Annotated[int, Field(ge=1, le=10)] | None = None

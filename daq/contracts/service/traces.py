@@ -24,6 +24,8 @@ class CatalogueEntry(Wire):
     """Kind of trajectory, if the trace is of an experiment."""
     name: str | None
     joints: tuple[int, ...]
+    moved: tuple[int, ...] = ()
+    """Joints that the experiment moves; of other traces, those that moved."""
     outcome: Outcome | None
     samples: int | None
     duration: float | None

@@ -65,6 +65,7 @@ def summary(entry: CatalogueEntry) -> TraceSummary:
         kind=entry.kind,
         name=entry.name,
         joints=entry.joints,
+        moved=entry.moved or None,
         outcome=entry.outcome,
         samples=entry.samples,
         duration=entry.duration,

@@ -17,6 +17,7 @@ def new_trace(number: int, **changes: object) -> NewTrace:
         "kind": "ramp",
         "name": None,
         "joints": (1, 2, 3),
+        "moved": (1, 2, 3),
         "outcome": "complete",
         "samples": 10,
         "duration": 0.2,

@@ -10,6 +10,7 @@ from sqlalchemy import text
 from daq.config.service import ServiceSettings
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.experiments import ExperimentRequest
+from daq.contracts.service.jobs import DiagnoseRequest
 from daq.contracts.service.traces import TraceChange
 from server.experiments.states import Event
 from server.problems import ProblemError
@@ -17,6 +18,7 @@ from server.stopping.tokens import reader_of
 from server.store.address import address_of
 from server.store.engine import Store, StoreError
 from server.store.experiments import ExperimentStore
+from server.store.jobs import JobStore
 from server.store.lock import sqlite_file
 from server.store.models import ModelStore, NewModel
 from server.store.pages import Cursor
@@ -164,6 +166,23 @@ def test_search_finds_what_it_is_asked_for_and_takes_nothing_as_a_pattern(store:
     assert _found(traces, kind="sine") == [2]
     assert _found(traces, tag="\0") == []
     assert _found(traces, since=NOW + timedelta(seconds=2)) == [3, 2]
+
+
+def test_traces_are_found_by_joints_that_moved_and_by_what_the_newest_diagnosis_named(store: Store) -> None:
+    traces, jobs = TraceStore(store), JobStore(store)
+    traces.insert(new_trace(1, moved=(1, 12)))
+    traces.insert(new_trace(2, moved=(2,)))
+    assert (_found(traces, joint=1), _found(traces, joint=2), _found(traces, joint=3)) == ([1], [2], [])
+    assert traces.get("ma2000", f"{1:012x}").moved == (1, 12)
+    request = DiagnoseRequest(traces=(f"{1:012x}",), held_out=(f"{2:012x}",))
+    made = [jobs.submit("ma2000", request, NOW, "anna", None)[0].id for _ in range(3)]
+    for job, effects in zip(made, (("backlash", "coulomb_friction"), ("load",)), strict=False):
+        jobs.change("ma2000", job, Event.TAKEN, NOW)
+        jobs.change("ma2000", job, Event.COMPLETED, NOW, effects=effects)
+    assert (_found(traces, effect="load"), _found(traces, effect="load", joint=2)) == ([2, 1], [2])
+    assert _found(traces, effect="backlash") == _found(traces, effect="loa_") == []
+    jobs.remove("ma2000", made[1])
+    assert _found(traces, effect="backlash") == [2, 1]
 
 
 def test_a_file_that_is_gone_is_marked_and_comes_back(store: Store) -> None:

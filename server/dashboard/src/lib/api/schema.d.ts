@@ -2130,14 +2130,14 @@ export interface components {
         };
         /**
          * CameraStatus
-         * @description A robot's camera. `source`: `none`, `synthetic` (drawn from the mock's posture) or `mjpeg`.
+         * @description A robot's camera.
          */
         CameraStatus: {
             /**
              * Source
              * @enum {string}
              */
-            source: "none" | "synthetic" | "mjpeg";
+            source: "none" | "synthetic" | "mjpeg" | "webrtc";
             /** Records */
             records: boolean;
             /** Problem */
@@ -2170,6 +2170,11 @@ export interface components {
             name: string | null;
             /** Joints */
             joints: number[];
+            /**
+             * Moved
+             * @default []
+             */
+            moved?: number[];
             /** Outcome */
             outcome: ("complete" | "stopped" | "fault" | "interrupted") | null;
             /** Samples */
@@ -8620,6 +8625,10 @@ export interface operations {
                 kind?: string | null;
                 since?: string | null;
                 until?: string | null;
+                /** @description A joint that moved. */
+                joint?: number | null;
+                /** @description Named by its newest diagnosis. */
+                effect?: string | null;
                 /** @description Length of this part of the list. */
                 limit?: number;
                 /** @description `next` of the previous part. */

@@ -4,29 +4,25 @@ import { homeOf, queueBadge, queueState, whatGoesOn } from './words';
 const robot = { connection: 'connected', arm: 'idle', activity: 'none' } as const;
 const queue = { paused: false, reason: 'resumed by anna', running: null, waiting_for: '' };
 const paused = { ...queue, paused: true, reason: 'by anna' };
+const held = { ...queue, waiting_for: 'somebody has control' };
 
 describe('what goes on', () => {
   it('is nothing only where something could be started at once', () => {
-    expect(whatGoesOn(robot, queue, 0)).toEqual({ text: 'Nothing is running or waiting.', isFree: true });
-    expect(whatGoesOn(robot, queue, 2)).toEqual({ text: '', isFree: false });
-    expect(whatGoesOn({ ...robot, connection: 'lost' }, queue, 0).isFree).toBe(false);
-    expect(whatGoesOn(null, null, 0).isFree).toBe(false);
+    expect(whatGoesOn(robot, queue, 0)).toBe('Nothing is running or waiting.');
+    expect(whatGoesOn(robot, queue, 2)).toBe('');
+    expect(whatGoesOn({ ...robot, connection: 'lost' }, queue, 0)).toBe('');
+    expect(whatGoesOn(null, null, 0)).toBe('');
+    expect(whatGoesOn(robot, held, 1)).toBe('Somebody has control.');
   });
 
   it('says once that the arm is stopped, and that the queue is paused', () => {
     const found = whatGoesOn({ ...robot, arm: 'stopped' }, { ...paused, reason: 'the arm is stopped' }, 0);
-    expect(found).toEqual({
-      text: 'Nothing moves until the arm is reset.',
-      isFree: false,
-    });
-    expect(whatGoesOn(robot, paused, 0)).toEqual({
-      text: 'The queue is paused: by anna.',
-      isFree: false,
-    });
+    expect(found).toBe('Nothing moves until the arm is reset.');
+    expect(whatGoesOn(robot, paused, 0)).toBe('The queue is paused: by anna.');
   });
 
   it('is what the arm does, also while the queue is paused', () => {
-    expect(whatGoesOn({ ...robot, activity: 'experiment' }, paused, 0).text).toBe(
+    expect(whatGoesOn({ ...robot, activity: 'experiment' }, paused, 0)).toBe(
       'An experiment is running. The queue is paused: by anna.',
     );
   });
@@ -57,14 +53,14 @@ describe('the queue', () => {
 
 it('home is one screen, and the arm comes before the queue', () => {
   const screens = [
-    homeOf(null, null, 0),
-    homeOf({ ...robot, connection: 'disconnected' }, queue, 0),
-    homeOf(robot, queue, 0),
-    homeOf(robot, paused, 1),
-    homeOf(robot, queue, 1),
-    homeOf({ ...robot, activity: 'jog' }, paused, 0),
-    homeOf({ ...robot, arm: 'stopped' }, paused, 0),
-    homeOf({ ...robot, arm: 'fault', activity: 'experiment' }, queue, 0),
+    homeOf(null, null),
+    homeOf({ ...robot, connection: 'disconnected' }, queue),
+    homeOf(robot, queue),
+    homeOf(robot, paused),
+    homeOf(robot, held),
+    homeOf({ ...robot, activity: 'jog' }, paused),
+    homeOf({ ...robot, arm: 'stopped' }, paused),
+    homeOf({ ...robot, arm: 'fault', activity: 'experiment' }, queue),
   ].map((home) => home.screen);
   expect(screens).toEqual([
     'unknown',

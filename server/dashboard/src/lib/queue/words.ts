@@ -1,6 +1,7 @@
 /** What the queue and the arm are doing, in words that hold together: nothing is called free that is held. Pure. */
 
 import type { QueueStatus, RobotMessage } from '../api/types';
+import { sentence } from '../format';
 
 type Robot = Pick<RobotMessage, 'connection' | 'arm' | 'activity'>;
 type Queue = Pick<QueueStatus, 'paused' | 'reason' | 'running' | 'waiting_for'>;
@@ -14,23 +15,16 @@ export const ACTIVITIES: Readonly<Record<Robot['activity'], string>> = {
   lead: 'The arm is led by hand: hold it.',
 };
 
-export interface Doing {
-  text: string;
-  /** Whether the way to start something is offered beside it. */
-  isFree: boolean;
-}
-
 /** What goes on, for the line above the charts. `waiting`: experiments in the queue. */
-export function whatGoesOn(robot: Robot | null, queue: Queue | null, waiting: number): Doing {
+export function whatGoesOn(robot: Robot | null, queue: Queue | null, waiting: number): string {
   const activity = ACTIVITIES[robot?.activity ?? 'none'];
   const isHeld = robot?.arm === 'stopped' || robot?.arm === 'fault';
   const held = isHeld ? 'Nothing moves until the arm is reset.' : '';
   // Until the reset, the banner says why; the queue waits for the same reason.
-  const paused = queue?.paused && !isHeld ? `The queue is paused: ${queue.reason}.` : '';
-  const said = [activity || held, paused].filter((part) => part !== '').join(' ');
-  if (said !== '' || waiting > 0 || robot === null || queue === null) return { text: said, isFree: false };
-  if (robot.connection !== 'connected') return { text: '', isFree: false };
-  return { text: 'Nothing is running or waiting.', isFree: true };
+  const paused = queue?.paused ? `The queue is paused: ${queue.reason}.` : sentence(queue?.waiting_for ?? '');
+  const said = [activity || held, isHeld ? '' : paused].filter((part) => part !== '').join(' ');
+  const isIdle = waiting === 0 && queue !== null && robot?.connection === 'connected';
+  return said === '' && isIdle ? 'Nothing is running or waiting.' : said;
 }
 
 export interface Home {
@@ -48,8 +42,8 @@ export interface Home {
   title: string;
 }
 
-/** Where the person stands: what the Live page says first. `waiting`: experiments in the queue. */
-export function homeOf(robot: Robot | null, queue: Queue | null, waiting: number): Home {
+/** Where the person stands: what the Live page says first. Experiments that are planned for later wait for nothing. */
+export function homeOf(robot: Robot | null, queue: Queue | null): Home {
   if (robot === null) return { screen: 'unknown', title: 'Not known' };
   if (robot.connection === 'connecting') return { screen: 'connecting', title: 'Connecting' };
   if (robot.connection !== 'connected') return { screen: 'disconnected', title: 'No arm is connected' };
@@ -57,7 +51,7 @@ export function homeOf(robot: Robot | null, queue: Queue | null, waiting: number
   if (robot.arm === 'stopped') return { screen: 'stopped', title: 'Stopped' };
   if (robot.activity !== 'none') return { screen: 'running', title: 'Moving' };
   if (queue?.paused) return { screen: 'paused', title: 'The queue is paused' };
-  return waiting > 0 ? { screen: 'waiting', title: 'Waiting' } : { screen: 'ready', title: 'Ready' };
+  return queue?.waiting_for ? { screen: 'waiting', title: 'Waiting' } : { screen: 'ready', title: 'Ready' };
 }
 
 /** Why the queue does what it does. `isConnected`: whether there is an arm to move. */

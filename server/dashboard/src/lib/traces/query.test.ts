@@ -1,11 +1,16 @@
 import { expect, it } from 'vitest';
 import { completionsOf, searchOf, withFilter } from './query';
 
-const known = { tags: ['cold', 'cold start'], kinds: ['ramp', 'sine'] };
+const known = {
+  tags: ['cold', 'cold start'],
+  kinds: ['ramp', 'sine'],
+  joints: [1, 2],
+  effects: ['backlash', 'coulomb_friction'],
+};
 
 it('free words are searched for, and filters are told apart from them', () => {
   const { search, problem } = searchOf(
-    'dry friction tag:"cold start" source:real outcome:fault kind:ramp a:b',
+    'dry friction tag:"cold start" source:real outcome:fault kind:ramp joint:2 effect:backlash a:b',
   );
   expect(problem).toBe('');
   expect(search).toEqual({
@@ -14,6 +19,8 @@ it('free words are searched for, and filters are told apart from them', () => {
     source: 'real',
     outcome: 'fault',
     kind: 'ramp',
+    joint: 2,
+    effect: 'backlash',
   });
 });
 
@@ -29,6 +36,8 @@ it.each([
   ['source:moon', 'source: allowed are mock, real, imported'],
   ['after:yesterday', 'after: a day is allowed, as 2026-11-30'],
   ['after:2026-13-01', 'after: a day is allowed'],
+  ['joint:two', 'joint: a number from 1 is allowed'],
+  ['effect:Backlash', 'effect: a name is allowed'],
   ['tag:a tag:b', 'tag: can be given once'],
 ])('%s is refused in one line', (line, problem) => {
   expect(searchOf(line).problem).toContain(problem);
@@ -41,6 +50,8 @@ it('a filter that is being typed filters nothing yet', () => {
 it('the last word is completed: keys first, then what is known', () => {
   expect(completionsOf('x so', known)).toEqual(['x source:']);
   expect(completionsOf('x source:r', known)).toEqual(['x source:real']);
+  expect(completionsOf('joint:', known)).toEqual(['joint:1', 'joint:2']);
+  expect(completionsOf('x effect:c', known)).toEqual(['x effect:coulomb_friction']);
   expect(completionsOf('tag:c', known)).toEqual(['tag:cold']);
   expect(completionsOf('tag:"', known)).toEqual(['tag:"cold start"']);
   expect(completionsOf('source:real ', known)).not.toContain('source:real source:');

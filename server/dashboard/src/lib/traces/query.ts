@@ -1,7 +1,7 @@
 /**
  * The query line of the list of traces: free words, and what the service can filter by, as `key:value`. Pure.
  *
- *   friction tag:"cold start" source:real outcome:fault kind:ramp after:2026-11-01 before:2026-12-01
+ *   friction joint:2 effect:backlash tag:"cold start" source:real outcome:fault kind:ramp after:2026-11-01
  */
 
 export const SOURCES = ['mock', 'real', 'imported'] as const;
@@ -14,6 +14,8 @@ export interface Search {
   source?: (typeof SOURCES)[number];
   outcome?: (typeof OUTCOMES)[number];
   kind?: string;
+  joint?: number;
+  effect?: string;
   since?: string;
   until?: string;
 }
@@ -22,11 +24,14 @@ export interface Search {
 export interface Known {
   tags: readonly string[];
   kinds: readonly string[];
+  joints: readonly number[];
+  effects: readonly string[];
 }
 
-const KEYS = ['tag', 'source', 'outcome', 'kind', 'after', 'before'] as const;
+const KEYS = ['joint', 'effect', 'tag', 'source', 'outcome', 'kind', 'after', 'before'] as const;
 type Key = (typeof KEYS)[number];
 const WORD = /(?:(\w+):)?(?:"([^"]*)"?|(\S+))|(\w+):/g;
+const EFFECT = /^[a-z]\w*$/;
 const DAY = /^\d{4}-\d{2}-\d{2}$/;
 
 /** The search that a line asks for, or in one line what is wrong with it. */
@@ -66,6 +71,14 @@ function taken(search: Search, key: Key, value: string): string {
       return oneOf(SOURCES, (one) => (search.source = one));
     case 'outcome':
       return oneOf(OUTCOMES, (one) => (search.outcome = one));
+    case 'joint':
+      if (!/^[1-9]\d?$/.test(value)) return 'joint: a number from 1 is allowed';
+      search.joint = Number(value);
+      return '';
+    case 'effect':
+      if (!EFFECT.test(value)) return 'effect: a name is allowed, as coulomb_friction';
+      search.effect = value;
+      return '';
     case 'after':
     case 'before': {
       const moment = new Date(`${value}T00:00:00`);
@@ -90,6 +103,8 @@ export function completionsOf(line: string, known: Known): string[] {
     source: SOURCES,
     outcome: OUTCOMES,
     kind: known.kinds,
+    joint: known.joints.map(String),
+    effect: known.effects,
   };
   const found =
     begun === undefined

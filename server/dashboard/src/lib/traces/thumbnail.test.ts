@@ -21,20 +21,18 @@ it('a thumbnail has the joints that moved, from where they began, and the larges
       [3, 3.5, 4],
       [1, 1.001, 1],
     ]),
+    [1, 7],
   );
-  expect(found.moved).toEqual([1]);
   expect(found.positions).toEqual([{ joint: 1, points: '0.0,22.0 50.0,12.0 100.0,2.0' }]);
   expect(found.error).toBe('0,10 0.0,10.0 50.0,1.0 100.0,5.5 100,10');
 });
 
 it('of a trace at rest no line is drawn, and nothing is divided by nothing', () => {
-  const found = thumbnailOf({
-    ...signals([
-      [1, 1, 1],
-      [2, 2, 2],
-    ]),
-    error: null,
-  });
-  expect([found.moved, found.positions]).toEqual([[], []]);
+  const still = signals([
+    [1, 1, 1],
+    [2, 2, 2],
+  ]);
+  const found = thumbnailOf({ ...still, error: null }, []);
+  expect(found.positions).toEqual([]);
   expect(found.error).not.toContain('NaN');
 });

@@ -1,7 +1,7 @@
 /** Thumbnails of traces: asked for when they come into sight, one after the other, and kept, since a trace never changes. */
 
 import { SvelteMap } from 'svelte/reactivity';
-import { api, ask, here } from '../api';
+import { api, ask, here, type CatalogueEntry } from '../api';
 import { thumbnailOf, type Thumbnail } from './thumbnail';
 
 /** Of a signal: a thumbnail has no more room. */
@@ -18,25 +18,23 @@ class Thumbnails {
 
   /** Asks for one when its place comes into sight: an attachment. */
   readonly seen =
-    (id: string) =>
+    (entry: CatalogueEntry) =>
     (place: Element): (() => void) => {
       const observer = new IntersectionObserver((entries) => {
         if (!entries.some((one) => one.isIntersecting)) return;
         observer.disconnect();
-        if (!this.known.has(id)) this.turn = this.turn.then(() => this.ask(id));
+        if (!this.known.has(entry.id)) this.turn = this.turn.then(() => this.ask(entry));
       });
       observer.observe(place);
       return () => observer.disconnect();
     };
 
-  private async ask(id: string): Promise<void> {
+  private async ask({ id, moved }: CatalogueEntry): Promise<void> {
     if (this.known.has(id)) return;
     try {
       const params = { path: { ...here(), trace: id }, query: { points: POINTS } };
-      this.known.set(
-        id,
-        thumbnailOf(await ask(api.GET('/api/v1/robots/{robot}/traces/{trace}/data.json', { params }))),
-      );
+      const signals = await ask(api.GET('/api/v1/robots/{robot}/traces/{trace}/data.json', { params }));
+      this.known.set(id, thumbnailOf(signals, moved ?? []));
     } catch {
       this.known.set(id, null); // the list says what is wrong with a trace that cannot be read
     }

@@ -4,7 +4,7 @@
 import { api, ask, asProblem, here, newKey, type ConsoleCommand, type ConsoleOrder } from '../../lib/api';
 import type { ExperimentSpec } from '../../lib/api';
 import { helpOf } from '../../lib/console/completion';
-import { dayAndTime, fixed } from '../../lib/format';
+import { dayAndTime, fixed, sentence } from '../../lib/format';
 import { live } from '../../lib/live/live.svelte';
 import { previewOf, submit, toldMotion } from '../../lib/queue/submit';
 import { queueState } from '../../lib/queue/words';
@@ -116,7 +116,7 @@ export class Console {
 
 function refusal(error: unknown): Told[] {
   const problem = asProblem(error);
-  return [say(problem.detail, 'bad'), ...(problem.advice ? [say(problem.advice)] : [])];
+  return [say(problem.detail, 'bad'), ...(problem.advice ? [say(sentence(problem.advice))] : [])];
 }
 
 async function carryOut(order: ConsoleOrder, isDry: boolean): Promise<Answer> {

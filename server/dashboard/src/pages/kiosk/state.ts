@@ -30,7 +30,7 @@ export function kioskState(
   at: { isOpen: boolean; isStale: boolean; age: number | null },
 ): KioskState {
   if (!at.isOpen) return { word: 'Not known', tone: 'warn', sign: '▲' };
-  const { screen, title } = homeOf(robot, queue, queue?.queued ?? 0);
+  const { screen, title } = homeOf(robot, queue);
   const isConnected = robot?.connection === 'connected';
   if (isConnected && at.isStale) return { word: 'Not known', tone: 'warn', sign: '▲' };
   return { word: screen === 'paused' ? 'Queue paused' : title, ...LOOKS[screen] };

@@ -26,8 +26,15 @@ export class Catalogue {
       for (const tag of tags) this.tags.add(tag);
       if (kind) this.kinds.add(kind);
     }
-    return { tags: [...this.tags].sort(), kinds: [...this.kinds].sort() };
+    const joints = live.machine?.joints.map((_, place) => place + 1) ?? [];
+    return {
+      tags: [...this.tags].sort(),
+      kinds: [...this.kinds].sort(),
+      joints,
+      effects: this.effects ?? [],
+    };
   });
+  private effects = $state.raw<readonly string[] | null>(null);
   private readonly tags = new Set<string>();
   private readonly kinds = new Set<string>();
   private readonly listing = new Listing<CatalogueEntry>();
@@ -48,7 +55,7 @@ export class Catalogue {
 
   /** For an effect that follows the fields of the search. */
   searchSoon(): () => void {
-    void this.line;
+    if (this.line.includes('effect:')) void untrack(() => this.learnEffects());
     this.listing.beginAnew();
     this.reload.soon(untrack(() => this.loaded) ? QUIET : 0);
     return () => this.reload.leave();
@@ -61,6 +68,18 @@ export class Catalogue {
   async more(): Promise<void> {
     this.listing.more(this.items.length);
     await this.load();
+  }
+
+  /** The effects that can be completed: asked for once somebody wants one. */
+  private async learnEffects(): Promise<void> {
+    if (this.effects !== null) return;
+    this.effects = [];
+    try {
+      const known = await ask(api.GET('/api/v1/robots/{robot}/effects', { params: { path: here() } }));
+      this.effects = known.map((one) => one.name).sort();
+    } catch {
+      this.effects = null; // asked again at the next key
+    }
   }
 
   /** Loads it anew, as far as it is shown. */
