@@ -151,13 +151,14 @@ class _Search:
         return Fitted(effect, joints, wider, own, fitted, places, stated=stated)
 
     def from_expected(self, found: Sequence[Fitted], tried: Sequence[Trial]) -> list[Fitted]:
-        """The candidates, and those that promise most where the file states its numbers, begun there: where tolerances
-        are far off without them, what they imitate is not seen from where they are, and the best of the candidates does
-        not bring them back."""
-        now, case = self.now, self.case
-        if not is_strained(now) or (found and not is_strained(found[0].fit)):
-            return list(found)
-        every = self._begun_at(case.where_expected(now), found, tried)
+        """The candidates, and those that promise most from other numbers, where the fit's are far off: what numbers
+        imitate is not seen from there. Others are those of the best candidate, if it brings them back; else as the file
+        states them, until one does."""
+        now, every = self.now, list(found)
+        if not is_strained(now):
+            return every
+        if not every or is_strained(every[0].fit):
+            every = self._begun_at(self.case.where_expected(now), every, tried)
         if not every or is_strained(every[0].fit):
             return every
         values = {u.name: every[0].fit.values.get(u.name, now.values[u.name]) for u in now.unknowns}
@@ -169,10 +170,12 @@ class _Search:
         if not math.isfinite(there.cost):
             return list(found)
         clear = projection(there.with_slopes())
+        done = {(f.effect, f.joints) for f in found if f.ended and not is_strained(f.fit)}
         best: dict[tuple[str, tuple[int, ...]], Probe] = {}
         for probe in sorted((clear.probe(t) for t in tried if not t.stated), key=lambda p: -p.gain):
-            if len(best) < RESTARTED:
-                best.setdefault((probe.trial.effect, probe.trial.joints), probe)
+            place = probe.trial.effect, probe.trial.joints
+            if len(best) < RESTARTED and place not in done:
+                best.setdefault(place, probe)
         every = list(found)
         for probe in best.values():
             trial, own = probe.trial, {p.name for p in probe.trial.parameters}

@@ -54,7 +54,7 @@ def test_the_first_candidates_are_fitted_to_their_ends(rubbing: Workflow, found:
     away = {name: value + 3.0 for name, value in last.values.items()}
     begun = fit(last.compared, last.unknowns, away, last.memory, rounds=0)
     assert begun.cost > last.cost + 10.0
-    some = [replace(best, fit=begun)] * (REFINED + 1)
+    some = [replace(best, fit=begun, ended=False)] * (REFINED + 1)
     refined = _Search(rubbing.found.now, rubbing.case, {}).refined(some, Never())
     assert all(one.fit.cost == pytest.approx(last.cost, abs=0.5) for one in refined[:REFINED])
     assert refined[REFINED].fit is begun
