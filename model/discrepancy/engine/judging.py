@@ -53,9 +53,12 @@ class Comparison:
 def compare(standing: Standing, chosen: Fitted) -> Comparison | None:
     """The candidate beside its reference; None where there was no more than noise to explain."""
     case, reference = standing.case, _reference(standing, chosen.fit.values, chosen.stated)
-    if not _is_beyond_noise(standing, chosen, reference.squares, chosen.fit.squares):
-        return None
     before, after = (holdout.squares_unseen(case, f) for f in (reference, chosen.fit))
+    seen = [(reference.squares, chosen.fit.squares, case.noise)]
+    if case.held_out is not None:
+        seen.append((before, after, case.noise_held))
+    if not any(_is_beyond_noise(standing, chosen, *one) for one in seen):
+        return None
     return Comparison(chosen, reference, before, after, case.options.least_share)
 
 
@@ -110,16 +113,16 @@ def share_of_rest(standing: Standing, step: Step) -> float:
     return explained / unexplained if unexplained > 0.0 else np.inf
 
 
-def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Floats) -> bool:
+def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Floats, noise: Floats) -> bool:
     """Whether there was more than noise to explain: of a torque on a joint, on that joint.
 
     Args:
-        fell, left: mean squares (n,) on the fitted records without and with the candidate.
+        fell, left: mean squares (n,) without and with the candidate. noise: (n,) standard deviation of noise.
     """
     if chosen.joints and find_named_effect(chosen.effect).shared_name.acts_on == "joint torque":
         elsewhere = np.array([j not in chosen.joints for j in standing.model.machine.modelled_joints])
         fell = np.where(elsewhere, np.nan, fell)
-    return holdout.is_beyond_noise(fell, left, standing.case.noise * (1.0 + standing.case.noise_error))
+    return holdout.is_beyond_noise(fell, left, noise * (1.0 + standing.case.noise_error))
 
 
 def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Comparison | None:

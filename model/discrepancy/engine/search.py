@@ -226,6 +226,16 @@ class _Search:
         return sorted(weighed, key=order_by_odds)
 
 
+def improved(before: Fit, after: Fit) -> Fit | None:
+    """A better fit of a model from the values that another one, with a further effect, has found for its unknowns; None
+    if it is not better by as much as an effect needs."""
+    values = {name: after.values.get(name, value) for name, value in before.values.items()}
+    tried = evaluate(before.compared, before.unknowns, values, before.memory)
+    if not tried.cost < before.cost - THRESHOLDS.significant:
+        return None
+    return fit(before.compared, before.unknowns, values, before.memory, rounds=LONG)
+
+
 def evidence(before: Fit, after: Fit, parameters: int, places: int) -> float:
     """Fall of −2 log posterior from one fit to another, less the cost of its parameters and of the places searched."""
     (first, last), memory = after.compared.descriptions([before.row, after.row])

@@ -15,6 +15,7 @@ from model.discrepancy.engine.judging import judge, share_of_rest, suspect
 from model.discrepancy.engine.search import (
     Findings,
     evidence,
+    improved,
     order_by_odds,
     prefer_fewer_joints,
     prefer_shorter_laws,
@@ -68,9 +69,8 @@ class Workflow:
         for _ in range(2 * most):  # two effects may make each other superfluous in turn
             if len(self.found.adopted) >= most:
                 break
-            before = self.found
             self._report(0.1, "what is missing")
-            findings = self._search(before)
+            before, findings = self._searched()
             self.found = self._adopt(before, findings)
             if len(self.found.adopted) == len(before.adopted):
                 self.tried = list_tried(self.found, findings)
@@ -87,6 +87,17 @@ class Workflow:
         so_far = f"found so far: {named}; " if named else ""
         share = (len(steps) + fraction) / (self.case.options.most_steps + 1)
         self.progress(min(0.99, share), f"{so_far}step {len(steps) + 1}: {text}")
+
+    def _searched(self) -> tuple[Standing, Findings]:
+        """Where the diagnosis stands, and what a step finds there: from a better fit, if the best candidate leads to
+        one without its effect. That fall of the cost is no merit of the candidate."""
+        found = self.found
+        findings = self._search(found)
+        better = improved(found.now, findings.fitted[0].fit) if findings.fitted else None
+        if better is None:
+            return found, findings
+        found = replace(found, now=better, first=found.first if found.adopted else better)
+        return found, self._search(found)
 
     def _search(self, found: Standing) -> Findings:
         """What a step finds, without what the records do not resolve, the most probable by all records first."""

@@ -288,9 +288,9 @@ def noise_floor(compared: ReadingResidual, values: Values) -> Floats:
     round the real loop and moves the arm a little near standstill.
     """
     observation = compared.observation
-    own = {u.name for u in compared.own}
-    truth = replace(compared, own=(), known={n: u for n, u in compared.known.items() if n not in own}, fixed={})
-    known = {n: v for n, v in values.items() if n not in own} if own else values
+    truth = replace(compared, own=(), fixed={})
+    if compared.own:  # the postures that are known are of other records
+        truth = replace(truth, known={n: u for n, u in compared.known.items() if u.kind is not Kind.INITIAL_POSITION})
     rng = np.random.default_rng(SEED)
     scale = observation.deviations / observation.unit
     squares = []
@@ -299,8 +299,8 @@ def noise_floor(compared: ReadingResidual, values: Values) -> Floats:
         if observation.noise is not None:
             filters = observation.noise.whiteners
             noise = [np.stack([w.coloured(n) for w, n in zip(filters, one.T, strict=True)], axis=1) for one in noise]
-        replica = observation.imagined(truth.model, truth.state(known), [scale * one for one in noise])
-        squares.append(truth.samples.mean_squares(truth.on(replica).at(known)))
+        replica = observation.imagined(truth.model, truth.state(values), [scale * one for one in noise])
+        squares.append(truth.samples.mean_squares(truth.on(replica).at(values)))
     found = np.sqrt(np.mean(squares, axis=0))
     return found if np.isfinite(found).all() else observation.deviations
 

@@ -10,8 +10,11 @@ from typing import Any, cast
 import numpy as np
 
 from model.arrays import Floats
+from model.discrepancy.engine.case import Case
 from model.discrepancy.engine.residual import Residual, Samples
+from model.discrepancy.options import TorqueOptions
 from model.fitting.unknowns import Unknown
+from model.machine_model.model import Model
 from model.machine_model.parameter import Kind, Parameter
 
 Formula = Callable[[Floats, Mapping[str, float]], Floats]
@@ -41,6 +44,9 @@ class Curve:
         runs = [slice(*own.indices(len(self.time))[:2]) for own in self.kept]
         return Samples((tuple((0, own) for own in runs),), np.array([float(sum(r.stop - r.start for r in runs))]))
 
+    def of_model(self, _model: Any) -> Curve:
+        return self
+
     def within(self, fold: int, folds: int) -> tuple[Curve, Curve]:
         a, b = (round(k * len(self.time) / folds) for k in (fold, fold + 1))
         outside = tuple(s for s in (slice(0, a), slice(b, len(self.time))) if s.start < s.stop)
@@ -64,6 +70,9 @@ class Curve:
     def costs(self, row: Floats, memory: Floats) -> Floats:
         return np.array([float(row @ row) / float(memory[0])])
 
+    def descriptions(self, rows: Sequence[Floats]) -> tuple[list[Floats], Floats]:
+        return [self.costs(row, np.ones(1)) for row in rows], np.ones(1)
+
 
 def compared(curve: Curve) -> Residual:
     """The curve as what a fit compares."""
@@ -75,3 +84,10 @@ def unknown(name: str, low: float = -np.inf, high: float = np.inf, **prior: floa
     parameter = Parameter(name=name, kind=Kind.EFFECT, component="curve", part=name, unit="1", value=1.0, low=low)
     own: dict[str, Any] = dict(prior)
     return Unknown(parameter, float(np.clip(1.0, low, high)), low, high, **own)
+
+
+def curve_case(curve: Curve, held_out: Curve | None = None, **own: Any) -> Any:
+    """A case of curves, without what only real records have. own: methods in place of those."""
+    kind = type("CurveCase", (Case,), {**dict.fromkeys(Case.__abstractmethods__), **own})
+    one = np.ones(1)
+    return kind(cast(Model, curve.model), curve, held_out, one, one, TorqueOptions())

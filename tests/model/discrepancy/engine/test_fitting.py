@@ -12,7 +12,7 @@ from model.arrays import Floats
 from model.discrepancy.engine.fitting import LONG, SETTLED, Fit, evaluate, fit, found_values
 from model.fitting.fit import INTERVAL
 from model.fitting.unknowns import Unknown
-from tests.model.discrepancy.engine.curves import Curve, compared, unknown
+from tests.model.discrepancy.engine.curves import Curve, Formula, compared, unknown
 
 TRUTH = {"size": 20.0, "rate": 0.8, "end": 3.0}
 FAR = {"size": 60.0, "rate": 5.0, "end": 10.0}
@@ -23,7 +23,7 @@ def decay(time: Floats, at: Mapping[str, float]) -> Floats:
     return np.asarray(at["size"] * np.exp(-at["rate"] * time) + at["end"])
 
 
-SLOPES = {
+SLOPES: dict[str, Formula] = {
     "size": lambda t, at: np.exp(-at["rate"] * t),
     "rate": lambda t, at: -t * at["size"] * np.exp(-at["rate"] * t),
     "end": lambda t, _at: np.ones_like(t),
@@ -121,13 +121,18 @@ def test_a_step_to_where_a_simulation_does_not_stay_finite_is_not_taken() -> Non
     found = fit(compared(curve), FREE, FAR, rounds=LONG)
     assert min(tried) < 0.5, "it was tried"
     assert found.cost == pytest.approx(of_scipy(curve, FREE)[1], abs=SETTLED)
+    curve.asked.clear()
     lost = fit(compared(curve), FREE, {**FAR, "rate": 0.1})
+    assert curve.asked == []
     assert (lost.cost, lost.values) == (np.inf, {**FAR, "rate": 0.1}), "there is nowhere to go from"
 
 
 # ---- How well a number is known.
 
-LINE = {"level": lambda t, _at: 1e8 * np.ones_like(t), "slow": lambda t, _at: 1e-3 * np.sin(t / 40.0)}
+LINE: dict[str, Formula] = {
+    "level": lambda t, _at: 1e8 * np.ones_like(t),
+    "slow": lambda t, _at: 1e-3 * np.sin(t / 40.0),
+}
 LEVELS = (unknown("level", size=1e-8), unknown("slow", size=1e3))
 
 
@@ -137,7 +142,7 @@ def line(time: Floats, at: Mapping[str, float]) -> Floats:
 
 def line_fit(noise: Floats) -> Fit:
     """Two numbers of very different units, of which nothing is there, fitted to noise."""
-    return fit(compared(Curve(np.arange(len(noise)) + 0.0, noise, line, LINE)), LEVELS, {"level": 0.0, "slow": 0.0})
+    return fit(compared(Curve(np.arange(float(len(noise))), noise, line, LINE)), LEVELS, {"level": 0.0, "slow": 0.0})
 
 
 def test_numbers_are_as_uncertain_as_repeated_records_show_however_slow_their_noise() -> None:
@@ -171,7 +176,8 @@ def test_an_interval_covers_the_bias_and_ends_at_a_bound() -> None:
     plain, wide = (
         found_values(found, [LEVELS[1].parameter], bias)["slow"] for bias in (None, {"slow": 2.0 * deviation})
     )
-    assert (plain.value, plain.high) == (at, pytest.approx(at + INTERVAL * deviation))
+    assert plain.value == at
+    assert plain.high == pytest.approx(at + INTERVAL * deviation)
     assert wide.high == pytest.approx(at + INTERVAL * np.sqrt(5.0) * deviation)
     bounded = replace(LEVELS[1].parameter, low=at - 0.1 * deviation)
     assert found_values(found, [bounded])["slow"].low == bounded.low
