@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -17,10 +18,17 @@ def start_owner(program: Sequence[str] = ()) -> subprocess.Popen[bytes]:
 
 
 def start_early() -> None:
-    """Starts the process that the next `started` returns."""
+    """Starts the process that the next `started` returns. A command that needs none ends it."""
     _early.append(start_owner())
+    atexit.register(_end_unused)
 
 
 def started() -> subprocess.Popen[bytes]:
     """Returns the process that was started early, or a new one."""
     return _early.pop() if _early else start_owner()
+
+
+def _end_unused() -> None:
+    for process in _early:  # it has opened no port
+        process.kill()
+        process.wait()

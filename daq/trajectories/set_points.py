@@ -92,7 +92,7 @@ class Plan:
 
     def sent_at(self, index: int) -> dict[int, int]:
         """Joint → posture units of the moving joints at set point `index`. Made when it is due: those of all periods at
-        once would take ten times the memory of the plan."""
+        once would take more memory than the plan."""
         row = self.postures[index].tolist()
         return {joint: row[joint - 1] for joint in self.moving}
 

@@ -375,7 +375,9 @@ def test_a_reader_that_does_not_read_costs_no_time(pipe: tuple[int, int], monkey
         for _ in range(200):  # 2 MB: no pipe takes that, nor do 50 waiting reports
             speaker.progress(0.5, text)
         assert speaker.dropped > 0
-        os.close(reader)
+        with os.fdopen(reader, "rb") as heard:
+            told = next(line for line in heard if b'"missing"' in line)
+    assert f"{speaker.dropped} reports" in REPORT.validate_json(told).event.message
 
 
 def test_a_period_that_began_before_the_reset_is_no_new_stop(scene: Scene) -> None:
