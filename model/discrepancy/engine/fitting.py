@@ -38,6 +38,8 @@ DAMPING = 0.01
 """Damping of a step, over the scales of its unknowns. It decides only what the records do not: a tilt about an axis
 along gravity would be thrown to its bound otherwise, and all other numbers would stay where they are, since the step as
 a whole leads uphill."""
+LEAST_DAMPING = 1e-9
+"""The least of that damping: where derivatives are huge, one by the scales alone is lost in rounding."""
 LONG = 32
 """Most steps of a fit that has to find its way."""
 STEPS_APART = 4
@@ -207,7 +209,7 @@ def _step(now: Fit, J: Floats) -> tuple[Fit, Floats, bool]:
     for share, damping in ATTEMPTS:
         information = seen + rows.T @ rows
         descent = rows.T @ aims - A @ left
-        curvature = information + np.diag(DAMPING**2 + damping * np.diag(information))
+        curvature = information + np.diag(DAMPING**2 + (LEAST_DAMPING + damping) * np.diag(information))
         step = share * bounded_step(curvature, descent, (low - at) / scale, (high - at) / scale)
         if float(descent @ step) < 0.5 * SETTLED:
             break

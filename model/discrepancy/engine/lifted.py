@@ -48,10 +48,15 @@ def expected_of(now: Fit) -> dict[str, Unknown]:
 
 
 def stated_trial(model: Model, name: str, joints: tuple[int, ...], now: Fit, shares: tuple[float, ...]) -> Trial | None:
-    """An effect that the file states for this joint: it may be larger or smaller than within its stated deviations."""
-    known = expected_of(now)
-    mine = (p for p in model.parameters if p.effect == name and p.joints == joints and p.null is not None)
-    own = [(p, known[p.name]) for p in mine if p.name in known]
+    """An effect that the file states for this joint: it may be larger or smaller than within its stated deviations. So
+    may the bend of a sensor, which is a tolerance."""
+    known = {u.name: u for u in now.unknowns if u.deviation is not None and (name == BENT or not u.nuisance)}
+    own = [
+        (p, known[p.name])
+        for p in model.parameters
+        if p.effect == name and p.joints == joints and p.null is not None and p.name in known
+        if name != BENT or p.part in FREED_BENDS
+    ]
     return lift_priors(model, name, joints, now, own, shares) if own and joints else None
 
 

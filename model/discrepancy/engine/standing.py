@@ -56,8 +56,9 @@ class Standing:
         return replace(self, now=now, added=added, stated=stated)
 
     def model_without(self, step: Step, model: Model) -> Model:
-        """A model without the effect of a step, but for joints of which the file states it."""
-        known = self.case.given.by_name
+        """A model without the effect of a step, but for joints of which the file states it, or that have tolerances of
+        it."""
+        known = self.case.compared.model.by_name
         stated = {j for name in step.parameters if name in known for j in known[name].joints}
         joints = tuple(j for j in step.joints if j not in stated)
         if step.effect is None or (step.joints and not joints):

@@ -169,7 +169,7 @@ def _trial(
     for shape in shapes:
         for size in (side * t for t in times for side in sides):
             start = {p.name: shape.get(p.part, p.value) if p.null is None else typical(p, size) for p in own}
-            absent = all(start[p.name] == p.null for p in own if p.null is not None)
+            absent = all(start[p.name] == typical(p, 0.0) for p in own if p.null is not None)
             if not absent and start not in starts:
                 starts.append(start)
     amplitudes = tuple(p.name for p in own if p.null is not None)

@@ -1,6 +1,5 @@
 """What is answered when nothing more is found, and what is taken back."""
 
-
 from model.discrepancy.diagnosis import Candidate, SignalError
 from model.discrepancy.grounds import Refusal
 from model.discrepancy.thresholds import Thresholds

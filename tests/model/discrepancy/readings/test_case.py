@@ -47,18 +47,22 @@ def test_the_first_fit_reaches_the_same_end_from_wherever_the_model_was_given() 
     assert at_start(case_of(ARM.with_values(others), [record])).cost > 100 * truth.cost
 
 
+Fails = Callable[[float, Floats], bool]
+
+
 @dataclass(frozen=True)
 class Unstable(Observation):
-    """An observation whose simulations do not stay finite where `fails` of the feedback share and states says so."""
+    """An observation whose simulations do not stay finite where `fails` of the feedback share and numbers says so."""
 
-    fails: Callable[[float], bool] = lambda _share: False
+    fails: Fails = lambda _share, _numbers: False
 
     def readings(self, model: Model, states: Any, *options: Any) -> list[Floats]:
         shown = super().readings(model, states, *options)
-        return [np.full_like(y, np.nan) for y in shown] if self.fails(self.prepared[0].following) else shown
+        failed = self.fails(self.prepared[0].following, states[0][0])
+        return [np.full_like(y, np.nan) for y in shown] if failed else shown
 
 
-def unstable(fails: Callable[[float], bool]) -> tuple[ReadingCase, float]:
+def unstable(fails: Fails) -> tuple[ReadingCase, float]:
     """A case whose simulations fail there, and the cost of the given model along the record where they do not."""
     case = case_of(ARM, [imagined.trace(ARM.with_values(TRUTH), seconds=2.0)])
     own = case.compared.observation
@@ -67,16 +71,21 @@ def unstable(fails: Callable[[float], bool]) -> tuple[ReadingCase, float]:
 
 
 def test_the_first_fit_starts_from_the_given_model_where_the_closed_loop_has_led_to_instability() -> None:
-    failures = iter([True])  # the first simulation with the full share, from where the closed loop has led
-    case, given = unstable(lambda share: share == FEEDBACK_SHARE and next(failures, False))
+    led: list[Floats] = []  # there, with the full share
+
+    def fails_there(share: float, numbers: Floats) -> bool:
+        led.extend([numbers] if share == FEEDBACK_SHARE else [])
+        return share == FEEDBACK_SHARE and np.array_equal(numbers, led[0])
+
+    case, given = unstable(fails_there)
     assert fitted(case).cost < 0.2 * given
-    case, given = unstable(lambda share: share != FEEDBACK_SHARE)
+    case, given = unstable(lambda share, _numbers: share != FEEDBACK_SHARE)
     assert fitted(case).cost < 0.2 * given, "with the record as feedback"
 
 
 def test_a_model_that_is_unstable_everywhere_is_refused_with_one_line() -> None:
     with pytest.raises(SpecError, match="the simulation does not stay finite: the control loop is unstable"):
-        fitted(unstable(lambda _share: True)[0])
+        fitted(unstable(lambda _share, _numbers: True)[0])
 
 
 # ---- What may differ, and around which numbers.
