@@ -139,7 +139,7 @@ def fit(
         known: derivatives of a place near it, of another model with some of these unknowns. goal: a cost; the fit ends
             where the steps that are left, each as good as the last, would not lead there.
     """
-    values = {u.name: float(np.clip(begin.get(u.name, u.expected), u.low, u.high)) for u in unknowns}
+    values = start_values(unknowns, begin)
     near = known or {}
     slopes = {u.name: near[u.name] for u in unknowns if u.name in near}
     first = evaluate(compared, unknowns, values, np.ones(len(compared.floor)) if memory is None else memory)
@@ -150,6 +150,11 @@ def fit(
     if np.array_equal(memory, first.memory):
         return first
     return descend(evaluate(compared, unknowns, first.values, memory), first.known, rounds, goal)
+
+
+def start_values(unknowns: Sequence[Unknown], begin: Values) -> dict[str, float]:
+    """Values of the unknowns within their bounds, as expected where `begin` names none."""
+    return {u.name: float(np.clip(begin.get(u.name, u.expected), u.low, u.high)) for u in unknowns}
 
 
 def evaluate(compared: Residual, unknowns: Sequence[Unknown], values: dict[str, float], memory: Floats) -> Fit:

@@ -13,11 +13,12 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import Candidate
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case, is_strained
-from model.discrepancy.engine.fitting import LONG, Fit, Slopes, evaluate, fit
+from model.discrepancy.engine.fitting import LONG, Fit, Slopes, evaluate, fit, start_values
 from model.discrepancy.engine.priors import free_unknown
 from model.discrepancy.engine.probing import Probe, Start, Trial, projection
 from model.discrepancy.thresholds import LARGER_PART, THRESHOLDS
 from model.effects.names import effect_on
+from model.fitting.unknowns import Unknown
 
 SHORTLIST = 7
 """Most effects that are fitted after probing."""
@@ -181,7 +182,10 @@ class _Search:
             trial, own = probe.trial, {p.name for p in probe.trial.parameters}
             kept = (u for u in case.kept(now, trial.model) if u.name not in own)
             unknowns = (*kept, *(free_unknown(p) for p in trial.parameters))
-            compared, begin = now.compared.of_model(trial.model), {**there.values, **probe.start}
+            compared = now.compared.of_model(trial.model)
+            begin = _nearest(
+                [{**there.values, **start} for start in (probe.start, *trial.starts)], there, trial, unknowns
+            )
             if there.compared is now.compared:
                 fitted = fit(compared, unknowns, begin, now.memory, clear.now.known)
             else:
@@ -224,6 +228,13 @@ class _Search:
             fell = float((before - described).sum()) + now.prior - f.fit.prior
             weighed.append(replace(f, evidence=fell - cost, cost=cost, relieved=max(now.prior - f.fit.prior, 0.0)))
         return sorted(weighed, key=order_by_odds)
+
+
+def _nearest(begun: Sequence[Start], there: Fit, trial: Trial, unknowns: Sequence[Unknown]) -> Start:
+    """The start of the lowest cost: what gives or has play is not in proportion to its size."""
+    compared = there.compared.of_model(trial.model)
+    tried = [evaluate(compared, unknowns, start_values(unknowns, one), there.memory) for one in begun]
+    return min(zip(tried, begun, strict=True), key=lambda pair: pair[0].cost)[1]
 
 
 def improved(before: Fit, after: Fit) -> Fit | None:
