@@ -8,6 +8,7 @@ import pytest
 from sqlalchemy import event, text
 
 from daq.config.service import ServiceSettings
+from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.experiments import ExperimentRequest
 from daq.contracts.service.jobs import DiagnoseRequest
@@ -16,7 +17,7 @@ from server.experiments.states import Event
 from server.problems import ProblemError
 from server.stopping.tokens import reader_of
 from server.store.address import address_of
-from server.store.engine import Store, StoreError
+from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.lock import sqlite_file
@@ -54,7 +55,7 @@ def test_a_folders_name_is_no_syntax_of_an_address(tmp_path: Path, name: str) ->
 def test_a_database_of_another_version_is_refused(store: Store) -> None:
     with store.writing() as session:
         session.execute(text("UPDATE alembic_version SET version_num='9999'"))
-    with pytest.raises(StoreError, match="cannot be brought up to date"):
+    with pytest.raises(SpecError, match="cannot be brought up to date"):
         store.migrate()
 
 
