@@ -22,7 +22,7 @@ from daq.owner import long_orders, stop_socket
 from daq.owner import speaker as module
 from daq.owner.guardian import EndCause, Guardian
 from daq.owner.loop import _watch, serve
-from daq.owner.messages import BEGINS_WITHIN, REPORT, Answer, MoveGripper, Open, Reset, RunProgram
+from daq.owner.messages import BEGINS_WITHIN, REPORT, Answer, EventHappened, MoveGripper, Open, Reset, RunProgram
 from daq.owner.owned_robot import OwnedRobot
 from daq.owner.quick_orders import carry_out
 from daq.owner.speaker import Speaker
@@ -377,7 +377,8 @@ def test_a_reader_that_does_not_read_costs_no_time(pipe: tuple[int, int], monkey
         assert speaker.dropped > 0
         with os.fdopen(reader, "rb") as heard:
             told = next(line for line in heard if b'"missing"' in line)
-    assert f"{speaker.dropped} reports" in REPORT.validate_json(told).event.message
+    assert isinstance(report := REPORT.validate_json(told), EventHappened)
+    assert f"{speaker.dropped} reports" in report.event.message
 
 
 def test_a_period_that_began_before_the_reset_is_no_new_stop(scene: Scene) -> None:
