@@ -52,14 +52,13 @@ export async function openSocket(robot: Promise<unknown> = Promise.resolve()): P
 }
 
 function askAll(): Asked {
+  const system = askSystem(); // the second door of a stop: nothing is asked before it
   const robot = chosenRobot();
   const socket = openSocket(robot);
   const machine = robot.then(() =>
     ask(api.GET('/api/v1/robots/{robot}/machine', { params: { path: here() } })),
   );
   const me = ask(api.GET('/api/v1/me'));
-  // Its answer takes longest, and nothing that is shown first needs it.
-  const system = machine.then(askSystem, askSystem);
   const found: Asked = { robot, machine, me, system, socket };
   // A refusal is told to whoever waits for the answer; until then nobody has missed it.
   for (const answer of Object.values(found) as Promise<unknown>[]) answer.catch(() => {});

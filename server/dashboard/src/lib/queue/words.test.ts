@@ -18,12 +18,12 @@ describe('what goes on', () => {
   it('says once that the arm is stopped, and that the queue is paused', () => {
     const found = whatGoesOn({ ...robot, arm: 'stopped' }, { ...paused, reason: 'the arm is stopped' }, 0);
     expect(found).toBe('Nothing moves until the arm is reset.');
-    expect(whatGoesOn(robot, paused, 0)).toBe('The queue is paused: by anna.');
+    expect(whatGoesOn(robot, paused, 0)).toBe('The queue is paused. By anna.');
   });
 
   it('is what the arm does, also while the queue is paused', () => {
     expect(whatGoesOn({ ...robot, activity: 'experiment' }, paused, 0)).toBe(
-      'An experiment is running. The queue is paused: by anna.',
+      'An experiment is running. The queue is paused. By anna.',
     );
   });
 });

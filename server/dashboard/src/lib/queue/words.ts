@@ -21,7 +21,9 @@ export function whatGoesOn(robot: Robot | null, queue: Queue | null, waiting: nu
   const isHeld = robot?.arm === 'stopped' || robot?.arm === 'fault';
   const held = isHeld ? 'Nothing moves until the arm is reset.' : '';
   // Until the reset, the banner says why; the queue waits for the same reason.
-  const paused = queue?.paused ? `The queue is paused: ${queue.reason}.` : sentence(queue?.waiting_for ?? '');
+  const paused = queue?.paused
+    ? `The queue is paused. ${sentence(queue.reason)}`
+    : sentence(queue?.waiting_for ?? '');
   const said = [activity || held, isHeld ? '' : paused].filter((part) => part !== '').join(' ');
   const isIdle = waiting === 0 && queue !== null && robot?.connection === 'connected';
   return said === '' && isIdle ? 'Nothing is running or waiting.' : said;

@@ -10,12 +10,12 @@ export interface Stop {
 export const STOPS: readonly Stop[] = [
   {
     title: 'This arm is a mock',
-    text: 'Nothing real moves, so press whatever you like. What it does now, and the next step, are always here.',
+    text: 'A program plays the arm: nothing real moves, so press whatever you like. What it does, and the next step, are here.',
     about: '.home',
   },
   {
     title: 'Stop is on every page',
-    text: 'It stops the arm when pressed and asks nothing. F8 does the same, also while you type.',
+    text: 'It stops the arm when pressed and asks nothing. On a keyboard F8 does the same, also while you type.',
     about: 'header .stop',
   },
   {
