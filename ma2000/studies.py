@@ -63,9 +63,10 @@ def diagnose(
 
     Args:
         options: `DiagnosisOptions(method="output-error")` simulates. By default, torques are balanced (inverse
-    dynamics) if a sampled controller's drive was recorded, unless `design` is set; no experiment is proposed then.
+            dynamics) if a sampled controller's drive was recorded, unless `design` is set; no experiment is proposed
+            then.
         design: whether the proposed experiment may be a motion designed for the candidates, which takes about 10 s
-    more.
+            more.
 
     Raises TraceError, SpecError for unusable input; CancelledError if cancelled.
     """
