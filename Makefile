@@ -7,6 +7,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 FOR_USE := .venv/installed-for-use
 FOR_DEVELOPMENT := .venv/installed-for-development
+FOR_ALL_TESTS := .venv/installed-for-all-tests
 
 # Three workers, because many tests wait for processes in real time. The checks run beside them.
 # For one thing after the other, in one process: make test WORKERS=
@@ -59,7 +60,7 @@ checks: $(FOR_DEVELOPMENT) page ## lint and the tests of the page
 	@$(MAKE) --no-print-directory lint page-tests
 
 # What all workers of the tests need is compiled once: each would do it again, or wait for the one that does.
-compiled: $(FOR_DEVELOPMENT) page ## compile what the thorough tests need
+compiled: $(FOR_ALL_TESTS) page ## compile what the thorough tests need
 	@$(BIN)/python -m tests.compile_ahead
 
 page-tests: $(FOR_DEVELOPMENT) ## the tests of the modules of the page
@@ -131,6 +132,11 @@ $(FOR_DEVELOPMENT): requirements-dev.txt $(FOR_USE)
 	@$(call INSTALL,requirements-dev.txt)
 	@touch $@
 
+$(FOR_ALL_TESTS): requirements-thorough.txt $(FOR_DEVELOPMENT)
+	@echo "Installing the pinned requirements of the thorough tests into .venv"
+	@$(call INSTALL,requirements-thorough.txt)
+	@touch $@
+
 $(BIN)/uv: requirements-installer.txt | $(BIN)/pip
 	@$(PIP) install --require-hashes --requirement requirements-installer.txt
 	@touch $@
@@ -151,7 +157,8 @@ COMPILE = $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 
 # Those of development come first: what the tests need may hold a package back that the product alone would not.
 requirements: $(FOR_DEVELOPMENT) ## pin what pyproject.toml asks for (UPGRADE=--upgrade: the newest of everything)
 	@$(COMPILE) --group installer --output-file requirements-installer.txt
-	@$(COMPILE) pyproject.toml --all-extras --group build --group dev --output-file requirements-dev.txt
+	@$(COMPILE) pyproject.toml --extra all --group build --group dev --output-file requirements-dev.txt
+	@$(COMPILE) pyproject.toml --extra rerun --extra webrtc --group thorough --constraint requirements-dev.txt --output-file requirements-thorough.txt
 	@$(COMPILE) pyproject.toml --extra all --group build --constraint requirements-dev.txt --output-file requirements.txt
 	@$(COMPILE) --group release --constraint requirements-dev.txt --output-file requirements-release.txt
 	@$(MAKE) --no-print-directory $(FOR_DEVELOPMENT)

@@ -20,36 +20,76 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
 from benchmarks.figures import machine
-from benchmarks.real_machines.records import content, find_repository
+from benchmarks.real_machines.records import MissingDataError, content, find_repository
+from extras.formats.bags.joint_messages import JOINT_STATE
 
 MOST_LINES, MOST_MINUTES = 15, 10.0
+BAG_BEGINS = 1_700_000_000 * 10**9
+"""ns since 1970 at which a bag begins that is written from tables, whose times begin at 0."""
 COMMAND = "from daq_cli import main; main()"
 IN_PYTHON = """
 import ast, sys, ma2000
-record, parts, model = ast.literal_eval(sys.argv[1])
-traces = [ma2000.read_trace(file, map=record["map"], where=where or None) for file, where in parts]
+given, parts, model = ast.literal_eval(sys.argv[1])
+traces = [ma2000.read_trace(file, where=where or None, **given) for file, where in parts]
 print(ma2000.diagnose(ma2000.load_machine(model), traces[:1], traces[1:]).summary)
 """
 
 
-def lay_out(record: dict[str, Any], data: Path, place: Path, *, clone: bool) -> None:
+def repository_of(record: dict[str, Any], data: Path, *, clone: bool) -> Path:
+    """Returns a record's repository below `data`, which is cloned if it is missing. Raises MissingDataError."""
+    try:
+        return find_repository(data, record["repository"])
+    except MissingDataError:
+        if not clone:
+            raise
+    place = data / f"{record['repository'].partition('/')[2]}.git"
+    words = ["git", "clone", "--bare", f"https://github.com/{record['repository']}", str(place)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise MissingDataError(f"{' '.join(words)}: {done.stderr.strip().splitlines()[-1]}")
+    return place
+
+
+def lay_out(record: dict[str, Any], repository: Path, place: Path) -> None:
     """Writes a record's files and machine file below `place`. Raises MissingDataError."""
-    if clone:  # git refuses a folder that is there
-        name = record["repository"].partition("/")[2]
-        words = ["git", "clone", "--bare", f"https://github.com/{record['repository']}", str(data / f"{name}.git")]
-        subprocess.run(words, capture_output=True, check=False)
-    repository = find_repository(data, record["repository"])
     for name, inside in record["files"].items():
         (place / name).parent.mkdir(parents=True, exist_ok=True)
         (place / name).write_bytes(content(repository, record["commit"], inside))
     if "machine" in record:
         (place / "machine.toml").write_text(record["machine"], encoding="utf-8")
+    if "bag" in record:
+        write_bag({signal: place / name for signal, name in record["bag"].items()}, place / record["import"])
+
+
+def write_bag(tables: dict[str, Path], place: Path) -> None:
+    """Writes tables of `position`, `velocity` and `effort` as a bag of ROS 2 with sensor_msgs/JointState, by ROS's own
+    definitions. Their columns are times (s) and `- JOINT_SIGNAL`.
+    """
+    rows = {signal: np.genfromtxt(path, delimiter=",", skip_header=1) for signal, path in tables.items()}
+    head = tables["position"].read_text("utf-8").partition("\n")[0].split(",")[1:]
+    names = [one.strip().removeprefix("- ").removesuffix("_position") for one in head]
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    state, header, stamp = (
+        store.types[one] for one in (JOINT_STATE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+    )
+    with Writer(place, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topic = writer.add_connection("/joint_states", JOINT_STATE, typestore=store)
+        for k, time in enumerate(rows["position"][:, 0]):
+            seconds, rest = divmod(BAG_BEGINS + round(1e9 * time), 10**9)
+            signals = {signal: table[k, 1:] for signal, table in rows.items()}
+            message = state(header=header(stamp=stamp(sec=seconds, nanosec=rest), frame_id=""), name=names, **signals)
+            writer.write(topic, seconds * 10**9 + rest, store.serialize_cdr(message, JOINT_STATE))
 
 
 def steps(record: dict[str, Any], parts: Sequence[tuple[str, str]], model: str) -> list[list[str]]:
     """Returns the commands from the file to a verdict; `#0` stands for the first imported trace, `#1` for the next."""
-    options = [word for key, text in record["map"].items() for word in ("--map", f"{key}={text}")]
+    options = [word for key, text in record.get("map", {}).items() for word in ("--map", f"{key}={text}")]
+    options += ["--drive-unit", record["drive_unit"]] if "drive_unit" in record else []
     imports = []
     for k, (file, where) in enumerate(parts):
         known = file in dict(parts[:k])  # the answers are kept beside the file
@@ -68,11 +108,12 @@ def walk(record: dict[str, Any], data: Path, *, python: bool, clone: bool) -> tu
     lines = len(commands) + sum(bool(line.strip()) for line in record.get("machine", "").splitlines())
     programs = [[COMMAND, *words] for words in commands]
     if python:
-        programs = [p for p in programs if p[1] == "machine"] + [[IN_PYTHON, repr((record, parts, model))]]
+        given = {key: record[key] for key in ("map", "drive_unit") if key in record}
+        programs = [p for p in programs if p[1] == "machine"] + [[IN_PYTHON, repr((given, parts, model))]]
         lines = IN_PYTHON.count("\n") - 1
     begun, traces, said = resource.getrusage(resource.RUSAGE_CHILDREN), list[str](), ""
     with TemporaryDirectory() as folder:
-        lay_out(record, data, Path(folder), clone=clone)
+        lay_out(record, repository_of(record, data, clone=clone), Path(folder))
         for program, *words in programs:
             filled = [traces[int(word[1:])] if word in ("#0", "#1") else word for word in words]
             call = [sys.executable, "-c", program, *filled]

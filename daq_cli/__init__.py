@@ -29,11 +29,17 @@ def main() -> None:
         raise SystemExit(0)
     # Matrices here are small: BLAS threads would slow a diagnosis by a fifth. Simulations use the cores instead.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Looking for pydantic's plug-ins takes longer than loading pydantic.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     from daq.contracts.errors import DaqError
     from daq.contracts.extras import missing_extras_named
     from daq_cli.app.subcommands import called, extra_of
 
     command = called(sys.argv[1:])
+    if command == "run" and not {"-h", "--help", "--dry-run", "--server"} & set(sys.argv):
+        from daq.owner.start import start_early
+
+        start_early()  # it loads its modules while this process loads its own
     try:
         with missing_extras_named(f"daq {command}".strip(), extra_of(command)):
             from daq_cli.app.command import main as run

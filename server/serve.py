@@ -22,8 +22,7 @@ from fastapi import FastAPI
 
 from daq.config.service import ServiceSettings
 from daq.config.settings import Settings
-from daq.contracts import exit_codes
-from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.errors import ReachError, SpecError
 from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.system import stop_port_after
 from server.access.caller import Caller
@@ -94,15 +93,9 @@ TRIES = 50
 """Number of pairs of neighbouring ports to try if the configuration allows any free port."""
 
 
-class ListenError(DaqError):
-    """The service cannot listen on an address."""
-
-    exit_code = exit_codes.NOT_REACHED
-
-
 @contextmanager
 def listening(section: ServiceSettings) -> Iterator[tuple[socket.socket, socket.socket]]:
-    """Binds sockets for the service and its stop listener. Raises ListenError."""
+    """Binds sockets for the service and its stop listener. Raises ReachError."""
     own, beside = _both(section)
     with own, beside:
         yield own, beside
@@ -114,7 +107,7 @@ def _both(section: ServiceSettings) -> tuple[socket.socket, socket.socket]:
         port = stop_port_after(own.getsockname()[1]) if section.stop_port is None else section.stop_port
         try:
             return own, _bound(section.host, port, "server.stop_port")
-        except ListenError:
+        except ReachError:
             own.close()
             if section.port != 0 or section.stop_port is not None or attempt == TRIES - 1:
                 raise
@@ -133,7 +126,7 @@ def _bound(host: str, port: int, setting: str) -> socket.socket:
             listener.close()
         why = error.strerror if isinstance(error, OSError) and error.strerror else error
         line = f"server.host {host}, {setting} {port}: cannot be listened at: {why}"
-        raise ListenError(line) from error
+        raise ReachError(line) from error
     return listener
 
 
@@ -145,8 +138,7 @@ GRACE = 1
 
 
 def serve(settings: Settings, ready: Callable[[str], None]) -> None:
-    """Serves until a signal comes. Calls `ready` with the address. Raises ListenError, InUseError, StoreError,
-    SpecError, StopDoorError."""
+    """Serves until a signal comes. Calls `ready` with the address. Raises ReachError, SpecError."""
     section = settings.server
     with (
         sole_use(address_of(section)),

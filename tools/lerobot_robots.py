@@ -2,8 +2,9 @@
 
     python -m tools.lerobot_robots
 
-Needs lerobot with its Feetech extra in this environment (tried with 0.4.4); the tests have a stand-in instead. What is
-lerobot's: configuration, robot, bus, calibration and normalisation. What is not: the bytes and the servos.
+Needs lerobot with its Feetech extra in this environment (tried with 0.4.4 and 0.6.2); the tests have a stand-in
+instead. What is lerobot's: configuration, robot, bus, calibration and normalisation. What is not: the bytes and the
+servos.
 """
 
 from __future__ import annotations

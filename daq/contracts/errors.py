@@ -29,7 +29,7 @@ class TraceError(DaqError):
 
 
 class ReachError(DaqError):
-    """The robot, or the process that owns it, cannot be reached."""
+    """A robot, its owner, a port, a folder or a database cannot be reached, or another program uses it."""
 
     exit_code = exit_codes.NOT_REACHED
 

@@ -11,7 +11,7 @@ REPORTEPP  errors, positions, powers                       `errors_positions_pow
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -189,6 +189,13 @@ class Controller:
         case the snapshot can still be read.
         """
         return self._sampling.next(after, self.joints if joints is None else joints, set_points or {})
+
+    def kept(self, after: int, before: int, joints: Sequence[int] | None = None) -> Iterator[BoardSnapshot]:
+        """Returns the snapshots between two ticks, without these, that a bridge with SAMPLE still has; none of another
+        one. For views: they do not change the counters."""
+        if not isinstance(self._sampling, RingSampling):
+            return iter(())
+        return self._sampling.kept(after, before, self.joints if joints is None else joints)
 
     def stop(self) -> StopConfirmation:
         """Freezes the arm at its measured posture. May be called at any time, from any thread, repeatedly. Never raises

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 from daq.contracts.sample import SampleCount
@@ -157,6 +157,18 @@ class RingSampling:
             self._deliveries.taken(batch, request, confirmation, None)
         snapshot = expect(question, answer, Snapshot)
         return self._received(snapshot, snapshot.joints, after)
+
+    def kept(self, after: int, before: int, joints: Sequence[int]) -> Iterator[BoardSnapshot]:
+        """Yields the snapshots between two ticks, without these, that the bridge still has. They are for a view, which
+        looked elsewhere meanwhile: none of them counts as late, and none that is gone as missing."""
+        link, clock = self._deliveries.link, self._deliveries.clock
+        while after + 1 < before and self._newest is not None:
+            reply = link.request(Sample(after, mask_of(tuple(joints))), Snapshot)
+            if not after < reply.tick < before:
+                return
+            after, flags = reply.tick, StatusFlag(reply.status)
+            tick_time = self._tick_time.time_of(after)
+            yield BoardSnapshot(after, clock.now(), tick_time, reply.joints, flags, "sample")
 
     def _compact(self, after: int | None, joints: Sequence[int], postures: Mapping[int, int]) -> BoardSnapshot:
         """Sends set points and request in one frame."""

@@ -7,10 +7,9 @@ import itertools
 import logging
 import select
 import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -33,6 +32,7 @@ from daq.owner.messages import (
     Report,
     RunExperiment,
 )
+from daq.owner.start import started
 from daq.owner.stop_socket import StopAnswer
 
 GRACE = 4.0
@@ -43,7 +43,6 @@ OWN_GRACE = 8.0
 on the link and a slow disk."""
 STOPS_WITHIN = 1.0
 """Longest wait (s) for the answer to a stop, the same as at the stop socket."""
-PROGRAM = (sys.executable, "-m", "daq.owner")
 log = logging.getLogger("daq.owner")
 
 
@@ -58,21 +57,17 @@ class OwnerGoneError(DaqError):
 
 
 class OwnerProcess:
-    """A running owner. `report` and `ended` are called on a separate thread; `ended` is called once, last."""
+    """A running owner. `report` and `ended` are called on a separate thread; `ended` is called once, last. `process`:
+    that of `daq.owner.start`, by default a new one of this program."""
 
     def __init__(
         self,
         opening: Open,
         report: Callable[[Report], None],
         ended: Callable[[str], None],
-        program: Sequence[str] | None = None,
+        process: subprocess.Popen[bytes] | None = None,
     ) -> None:
-        self._process = subprocess.Popen(
-            program or PROGRAM,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C in the terminal is the client's to handle
-        )
+        self._process = process or started()
         self._report = report
         self._ended = ended
         self._writing = threading.Lock()

@@ -52,7 +52,7 @@ def serve(robot: OwnedRobot) -> None:
     """Runs until the client returns the port. A program fault freezes the arm and is raised."""
     watched = robot.opening.watched
     if watched:
-        _notice_a_stop_before_us(robot)
+        _notice_a_stop(robot, "before this connection")
     last: int | None = None
     with robot.control.frozen_on_error():
         while not _leaving(robot):
@@ -87,8 +87,8 @@ def _watch(robot: OwnedRobot, last: int | None) -> int:
     """Reads the next sample of an arm at rest. Returns its tick."""
     every = robot.controller.line_rate().every
     snapshot = robot.controller.next_snapshot(None if last is None else last + every - 1)
-    if is_frozen(snapshot) and robot.control.arm.state is State.IDLE:
-        robot.control.stop("on the board, by another host")
+    if is_frozen(snapshot):  # its period may have begun before a release
+        _notice_a_stop(robot, "on the board, by another host")
     robot.number_stop()
     return snapshot.tick
 
@@ -163,7 +163,7 @@ def _come_back(robot: OwnedRobot) -> None:
     robot.control.handle(Event.CONNECTED)
     robot.controller.hello()
     robot.read_gains()
-    _notice_a_stop_before_us(robot)
+    _notice_a_stop(robot, "before this connection")
 
 
 def _answers_again(robot: OwnedRobot) -> None:
@@ -174,9 +174,9 @@ def _answers_again(robot: OwnedRobot) -> None:
         robot.controller.next_snapshot()
 
 
-def _notice_a_stop_before_us(robot: OwnedRobot) -> None:
-    if StatusFlag.FROZEN in robot.controller.status().flags and robot.control.arm.state is State.IDLE:
-        robot.control.stop("before this connection")
+def _notice_a_stop(robot: OwnedRobot, cause: str) -> None:
+    if robot.control.arm.state is State.IDLE and StatusFlag.FROZEN in robot.controller.status().flags:
+        robot.control.stop(cause)
 
 
 def _refuse(robot: OwnedRobot, order: LongOrder | QuickOrder, line: str, exit_code: int) -> None:

@@ -10,6 +10,7 @@ from daq.contracts.limits import Limits
 from daq.contracts.limp import limp_joints
 from daq.contracts.machine import Machine
 from daq.contracts.service.robot import Activity
+from daq.contracts.trace import TraceEvent
 from daq.driver import BoardSnapshot
 from daq.driver.controller import ControllerStatus
 from daq.owner.guardian import Guardian
@@ -50,8 +51,12 @@ class OwnedRobot:
             self.speaker.say(self.samples.sample(snapshot, time.monotonic()))
             self.report_arm()
 
+        def lost(count: int, tick: int) -> None:
+            message = f"{count} samples between two activities are not shown: the bridge no longer had them"
+            self.speaker.happened(TraceEvent(time=0.0, kind="missing", message=message, tick=tick))
+
         if self.opening.live:
-            self.controller.listener = listen
+            self.controller.listener, self.controller.lost = listen, lost
 
     @property
     def machine(self) -> Machine:

@@ -26,7 +26,7 @@ class Speaker:
 
     def __init__(self, output: int) -> None:
         self.dropped = 0
-        """Number of reports that were dropped."""
+        """Number of reports that were dropped. The first report after them tells the client."""
         self._output = output
         self._queue: queue.Queue[BaseModel | None] = queue.Queue(WAITING_REPORTS)
         self._thread = threading.Thread(target=self._write_all, name="reports", daemon=True)
@@ -63,17 +63,22 @@ class Speaker:
         except queue.Full:
             self.dropped += 1
 
-    def _write(self, data: bytes) -> None:
+    def _send(self, report: BaseModel) -> None:
+        data = report.model_dump_json().encode() + b"\n"
         # Bypass Python's buffer: it would retry unwritten data at exit, and report the error.
         while data:
             data = data[os.write(self._output, data) :]
 
     def _write_all(self) -> None:
-        heard = True
+        heard, told = True, 0
         while (report := self._queue.get()) is not None:
             if not heard:
                 continue
             try:
-                self._write(report.model_dump_json().encode() + b"\n")
+                if (dropped := self.dropped) > told:
+                    line = f"{dropped - told} reports of the arm are lost: their reader was too slow"
+                    self._send(EventHappened(event=TraceEvent(time=0.0, kind="missing", message=line)))
+                    told = dropped
+                self._send(report)
             except OSError:
                 heard = False

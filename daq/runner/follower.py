@@ -82,8 +82,6 @@ class Follower:
         self._rows = RowMaker(machine, joints, controller.period_s)
         self._lag = Lag(controller.period_s, every)
         self._retries = controller.counters.retries
-        self._postures: list[dict[int, int]] = []
-        """Set points of the plan that is followed, by joint, one for each period."""
         self.last: SampleRow | None = None
         known = every == 1 and Capability.SAMPLE in controller.identity.capabilities
         self.late_set_points: int | None = 0 if known else None
@@ -140,8 +138,6 @@ class Follower:
         observer's errors.
         """
         guards = RunningGuards(self._machine, self._limits, self._joints, plan.moving, self._every)
-        moving = [joint - 1 for joint in plan.moving]
-        self._postures = [dict(zip(plan.moving, row, strict=True)) for row in plan.postures[:, moving].tolist()]
         try:
             return self._play(plan, guards, progress)
         except (LinkError, NoSampleError) as error:
@@ -159,6 +155,7 @@ class Follower:
     def _play(self, plan: Plan, guards: RunningGuards, progress: Callable[[int], None]) -> Ending:
         # The first set point is already in force. Sending it again aligns rows and plan.
         index, following, hold, last = -1, 0, False, len(plan) - 1
+        in_force = coming = plan.sent_at(following)
         while True:
             go_on = not hold and index < last
             before = self.last
@@ -166,20 +163,21 @@ class Follower:
             if outside is not None:
                 return self._stopped(outside)
             try:
-                row, snapshot = self._next(self._postures[following] if go_on else {})
+                row, snapshot = self._next(coming if go_on else {})
             except RequestRefusedError as error:
                 return self._stopped(self._ended() or str(error))
             self._observer.row(row)
             if go_on:
-                self._count_late(snapshot, before, self._postures[following])
+                self._count_late(snapshot, before, coming)
                 for passed in range(index + 1, following + 1):
                     for mark in plan.marks_at(passed):
                         self._observer.event(row.time, mark.kind, mark.message, row.tick, mark.joint)
-                index = following
+                index, in_force = following, coming
                 progress(index)
-            expected = self._postures[index] if snapshot.set_points_missed else None
+            expected = in_force if snapshot.set_points_missed else None
             following = min(index + self._step(before, row), last)
-            verdict = guards.check(row, self._postures[following], expected)
+            coming = plan.sent_at(following)
+            verdict = guards.check(row, coming, expected)
             verdict |= self._lag.check(row.tick, snapshot.jitter)
             ending = self._judge(verdict, row)
             if ending is not None:

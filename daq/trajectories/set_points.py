@@ -90,6 +90,12 @@ class Plan:
         """(n,) s: time of each set point."""
         return np.arange(len(self), dtype=np.float64) * self.period
 
+    def sent_at(self, index: int) -> dict[int, int]:
+        """Joint → posture units of the moving joints at set point `index`. Made when it is due: those of all periods at
+        once would take more memory than the plan."""
+        row = self.postures[index].tolist()
+        return {joint: row[joint - 1] for joint in self.moving}
+
     def marks_at(self, index: int) -> tuple[Mark, ...]:
         """Marks of set point `index`."""
         return tuple(mark for mark in self.marks if mark.index == index)

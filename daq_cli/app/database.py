@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def service_database(call: Invocation) -> Store:
-    """Returns the configured database, migrated to the newest schema. Raises StoreError."""
+    """Returns the configured database, migrated to the newest schema. Raises SpecError."""
     from server.store.address import address_of
     from server.store.engine import Store
 

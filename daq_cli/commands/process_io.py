@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from daq.contracts import exit_codes
-from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.errors import ReachError, SpecError
 from daq_cli.app.consent import ConsentPrompt
 from daq_cli.app.context import JsonOption, YesOption, print_json
 from daq_cli.robot.access import robot_of
@@ -18,12 +17,6 @@ OUTPUTS = 8
 WhileStoppedOption = Annotated[
     bool, typer.Option("--while-stopped", help="Switch even while the arm is stopped: it may hold a load.")
 ]
-
-
-class NotSwitchedError(DaqError):
-    """The value read back differs from the value written."""
-
-    exit_code = exit_codes.NOT_REACHED
 
 
 @app.command()
@@ -72,9 +65,9 @@ def gripper(
 
 
 def _print_switched(what: str, wanted: str, found: str) -> None:
-    """Raises NotSwitchedError."""
+    """Raises ReachError."""
     if found != wanted:
-        raise NotSwitchedError(f"{what}: written as {wanted}, read back as {found}")
+        raise ReachError(f"{what}: written as {wanted}, read back as {found}")
     print(f"{what} {found}, read back")
 
 

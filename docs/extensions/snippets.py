@@ -16,8 +16,8 @@ BLOCK = re.compile(r"^[ ]*```(python|console)\n(.*?)^[ ]*```$", re.DOTALL | re.M
 RUN: Mapping[tuple[str, str], str] = {
     ("any-arm.md", "python"): "tests/extras/formats/command_line/test_pages.py",
     ("audit.md", "console"): "tests/extras/lab/audit/test_requests.py",
-    ("batches.md", "console"): "tests/extras/lab/batches/test_cluster.py",
-    ("batches.md", "python"): "tests/extras/lab/batches/test_cluster.py",
+    ("batches.md", "console"): "tests/extras/lab/batches/test_whole_batches.py",
+    ("batches.md", "python"): "tests/extras/lab/batches/test_whole_batches.py",
     ("feedforward.md", "python"): "tests/extras/motion/test_command.py",
     ("fleet.md", "console"): "tests/extras/lab/fleet/test_several_arms.py",
     ("fleet.md", "python"): "tests/extras/lab/fleet/test_several_arms.py",

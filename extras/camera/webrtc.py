@@ -67,7 +67,7 @@ def frames(url: str) -> Iterator[VideoFrame]:
 def jpeg(frame: VideoFrame) -> bytes:
     """Returns a frame as JPEG."""
     stream = io.BytesIO()
-    image: Image = frame.to_image()  # type: ignore[no-untyped-call]
+    image: Image = frame.to_image()
     image.save(stream, "JPEG", quality=QUALITY)
     return stream.getvalue()
 
@@ -98,4 +98,4 @@ async def _newest(track: MediaStreamTrack) -> VideoFrame:
     with suppress(TimeoutError):
         while True:
             frame = await asyncio.wait_for(track.recv(), WAITING)
-    return frame  # type: ignore[return-value]  # a track of video
+    return frame  # a track of video

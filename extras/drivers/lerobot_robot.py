@@ -1,4 +1,4 @@
-"""Drives a robot of lerobot (0.4 and later) through lerobot's interface `Robot`: `lerobot:so101_follower?port=…`.
+"""Drives a robot of lerobot (0.4 to 0.6) through lerobot's interface `Robot`: `lerobot:so101_follower?port=…`.
 
 lerobot speaks to the servos. Joints are the motors that it gives in degrees; others, such as a gripper, are held where
 they are. `connect` of lerobot switches the torque off and on while it configures the servos. Here that waits for the
@@ -47,7 +47,11 @@ def lerobot_robot(target: str, options: dict[str, str]) -> LeRobotDriver:
         config = draccus.parse(config_class=kind, args=[f"--{name}={value}" for name, value in given.items()])
     except SystemExit as error:  # it is a parser of command lines, which has said why
         raise DriverError(f"lerobot:{target}: its options are not accepted: {options}") from error
-    return LeRobotDriver(f"lerobot:{target}", make_robot_from_config(config), holds=STAYS_ON in allowed)
+    try:
+        robot = make_robot_from_config(config)
+    except ImportError as error:  # its bus needs a package of an extra
+        raise DriverError(f"lerobot:{target}: {error}") from error
+    return LeRobotDriver(f"lerobot:{target}", robot, holds=STAYS_ON in allowed)
 
 
 def _configuration(base: Any, target: str) -> Any:

@@ -78,10 +78,7 @@ def readings(
     plant = Plant(parts.plant, parts.modifications, experiment.start_angles(board.calibrations), step_us)
     sensors = PositionSensors(board, 0, parts.modifications, parts.arm_seed)
     set_point_effects: list[ChangesSetPoint] = of_kind(parts.modifications, ChangesSetPoint)
-    pids = [
-        _SmoothPid(gains, board.integral_shift, scale)
-        for gains, scale in zip(experiment.gains_by_joint, board.controller_scales, strict=True)
-    ]
+    pids = [_SmoothPid(experiment.gains, board.integral_shift, scale) for scale in board.controller_scales]
     scales = [scale.direction * board.dac_full_scale / DAC_MAX for scale in board.calibrations]
     delay, period = board.timing.computing_delay, board.timing.period
     rows: Sequence[tuple[int, ...]] = (experiment.set_points[0],) * experiment.settle + experiment.set_points

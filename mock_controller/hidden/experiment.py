@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -25,13 +24,12 @@ class ExperimentError(ValueError):
 class Experiment:
     """Set points (posture units, six per period) that follow `settle` periods at the first of them.
 
-    `gains`: P, I, D of every joint. `joint_gains`: those of each of the six joints, if they are not all the same.
+    `gains`: P, I, D of every joint.
     """
 
     set_points: tuple[tuple[int, ...], ...]
     gains: Gains = (2, 0, 0)
     settle: int = 50
-    joint_gains: tuple[Gains, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.set_points) < 2:
@@ -41,16 +39,8 @@ class Experiment:
                 raise ExperimentError(
                     f"period {number}: set points {row}: must be {JOINTS} from 0 to {POSTURE_UNITS - 1}"
                 )
-        for gains in (self.gains, *self.joint_gains):
-            if len(gains) != 3 or not all(0 <= gain <= GAIN_MAX for gain in gains):
-                raise ExperimentError(f"gains {gains}: must be three from 0 to {GAIN_MAX}")
-        if self.joint_gains and len(self.joint_gains) != JOINTS:
-            raise ExperimentError(f"gains of {len(self.joint_gains)} joints: must be of {JOINTS}")
-
-    @property
-    def gains_by_joint(self) -> tuple[Gains, ...]:
-        """P, I, D of each of the six joints."""
-        return self.joint_gains or (self.gains,) * JOINTS
+        if len(self.gains) != 3 or not all(0 <= gain <= GAIN_MAX for gain in self.gains):
+            raise ExperimentError(f"gains {self.gains}: must be three from 0 to {GAIN_MAX}")
 
     def start_angles(self, calibrations: Iterable[JointCalibration]) -> list[float]:
         """Angles (rad) of the first set points."""
@@ -59,14 +49,10 @@ class Experiment:
 
 
 def read_experiment(path: Path, gains: Gains = (2, 0, 0)) -> Experiment:
-    """Reads an experiment from CSV or JSON.
+    """Reads an experiment from CSV: one line per period, columns set_point_1 … set_point_6 (posture units).
 
-    CSV has one line per period and columns set_point_1 … set_point_6 (posture units). A `.json` file has the same in
-    `set_points`, one list per period, and P, I, D of the six joints in `gains`. Raises ExperimentError with one clear
-    line.
+    Raises ExperimentError with one clear line.
     """
-    if path.suffix == ".json":
-        return _from_json(path)
     try:
         with path.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
@@ -81,20 +67,6 @@ def read_experiment(path: Path, gains: Gains = (2, 0, 0)) -> Experiment:
             raise
         raise ExperimentError(f"{path}: not whole posture units: {error}") from None
     return Experiment(rows, gains)
-
-
-def _from_json(path: Path) -> Experiment:
-    try:
-        told = json.loads(path.read_text("utf-8"))
-        rows = tuple(tuple(int(posture) for posture in row) for row in told["set_points"])
-        joint_gains = tuple((int(p), int(i), int(d)) for p, i, d in told["gains"])
-    except OSError as error:
-        raise ExperimentError(f"{path}: {error.strerror}") from None
-    except (KeyError, TypeError, ValueError) as error:
-        raise ExperimentError(f"{path}: no set points with gains: {error}") from None
-    if len(set(joint_gains)) == 1:
-        return Experiment(rows, joint_gains[0])
-    return Experiment(rows, joint_gains=joint_gains)
 
 
 class _Path:

@@ -92,3 +92,14 @@ def torque_options(options: DiagnosisOptions | TorqueOptions | None) -> TorqueOp
         given = {"most_steps": options.most_steps} if "most_steps" in options.model_fields_set else {}
         return TorqueOptions(effects=options.effects, joints=options.joints, **given)
     return options or TorqueOptions()
+
+
+def reading_options(options: DiagnosisOptions) -> TorqueOptions:
+    """The same for readings, whose noise is known: what it takes to name an effect there."""
+    return TorqueOptions(
+        effects=options.effects,
+        joints=options.joints,
+        most_steps=options.most_steps,
+        least_evidence=THRESHOLDS.significant,
+        least_margin=THRESHOLDS.margin,
+    )

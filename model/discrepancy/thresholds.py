@@ -10,10 +10,6 @@ FEEDBACK_SHARE = 0.8
 """Share of the way from the simulated to the recorded reading that the simulated controller is given, where models are
 fitted and compared (docs/decisions/0020). More finds less: the laws of an arm are never exactly a model's, and a torque
 that is a little wrong adds up. With less, what noise has moved looks like a torque."""
-FEEDBACK_SHARE_FOR_ERRORS = 0.5
-"""The same where errors are reported and judged, held-out ones above all: nearer to what the model alone would do."""
-
-
 LARGER_PART = 0.5
 """Share of a whole from which something is the larger part of it. What is less than that beside a rival, or what it
 would need, does not catch up with it; of a residual it is no explanation."""
@@ -35,10 +31,6 @@ class Thresholds:
 
     Args:
         significant: evidence from which an effect counts as found.
-        echo: share of the evidence collected so far that a further effect must bring in addition. Where the law of an
-            added effect is not exactly the arm's, its remainder looks like an effect of its own.
-            distant_echo: the same for evidence collected on other joints.
-        kin: factor on that sum for an effect that has been found on another joint already.
         margin: lead in evidence from which one name is given, instead of a group.
         unexplained: excess variance of a joint's error, relative to its noise floor, above which something outside the
             library is missing. unnamed: the same on the fitted traces while no effect has been added; it then also
@@ -46,40 +38,21 @@ class Thresholds:
             called significant then.
         least_share: share of a joint's excess variance that effects must explain; with less they only resemble what is
             missing.
-        worse: rise of the held-out sum of squares, in its standard deviations, at which a step is rejected. A rise is
-            tolerated while it is less than `significant`, or than the share `lost` of what as many samples brought on
-            the fitted traces: the tolerance parameters, none of them known for sure, have moved too. A step is also
-            rejected where a rise by more than one deviation takes the evidence below `significant`. grown: relative
-            growth of the held-out excess variance on the effect's own joints at which it is rejected as well; not 0,
+        grown: relative growth of the held-out excess variance at which a joint is said to have become worse; not 0,
             because stuck joints break loose by chance.
         close: lead in evidence below which rivals are fitted to their ends before they are compared.
         interesting: gain of a probe below which no candidate is worth a fit.
     """
 
     significant: float = 10.0
-    echo: float = 0.03
-    distant_echo: float = 0.005
-    kin: float = 0.5
     margin: float = 4.0
     unexplained: float = MORE_THAN_NOISE
     unnamed: float = 0.12
     place: float = 0.001
     least_share: float = 0.8
-    worse: float = 2.0
-    lost: float = 0.5
     grown: float = 0.1
     close: float = 40.0
     interesting: float = 12.0
-
-    def needed(self, here: float = 0.0, elsewhere: float = 0.0, *, kin: bool = False) -> float:
-        """Evidence from which a further effect counts as found.
-
-        Args:
-            here, elsewhere: evidence collected on its own joints and on others. kin: whether the same effect has been
-                found before.
-        """
-        line = self.significant + self.echo * here + self.distant_echo * elsewhere
-        return line * self.kin if kin else line
 
 
 THRESHOLDS = Thresholds()

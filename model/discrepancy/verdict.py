@@ -54,17 +54,6 @@ def excess_removed(errors: Sequence[SignalError]) -> float | None:
     return 1.0 - sum(after for _, after in shown) / sum(before for before, _ in shown) if shown else None
 
 
-def rises_too_much(rise: float, deviation: float, fall: float, evidence: float, thresholds: Thresholds) -> bool:
-    """Whether the held-out sum of squares rises by more than an effect may cost there.
-
-    Args:
-        rise, deviation: of that sum, and the standard deviation that noise gives it. fall: of the fitted sum, for as
-            many samples. evidence: of the effect.
-    """
-    by_chance = max(thresholds.worse * deviation, thresholds.lost * fall, thresholds.significant)
-    return rise > min(by_chance, max(deviation, evidence - thresholds.significant))
-
-
 def worse_held_out(held: Sequence[SignalError]) -> tuple[int, ...]:
     """Joints whose error on held-out traces has grown beyond what noise may do."""
     grown = 1.0 + THRESHOLDS.grown
@@ -94,14 +83,6 @@ def unexplained(
             if after > max(least, (1.0 - thresholds.least_share) * before if named else 0.0):
                 found.append(e.joint)
     return tuple(dict.fromkeys(found))
-
-
-def first_to_withdraw(steps: Sequence[Step], unexplained_joints: Sequence[int]) -> int | None:
-    """Index of the first adopted step on a joint that stays unexplained: from there the search was on a wrong way."""
-    for k, step in enumerate(steps):
-        if step.adopted and (not step.joints or set(step.joints) & set(unexplained_joints)):
-            return k
-    return None
 
 
 def withdrawn(step: Step, unexplained_joints: Sequence[int]) -> Step:

@@ -8,13 +8,13 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import NoController, SampledPid
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
+from model.discrepancy.by_simulation import diagnose_by_simulation
 from model.discrepancy.diagnosis import UNWRITTEN, Diagnosis
+from model.discrepancy.engine.case import Watch
 from model.discrepancy.experiment_design.next_experiment import ExperimentChooser
 from model.discrepancy.explanation.answer_words import with_sentences
 from model.discrepancy.grounds import Method
 from model.discrepancy.options import DiagnosisOptions, check_options
-from model.discrepancy.output_error.case import Watch
-from model.discrepancy.selection.diagnose import diagnose_by_simulation
 from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES

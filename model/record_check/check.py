@@ -23,7 +23,16 @@ from model.machine_model.model import Model
 from model.record_check.columns import column_findings
 from model.record_check.drives import drive_findings
 from model.record_check.finding import FindingKind, RecordFinding, doubts_in
-from model.record_check.pieces import SHORTEST, cut_off, free_part, in_pieces, measures_speed, part_of, reading_of
+from model.record_check.pieces import (
+    SHORTEST,
+    cut_off,
+    free_part,
+    in_pieces,
+    measures_speed,
+    never_returns,
+    part_of,
+    reading_of,
+)
 from model.record_check.readings import (
     FalseReadings,
     Jump,
@@ -314,15 +323,17 @@ def _on_bounds(trace: Trace, machine: Machine, joint: int) -> Iterator[RecordFin
     longest = max(float(trace.time[last] - trace.time[first]) for first, last in bounds)
     unit = machine.joint(joint).units.position + ("/s" if measures_speed(machine, joint) else "")
     value = float(reading[bounds[0][0]])
-    part = free_part(trace, machine)
+    part, for_good = free_part(trace, machine), never_returns(trace, machine, joint)
     advice = "Is the sensor at the end of its range, or the joint at a stop? Use a piece without this."
-    if part is not None:
+    if for_good:
+        advice = "It never moves again: is the sensor dead, or the joint at a stop? Use the record up to there."
+    elif part is not None:
         advice = (
             f"Used: {trace.time[part.start]:.2f} to {trace.time[part.stop - 1]:.2f} s, the longest part without this."
         )
     yield RecordFinding(
         kind="saturated",
-        consequence="doubt" if part is None else "note",
+        consequence="doubt" if part is None or for_good else "note",
         record=trace.called,
         joint=joint,
         times=tuple(times[:MOST_KEPT]),

@@ -44,6 +44,19 @@ def cut_off(trace: Trace, machine: Machine, joint: int) -> list[tuple[int, int]]
     return [(first, last) for first, last in bounds if reading[last] != wanted[last]]
 
 
+def never_returns(trace: Trace, machine: Machine, joint: int) -> bool:
+    """Whether a position stays cut off up to the record's end, at a value from which it never came back before.
+
+    A joint that leaves its stop and a motion that returns into a sensor's range show that the reading is alive. After a
+    stretch without end, a dead one looks the same. A tachometer stands still as soon as its joint rests.
+    """
+    bounds, reading = cut_off(trace, machine, joint), reading_of(trace, machine, joint)
+    if not bounds or bounds[-1][1] < len(reading) - 1 or measures_speed(machine, joint):
+        return False
+    first = bounds[-1][0]
+    return not bool((reading[:first] == reading[first]).any())
+
+
 def free_part(trace: Trace, machine: Machine) -> slice | None:
     """Returns the longest part in which no reading is cut off, as at a joint's stop; None if too little is left.
 

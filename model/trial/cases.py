@@ -7,7 +7,6 @@ import io
 from collections.abc import Callable, Iterable
 
 from model.trial.score import Score
-from model.trial.sharpness import as_sharp
 
 _FIELDS = (
     *("seed", "kind", "load", "detectable", "verdict", "named_right", "merged_right", "in_answer", "in_first"),
@@ -21,8 +20,6 @@ _DERIVED: dict[str, Callable[[Score], str]] = {
     "strength": lambda score: " + ".join(f"{strength:.2f}" for strength in score.strengths),
     "d_prime": lambda score: " + ".join(f"{value:.1f}" for value in score.d_primes),
     "answered": lambda score: (" | " if score.place == "group" else " + ").join(score.answered),
-    "rivals": lambda score: " + ".join(f"{name} {value:.1f}" for name, value in sorted(score.rivals.items())),
-    "as_sharp": lambda score: _plain(as_sharp(score)),
     "intervals": lambda score: str(len(score.covered)),
     "intervals_right": lambda score: str(sum(covered.inside for covered in score.covered)),
 }

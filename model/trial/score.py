@@ -74,8 +74,6 @@ class Score(FrozenRecord):
     covered: tuple[Covered, ...] = ()
     groups: int = 0
     """Number of adopted steps that gave a group instead of a name."""
-    rivals: dict[str, float] = {}
-    """d′ of effects that the answer names besides or instead of the hidden one, if it has been computed."""
     seconds: float
     robot_seconds: float
 

@@ -10,7 +10,6 @@ import numpy as np
 from daq.contracts.frozen import FrozenRecord
 from model.trial.rates import Rate, rate
 from model.trial.score import SINGLE, Score
-from model.trial.sharpness import as_sharp
 from model.trial.truth import is_mock_friction
 
 
@@ -75,7 +74,6 @@ def trial_table(scores: Iterable[Score], not_acquired: int = 0) -> TrialTable:
     intervals = [covered.inside for s in single for covered in s.covered]
     lines = (
         Line(what="named right, strict", rate=rate(s.named_right for s in single), reach="≥ 92 %"),
-        _sharpness_line(single),
         Line(what="friction kinds merged", rate=rate(s.merged_right for s in single), reach="≥ 97 %"),
         Line(what="named right, or in the group that was given", rate=rate(s.in_answer for s in single)),
         Line(what="right name among the first three", rate=rate(s.in_first for s in single), reach="≥ 97 %"),
@@ -108,13 +106,6 @@ def trial_table(scores: Iterable[Score], not_acquired: int = 0) -> TrialTable:
         by_open_effect=_effects([s for s in every if s.kind == "open_set"], lambda s: s.honest),
         confusion=_confusion(single),
     )
-
-
-def _sharpness_line(single: Sequence[Score]) -> Line:
-    outcomes = [as_sharp(s) for s in single]
-    unknown = outcomes.count(None)
-    what = "as sharp as the record allows" + (f" ({unknown} not worked out)" if unknown else "")
-    return Line(what=what, rate=rate(outcomes), reach="≥ 95 %")
 
 
 def quantiles(values: Iterable[float | None]) -> Quantiles:

@@ -28,6 +28,7 @@ from daq.owner.messages import (
     Report,
     TeachingText,
 )
+from daq.owner.start import start_owner
 from daq.owner.stop_socket import StopAnswer
 from daq.transport import (
     PortBusyError,
@@ -53,7 +54,7 @@ T = TypeVar("T")
 
 
 def _start_owner(opening: Open, report: Callable[[Report], None], ended: Callable[[str], None]) -> OwnerProcess:
-    return OwnerProcess(opening, report, ended, PROGRAM)
+    return OwnerProcess(opening, report, ended, start_owner(PROGRAM))
 
 
 @dataclass(frozen=True)

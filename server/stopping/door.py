@@ -10,8 +10,7 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime, timedelta
 
 from daq.child import Child
-from daq.contracts import exit_codes
-from daq.contracts.errors import DaqError
+from daq.contracts.errors import ReachError
 from daq.transport import Terminal
 from server.access.caller import Caller
 from server.access.cookies import STOPS_FOR
@@ -25,12 +24,6 @@ process ends before it listens."""
 END_WITHIN = 3.0
 """Time (s) to answer requests under way when the service ends."""
 log = logging.getLogger("server.stop")
-
-
-class StopDoorError(DaqError):
-    """The stop listener does not start. The service does not start without it."""
-
-    exit_code = exit_codes.NOT_REACHED
 
 
 class StopDoor:
@@ -61,9 +54,9 @@ class StopDoor:
         return self._process.pid
 
     def wait_ready(self) -> None:
-        """Waits until the process listens. Raises StopDoorError."""
+        """Waits until the process listens. Raises ReachError."""
         if not self._ready.wait(READY_WITHIN):
-            raise StopDoorError(f"stop listener: its process did not listen within {READY_WITHIN:g} s")
+            raise ReachError(f"stop listener: its process did not listen within {READY_WITHIN:g} s")
 
     def set_owner(self, robot: str, process: int | None, terminal: Terminal | None) -> None:
         """Tells the listener which process owns the robot's port from now on."""

@@ -10,23 +10,16 @@ from sqlalchemy.exc import ArgumentError, NoSuchModuleError
 
 from daq.config.service import ServiceSettings
 from daq.config.settings import Settings
-from daq.contracts import exit_codes
 from daq.contracts.documents import shown
-from daq.contracts.errors import DaqError
+from daq.contracts.errors import SpecError
 from server.store.databases import added_databases, database_of
 
 EXAMPLE = "sqlite:////srv/arm/service.sqlite"
 
 
-class StoreError(DaqError):
-    """The database cannot be opened or migrated."""
-
-    exit_code = exit_codes.WRONG_INPUT
-
-
 def address_of(section: ServiceSettings) -> URL:
     """Returns the address of a service's database: the configured one, otherwise that of a file in the service's
-    folder. Raises StoreError."""
+    folder. Raises SpecError."""
     if section.database:
         return parse_address(section.database)
     return file_address(section.folder.absolute() / "service.sqlite")
@@ -38,7 +31,7 @@ def file_address(file: Path) -> URL:
 
 
 def parse_address(url: str | URL) -> URL:
-    """Parses a database address. Raises StoreError if it is invalid, or of an unknown kind of database.
+    """Parses a database address. Raises SpecError if it is invalid, or of an unknown kind of database.
 
     No error repeats a password.
     """
@@ -77,7 +70,7 @@ def masked_settings(settings: Settings) -> Settings:
 
 
 def open_engine(url: str | URL) -> Engine:
-    """Makes the engine of a database, which connects on first use. Raises StoreError; if a driver is missing, the error
+    """Makes the engine of a database, which connects on first use. Raises SpecError; if a driver is missing, the error
     names the package to install."""
     parsed = parse_address(url)
     try:
@@ -87,18 +80,18 @@ def open_engine(url: str | URL) -> Engine:
         raise _no_driver(parsed, error) from error
     except (ArgumentError, TypeError, ValueError) as error:
         line = f"server.database {masked(parsed)}: cannot be used: {error}"
-        raise StoreError(line) from error
+        raise SpecError(line) from error
 
 
-def _no_address(url: str | URL) -> StoreError:
+def _no_address(url: str | URL) -> SpecError:
     known = shown(str(url).rpartition("@")[2])
-    return StoreError(f"server.database {known}: is not the address of a database; write {EXAMPLE}")
+    return SpecError(f"server.database {known}: is not the address of a database; write {EXAMPLE}")
 
 
-def _no_driver(parsed: URL, error: ModuleNotFoundError) -> StoreError:
+def _no_driver(parsed: URL, error: ModuleNotFoundError) -> SpecError:
     module = error.name or parsed.drivername
     package = database_of(parsed.get_backend_name()).packages.get(module, module)
-    return StoreError(
+    return SpecError(
         f"server.database {masked(parsed)}: its driver {module} is not installed: "
         f"`pip install '{package}'` where daq is installed"
     )

@@ -8,15 +8,7 @@ from typing import Any, ClassVar, Protocol
 
 from sqlalchemy import URL, Connection
 
-from daq.contracts import exit_codes
-from daq.contracts.errors import DaqError
 from daq.plugins import named, plugins
-
-
-class InUseError(DaqError):
-    """A service is using this database."""
-
-    exit_code = exit_codes.NOT_REACHED
 
 
 class Database(Protocol):
@@ -26,7 +18,7 @@ class Database(Protocol):
     """Package to install for a driver's module, if its name differs."""
 
     def sole_use(self, url: str | URL) -> AbstractContextManager[None]:
-        """Keeps other services from using the database within the block. Raises InUseError, StoreError."""
+        """Keeps other services from using the database within the block. Raises ReachError, SpecError."""
         ...
 
     def require_columns(self, connection: Connection, place: str) -> None:

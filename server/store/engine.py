@@ -20,9 +20,10 @@ from sqlalchemy import URL, Connection, Engine, event, select, text
 from sqlalchemy.exc import DatabaseError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 
+from daq.contracts.errors import SpecError
 from daq.contracts.service.experiments import ExperimentState
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
-from server.store.address import StoreError, masked, open_engine, parse_address
+from server.store.address import masked, open_engine, parse_address
 from server.store.databases import database_of
 from server.store.schema import difference, expected_schema, schema_of, upgrade
 from server.store.tables import ExperimentRow, JobRow
@@ -83,13 +84,13 @@ class Store:
     """One database. Any thread may open sessions; one session writes at a time."""
 
     def __init__(self, url: str | URL) -> None:
-        """Raises StoreError."""
+        """Raises SpecError."""
         parsed = parse_address(url)
         if parsed.get_backend_name() == "sqlite" and parsed.database:
             try:
                 Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
             except OSError as error:
-                raise StoreError(f"database {parsed.database}: its folder cannot be made: {error.strerror}") from error
+                raise SpecError(f"database {parsed.database}: its folder cannot be made: {error.strerror}") from error
             _require_not_emptied(Path(parsed.database))
             with suppress(OSError):  # SQLite's own error, later, has more details
                 # Other users must not read hashes of tokens. SQLite gives its files beside this one the same mode.
@@ -104,24 +105,26 @@ class Store:
         self._readers = sessionmaker(self.engine, expire_on_commit=False)
         self._writers = sessionmaker(self.engine.execution_options(writing=True), expire_on_commit=False)
         self._writing = threading.RLock()
+        self.version = 0
+        """Grows with every writing session. No other process writes what lists show (`sole_use`)."""
         self._last = threading.local()
         """The last statement that each thread has sent."""
         event.listen(self.engine, "before_cursor_execute", self._note_statement)
 
     def migrate(self) -> None:
-        """Migrates the tables to this version's. Raises StoreError, also for a database of a newer version."""
+        """Migrates the tables to this version's. Raises SpecError, also for a database of a newer version."""
         try:
             with self.engine.connect() as connection:
                 upgrade(connection)
                 connection.commit()
         except OperationalError as error:
             line = f"database {self.place}: cannot be opened: {line_of(error)}"
-            raise StoreError(f"{line}; {advice_of(error)}") from error
+            raise SpecError(f"{line}; {advice_of(error)}") from error
         except DatabaseError as error:
-            raise StoreError(f"database {self.place}: {line_of(error)}; {advice_of(error)}") from error
+            raise SpecError(f"database {self.place}: {line_of(error)}; {advice_of(error)}") from error
         except Exception as error:
             line = f"database {self.place}: its tables cannot be brought up to date: {one_line(error)}"
-            raise StoreError(f"{line}; {BRING_BACK}") from error
+            raise SpecError(f"{line}; {BRING_BACK}") from error
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
@@ -133,8 +136,12 @@ class Store:
     def writing(self) -> Iterator[Session]:
         """A session whose changes are on the disk when it ends: all of them or none. Raises DamagedError for rows that
         this program cannot have written; other errors within the block pass unchanged."""
-        with self._writing, self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
-            yield session
+        with self._writing:
+            try:
+                with self._told_of_damage(_is_of_a_row), self._writers.begin() as session:
+                    yield session
+            finally:
+                self.version += 1
 
     @contextmanager
     def _told_of_damage(self, is_damage: Callable[[Exception], bool] = lambda _error: True) -> Iterator[None]:

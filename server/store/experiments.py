@@ -20,7 +20,7 @@ from server.experiments.states import Event, IllegalEventError, Waiting, advance
 from server.problems import conflict, not_found
 from server.store.engine import Store
 from server.store.labels import experiment_label
-from server.store.pages import Cursor, newest_first, page_of
+from server.store.pages import Cursor, KeptPages, newest_first, page_of
 from server.store.submitted import approval_of, approve, given_to, made_before, new_columns, require_approvable, void
 from server.store.submitted import digest_of as digest_of_request
 from server.store.tables import ExperimentRow
@@ -37,6 +37,7 @@ class ExperimentStore:
         self._store = store
         self._counting = threading.Lock()
         self._waiting: dict[str, int] = {}
+        self._pages: KeptPages[Experiment] = KeptPages(store)
 
     @contextmanager
     def _changing(self, *robots: str) -> Iterator[Session]:
@@ -103,6 +104,18 @@ class ExperimentStore:
     ) -> Page[Experiment]:
         """Returns a page of the list, the last submitted first; with the order `ended` only ended experiments, the last
         ended first."""
+        asked = (robot, tuple(states), schedule, cursor, limit, order)
+        return self._pages.page(asked, lambda: self._read_page(robot, states, schedule, cursor, limit, order))
+
+    def _read_page(
+        self,
+        robot: str,
+        states: Sequence[ExperimentState],
+        schedule: str | None,
+        cursor: str | None,
+        limit: int,
+        order: ExperimentOrder,
+    ) -> Page[Experiment]:
         query = select(ExperimentRow).where(ExperimentRow.robot == robot)
         if states:
             query = query.where(ExperimentRow.state.in_(states))

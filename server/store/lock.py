@@ -8,20 +8,21 @@ from pathlib import Path
 
 from sqlalchemy import URL
 
+from daq.contracts.errors import ReachError
 from daq.contracts.file_lock import take_lock
 from server.store.address import parse_address
-from server.store.databases import InUseError, database_of
+from server.store.databases import database_of
 
 
 def sqlite_file(url: str | URL) -> Path | None:
-    """Returns the file of a SQLite database; None for any other, and for one in memory. Raises StoreError."""
+    """Returns the file of a SQLite database; None for any other, and for one in memory. Raises SpecError."""
     parsed = parse_address(url)
     return Path(parsed.database) if parsed.get_backend_name() == "sqlite" and parsed.database else None
 
 
 @contextmanager
 def sole_use(url: str | URL) -> Iterator[None]:
-    """Keeps other services and restores from using this database within the block. Raises InUseError, and StoreError if
+    """Keeps other services and restores from using this database within the block. Raises ReachError, and SpecError if
     a database server cannot be reached."""
     file = sqlite_file(url)
     if file is not None:
@@ -41,13 +42,13 @@ def _locked_file(file: Path) -> Iterator[None]:
         path.parent.mkdir(parents=True, exist_ok=True)
         stream = path.open("ab")
     except OSError as error:
-        raise InUseError(f"{path}: cannot be made: {error.strerror}") from error
+        raise ReachError(f"{path}: cannot be made: {error.strerror}") from error
     with stream:
         try:
             alone = take_lock(stream)
         except OSError as error:
             line = f"{path}: cannot be locked: {error.strerror}; keep the database on another file system"
-            raise InUseError(line) from error
+            raise ReachError(line) from error
         if not alone:
-            raise InUseError(f"database {file}: a service uses it; end that one first")
+            raise ReachError(f"database {file}: a service uses it; end that one first")
         yield

@@ -16,7 +16,7 @@ from daq.contracts.service.traces import CatalogueEntry, TraceChange
 from server.problems import conflict, not_found
 from server.store.engine import Store
 from server.store.labels import label_of_row, trace_label, user_label
-from server.store.pages import Cursor, page_of
+from server.store.pages import Cursor, KeptPages, page_of
 from server.store.tables import JobRow, TraceRow, TraceTagRow, TraceUseRow, spaced
 
 
@@ -83,6 +83,7 @@ class TraceStore:
         self._store = store
         self.archive_index: ArchiveIndex | None = None
         """None if there is no archive."""
+        self._pages: KeptPages[CatalogueEntry] = KeptPages(store)
 
     def insert(self, new: NewTrace, file_exists: Callable[[str], bool] = lambda _file: True) -> None:
         """Adds a trace. If its row exists and the row's file is gone, the row gets the new file, and keeps its tags and
@@ -148,6 +149,10 @@ class TraceStore:
 
     def page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a page of the list, newest first."""
+        asked = (robot, search, cursor, limit)
+        return self._pages.page(asked, lambda: self._read_page(robot, search, cursor, limit))
+
+    def _read_page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         place = None if cursor is None else Cursor.parse(cursor)
         # PostgreSQL rejects NUL in text; nothing can match
         if any("\0" in one for one in (search.text, search.tag, search.kind) if one):

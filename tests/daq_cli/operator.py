@@ -7,7 +7,7 @@ import pytest
 import typer
 
 from daq.driver.controller import Identity
-from daq.owner import client
+from daq.owner import start
 from daq_cli.app import consent
 
 REAL = """
@@ -22,7 +22,7 @@ raise SystemExit(main())
 def pretend_real_arm(monkeypatch: pytest.MonkeyPatch) -> None:
     """The controller says of itself that it is no mock."""
     monkeypatch.setattr(Identity, "simulated", property(lambda _: False))
-    monkeypatch.setattr(client, "PROGRAM", (sys.executable, "-c", REAL))
+    monkeypatch.setattr(start, "PROGRAM", (sys.executable, "-c", REAL))
 
 
 def asked_operator(monkeypatch: pytest.MonkeyPatch, answer: Callable[[str], bool]) -> None:

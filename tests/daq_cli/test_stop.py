@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from daq.owner import client
+from daq.owner import start
 from daq.owner.stop_socket import StopAnswer, StopSocket, stop_listener
 from daq.transport.mock_process import MockProcess
 from tests.daq_cli.board import ask, silent_port
@@ -54,7 +54,7 @@ def test_a_reset_does_not_end_a_later_stop(
 ) -> None:
     assert daq("--port", port, "stop").code == 0
     with monkeypatch.context() as meanwhile:
-        meanwhile.setattr(client, "PROGRAM", (sys.executable, "-c", OVERTAKEN))
+        meanwhile.setattr(start, "PROGRAM", (sys.executable, "-c", OVERTAKEN))
         daq("--port", port, *words).complains(4, "the arm has been stopped after this request was sent")
     assert ask(mock, "state")["frozen"]
     assert daq("--port", port, *words).code == 0

@@ -108,9 +108,13 @@ FOR_INSTALLING = PYPROJECT["dependency-groups"]["installer"]
 FOR_A_RELEASE = PYPROJECT["dependency-groups"]["release"]
 FOR_DEVELOPMENT = [
     *FOR_USE,
-    *EXTRAS,
     *FOR_INSTALLING,
     *(line for name in ("dev", "docs") for line in PYPROJECT["dependency-groups"][name] if isinstance(line, str)),
+]
+
+FOR_ALL_TESTS = [
+    *PYPROJECT["dependency-groups"]["thorough"],
+    *(line for line in EXTRAS if Requirement(line).name in NOT_IN_ALL),
 ]
 
 
@@ -133,9 +137,10 @@ def pinned(name: str) -> dict[str, list[tuple[str, int]]]:
         ("requirements-installer.txt", FOR_INSTALLING),
         ("requirements.txt", FOR_USE),
         ("requirements-dev.txt", FOR_DEVELOPMENT),
+        ("requirements-thorough.txt", FOR_ALL_TESTS),
         ("requirements-release.txt", FOR_A_RELEASE),
     ],
-    ids=["for installing", "for use", "for development", "for a release"],
+    ids=["for installing", "for use", "for development", "for all tests", "for a release"],
 )
 def test_each_direct_dependency_is_pinned_to_versions_that_pyproject_allows(name: str, asked: list[str]) -> None:
     pins = pinned(name)

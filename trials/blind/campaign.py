@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -32,11 +33,21 @@ from trials.blind.folder import STAGES, Stage, TrialFolder
 from trials.blind.mock_side import TrialStageError, detect, reveal
 from trials.blind.recording import Recorded, record
 from trials.blind.sealed import DIAGNOSER, DiagnosisFailedError, SealedAnswer, diagnose_sealed
-from trials.blind.sharpness import sealed_answer, with_rivals, work_out_sharpness
 
 ROBOT_TIME = 60.0
 """Robot time in s that a trial may spend on further experiments."""
 Progress = Callable[[int, str], None]
+
+
+def _sealed_answer(folder: TrialFolder, seed: int) -> SealedAnswer:
+    """Returns the sealed answer of a case. Raises TrialStageError if it is missing, or changed."""
+    sealed = folder.row("diagnose", seed)
+    if sealed is None or "answer" not in sealed:
+        raise TrialStageError("no answer has been sealed")
+    text = (folder.path / "answers" / sealed["answer"]).read_bytes()
+    if sha256(text).hexdigest() != sealed["sha256"]:
+        raise TrialStageError(f"answer {sealed['answer']}: differs from the one that was sealed")
+    return SealedAnswer(text, sealed["seconds"])
 
 
 @contextmanager
@@ -128,7 +139,7 @@ class Campaign:
         """Returns the scores of all cases in the folder."""
         self.folder.reload()
         rows = self.folder.rows("score")
-        return [with_rivals(Score.model_validate(row), self.folder.row("sharpness", row["seed"])) for row in rows]
+        return [Score.model_validate(row) for row in rows]
 
     def table(self) -> TrialTable:
         """Returns the table of all scores."""
@@ -143,8 +154,6 @@ class Campaign:
                 return detect(seed, self._set_points, tangents)
         if stage == "record":
             return self._record(seed)
-        if stage == "sharpness":
-            return work_out_sharpness(self.folder, seed, self._machine(seed), self.experiment)
         return self._diagnose(seed) if stage == "diagnose" else self._score(seed)
 
     def _row(self, stage: Stage, seed: int) -> dict[str, Any]:
@@ -223,6 +232,6 @@ class Campaign:
         if "failure" in sealed:
             found = score_of_failure(parse_truth(reveal(seed)), seen, sealed["seconds"])
         else:
-            answer = sealed_answer(self.folder, seed).read()
+            answer = _sealed_answer(self.folder, seed).read()
             found = score(parse_truth(reveal(seed)), seen, answer, self._machine(seed))
         return found.model_dump(mode="json")

@@ -50,14 +50,6 @@ def blind(
         float | None,
         typer.Option(min=0, help="Begin nothing more after this time, in s; the same command continues. 0: the table."),
     ] = None,
-    sharpness: Annotated[
-        bool,
-        typer.Option(
-            "--sharpness",
-            help="Compute which effects the records of a trial's single effects can distinguish, for answers that have "
-            "been sealed and scored.",
-        ),
-    ] = False,
     hashes: Annotated[
         bool,
         typer.Option("--hashes", help="Print the hashes and versions for a registration, and run nothing."),
@@ -76,18 +68,15 @@ def blind(
         print(to_register())
         return
     require_extra("model", "daq blind", "numba")
-    if sharpness:
-        campaign, chosen = _after_the_answers(context, folder)
+    if registration is not None:
+        _refuse_beside_registration(context)
+        chosen, experiment, acquire, drawn = _registered(registration, run)
+    elif seeds is None:
+        raise SpecError("--seeds or --registration: one of them is needed")
     else:
-        if registration is not None:
-            _refuse_beside_registration(context)
-            chosen, experiment, acquire, drawn = _registered(registration, run)
-        elif seeds is None:
-            raise SpecError("--seeds or --registration: one of them is needed")
-        else:
-            chosen, drawn = _chosen(seeds, kinds, loads, cases), None
-        kept = TrialFolder.open(folder.absolute(), experiment, acquire, drawn)
-        campaign = Campaign(kept, load_machine("ma2000"), until=until)
+        chosen, drawn = _chosen(seeds, kinds, loads, cases), None
+    kept = TrialFolder.open(folder.absolute(), experiment, acquire, drawn)
+    campaign = Campaign(kept, load_machine("ma2000"), until=until)
     count = len(set(chosen))
     with ending(LocalWorkers(workers)) as pool:
         left = campaign.run(chosen, pool, lambda number, said: console().print(f"{number}/{count}  {said}"), seconds)
@@ -108,24 +97,6 @@ def _refuse_beside_registration(context: typer.Context) -> None:
     }
     if own := [name for name in why if _asked_for(context, name)]:
         raise SpecError(f"--{own[0]} and --registration: {why[own[0]]}")
-
-
-def _after_the_answers(context: typer.Context, folder: Path) -> tuple[Campaign, list[int]]:
-    """Returns the trial of a folder, and its cases whose answers need d′ of rivals.
-
-    Raises SpecError for other options, without a trial in the folder, and if no answer has been sealed and scored.
-    """
-    from trials.blind.campaign import Campaign
-    from trials.blind.folder import TrialFolder
-    from trials.blind.sharpness import rivals_wanted
-
-    others = ("seeds", "cases", "kinds", "loads", "experiment", "acquire", "registration", "run", "until")
-    if own := [name for name in others if _asked_for(context, name)]:
-        raise SpecError(f"--{own[0]} and --sharpness: the arms are those of the folder")
-    kept = TrialFolder.present(folder.absolute())
-    if not kept.rows("score"):
-        raise SpecError(f"{folder}: no answer has been sealed and scored; --sharpness comes after the answers")
-    return Campaign(kept, load_machine("ma2000"), until="sharpness"), rivals_wanted(kept)
 
 
 def _asked_for(context: typer.Context, option: str) -> bool:

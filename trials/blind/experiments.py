@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 from pathlib import Path
 
 from daq.contracts.carried_load import carrying
 from daq.contracts.experiment import ExperimentSpec, Pause, Ramp, Segment, Sequence
-from daq.contracts.machine import BoardPid, Machine
+from daq.contracts.machine import Machine
 
 
 def trial_experiment(name: str) -> ExperimentSpec:
@@ -39,19 +38,6 @@ def write_set_points(spec: ExperimentSpec, machine: Machine, path: Path) -> Path
         table = csv.writer(file)
         table.writerow([f"set_point_{joint}" for joint in range(1, motion.postures.shape[1] + 1)])
         table.writerows(motion.postures.tolist())
-    return path
-
-
-def write_experiment(spec: ExperimentSpec, machine: Machine, path: Path) -> Path:
-    """Writes the experiment for the mock's side, with its gains: set points (posture units, a list per period), and P,
-    I, D of the six joints.
-    """
-    from daq.trajectories.planner import plan, start_angles
-
-    motion = plan(spec, machine, start_angles(spec, machine))
-    own = machine.controller.gains if isinstance(machine.controller, BoardPid) else ()
-    gains = [spec.gains.get(joint, gain) for joint, gain in enumerate(own, start=1)]
-    path.write_text(json.dumps({"set_points": motion.postures.tolist(), "gains": gains}) + "\n", "utf-8")
     return path
 
 

@@ -18,9 +18,8 @@ from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
 
-Stage = Literal["detect", "record", "diagnose", "score", "sharpness"]
-STAGES: tuple[Stage, ...] = ("detect", "record", "diagnose", "score", "sharpness")
-"""In order. The last runs on request, once answers have been scored."""
+Stage = Literal["detect", "record", "diagnose", "score"]
+STAGES: tuple[Stage, ...] = ("detect", "record", "diagnose", "score")
 _CAMPAIGN = "trial.json"
 
 
@@ -72,14 +71,6 @@ class TrialFolder:
         finally:
             aside.unlink()
         folder = cls(path, asked)
-        folder._finish_lines()
-        folder.reload()
-        return folder
-
-    @classmethod
-    def present(cls, path: Path) -> TrialFolder:
-        """Opens the folder of an existing trial, whatever its options. Raises SpecError without one."""
-        folder = cls(path, _read_asked(path / _CAMPAIGN))
         folder._finish_lines()
         folder.reload()
         return folder

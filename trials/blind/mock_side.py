@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,18 +25,6 @@ def detect(seed: int, set_points: Path, cache: Path) -> dict[str, Any]:
 def reveal(seed: int) -> dict[str, Any]:
     """Returns the effects that the arm hides. Raises TrialStageError."""
     return _line("mock_controller.reveal", str(seed))
-
-
-def tell_apart(
-    seed: int, experiments: Sequence[Path], rivals: Iterable[tuple[str, tuple[int, ...]]], cache: Path
-) -> dict[str, Any]:
-    """Returns d′ of named effects (with their joints) from the hidden one, in experiments that were recorded together.
-
-    Raises TrialStageError.
-    """
-    files = [word for file in experiments for word in ("--experiment", str(file))]
-    named = [word for effect, joints in rivals for word in ("--rival", f"{effect}:{','.join(map(str, joints))}")]
-    return _line("mock_controller.sharpness", str(seed), *files, *named, "--cache", str(cache))
 
 
 def _line(module: str, *arguments: str) -> dict[str, Any]:

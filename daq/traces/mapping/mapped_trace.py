@@ -95,7 +95,7 @@ def integral(time: Floats, velocity: Floats) -> Floats:
 def _kept(table: Table, found: Signals, where: str | None) -> tuple[Rows, list[str]]:
     """Returns the rows to import, and notes about the others. Raises TraceError if none is left, or time goes back."""
     time = found.columns["time"]
-    rows = np.arange(len(time)) if where is None else np.flatnonzero(_selected(table, time, where))
+    rows = np.arange(len(time)) if where is None else np.flatnonzero(selected_rows(table, time, where))
     notes = [] if where is None else [f"Rows where {where}."]
     if not len(rows):
         raise TraceError(f"{table.origin}: no row is left{'' if where is None else f' where {where}'}")
@@ -128,7 +128,7 @@ def _resets(table: Table, time: Floats, rows: Rows, back: Rows) -> str:
     return f"{says}; choose rows with --where COLUMN=VALUE or COLUMN=LOW..HIGH"
 
 
-def _selected(table: Table, time: Floats, where: str) -> Rows:
+def selected_rows(table: Table, time: Floats, where: str) -> Rows:
     """Returns which rows match a condition: COLUMN=VALUE, or COLUMN=LOW..HIGH without HIGH itself. Raises
     TraceError."""
     name, _, said = where.partition("=")

@@ -124,10 +124,6 @@ OF_THE_ARM = (FILE, MAP, FINDINGS, MACHINE, CONFIG, "acceptance.html", "diagnosi
 """Files of a folder that belong to one arm; traces contain their machine."""
 
 
-class OtherArmError(SafetyError):
-    """The arm at the port is not the one of the folder."""
-
-
 def identity_of(record: Record) -> Identity:
     """Returns the identity of a folder's arm. Raises SpecError for a damaged record."""
     try:
@@ -162,7 +158,7 @@ def require_same_arm(bench: Bench, said: Said | None) -> None:
     """Compares the arm at the port with the folder's; only reads.
 
     said: the operator's answer if the arm differs: it is the `same` one with an exchanged part, or `new` Raises
-    OtherArmError, and the errors of connecting.
+    SafetyError, and the errors of connecting.
     """
     if not bench.record.identity:
         return
@@ -170,7 +166,7 @@ def require_same_arm(bench: Bench, said: Said | None) -> None:
     left, why, misplaced = _compared(bench, kept)
     if why and (said != "same" or misplaced):
         exchanged = "" if misplaced else ", or --arm same if a part of it was exchanged"
-        raise OtherArmError(
+        raise SafetyError(
             f"{bench.call.port}: this is not the arm of {bench.folder}: {why}; for a new arm give --arm new, which "
             f"starts over{exchanged}"
         )

@@ -37,10 +37,6 @@ APART = 0.8
 """Least time between two readings of the memory, in control periods: values do not change more often."""
 
 
-class UnprovedWriteError(SafetyError):
-    """A write to an address whose meaning is not proved."""
-
-
 @dataclass
 class LinkPage:
     """`Page` at a link. Every second reading begins at the other end, so that delays cancel."""
@@ -89,9 +85,9 @@ class LinkPage:
         self.proved.update(addresses)
 
     def write_byte(self, address: int, value: int) -> None:
-        """Writes one byte. Raises UnprovedWriteError."""
+        """Writes one byte. Raises SafetyError."""
         if address not in self.proved:
-            raise UnprovedWriteError(f"{address:04X}: the meaning of this byte is not proved; nothing was written")
+            raise SafetyError(f"{address:04X}: the meaning of this byte is not proved; nothing was written")
         self.link.request(WriteBlock(address, bytes((value,))), BlockWritten)
 
     def release_freeze(self, may: Callable[[], bool]) -> bool:

@@ -24,7 +24,7 @@ from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds
 from daq.traces.description import Description
 from daq.traces.mapping.expression import Table, listed
-from daq.traces.mapping.mapped_trace import mapped_trace
+from daq.traces.mapping.mapped_trace import mapped_trace, selected_rows
 from daq.traces.mapping.units import NONE, drive_of
 from daq.traces.naming import trace_id_of
 from extras.formats.bags.bag_files import check_files
@@ -81,7 +81,7 @@ def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
     known = choice.numbering if machine is None else tuple(joint.name for joint in machine.joints)
     names = taken_names(origin, names, machine, known, chosen=choice.joints is not None)
     table = _Table(origin, names, states, found.missing)
-    trace = table.trace(description.record(path, machine, ""), choice, asked)
+    trace = _chosen_rows(table.trace(description.record(path, machine, ""), choice, asked), origin, choice.where)
     description.check_period(trace.time, origin)
     numbers, record = numbers_by_name(names, known), trace.record
     spoken = ", ".join(f"{number} {name}" for number, name in zip(numbers, names, strict=True))
@@ -98,6 +98,20 @@ def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
     bounds.check_signals({name: getattr(trace, name) for name in bounds.LARGEST}, str(path))
     bounds.check_record(record, (), str(path))
     return replace(trace, record=record, joints=numbers)
+
+
+def _chosen_rows(trace: Trace, origin: str, where: str | None) -> Trace:
+    """Returns a trace's rows within `time=LOW..HIGH`, s from its start. Raises TraceError if none is left."""
+    if where is None:
+        return trace
+    rows = selected_rows(Table(origin, {"time": trace.time}), trace.time, where)
+    if not rows.any():
+        raise TraceError(f"{origin}: no row is left where {where}")
+    signals: dict[str, Any] = {
+        name: values[rows] for name, values in vars(trace).items() if isinstance(values, np.ndarray)
+    }
+    notes = f"{trace.record.notes} Rows where {where}.".strip()
+    return replace(trace, record=trace.record.model_copy(update={"notes": notes}), **signals)
 
 
 def _other_topics(found: Contents, topic: str) -> str:

@@ -11,6 +11,7 @@ PLUGIN = Plugin(
             about="computer",
         ),
     ),
+    routes=("extras.formats.robot_files.meshes:router",),
     sections=("extras.formats.robot_files.replay_section:replay_section",),
     names=(
         Name("machine_from_urdf", "extras.formats.robot_files.machine_of_arm", "robot"),

@@ -39,12 +39,16 @@ class ArmJoint:
 
 @dataclass(frozen=True, eq=False)
 class SerialArm:
-    """The arm, base first; the end (3,) of its last link in the root's frame, and the joints that are held."""
+    """The arm, base first; the end (3,) of its last link in the root's frame, and the joints that are held.
+
+    places: by link, its frame (4, 4) in the root's with the arm at 0, and the joint with which it moves; 0: the base
+    """
 
     description: Description
     joints: tuple[ArmJoint, ...]
     tip: Floats
     held: dict[str, float]
+    places: dict[str, tuple[Floats, int]]
 
 
 def serial_arm(
@@ -73,7 +77,11 @@ def serial_arm(
         members = [i for i, own in enumerate(owner) if own == link]
         body = _merged(robot, members, rotations, positions)
         joints.append(ArmJoint(joint, positions[link], rotations[link] @ joint.axis, body))
-    return SerialArm(robot, tuple(joints), positions[_tip(robot, tip, owner, chain[-1])], held)
+    places: dict[str, tuple[Floats, int]] = {}
+    for member, turn, position, own in zip(robot.links, rotations, positions, owner, strict=True):
+        frame = np.block([[turn, position[:, None]], [np.array([[0.0, 0.0, 0.0, 1.0]])]])
+        places[member.name] = frame, 0 if own is None else chain.index(own) + 1
+    return SerialArm(robot, tuple(joints), positions[_tip(robot, tip, owner, chain[-1])], held, places)
 
 
 def _joint(robot: Description, link: int) -> DescribedJoint:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from sqlalchemy.exc import DatabaseError
 
+from daq.contracts.errors import SpecError
 from daq_cli.app.database import computers_user
-from extras.lab.backup.places import BackupError
 from server.access.sessions import note_command
 from server.database_errors import line_of, one_line, open_to_read
 from server.store.address import file_address
@@ -30,9 +30,9 @@ from server.store.schema import (
 
 
 def copy_database(source: Path, target: Path) -> None:
-    """Copies a consistent state of the database during writes (SQLite's online backup). Raises BackupError."""
+    """Copies a consistent state of the database during writes (SQLite's online backup). Raises SpecError."""
     if not source.is_file():
-        raise BackupError(f"database {source}: does not exist: no service has run with this configuration yet")
+        raise SpecError(f"database {source}: does not exist: no service has run with this configuration yet")
     try:
         with (
             closing(sqlite3.connect(source, timeout=BUSY_TIMEOUT_MS / 1e3)) as here,
@@ -41,20 +41,20 @@ def copy_database(source: Path, target: Path) -> None:
             here.backup(there)
             there.execute("PRAGMA journal_mode=DELETE")  # one file, without a write-ahead log beside it
     except sqlite3.Error as error:
-        raise BackupError(f"database {source}: cannot be copied: {error}") from error
+        raise SpecError(f"database {source}: cannot be copied: {error}") from error
 
 
 def revision_of(database: Path) -> str | None:
-    """Returns the revision of a database's tables; None if it has none. Raises BackupError for a damaged one."""
+    """Returns the revision of a database's tables; None if it has none. Raises SpecError for a damaged one."""
     try:
         with closing(open_to_read(database)) as connection:
             found = connection.execute("PRAGMA integrity_check").fetchone()[0]
             if found != "ok":
-                raise BackupError(f"database {database.name}: is damaged: {str(found).splitlines()[0]}")
+                raise SpecError(f"database {database.name}: is damaged: {str(found).splitlines()[0]}")
             known = connection.execute("SELECT count(*) FROM sqlite_master WHERE name = 'alembic_version'").fetchone()
             row = connection.execute("SELECT version_num FROM alembic_version").fetchone() if known[0] else None
     except sqlite3.Error as error:
-        raise BackupError(f"database {database.name}: is damaged: {error}") from error
+        raise SpecError(f"database {database.name}: is damaged: {error}") from error
     return None if row is None else str(row[0])
 
 
@@ -62,7 +62,7 @@ def keep_own_objects(database: Path, revision: str | None) -> tuple[str, ...]:
     """Removes objects that the migrations to this revision do not make, such as triggers, which would act with the
     service's rights.
 
-    Returns their names. Raises BackupError if an object of the migrations is missing or different.
+    Returns their names. Raises SpecError if an object of the migrations is missing or different.
     """
     try:
         with closing(sqlite3.connect(database)) as connection, connection:
@@ -70,21 +70,21 @@ def keep_own_objects(database: Path, revision: str | None) -> tuple[str, ...]:
             own = {} if revision is None else expected_schema(revisions_of(connection.execute))
             wrong = difference(found, own) or ("its tables have no version" if found and not own else None)
             if wrong is not None:
-                raise BackupError(f"database {database.name}: {wrong}: the backup is damaged")
+                raise SpecError(f"database {database.name}: {wrong}: the backup is damaged")
             strange = foreign(found, own)
             for kind, name in strange:
                 remove(connection.execute, kind, name)
     except UnknownRevisionError as error:
-        raise BackupError(f"database {database.name}: {one_line(error)}: the backup is damaged") from error
+        raise SpecError(f"database {database.name}: {one_line(error)}: the backup is damaged") from error
     except sqlite3.Error as error:
-        raise BackupError(f"database {database.name}: is damaged: {error}") from error
+        raise SpecError(f"database {database.name}: is damaged: {error}") from error
     return tuple(f"{kind} {name}" for kind, name in strange)
 
 
 def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
     """Pauses the queue of `robot` in this database, for the service that will use it.
 
-    A queue that is already paused keeps its reason. Raises BackupError.
+    A queue that is already paused keeps its reason. Raises SpecError.
     """
     since = now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")  # as SQLAlchemy writes it
     line = "INSERT INTO queues (robot, paused, reason, since) VALUES (?, 1, ?, ?) ON CONFLICT (robot) DO UPDATE"
@@ -93,7 +93,7 @@ def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
         with closing(sqlite3.connect(database)) as connection, connection:
             connection.execute(f"{line} {changes}", (robot, reason, since))
     except sqlite3.Error as error:
-        raise BackupError(f"database {database.name}: its queue cannot be paused: {error}") from error
+        raise SpecError(f"database {database.name}: its queue cannot be paused: {error}") from error
 
 
 _NOT_APPROVED = "approved_content = NULL, approved_by = NULL, approved_as_owner = NULL, approved = NULL"
@@ -109,7 +109,7 @@ _NOT_SENT = f"UPDATE notifications SET {_GIVEN_UP} WHERE state = 'waiting'"
 
 def forget_what_may_have_ended(database: Path, now: datetime) -> None:
     """Ends sessions, approvals of waiting experiments, and waiting notifications: they may have been ended after the
-    backup. Raises BackupError.
+    backup. Raises SpecError.
     """
     words = {"now": now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")}
     try:
@@ -117,12 +117,12 @@ def forget_what_may_have_ended(database: Path, now: datetime) -> None:
             for line in (*_FORGOTTEN, *((_NOT_SENT,) if _has_table(connection, "notifications") else ())):
                 connection.execute(line, words)
     except sqlite3.Error as error:
-        raise BackupError(f"database {database.name}: its sessions cannot be ended: {error}") from error
+        raise SpecError(f"database {database.name}: its sessions cannot be ended: {error}") from error
 
 
 def note_dropped(source: Path, target: Path, packed: Container[str]) -> None:
     """Notes in the copy `target` which local traces without a file in `packed` the archive has by now, according to
-    `source`. Raises BackupError.
+    `source`. Raises SpecError.
     """
     try:
         with closing(sqlite3.connect(target, timeout=BUSY_TIMEOUT_MS / 1e3)) as connection:
@@ -137,17 +137,17 @@ def note_dropped(source: Path, target: Path, packed: Container[str]) -> None:
                 is_gone = f"id IN (SELECT trace {of_archive})"
                 connection.executemany(f"UPDATE main.traces SET missing = 1 WHERE {is_gone}", gone)
     except sqlite3.Error as error:
-        raise BackupError(f"database {source}: what the archive has cannot be copied: {error}") from error
+        raise SpecError(f"database {source}: what the archive has cannot be copied: {error}") from error
 
 
 def robots_of_traces(database: Path) -> dict[str, str]:
-    """Returns the robot of each trace. Raises BackupError."""
+    """Returns the robot of each trace. Raises SpecError."""
     try:
         with closing(open_to_read(database)) as connection:
             found = connection.execute("SELECT id, robot FROM traces") if _has_table(connection, "traces") else ()
             return dict(found)
     except sqlite3.Error as error:
-        raise BackupError(f"database {database.name}: is damaged: {error}") from error
+        raise SpecError(f"database {database.name}: is damaged: {error}") from error
 
 
 def head_of_audit(database: Path) -> str:
@@ -161,7 +161,7 @@ def head_of_audit(database: Path) -> str:
 
 def note_restored(database: Path, at: datetime, command: str, archive: str, detail: str) -> None:
     """Notes the restore in a database's audit log; a database without its tables stays unchanged. Raises
-    BackupError.
+    SpecError.
     """
     with closing(sqlite3.connect(database)) as connection:
         if not _has_table(connection, "audit"):
@@ -171,7 +171,7 @@ def note_restored(database: Path, at: datetime, command: str, archive: str, deta
         with store.writing() as session:
             note_command(session, at, computers_user(), "restore", command, archive, detail)
     except DatabaseError as error:
-        raise BackupError(f"database {database.name}: its audit log cannot be written: {line_of(error)}") from error
+        raise SpecError(f"database {database.name}: its audit log cannot be written: {line_of(error)}") from error
     finally:
         store.close()
 
@@ -182,6 +182,6 @@ def _has_table(connection: sqlite3.Connection, name: str) -> bool:
 
 
 def require_known(revision: str | None) -> None:
-    """Raises BackupError for tables that no migration of this program makes."""
+    """Raises SpecError for tables that no migration of this program makes."""
     if revision is not None and revision not in migrations()[VERSION]:
-        raise BackupError(f"the backup's tables are of another version ({revision}): install that version first")
+        raise SpecError(f"the backup's tables are of another version ({revision}): install that version first")

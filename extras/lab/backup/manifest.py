@@ -13,8 +13,9 @@ from typing import IO, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
-from extras.lab.backup.places import DATABASE, NAMES, BackupError
+from extras.lab.backup.places import DATABASE, NAMES
 from firmware_protocol.invalid import first_invalid
 
 FORMAT = 1
@@ -62,16 +63,16 @@ class Manifest(BaseModel):
 
 @contextmanager
 def opened(archive: Path) -> Iterator[tuple[zipfile.ZipFile, Manifest]]:
-    """Opens a backup and checks its manifest. Raises BackupError."""
+    """Opens a backup and checks its manifest. Raises SpecError."""
     try:
         with archive.open("rb") as stream, zipfile.ZipFile(stream) as pack:
             yield pack, _manifest(pack, archive)
     except DAMAGED as error:
-        raise BackupError(f"{archive}: is damaged, or not a backup: {error}; nothing was changed") from error
+        raise SpecError(f"{archive}: is damaged, or not a backup: {error}; nothing was changed") from error
 
 
 def verify(archive: Path, progress: Progress = lambda _fraction, _text: None) -> Manifest:
-    """Reads every byte of a backup. Raises BackupError if a file is missing or different from the one written."""
+    """Reads every byte of a backup. Raises SpecError if a file is missing or different from the one written."""
     try:
         with opened(archive) as (pack, manifest):
             done = 0
@@ -82,13 +83,13 @@ def verify(archive: Path, progress: Progress = lambda _fraction, _text: None) ->
                 done += entry.size
             return manifest
     except OSError as error:
-        raise BackupError(f"{archive}: cannot be read: {error.strerror or error}; nothing was changed") from error
+        raise SpecError(f"{archive}: cannot be read: {error.strerror or error}; nothing was changed") from error
 
 
 def check(entry: Entry, found: str, archive: Path) -> None:
-    """Raises BackupError if the digest `found` differs from that of the written file."""
+    """Raises SpecError if the digest `found` differs from that of the written file."""
     if found != entry.sha256:
-        raise BackupError(f"{archive}: {entry.name} is not as it was written: the backup is damaged")
+        raise SpecError(f"{archive}: {entry.name} is not as it was written: the backup is damaged")
 
 
 def pieces(stream: IO[bytes]) -> Iterator[bytes]:
@@ -107,25 +108,25 @@ def _digest(stream: IO[bytes]) -> str:
 def _manifest(pack: zipfile.ZipFile, archive: Path) -> Manifest:
     there = {info.filename: info for info in pack.infolist()}
     if MANIFEST not in there or there[MANIFEST].file_size > LARGEST_MANIFEST:
-        raise BackupError(f"{archive}: is not a backup of a service: it has no {MANIFEST}; nothing was changed")
+        raise SpecError(f"{archive}: is not a backup of a service: it has no {MANIFEST}; nothing was changed")
     try:
         manifest = Manifest.model_validate_json(pack.read(MANIFEST))
     except ValidationError as error:
         first = first_invalid(error)
         line = f"{archive}: {MANIFEST}: {first.where()}: {first.message}; nothing was changed"
-        raise BackupError(line) from error
+        raise SpecError(line) from error
     if manifest.format > FORMAT:
         line = (
             f"{archive}: is a backup of format {manifest.format}, this version supports {FORMAT}; nothing was changed"
         )
-        raise BackupError(line)
+        raise SpecError(line)
     listed = {entry.name: entry for entry in manifest.files}
     strange = next((name for name in listed if not NAMES.fullmatch(name)), None)
     if strange is not None:
-        raise BackupError(f"{archive}: {strange!r}: a backup has no file of this name; nothing was changed")
+        raise SpecError(f"{archive}: {strange!r}: a backup has no file of this name; nothing was changed")
     wrong = sorted(set(listed) ^ (set(there) - {MANIFEST}))
     wrong += [name for name, entry in listed.items() if name in there and there[name].file_size != entry.size]
     if wrong or DATABASE not in listed or len(there) != len(pack.infolist()) or len(listed) != len(manifest.files):
         line = f"{archive}: its files differ from its list ({', '.join(wrong[:3]) or DATABASE}): it is damaged"
-        raise BackupError(f"{line}; nothing was changed")
+        raise SpecError(f"{line}; nothing was changed")
     return manifest

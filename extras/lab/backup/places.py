@@ -10,8 +10,7 @@ from pathlib import Path
 from sqlalchemy import URL
 
 from daq.config.settings import Settings
-from daq.contracts import exit_codes
-from daq.contracts.errors import DaqError
+from daq.contracts.errors import SpecError
 from daq.traces.layout import SUFFIX
 from server.store.address import address_of, file_address
 from server.store.lock import sqlite_file
@@ -27,12 +26,6 @@ NAMES = re.compile(
 def is_trace(name: str) -> bool:
     """Whether the file with this name in a backup is a trace."""
     return name.startswith("traces/")
-
-
-class BackupError(DaqError):
-    """A backup cannot be made, is damaged, or belongs to another robot. Nothing was changed."""
-
-    exit_code = exit_codes.WRONG_INPUT
 
 
 @dataclass(frozen=True)
@@ -61,7 +54,7 @@ class Places:
         return (self.database.parent, *self.traces.values(), self.service)
 
     def home(self, name: str) -> Path:
-        """Returns the folder for the file with this name in a backup. Raises BackupError."""
+        """Returns the folder for the file with this name in a backup. Raises SpecError."""
         if name == DATABASE:
             return self.database.parent
         kind, *rest = name.split("/")
@@ -69,9 +62,7 @@ class Places:
             return self.service
         robot = rest[0] if len(rest) > 1 else self.robot
         if robot not in self.traces or (len(rest) > 1) != (len(self.traces) > 1):
-            raise BackupError(
-                f"{name!r}: the backup has a trace of another robot than {self.robot}; nothing was changed"
-            )
+            raise SpecError(f"{name!r}: the backup has a trace of another robot than {self.robot}; nothing was changed")
         return self.traces[robot]
 
     def target(self, name: str) -> Path:
@@ -96,11 +87,11 @@ class Places:
 
 
 def places_of(settings: Settings) -> Places:
-    """Returns the paths of a configuration. Raises BackupError if its database is not a file."""
+    """Returns the paths of a configuration. Raises SpecError if its database is not a file."""
     address = address_of(settings.server)
     database = sqlite_file(address)
     if database is None:
-        raise BackupError(
+        raise SpecError(
             f"database {address.drivername}: is not a file; back it up with its own tools, and copy the folders"
         )
     traces = {own.robot.name: own.traces.folder.absolute() for own in settings.each_robot()}

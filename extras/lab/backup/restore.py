@@ -16,6 +16,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from daq.contracts.errors import SpecError
 from daq.contracts.whole_file import sync_folder
 from daq.traces import disk
 from daq.traces.layout import PART_SUFFIX, SUFFIX
@@ -30,7 +31,7 @@ from extras.lab.backup.database import (
     robots_of_traces,
 )
 from extras.lab.backup.manifest import Entry, Manifest, Progress, check, opened, pieces, verify
-from extras.lab.backup.places import DATABASE, BackupError, Places, is_trace
+from extras.lab.backup.places import DATABASE, Places, is_trace
 from extras.lab.backup.write import RESERVE
 from server.jobs.mailbox import REQUEST
 from server.store.lock import sole_use
@@ -70,20 +71,20 @@ def restore(
 ) -> Restored:
     """Writes all files of a backup to the paths of this configuration.
 
-    Raises BackupError if the backup is damaged or another robot's, or if files exist there and `overwrite` is False;
-    raises InUseError while a service runs. In these cases nothing has been changed.
+    Raises SpecError if the backup is damaged or another robot's, or if files exist there and `overwrite` is False;
+    raises ReachError while a service runs. In these cases nothing has been changed.
     """
     manifest = verify(archive, lambda fraction, text: progress(CHECK_SHARE * fraction, text))
     if manifest.robot != places.robot:
         line = f"{archive}: is of robot {manifest.robot!r}; this configuration is for {places.robot!r}"
-        raise BackupError(f"{line}; nothing was changed")
+        raise SpecError(f"{line}; nothing was changed")
     require_known(manifest.revision)
     with sole_use(places.url):
         there = occupied(places)
         if there and not overwrite:
             names = ", ".join(str(path) for path in there[:3]) + (", …" if len(there) > 3 else "")
             line = f"{len(there)} files or folders already exist ({names})"
-            raise BackupError(f"{line}: with --overwrite they are moved aside; nothing was changed")
+            raise SpecError(f"{line}: with --overwrite they are moved aside; nothing was changed")
         staged = _Staged(archive, places, now, reserve)
         try:
             staged.write(manifest, lambda f, text: progress(CHECK_SHARE + (WRITE_SHARE - CHECK_SHARE) * f, text))
@@ -91,7 +92,7 @@ def restore(
             aside = _put_aside(there, now)
             staged.move_in()
         except OSError as error:
-            raise BackupError(f"restore: {error.filename or archive}: {error.strerror or error}") from error
+            raise SpecError(f"restore: {error.filename or archive}: {error.strerror or error}") from error
         finally:
             staged.clear()
     return Restored(manifest, aside, staged.removed)
@@ -123,7 +124,7 @@ class _Staged:
         self.removed: tuple[str, ...] = ()
 
     def write(self, manifest: Manifest, progress: Progress) -> None:
-        """Extracts all files, and checks the digest of each again. Raises BackupError, OSError."""
+        """Extracts all files, and checks the digest of each again. Raises SpecError, OSError."""
         self.clear()
         for folder in self._folders:
             folder.mkdir(parents=True)
@@ -140,7 +141,7 @@ class _Staged:
                     self._robots = robots_of_traces(self._staged(DATABASE))
                 done += entry.size
         if revision_of(self._staged(DATABASE)) != manifest.revision:
-            raise BackupError(f"{self._archive}: its database is not the one that its list names")
+            raise SpecError(f"{self._archive}: its database is not the one that its list names")
         self.removed = keep_own_objects(self._staged(DATABASE), manifest.revision)
         if manifest.revision is not None:
             line = "restored from a backup: look at the arm, then resume the queue"
@@ -216,7 +217,7 @@ class _Staged:
             free = shutil.disk_usage(folder).free
             if free < manifest.size + self._reserve:
                 needed = (manifest.size + self._reserve) / 1e6
-                raise BackupError(f"{folder.parent}: {free / 1e6:.0f} MB are free, {needed:.0f} MB are needed")
+                raise SpecError(f"{folder.parent}: {free / 1e6:.0f} MB are free, {needed:.0f} MB are needed")
 
 
 def _put_aside(there: list[Path], now: datetime) -> tuple[Path, ...]:

@@ -11,10 +11,11 @@ from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
 
+from daq.contracts.errors import SpecError
 from daq.contracts.whole_file import sync_folder
 from extras.lab.backup.database import copy_database, note_dropped, revision_of
 from extras.lab.backup.manifest import FORMAT, MANIFEST, Entry, Manifest, Progress, pieces
-from extras.lab.backup.places import DATABASE, BackupError, Places, is_trace
+from extras.lab.backup.places import DATABASE, Places, is_trace
 
 RESERVE = 20_000_000
 """Number of bytes that must stay free on the disk beside a backup."""
@@ -25,10 +26,10 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
 
     The database is copied first, in a consistent state: every file that it names exists by then, and is copied
     afterwards. Files deleted meanwhile are left out, and the manifest lists them; those that the archive took over are
-    noted as archived. Raises BackupError.
+    noted as archived. Raises SpecError.
     """
     if target.exists():
-        raise BackupError(f"{target}: already exists; a backup is never overwritten")
+        raise SpecError(f"{target}: already exists; a backup is never overwritten")
     try:
         with tempfile.TemporaryDirectory(prefix=".backup-", dir=target.absolute().parent) as folder:
             database = Path(folder) / "service.sqlite"
@@ -57,11 +58,11 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
             with part.open("rb") as stream:
                 os.fsync(stream.fileno())
             if target.exists():
-                raise BackupError(f"{target}: was made by another program meanwhile; it was not overwritten")
+                raise SpecError(f"{target}: was made by another program meanwhile; it was not overwritten")
             part.replace(target)
             sync_folder(target.absolute().parent)
     except OSError as error:
-        raise BackupError(f"{target}: cannot be written: {error.strerror or error}") from error
+        raise SpecError(f"{target}: cannot be written: {error.strerror or error}") from error
     return manifest
 
 
@@ -93,4 +94,4 @@ def _require_room(folder: Path, files: list[tuple[str, Path]], reserve: int) -> 
     needed = sum(path.stat().st_size for _, path in files if path.is_file()) + reserve
     free = shutil.disk_usage(folder).free
     if free < needed:
-        raise BackupError(f"{folder}: {free / 1e6:.0f} MB are free, a backup needs {needed / 1e6:.0f} MB")
+        raise SpecError(f"{folder}: {free / 1e6:.0f} MB are free, a backup needs {needed / 1e6:.0f} MB")

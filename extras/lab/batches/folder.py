@@ -16,9 +16,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from daq.contracts import exit_codes
 from daq.contracts.documents import parse_json, read_text
-from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.errors import ReachError, SpecError
 from daq.contracts.extras import is_installed
 from daq.contracts.file_lock import take_lock
 from daq.contracts.frozen import FrozenRecord
@@ -59,12 +58,6 @@ def _names(rows: Sequence[Columns]) -> list[str]:
 
 ASKED, ROWS, ANSWERS, CSV, PARQUET = "batch.json", "rows.jsonl", "answers", "table.csv", "table.parquet"
 _HIDDEN_LOCK = ".lock"
-
-
-class BatchInUseError(DaqError):
-    """Another program is computing into this folder."""
-
-    exit_code = exit_codes.NOT_REACHED
 
 
 class Asked(FrozenRecord):
@@ -166,7 +159,7 @@ def asked_of(common: Common) -> Asked:
 def opened(path: Path, asked: Asked) -> Iterator[BatchFolder]:
     """Yields the folder, created if new, for exclusive use by this program within the block.
 
-    Raises SpecError if it holds another batch or cannot be written; BatchInUseError.
+    Raises SpecError if it holds another batch or cannot be written; ReachError.
     """
     try:
         (path / ANSWERS).mkdir(parents=True, exist_ok=True)
@@ -180,7 +173,7 @@ def opened(path: Path, asked: Asked) -> Iterator[BatchFolder]:
         except OSError as error:
             raise _unwritable(path, error) from error
         if not alone:
-            raise BatchInUseError(f"{path}: another batch is computing into it; wait until it has ended")
+            raise ReachError(f"{path}: another batch is computing into it; wait until it has ended")
         _require_same(path / ASKED, asked)
         yield BatchFolder(path, _read_rows(path / ROWS))
 

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from sqlalchemy import URL, Connection, Engine, text
 from sqlalchemy.exc import DatabaseError
 
+from daq.contracts.errors import ReachError, SpecError
 from server.database_errors import line_of
-from server.store.address import StoreError, masked, open_engine, parse_address
-from server.store.databases import InUseError
+from server.store.address import masked, open_engine, parse_address
 
 LOOKED_AT = 10.0
 """Time (s) between two checks of the lock, which is lost when the server restarts."""
@@ -25,7 +25,7 @@ log = logging.getLogger("server")
 
 @contextmanager
 def locked(url: str | URL) -> Iterator[None]:
-    """Holds the lock within the block. Raises InUseError, and StoreError if the server cannot be reached."""
+    """Holds the lock within the block. Raises ReachError, and SpecError if the server cannot be reached."""
     engine = open_engine(url)
     place = masked(parse_address(url))
     try:
@@ -45,7 +45,7 @@ class ServerLock:
         """Acquires the lock. Calls `lost` if another service has acquired it while the database's server was
         unreachable.
 
-        Raises InUseError and StoreError.
+        Raises ReachError and SpecError.
         """
         self._engine = engine
         self._place = place
@@ -56,7 +56,7 @@ class ServerLock:
         try:
             self._connection: Connection | None = self._taken()
         except DatabaseError as error:
-            raise StoreError(f"database {place}: cannot be opened: {line_of(error)}") from error
+            raise SpecError(f"database {place}: cannot be opened: {line_of(error)}") from error
         self._watch = threading.Thread(target=self._look_again, name="database lock", daemon=True)
         self._watch.start()
 
@@ -79,7 +79,7 @@ class ServerLock:
             return True
         try:
             self._connection = self._taken()
-        except InUseError as error:
+        except ReachError as error:
             log.warning("%s: this service ends", error)
             return False
         except DatabaseError:  # the server is unreachable: the next check tries again
@@ -102,7 +102,7 @@ class ServerLock:
         if connection.execute(text("SELECT pg_try_advisory_lock(:number)"), {"number": _NUMBER}).scalar():
             return connection
         connection.close()
-        raise InUseError(f"database {self._place}: a service uses it; end that one first")
+        raise ReachError(f"database {self._place}: a service uses it; end that one first")
 
     def _look_again(self) -> None:
         while not self._closing.wait(LOOKED_AT):

@@ -7,7 +7,6 @@ as one class of effects, with the measurement that would tell them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -20,9 +19,9 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.design.drawn_experiments import CALLED, drawn_experiment
 from model.design.information import Planner
-from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, same_answer
-from model.discrepancy.candidates.ranking import Decision, Ranking
 from model.discrepancy.diagnosis import UNWRITTEN, DifferencePlace, Inseparable, NextExperiment, PlacedEffect, Verdict
+from model.discrepancy.engine.candidate import Fitted
+from model.discrepancy.engine.fitting import Fit
 from model.discrepancy.experiment_design.separation import (
     NOISE_SEED,
     Imagined,
@@ -36,8 +35,7 @@ from model.discrepancy.experiment_design.separation import (
 from model.discrepancy.explanation.effect_words import LAWS, MEASUREMENTS
 from model.discrepancy.grounds import Measurement, Note, SharedLaw
 from model.discrepancy.localisation.phases import PHASES, AskedMotion
-from model.discrepancy.output_error.observation import Observation
-from model.discrepancy.output_error.search import FEW_STEPS, Point, converge
+from model.discrepancy.readings.observation import Observation
 from model.discrepancy.thresholds import WITHIN_NOISE
 from model.effects.names import effect_on
 
@@ -154,8 +152,8 @@ class ExperimentChooser:
     def after(
         self,
         verdict: Verdict,
-        current: Point,
-        rivals: Sequence[CandidateFit],
+        current: Fit,
+        rivals: Sequence[Fitted],
         traces: Sequence[Trace],
         cancel: Cancel | None = None,
     ) -> Asked:
@@ -167,40 +165,23 @@ class ExperimentChooser:
         done = [t.record.spec for t in traces if t.record.spec is not None]
         return most_information(current, self, done)
 
-    def imagine(self, experiment: OfferedExperiment, point: Point, noise_seed: int = NOISE_SEED) -> Imagined | None:
+    def imagine(self, experiment: OfferedExperiment, point: Fit, noise_seed: int = NOISE_SEED) -> Imagined | None:
         """An experiment as a diagnosis would see it; None where it cannot be run or takes too long."""
-        there = imagine(point.model, experiment.spec, self.plan, noise_seed)
+        there = imagine(point.fitted_model, experiment.spec, self.plan, noise_seed)
         return None if there is None or (self.budget is not None and there.duration > self.budget) else there
 
 
-def rivals_of(ranking: Ranking, decision: Decision) -> tuple[CandidateFit, ...]:
-    """Candidates that another experiment should tell apart: a group, and what comes close to a name."""
-    best = decision.best
-    if best is None or decision.kind == "nothing":
-        return ()
-    close = [
-        f
-        for f in ranking.fitted
-        if f is not best and not same_answer(f, best) and best.evidence - f.evidence < SURE and f.evidence > 0
-    ]
-    return (best, *close) if close else ()
+def converge_rivals(rivals: Sequence[Fitted]) -> list[Fitted]:
+    """The first of several candidates and those that come close to it, with new derivatives."""
+    close = [r for r in rivals[1:] if rivals[0].log_odds - r.log_odds < SURE and r.evidence > 0]
+    found = [*rivals[:1], *close][:MOST_RIVALS]
+    return [replace(r, fit=replace(r.fit, known={}).with_slopes()) for r in found]
 
 
-def converge_rivals(rivals: Sequence[CandidateFit]) -> list[CandidateFit]:
-    """Rivals with their fits run to convergence and new derivatives: a difference that a fit would still remove
-    separates nothing. A rival on the verge of instability has no derivatives and is left out."""
-    found = []
-    for rival in rivals[:MOST_RIVALS]:
-        point = converge(rival.fit.point, FEW_STEPS)
-        with suppress(SpecError):
-            found.append(replace(rival, fit=judge(point.with_new_tangents())))
-    return found
-
-
-def best_experiment(rivals: Sequence[CandidateFit], chooser: ExperimentChooser, cancel: Cancel | None = None) -> Asked:
+def best_experiment(rivals: Sequence[Fitted], chooser: ExperimentChooser, cancel: Cancel | None = None) -> Asked:
     """The experiment on which the rivals that are hardest to tell apart differ most for its robot time; pairs that no
     experiment tells apart are named in notes. Raises CancelledError when asked to end."""
-    names = [effect_on(r.hypothesis.name, r.hypothesis.joints) for r in rivals]
+    names = [effect_on(r.effect, r.joints) for r in rivals]
     pairs = list(combinations(range(len(rivals)), 2))
     judged, tried = judge_experiments(rivals, chooser, pairs, cancel or Never())
     if not judged:
@@ -208,7 +189,7 @@ def best_experiment(rivals: Sequence[CandidateFit], chooser: ExperimentChooser, 
     best = {pair: max(judged, key=lambda j: j.sizes[pair]) for pair in pairs}
     hopeless = {p: (j.sizes[p], j.experiment.name) for p, j in best.items() if j.sizes[p] < WITHIN_NOISE}
     separable = [pair for pair in pairs if pair not in hopeless]
-    placed = [PlacedEffect(effect=r.hypothesis.name, joints=r.hypothesis.joints) for r in rivals]
+    placed = [PlacedEffect(effect=r.effect, joints=r.joints) for r in rivals]
     inseparable = classes_of(placed, hopeless, tried)
     notes = notes_on(inseparable, chooser.budget)
     if not separable:
@@ -224,7 +205,7 @@ def best_experiment(rivals: Sequence[CandidateFit], chooser: ExperimentChooser, 
 
 
 def judge_experiments(
-    rivals: Sequence[CandidateFit], chooser: ExperimentChooser, pairs: Sequence[Pair], cancel: Cancel
+    rivals: Sequence[Fitted], chooser: ExperimentChooser, pairs: Sequence[Pair], cancel: Cancel
 ) -> tuple[list[Separations], int]:
     """The experiments of the chooser that can be run, and the best of those that were drawn, with their separations;
     and how many were judged. Raises CancelledError when asked to end."""
@@ -232,7 +213,7 @@ def judge_experiments(
     def judged(experiment: OfferedExperiment, noise_seed: int = NOISE_SEED) -> Separations | None:
         """None where it cannot be run, or an arm like a rival would not follow what was drawn."""
         stop_if(cancel)
-        there = chooser.imagine(experiment, rivals[0].fit.point, noise_seed)
+        there = chooser.imagine(experiment, rivals[0].fit, noise_seed)
         if there is None:
             return None
         own = recorded_by(rivals, there)
@@ -251,8 +232,8 @@ def judge_experiments(
     return offered, tried
 
 
-def _drawn(rivals: Sequence[CandidateFit], chooser: ExperimentChooser) -> Iterator[OfferedExperiment]:
-    machine = rivals[0].fit.point.model.machine
+def _drawn(rivals: Sequence[Fitted], chooser: ExperimentChooser) -> Iterator[OfferedExperiment]:
+    machine = rivals[0].fit.model.machine
     longest = min(LONGEST_DESIGN, chooser.budget or LONGEST_DESIGN)
     for number in range(chooser.search or 0):
         kind, turn = number % len(CALLED), number // len(CALLED)
@@ -261,7 +242,7 @@ def _drawn(rivals: Sequence[CandidateFit], chooser: ExperimentChooser) -> Iterat
         yield OfferedExperiment(f"designed-{number}", f"{CALLED[kind]} that were drawn for these candidates", spec)
 
 
-def most_information(point: Point, chooser: ExperimentChooser, done: Sequence[ExperimentSpec]) -> Asked:
+def most_information(point: Fit, chooser: ExperimentChooser, done: Sequence[ExperimentSpec]) -> Asked:
     """Returns the most informative general experiment that was not made yet, or another one if all of those take too
     long. Returns none if a general experiment was made already."""
     if any(_same_motion(e.spec, s) for e in chooser.experiments if e.general for s in done):
@@ -276,14 +257,14 @@ def most_information(point: Point, chooser: ExperimentChooser, done: Sequence[Ex
 
 
 def _information(
-    point: Point, experiment: OfferedExperiment, chooser: ExperimentChooser
+    point: Fit, experiment: OfferedExperiment, chooser: ExperimentChooser
 ) -> tuple[OfferedExperiment, Imagined, float] | None:
     """The experiment with the information that it would add about the arm's parameters, nats."""
     there = chooser.imagine(experiment, point)
     if there is None:
         return None
     try:
-        new = Prediction(there, point).recorded().tangents({})
+        new = np.stack(list(Prediction(there, point).recorded().tangents({}).values()))
     except SpecError:
         return None
     known = Prediction(there, point).known_so_far()
@@ -309,13 +290,13 @@ def _next(
     )
 
 
-def _differs_at(rival: CandidateFit, observation: Observation, left: Floats) -> DifferencePlace:
+def _differs_at(rival: Fitted, observation: Observation, left: Floats) -> DifferencePlace:
     """Joint and phase that hold most of the squared difference (N,) that a rival's parameters could not hide."""
-    machine, joints = observation.machine, rival.hypothesis.joints
+    machine, joints = observation.machine, rival.joints
     record = observation.records[0]
     every = AskedMotion(machine, record).phases
     phases = np.concatenate([every[run] for run in record.runs])
-    energy = left.reshape(phases.shape) ** 2
+    energy = left.reshape(phases.shape[::-1]).T ** 2
     total = max(float(energy.sum()), 1e-300)
     sums = {
         (joint, phase): float(energy[phases[:, column] == number, column].sum())

@@ -20,10 +20,12 @@ from daq.contracts.experiment import ExperimentSpec, OfferedExperiment
 from model import layout as at
 from model.arrays import Floats
 from model.design.information import Planner, falls_behind, imagined_trace
-from model.discrepancy.candidates.candidate_fit import CandidateFit
-from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.observation import Observation, Signals, observe
-from model.discrepancy.output_error.search import Point
+from model.discrepancy.engine.candidate import Fitted
+from model.discrepancy.engine.fitting import Fit
+from model.discrepancy.engine.priors import prior_rows
+from model.discrepancy.engine.residual import Signals
+from model.discrepancy.readings.observation import Observation, observe
+from model.discrepancy.readings.residual import ReadingResidual, samples_of
 from model.discrepancy.thresholds import MOST_ROUNDS, WITHIN_NOISE
 from model.drives.sensor import sensed_angle
 from model.fitting.unknowns import Unknown
@@ -56,40 +58,55 @@ class Imagined:
 def imagine(model: Model, spec: ExperimentSpec, plan: Planner, noise_seed: int = NOISE_SEED) -> Imagined | None:
     """The experiment on the grid of control periods; None where the planner refuses it, or nothing would move."""
     try:
-        observation, given = observe(model, [imagined_trace(model, spec, plan)])
+        observation, _, unknowns = observe(model, [imagined_trace(model, spec, plan)])
     except DaqError:
         return None
     counts = observation.deviations / observation.unit
     drawn = np.random.default_rng(noise_seed).standard_normal(observation.prepared[0].noise.shape)
     observation = observation.with_drive_as_input(False)  # nothing has been recorded yet
-    return Imagined(observation, tuple(u for u in given.unknowns if u.trace is not None), (drawn * counts,))
+    return Imagined(observation, tuple(u for u in unknowns if u.trace is not None), (drawn * counts,))
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a point's model would show on an imagined experiment, by its shared unknowns and the experiment's starts."""
+    """What a fitted model would show on an imagined experiment, by its shared unknowns and the experiment's starts."""
 
     there: Imagined
-    point: Point
+    fit: Fit
 
     @cached_property
-    def begun(self) -> Calibration:
-        """The point with those of its unknowns that belong to no trace, because they keep their values on the next one,
-        and with the starts, at rest."""
-        shared = self.point.only([k for k, u in enumerate(self.point.unknowns) if u.trace is None])
-        starts = self.there.starts
-        values = np.concatenate([shared.values, starts_at_rest(self.there.observation, shared, starts)])
-        return Calibration(shared.model, (*shared.unknowns, *starts), values)
+    def shared(self) -> tuple[Unknown, ...]:
+        """The unknowns that belong to no trace, because they keep their values on the next one."""
+        return tuple(u for u in self.fit.unknowns if u.trace is None)
 
-    def named(self, derivatives: Floats) -> dict[str, Floats]:
-        """Rows of derivatives by the unknowns' names."""
-        return dict(zip((u.name for u in self.begun.unknowns), derivatives, strict=True))
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Those and the starts."""
+        return (*self.shared, *self.there.starts)
+
+    @cached_property
+    def compared(self) -> ReadingResidual:
+        """The model on the experiment's record."""
+        own = self.fit.compared
+        assert isinstance(own, ReadingResidual)
+        forms = {n: u for n, u in own.known.items() if u.trace is None}
+        known = {**forms, **{u.name: u for u in self.there.starts}}
+        return ReadingResidual(self.fit.model, self.there.observation, samples_of(self.there.observation), known)
+
+    @cached_property
+    def begun(self) -> dict[str, float]:
+        """The fitted values with the starts, at rest."""
+        values = {u.name: self.fit.values[u.name] for u in self.shared}
+        vector, _ = self.compared.state(values)
+        return {**values, **starts_at_rest(self.there.observation, vector, self.there.starts)}
 
     def recorded(self) -> Prediction:
-        """The same on the record that an arm like the point's model would leave. Not finite where its simulation is
-        not."""
-        own = self.there.observation.imagined(self.begun, self.there.noise)
-        observation = own.with_drive_as_input(self.point.observation.drive_is_input)
+        """The same on the record that an arm like the model would leave. Not finite where its simulation is not."""
+        state = self.compared.state(self.begun)
+        own = self.there.observation.imagined(self.fit.model, state, self.there.noise)
+        compared = self.fit.compared
+        assert isinstance(compared, ReadingResidual)
+        observation = own.with_drive_as_input(compared.observation.drive_is_input)
         return replace(self, there=replace(self.there, observation=observation))
 
     @property
@@ -97,33 +114,42 @@ class Prediction:
         """Whether set points would not pause on an arm that has made the record: a margin is kept."""
         record = self.there.observation.records[0]
         set_points = record.inputs.set_points
-        return falls_behind(self.point.model.machine, set_points, set_points - record.measured) is None
+        return falls_behind(self.fit.model.machine, set_points, set_points - record.measured) is None
 
-    def shown(self, values: Floats | None = None) -> Floats:
-        """The simulation that is given the record, (N,) in deviations of a reading; at other values (p,) than the
-        point's, if given. Not finite where the simulation is not."""
-        own = self.begun if values is None else self.begun.at(values)
-        return self.there.observation.weighted(self.there.observation.shown(own))
+    def _weighted(self, rows: Floats) -> Floats:
+        ones = np.ones(len(self.compared.floor))
+        return self.compared.weighted(rows, self.compared.floor, ones)
 
-    def tangents(self, known: Mapping[str, Floats], values: Floats | None = None) -> Floats:
-        """Derivatives (p, N) of that by the unknowns, at other values than the point's, if given. known: rows that are
-        taken over by name, because those by the tolerance parameters change little.
+    def left(self, values: Floats | None = None) -> Floats:
+        """What the simulation that is given the record leaves of it, (N,) in deviations of a reading; at other values
+        (p,) than the fitted ones, if given. Not finite where the simulation is not."""
+        return self._weighted(self.compared.samples.flat(self.compared.at(self._named(values))))
+
+    def _named(self, values: Floats | None) -> dict[str, float]:
+        return self.begun if values is None else dict(zip((u.name for u in self.unknowns), values, strict=True))
+
+    def tangents(self, known: Mapping[str, Floats], values: Floats | None = None) -> dict[str, Floats]:
+        """Derivatives (N,) of the readings by the unknowns, at other values than the fitted ones, if given. known:
+        those that are taken over by name, because those by the tolerance parameters change little.
 
         Raises SpecError when the simulation does not stay finite.
         """
-        rows, unknowns = dict(known), self.begun.unknowns
-        missing = [k for k, u in enumerate(unknowns) if u.name not in rows]
-        if missing:
-            own = self.begun if values is None else self.begun.at(values)
-            new = self.there.observation.tangents(own, missing)
-            rows |= {unknowns[k].name: row for k, row in zip(missing, new, strict=True)}
-        return np.stack([rows[u.name] for u in unknowns])
+        missing = [u for u in self.unknowns if u.name not in known]
+        rows = -self._weighted(self.compared.slopes(self._named(values), missing)) if missing else np.zeros((0, 0))
+        if not np.isfinite(rows).all():
+            raise SpecError("the simulation does not stay finite: the control loop is unstable")
+        found = {**known, **dict(zip((u.name for u in missing), rows, strict=True))}
+        return {u.name: found[u.name] for u in self.unknowns}
 
     def known_so_far(self) -> Floats:
         """Information (p, p) about the shared unknowns from traces and priors, those of single traces marginalised;
         about the new starts, their priors."""
-        mine = np.array([u.trace is None for u in self.point.unknowns])
-        information = self.point.information.copy()
+        mine = np.array([u.trace is None for u in self.fit.unknowns])
+        slopes = self.fit.slopes()
+        T = self.fit.weighted(np.stack([slopes[u.name] for u in self.fit.unknowns]))
+        at = np.array([self.fit.values[u.name] for u in self.fit.unknowns])
+        rows, _ = prior_rows(self.fit.unknowns, at)
+        information = T @ T.T + rows.T @ rows
         information[np.diag_indices_from(information)] *= 1 + LOOSE
         inner, cross = information[np.ix_(~mine, ~mine)], information[np.ix_(~mine, mine)]
         left = information[np.ix_(mine, mine)]
@@ -139,24 +165,23 @@ class Prediction:
         return whole
 
 
-def starts_at_rest(observation: Observation, shared: Calibration, starts: Sequence[Unknown]) -> Floats:
-    """Values of the starts of an observation's last record with which the arm's readings begin where the record does:
-    there its controller holds it.
+def starts_at_rest(observation: Observation, vector: Floats, starts: Sequence[Unknown]) -> dict[str, float]:
+    """Values of the starts of an observation's last record with which the readings of an arm with these numbers begin
+    where the record does: there its controller holds it.
 
     An arm that began at the angles that are read would first make up for the error of its potentiometers, a motion that
     no record holds; and a fit that begins there ends in another minimum.
     """
-    vector, _ = observation.state(shared)
     read = observation.records[-1].inputs.initial[:, 0]
-    found = []
+    found = {}
     for start in starts:
         (joint,) = start.joints
         first = at.slot(joint, 0)
         angle = wanted = read[joint - 1]
         for _ in range(MOST_ROUNDS):
             angle += wanted - sensed_angle(angle, vector[first : first + at.PER_JOINT])
-        found.append(float(np.clip(angle - wanted, start.low, start.high)))
-    return np.array(found)
+        found[start.name] = float(np.clip(angle - wanted, start.low, start.high))
+    return found
 
 
 Pair = tuple[int, int]
@@ -182,29 +207,28 @@ class Separations:
         return separation >= WITHIN_NOISE, min(separation, ENOUGH) ** 2 / self.there.duration
 
 
-def recorded_by(rivals: Sequence[CandidateFit], there: Imagined) -> list[Prediction]:
+def recorded_by(rivals: Sequence[Fitted], there: Imagined) -> list[Prediction]:
     """The rivals on the records that arms like them would leave of an experiment."""
-    return [Prediction(there, r.fit.point).recorded() for r in rivals]
+    return [Prediction(there, r.fit).recorded() for r in rivals]
 
 
 def separations(
-    rivals: Sequence[CandidateFit], experiment: OfferedExperiment, own: Sequence[Prediction]
+    rivals: Sequence[Fitted], experiment: OfferedExperiment, own: Sequence[Prediction]
 ) -> Separations | None:
     """How far apart the rivals would be on an experiment; None where a simulation does not stay finite.
 
     Args:
         own: each rival on the record that an arm like it would leave.
     """
-    points = [r.fit.point for r in rivals]
-    signals = [prediction.shown() for prediction in own]
+    signals = [prediction.left() for prediction in own]
     if not all(np.isfinite(s).all() for s in signals):
         return None
     sizes, left = {}, {}
     try:
-        first = own[0].named(own[0].tangents({}))
+        first = own[0].tangents({})
         for a, b in combinations(range(len(rivals)), 2):
             sides = [
-                _unhidden(Prediction(own[true].there, points[wrong]), rivals[wrong], signals[true], first)
+                _unhidden(Prediction(own[true].there, rivals[wrong].fit), rivals[wrong], signals[true], first)
                 for wrong, true in ((a, b), (b, a))
             ]
             sizes[a, b], left[a, b] = min(sides, key=lambda side: side[0])
@@ -213,24 +237,24 @@ def separations(
     return Separations(experiment, own[0].there, sizes, left)
 
 
-def _unhidden(
-    predicted: Prediction, wrong: CandidateFit, target: Floats, known: dict[str, Floats]
-) -> tuple[float, Floats]:
-    """d′ of a rival that is wrong from what the record's own model would show, and what of the difference is left once
+def _unhidden(predicted: Prediction, wrong: Fitted, target: Floats, known: dict[str, Floats]) -> tuple[float, Floats]:
+    """d′ of a rival that is wrong from what the record's own model would leave, and what of the difference is left once
     its parameters have moved. They move twice: what an effect does is not proportional to its parameters.
 
     Raises SpecError when the simulation does not stay finite.
     """
-    information, begun = predicted.known_so_far(), predicted.begun.values
-    derivatives = predicted.tangents(known)
-    delta = target - predicted.shown()
+    information, unknowns = predicted.known_so_far(), predicted.unknowns
+    begun = np.array([predicted.begun[u.name] for u in unknowns])
+    shared = {u.name for u in unknowns}
+    rows = predicted.tangents({n: row for n, row in known.items() if n in shared})
+    derivatives = np.stack(list(rows.values()))
+    delta = predicted.left() - target
     moved = begun + np.linalg.solve(information + derivatives @ derivatives.T, derivatives @ delta)
-    unknowns = predicted.begun.unknowns
     moved = np.clip(moved, [u.low for u in unknowns], [u.high for u in unknowns])
-    own = {p.name for p in wrong.hypothesis.free}
-    kept = {name: row for name, row in predicted.named(derivatives).items() if name not in own}
-    derivatives = predicted.tangents(kept, moved)
-    delta, distance = target - predicted.shown(moved), moved - begun
+    own = {p.name for p in wrong.parameters}
+    rows = predicted.tangents({name: row for name, row in rows.items() if name not in own}, moved)
+    derivatives = np.stack(list(rows.values()))
+    delta, distance = predicted.left(moved) - target, moved - begun
     if not np.isfinite(delta).all():
         raise SpecError("the simulation does not stay finite: the control loop is unstable")
     gradient = derivatives @ delta - information @ distance

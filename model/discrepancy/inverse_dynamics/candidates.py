@@ -9,25 +9,38 @@ magnet), the effect alone is tried: two names for one thing would be a group.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from model import layout as at
-from model.discrepancy.candidates.library import FREED_BENDS, is_beside
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, TorqueCase
-from model.discrepancy.inverse_dynamics.starts import Place, Trial, narrowed, starts_of
-from model.discrepancy.inverse_dynamics.tolerances import prior_distance
+from model.discrepancy.engine.fitting import Fit
+from model.discrepancy.engine.lifted import (
+    BENT,
+    FREED_BENDS,
+    expected_of,
+    has_effect,
+    is_beside,
+    lift_priors,
+    stated_trial,
+)
+from model.discrepancy.engine.priors import prior_distance
+from model.discrepancy.engine.probing import Trial
+from model.discrepancy.inverse_dynamics.starts import NONLINEAR, Place, narrowed, starts_of
+from model.discrepancy.options import TorqueOptions
 from model.effects.effect import Effect
 from model.effects.library import library
 from model.fitting.unknowns import Unknown
 from model.inverse_dynamics.recorded_motion import RecordedMotion, turns_round
 from model.inverse_dynamics.recorded_sizes import recorded_sizes
-from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, levels_along
+from model.inverse_dynamics.torque_balance import DIFFERENCE, NOT_IN_TORQUES, levels_along
 from model.machine_model.effect_parameters import suits_drive
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
+SHARES = (1.0, DIFFERENCE)
+"""Shares of a start at which it is tried. Also at the step of the fit's own derivatives: what the tolerances took over
+of an effect would be there twice at its full size, and friction would hold a different part of it where a joint
+turns."""
 TRIED = 2.0
 """Distance, in deviations, from which a number is tried: half of what it takes to be named, because several numbers may
 share one distance."""
@@ -49,19 +62,11 @@ NUMBERS = {
 library that do the same."""
 
 
-def stated_trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) -> Trial | None:
-    """An effect that the file states for this joint: it may be larger or smaller than within its stated deviations."""
-    tolerances = _expected(now)
-    mine = (p for p in model.parameters if p.effect == name and p.joints == joints and p.null is not None)
-    own = tuple(p for p in mine if p.name in tolerances)
-    return _lift_priors(model, name, joints, now, [(p, tolerances[p.name]) for p in own]) if own and joints else None
-
-
-def number_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Trial]:
+def number_trials(model: Model, now: Fit, options: TorqueOptions) -> Iterator[Trial]:
     """The machine's own numbers that the fit has moved, those of one kind on one joint together; where the effects to
     look for are named, those among them."""
-    asked = case.options.effects
-    tolerances = _expected(now)
+    asked = options.effects
+    tolerances = expected_of(now)
     found: dict[tuple[str, tuple[int, ...]], list[tuple[Parameter, Unknown]]] = {}
     for p in model.parameters:
         name, u = NUMBERS.get((p.component, p.part)), tolerances.get(p.name)
@@ -69,7 +74,7 @@ def number_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[T
             continue
         if asked is not None and name not in asked:
             continue
-        if case.options.joints and p.joints[0] not in case.options.joints:
+        if options.joints and p.joints[0] not in options.joints:
             continue
         if not _has_effect(model, p, _is_lower(p, now, tolerances)):
             found.setdefault((name, p.joints), []).append((p, u))
@@ -77,10 +82,10 @@ def number_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[T
         moved = [(p, u) for p, u in numbers if abs(prior_distance(u, now.values[p.name])[0]) >= TRIED]
         if moved:
             # both constants of a motor are of one magnet: one that is held would hold the other
-            yield _lift_priors(model, name, joints, now, numbers if name == "wrong_torque_constant" else moved)
+            yield lift_priors(model, name, joints, now, numbers if name == "wrong_torque_constant" else moved, SHARES)
 
 
-def take_back(effect: str, own: Sequence[Parameter], now: BalanceFit) -> dict[str, float]:
+def take_back(effect: str, own: Sequence[Parameter], now: Fit) -> dict[str, float]:
     """Values with which an effect has taken over what the fit has made of stated numbers, which are as stated again:
     the torques are those of the fit. Empty for effects whose torque is a sum with that of the numbers, where a fit goes
     from one to the other in a step.
@@ -89,7 +94,7 @@ def take_back(effect: str, own: Sequence[Parameter], now: BalanceFit) -> dict[st
     """
     values: dict[str, float] = {}
     for loss in own if effect == "weakened_magnet" else ():
-        both = [u for u in _expected(now).values() if u.parameter.part in MAGNET and u.joints == loss.joints]
+        both = [u for u in expected_of(now).values() if u.parameter.part in MAGNET and u.joints == loss.joints]
         if not both:
             continue
         left = float(np.mean([now.values[u.name] / u.expected for u in both]))
@@ -98,23 +103,7 @@ def take_back(effect: str, own: Sequence[Parameter], now: BalanceFit) -> dict[st
     return values
 
 
-def _expected(now: BalanceFit) -> dict[str, Unknown]:
-    """The unknowns of a fit of which something is expected, by name."""
-    return {u.name: u for u in now.unknowns if u.deviation is not None and not u.nuisance}
-
-
-def _lift_priors(
-    model: Model, name: str, joints: tuple[int, ...], now: BalanceFit, numbers: Sequence[tuple[Parameter, Unknown]]
-) -> Trial:
-    """Stated numbers without their priors."""
-    own = tuple(p for p, _ in numbers)
-    stated = tuple(replace(p, value=u.expected, deviation=u.as_stated.deviation) for p, u in numbers)
-    origin = {p.name: now.values[p.name] for p in own}
-    start = {p.name: origin[p.name] + u.scale for p, u in numbers}
-    return Trial(name, joints, model, own, tuple(origin), (start,), stated, origin)
-
-
-def _is_lower(p: Parameter, now: BalanceFit, tolerances: Mapping[str, Unknown]) -> bool:
+def _is_lower(p: Parameter, now: Fit, tolerances: Mapping[str, Unknown]) -> bool:
     """Whether the fit has lowered a number; of a motor's two constants, the one that is further off says it of both."""
     own = [tolerances[p.name]]
     if p.part in MAGNET:
@@ -134,7 +123,6 @@ def _has_effect(model: Model, p: Parameter, lower: bool) -> bool:
 UNSEEN = ("backlash", "damping")
 """Part of an effect that torques do not show: the damping of a contact acts in its vibration, above every cutoff."""
 SENSOR_EFFECTS = ("potentiometer_gain", "potentiometer_offset", "potentiometer_nonlinearity")
-BENT = "potentiometer_nonlinearity"
 UNDER_LOAD = {"load_dependent_friction": "arm", "gravity_torque_friction": "share"}
 """Effects whose friction goes with a load that the posture decides, and the parameter that multiplies it."""
 SPRINGS = ("spring_torque", "one_sided_spring")
@@ -144,44 +132,47 @@ CONSTANT_LOAD = 0.05
 """Relative change of a load below which it counts as constant."""
 
 
-def list_trials(model: Model, now: BalanceFit, case: TorqueCase) -> Iterator[Trial]:
+def list_trials(now: Fit, records: Sequence[RecordedMotion], options: TorqueOptions) -> Iterator[Trial]:
     """Every effect that the model lacks, joint by joint, and those of the whole machine once; of what the file states,
     whether it is another size than stated; and numbers of the machine that the fit has moved."""
-    names, round_ = case.options.effects, turns_round(case.records, model.machine)
+    model, names = now.fitted_model, options.effects
+    round_ = turns_round(records, model.machine)
     for name, effect in library().items():
         if name in NOT_IN_TORQUES or (names is not None and name not in names):
             continue
         places: list[tuple[int, ...]] = (
-            [()] if effect.whole_machine else [(j,) for j in case.options.joints or model.machine.modelled_joints]
+            [()] if effect.whole_machine else [(j,) for j in options.joints or model.machine.modelled_joints]
         )
         for joints in places:
-            if any(u.name == name and (not joints or set(u.joints) & set(joints)) for u in model.effects):
-                if (again := stated_trial(model, name, joints, now)) is not None:
+            if has_effect(model, name, joints):
+                if (again := stated_trial(model, name, joints, now, SHARES)) is not None:
                     yield again
                 continue
             if not _possible(model, effect, joints) or (names is None and not is_beside(model, name, joints)):
                 continue
-            if name in UNDER_LOAD and _constant_load(model, name, joints[0] - 1, case.records):
+            if name in UNDER_LOAD and _constant_load(model, name, joints[0] - 1, records):
                 continue  # the same torque as Coulomb friction, by a longer name
             if name in SPRINGS and round_[joints[0] - 1]:
                 continue
-            trial = _trial(model, name, joints, now)
+            trial = _trial(model, name, joints, now, records)
             if trial.starts:
                 yield trial
-    yield from number_trials(model, now, case)
+    yield from number_trials(model, now, options)
 
 
-def _trial(model: Model, name: str, joints: tuple[int, ...], now: BalanceFit) -> Trial:
+def _trial(model: Model, name: str, joints: tuple[int, ...], now: Fit, records: Sequence[RecordedMotion]) -> Trial:
     """One effect on one joint, or of the whole machine."""
     wider = model.with_effect(name, joints)
-    place = Place(wider, joints[0] - 1 if joints else 0, now.balance.records, now.residual)
-    sizes = recorded_sizes(wider, now.balance.records)
+    place = Place(wider, joints[0] - 1 if joints else 0, records, now.signals)
+    sizes = recorded_sizes(wider, records)
     added = (
         sizes.get(p.name, p) for p in wider.parameters if p.name not in model.by_name and (p.effect, p.part) != UNSEEN
     )
     own = tuple(narrowed(p, place) for p in added if p.effect != BENT or p.part in FREED_BENDS)
     amplitudes = tuple(p.name for p in own if p.null is not None)
-    return Trial(name, joints, wider, own, amplitudes, tuple(starts_of(name, own, place)))
+    linear = name not in NONLINEAR
+    shares = SHARES if linear else (1.0,)
+    return Trial(name, joints, wider, own, amplitudes, tuple(starts_of(name, own, place)), shares=shares, linear=linear)
 
 
 def _constant_load(model: Model, name: str, column: int, records: Sequence[RecordedMotion]) -> bool:

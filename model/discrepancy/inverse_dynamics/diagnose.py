@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
+from dataclasses import asdict
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.progress import Cancel, Never, Progress, silent
 from daq.contracts.trace import Trace
+from model.discrepancy.controller.evidence import judge_controller
 from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.engine.answer import answer_of, given_fit
+from model.discrepancy.engine.workflow import Workflow
 from model.discrepancy.explanation.answer_words import with_sentences
-from model.discrepancy.inverse_dynamics.answer import answer_of
-from model.discrepancy.inverse_dynamics.fitting import TorqueCase
-from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
+from model.discrepancy.explanation.notes import on_drives_at_limit
+from model.discrepancy.grounds import Note
+from model.discrepancy.inverse_dynamics.case import TorqueCase, torque_case
+from model.discrepancy.inverse_dynamics.tolerances import FITTED_SHARE, tolerances
 from model.discrepancy.options import DiagnosisOptions, TorqueOptions, check_options, torque_options
-from model.discrepancy.output_error.controller_evidence import judge_controller
+from model.inverse_dynamics.drive_limits import find_drives_at_limit
 from model.inverse_dynamics.readings import choose_cutoff
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.inverse_dynamics.repeats import noise_left
+from model.inverse_dynamics.shaking import find_shaking
 from model.inverse_dynamics.torque_balance import NOT_IN_TORQUES, TorqueBalance
 from model.machine_model.model import Model
 
@@ -51,10 +58,34 @@ def diagnose_torques(
     progress(0.0, f"low-passing the records at {cutoff:g} Hz")
     records, held = (recorded_motions(some, model.machine, cutoff) for some in (traces, held_out))
     noise = noise_left(model, traces, TorqueBalance(model, records), cutoff)
-    work = TorqueWorkflow(model, TorqueCase(records, held, noise, chosen), progress, cancel or Never())
+    case = torque_case(model, records, held, noise, chosen)
+    recorded = sum(float(r.time[-1] - r.time[0]) for r in (*records, *held))
+    work = Workflow(case, recorded, progress, cancel or Never())
     work.run()
-    found = with_sentences(answer_of(work, controller, traces, held_out, cutoff))
-    return found.model_copy(update={"seconds": time.perf_counter() - begun})
+    shares = _torque_left(case, work)
+    answer = answer_of(work, controller.steps, traces, held_out, doubted=shares["after"] > 1.0)
+    unseen = {name: why for name, why in NOT_IN_TORQUES.items() if name not in controller.settled}
+    limits = find_drives_at_limit((*records, *held), model.machine.modelled_joints)
+    notes = (
+        *answer.notes_data[: len(answer.notes_data) - len(work.notes)],
+        *_on_torque_left(case, shares, named=answer.verdict in ("named", "ambiguous")),
+        Note(kind="cutoff", values={"cutoff": cutoff}),
+        Note(kind="resting-left-out"),
+        Note(kind="not-looked-for", values={"effects": unseen}),
+        Note(kind="positions-of-links"),
+        *on_drives_at_limit(limits.shares, limits.unknown),
+        _on_tolerances(case),
+        *work.notes,
+        *_on_shaking(model, (*traces, *held_out), traces),
+    )
+    found = answer.model_copy(
+        update={
+            "notes_data": notes,
+            "model_after": controller.with_findings(answer.model_after),
+            "not_examined": find_drives_at_limit(records, model.machine.modelled_joints).not_examined,
+        }
+    )
+    return with_sentences(found).model_copy(update={"seconds": time.perf_counter() - begun})
 
 
 def _refuse_unseen(options: TorqueOptions, settled: Sequence[str]) -> None:
@@ -62,3 +93,36 @@ def _refuse_unseen(options: TorqueOptions, settled: Sequence[str]) -> None:
     for name in options.effects or ():
         if name in NOT_IN_TORQUES and name not in settled:
             raise SpecError(f"effect {name}: cannot be found in torques: {NOT_IN_TORQUES[name]}; leave it out")
+
+
+def _on_tolerances(case: TorqueCase) -> Note:
+    values = {"source": tolerances(case.given)[1], "share": FITTED_SHARE, "fitted": len(case.earlier or {})}
+    return Note(kind="tolerance-source", values=values)
+
+
+def _torque_left(case: TorqueCase, work: Workflow) -> dict[str, float]:
+    """Residual as a share of the recorded torque, by the model as given, with its numbers fitted, and after: the figure
+    that the literature usually gives. NaN where nothing is driven."""
+    fits = {"given": given_fit(case), "before": work.found.first, "after": work.found.now}
+    return {name: case.torque_left(one) for name, one in fits.items()}
+
+
+def _on_torque_left(case: TorqueCase, shares: dict[str, float], *, named: bool) -> tuple[Note, ...]:
+    """These shares; none where nothing is driven. A warning where more is left than there is, and nothing explains why:
+    a spring that is named takes away a torque that the model as given has to supply."""
+    if not math.isfinite(shares["given"]):
+        return ()
+    doubted = max(shares.values()) > 1.0 and not named
+    values = {"held_out": case.held_out is not None, **shares, "doubted": doubted}
+    return (Note(kind="torque-left", values=values, warning=doubted),)
+
+
+def _on_shaking(model: Model, every: Sequence[Trace], traces: Sequence[Trace]) -> tuple[Note, ...]:
+    """A warning about joints that shake faster than torques can be compared; none where none does."""
+    try:
+        cutoff = choose_cutoff(traces, model.machine)
+    except SpecError:  # nothing moves beyond noise, and a cutoff was asked for
+        return ()
+    shaking = find_shaking(every, model.machine, cutoff)
+    values = {"cutoff": cutoff, "joints": [asdict(one) for one in shaking]}
+    return (Note(kind="shakes-above-cutoff", values=values, warning=True),) if shaking else ()

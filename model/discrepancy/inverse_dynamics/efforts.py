@@ -9,8 +9,9 @@ import numpy as np
 from daq.contracts.trace import Trace
 from model.comparison.compare import TraceSignals
 from model.discrepancy.diagnosis import Diagnosis
-from model.discrepancy.inverse_dynamics.estimates import torque_unit
-from model.discrepancy.inverse_dynamics.fitting import Data, fit, stretches_of
+from model.discrepancy.engine.fitting import fit
+from model.discrepancy.inverse_dynamics.localisation import torque_unit
+from model.discrepancy.inverse_dynamics.residual import TorqueResidual, samples_of
 from model.inverse_dynamics.drive_timing import timing_unknowns
 from model.inverse_dynamics.recorded_motion import recorded_motions
 from model.inverse_dynamics.torque_balance import TorqueBalance
@@ -44,9 +45,9 @@ def _efforts(found: Diagnosis, trace: Trace, cutoff: float, is_held_out: bool) -
     records = recorded_motions([trace], model.machine, cutoff)
     recorded = TorqueBalance(model, records).supplied_by_drive()[0]
     floors = np.array([error.floor for error in found.rmse_fit])
-    data = Data(stretches_of(records), np.maximum(floors, 1e-12))
+    samples, floor = samples_of(records), np.maximum(floors, 1e-12)
     asked = (
-        recorded + fit(TorqueBalance(one, records), timing_unknowns(one), {}, data).residual[0]
+        recorded + fit(TorqueResidual(TorqueBalance(one, records), samples, floor), timing_unknowns(one), {}).signals[0]
         for one in (model, found.model_after)
     )
     moving = records[0].moving

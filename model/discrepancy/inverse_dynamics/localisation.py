@@ -18,8 +18,7 @@ from model.discrepancy.diagnosis import (
     Where,
     WorstPlace,
 )
-from model.discrepancy.inverse_dynamics.estimates import torque_unit
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, TorqueCase
+from model.discrepancy.engine.fitting import Fit
 from model.discrepancy.localisation.disagreement import WINDOW
 from model.discrepancy.localisation.statistics import (
     LEAST,
@@ -34,6 +33,7 @@ from model.discrepancy.localisation.statistics import (
 )
 from model.discrepancy.localisation.structure import LINE
 from model.inverse_dynamics.recorded_motion import RecordedMotion
+from model.machine_model.model import Model
 
 FAST = 0.5
 """Acceleration above which a joint starts to move or turns back, as a share of its larger ones (95 % quantile)."""
@@ -56,20 +56,25 @@ def phases(record: RecordedMotion, joint: int) -> list[Phase]:
     return [names[k] for k in number]
 
 
-def locate(now: BalanceFit, case: TorqueCase) -> Where:
-    """Map of the residual, in units of its noise, and the quantities that it depends on."""
-    model, records, residual, noise = now.balance.model, now.balance.records, now.residual, case.noise
+def torque_unit(model: Model, joint: int) -> str:
+    """N·m, or N on a prismatic joint."""
+    return "N·m" if model.machine.joint(joint).kind == "revolute" else "N"
+
+
+def locate(now: Fit, records: Sequence[RecordedMotion], noise: Floats) -> Where:
+    """Map of the residual, in units of its noise (n,), and the quantities that it depends on."""
+    model, residual, samples = now.model, now.signals, now.compared.samples
     cells: list[PhaseCell] = []
     dependences: list[Dependence] = []
     places: list[WorstPlace] = []
-    sizes = np.sqrt(case.stretches.mean_squares(residual))
+    sizes = np.sqrt(now.squares)
     for j, joint in enumerate(model.machine.modelled_joints):
-        pieces = case.stretches.of_joint(residual, j)
+        pieces = samples.pieces(residual, j)
         if not pieces or not np.isfinite(sizes[j]):
             continue
         correlation = correlation_of([p / noise[j] for p in pieces], LEAST)
         squares: dict[Phase, float] = {}
-        for i, rows in case.stretches.by_joint[j]:
+        for i, rows in samples.runs[j]:
             record = records[i]
             named = phases(record, j)
             size = max(1, round(WINDOW / (record.period * record.every)))
@@ -91,8 +96,8 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
                         trace=i,
                     )
                 )
-        signal, floor = _signal(now, case, j)
-        dependences += table_of(signal, j, joint, _quantities(now, case, j), floor)
+        signal, floor = _signal(now, j), LEAST * float(noise[j])
+        dependences += table_of(signal, j, joint, _quantities(now, records, j), floor)
         phase = max(squares, key=lambda p: squares[p])
         relative = float(sizes[j]) / noise[j]
         rms, unit = relative * noise[j], torque_unit(model, joint)
@@ -112,15 +117,15 @@ def locate(now: BalanceFit, case: TorqueCase) -> Where:
     )
 
 
-def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape, ...]:
+def remaining_shapes(now: Fit, records: Sequence[RecordedMotion], noise: Floats) -> tuple[RemainingShape, ...]:
     """Per joint, the dependence that explains most of a torque beyond noise, where there is a significant one."""
-    model, found = now.balance.model, []
-    sizes = np.sqrt(np.nan_to_num(case.stretches.mean_squares(now.residual)))
+    model, found = now.model, []
+    sizes = np.sqrt(np.nan_to_num(now.squares))
     for j, joint in enumerate(model.machine.modelled_joints):
-        if sizes[j] < BEYOND_NOISE * case.noise[j]:
+        if sizes[j] < BEYOND_NOISE * noise[j]:
             continue
-        signal, floor = _signal(now, case, j)
-        known = _quantities(now, case, j)
+        signal, floor = _signal(now, j), LEAST * float(noise[j])
+        known = _quantities(now, records, j)
         every = [(bins, against, False) for against, bins in dependences(signal, j, known, floor)]
         # friction of a tight spot changes its sign with the motion: its mean over both directions shows nothing
         rubs = dependence(-signal * known.values["direction"][:, j], j, "position", known, floor)
@@ -144,11 +149,10 @@ def remaining_shapes(now: BalanceFit, case: TorqueCase) -> tuple[RemainingShape,
     return tuple(found)
 
 
-def is_function_of(torque: Sequence[Floats], now: BalanceFit, case: TorqueCase, j: int) -> bool:
+def is_function_of(torque: Sequence[Floats], now: Fit, noise: Floats, j: int) -> bool:
     """Whether much of what is left on a joint (index) is a function of a torque (m, n) of every record."""
-    signal, floor = _signal(now, case, j)
-    known = Quantities({"drive": np.concatenate(list(torque))}, {}, _stretches(now, case, j))
-    bins = dependence(signal, j, "drive", known, floor)
+    known = Quantities({"drive": np.concatenate(list(torque))}, {}, _stretches(now, j))
+    bins = dependence(_signal(now, j), j, "drive", known, LEAST * float(noise[j]))
     return bins is not None and bins.significance > LINE and bins.explained >= CLEAR_SHAPE
 
 
@@ -156,20 +160,20 @@ def _time(record: RecordedMotion, row: int) -> float:
     return round(float(record.time[record.edge] + row * record.every * record.period - record.time[0]), 4)
 
 
-def _signal(now: BalanceFit, case: TorqueCase, j: int) -> tuple[Floats, float]:
-    """The residual (m,) of a joint (index), all records in a row, and the least deviation that it can have."""
-    return np.concatenate(list(now.residual))[:, j], LEAST * float(case.noise[j])
+def _signal(now: Fit, j: int) -> Floats:
+    """The residual (m,) of a joint (index), all records in a row."""
+    return np.concatenate(list(now.signals))[:, j]
 
 
-def _stretches(now: BalanceFit, case: TorqueCase, j: int) -> tuple[slice, ...]:
+def _stretches(now: Fit, j: int) -> tuple[slice, ...]:
     """Where a joint (index) moves, all records in a row."""
-    begins = np.cumsum([0, *(len(r) for r in now.residual)])
-    return tuple(slice(int(begins[i]) + s.start, int(begins[i]) + s.stop) for i, s in case.stretches.by_joint[j])
+    begins = np.cumsum([0, *(len(r) for r in now.signals)])
+    runs = now.compared.samples.runs[j]
+    return tuple(slice(int(begins[i]) + s.start, int(begins[i]) + s.stop) for i, s in runs)
 
 
-def _quantities(now: BalanceFit, case: TorqueCase, j: int) -> Quantities:
+def _quantities(now: Fit, records: Sequence[RecordedMotion], j: int) -> Quantities:
     """What the residual of a joint (index) may depend on, where it moves."""
-    records = now.balance.records
     times = [np.repeat((r.time[r.rows] - r.time[0])[:, None], r.speed.shape[1], axis=1) for r in records]
     speed = np.concatenate([r.speed[r.rows] for r in records])
     values: dict[AgainstWhat, Floats] = {
@@ -179,4 +183,4 @@ def _quantities(now: BalanceFit, case: TorqueCase, j: int) -> Quantities:
         "direction": np.sign(speed),
         "drive": np.concatenate([r.drive[r.rows] for r in records]),
     }
-    return Quantities(values, units_of(now.balance.model.machine), _stretches(now, case, j))
+    return Quantities(values, units_of(now.model.machine), _stretches(now, j))

@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from model import layout as at
+from model.arrays import Floats
+from model.discrepancy.engine.candidate import Fitted
+from model.discrepancy.engine.fitting import Fit, found_values
+from model.discrepancy.engine.lifted import BENT, LIMIT, ends_at_bound, is_far_everywhere
+from model.discrepancy.engine.search import cost_of
 from model.discrepancy.excitation import own_frequencies
-from model.discrepancy.inverse_dynamics.estimates import found_values
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, TorqueCase, minus_twice_log_likelihood, noise_model
-from model.discrepancy.inverse_dynamics.search import Fitted, cost_of
+from model.discrepancy.inverse_dynamics.residual import TorqueResidual
 from model.discrepancy.localisation.structure import CLIP
+from model.discrepancy.options import TorqueOptions
 from model.discrepancy.thresholds import LARGER_PART
 from model.inverse_dynamics.drive_timing import DELAY, MOST
-from model.inverse_dynamics.recorded_motion import holds_drive_between_samples
+from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-from model.machine_model.record_verdict import FAR_OFF
 
 OF_CHANGES = frozenset({"joint_compliance", "backlash", "input_delay", "motor_inductance"})
 """Effects whose torque follows how a torque changes in time: they cut short or shift what is fast, and noise of
 accelerations, or a gear that rattles, is fast."""
-LIMIT = "supply_limit"
-"""The effect of a drive that gives no more than a limit."""
 REPEATING = "periodic_disturbance"
 """The effect of a torque that repeats in time."""
-BENT = "potentiometer_nonlinearity"
-"""The effect of a reading that bends over the sensor's range."""
 MOST_UNEVEN = 0.6
 """Largest change of a bent sensor's scale over its range, as a share: a potentiometer that is loaded with twice its own
 resistance comes to 0.5. Rigs whose friction had a tight spot, and gears that gave, were told as sensors of which the
@@ -52,33 +50,33 @@ IMPOSSIBLE_ENDS = {("stribeck_friction", "speed"): "high", ("resistance_rise", "
 """Ends of a shape that are another effect: no record shows that friction fades at the highest speed, and Coulomb
 friction is the simpler law; no copper is as warm as it gets at once, and what is more at once than before is friction
 or a lost part of the drive."""
-AT_END = 1e-6
-"""Share of a bound within which a size is at it."""
 
 
-def is_resolved(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
+def is_resolved(
+    found: Fitted, before: Fit, records: Sequence[RecordedMotion], noise: Floats, options: TorqueOptions
+) -> bool:
     """Whether the records can tell this effect from a sound rig.
 
     Args:
-        before: the fit without the effect.
+        before: the fit without the effect. noise: (n,) standard deviation of a residual of which only noise is left.
     """
-    if _is_of_no_machine(found) or _repeats_with_motion(found, case):
+    if _is_of_no_machine(found, records) or _repeats_with_motion(found, records):
         return False
-    plain = _takes_half_of_what_is_no_noise(found, before, case)
+    plain = _takes_half_of_what_is_no_noise(found, before, noise)
     if not plain and _ends(found, UNRESOLVED_ENDS):
         return False
     if sizes_at_bounds(found) or not is_far_everywhere(found.stated, found.fit.values):
         return False
     if found.effect not in OF_CHANGES or plain:
         return True
-    return slower_evidence(found, before, case) >= case.options.least_evidence
+    return slower_evidence(found, before, records) >= options.least_evidence
 
 
-def _is_of_no_machine(found: Fitted) -> bool:
+def _is_of_no_machine(found: Fitted, records: Sequence[RecordedMotion]) -> bool:
     """Whether an effect as it was fitted is how drives are formed, or what no machine does in the recorded motion."""
-    if found.effect == DELAY and _may_be_timing(found):
+    if found.effect == DELAY and _may_be_timing(found, records):
         return True
-    return _ends(found, IMPOSSIBLE_ENDS) or _is_uneven(found) or _is_hardly_reached(found)
+    return _ends(found, IMPOSSIBLE_ENDS) or _is_uneven(found) or _is_hardly_reached(found, records)
 
 
 def _ends(found: Fitted, ends: Mapping[tuple[str, str], str]) -> bool:
@@ -90,23 +88,22 @@ def _ends(found: Fitted, ends: Mapping[tuple[str, str], str]) -> bool:
     return False
 
 
-def _takes_half_of_what_is_no_noise(found: Fitted, before: BalanceFit, case: TorqueCase) -> bool:
+def _takes_half_of_what_is_no_noise(found: Fitted, before: Fit, noise: Floats) -> bool:
     """Whether on every joint of an effect five times the noise is left without it, and half of that with it: no noise
     imitates that, however fast it is."""
     own = np.array([j in found.joints for j in found.model.machine.modelled_joints])
-    first, last = (case.stretches.mean_squares(fit.residual)[own] for fit in (before, found.fit))
-    return bool(own.any() and (first > (CLIP * case.noise[own]) ** 2).all() and (last < LARGER_PART * first).all())
+    first, last = (fit.squares[own] for fit in (before, found.fit))
+    return bool(own.any() and (first > (CLIP * noise[own]) ** 2).all() and (last < LARGER_PART * first).all())
 
 
-def slower_evidence(found: Fitted, before: BalanceFit, case: TorqueCase) -> float:
+def slower_evidence(found: Fitted, before: Fit, records: Sequence[RecordedMotion]) -> float:
     """Evidence of an effect, as it was fitted, in torques low-passed at a share `SLOWER` of the cutoff."""
-    data = found.fit.data
-    floor = data.floor * SLOWER**2.5
-    slower = tuple(record.slower(SLOWER) for record in case.records)
-    first, last = (TorqueBalance(fit.balance.model, slower).residual(fit.values) for fit in (before, found.fit))
-    memory = noise_model(data.stretches, last, floor).memory
-    fell = [minus_twice_log_likelihood(data.stretches, r, memory, floor).sum() for r in (first, last)]
-    return float(fell[0] - fell[1]) - cost_of(before, memory, len(found.parameters), 1)
+    samples, floor = found.fit.compared.samples, found.fit.compared.floor * SLOWER**2.5
+    slower = tuple(record.slower(SLOWER) for record in records)
+    both = [TorqueResidual(TorqueBalance(fit.model, slower), samples, floor) for fit in (before, found.fit)]
+    rows = [samples.flat(one.at(fit.values)) for one, fit in zip(both, (before, found.fit), strict=True)]
+    (first, last), memory = both[0].descriptions(rows)
+    return float((first - last).sum()) - cost_of(before, memory, len(found.parameters), 1)
 
 
 def _is_uneven(found: Fitted) -> bool:
@@ -117,12 +114,12 @@ def _is_uneven(found: Fitted) -> bool:
     return any(steepest_bend(model, joint) > MOST_UNEVEN for joint in found.joints)
 
 
-def _is_hardly_reached(found: Fitted) -> bool:
+def _is_hardly_reached(found: Fitted, records: Sequence[RecordedMotion]) -> bool:
     """Whether this is a limit above which the drive hardly ever is."""
     if found.effect != LIMIT:
         return False
     for p in found.parameters:
-        drives = np.concatenate([np.abs(r.commanded[:, p.joints[0] - 1]) for r in found.fit.balance.records])
+        drives = np.concatenate([np.abs(r.commanded[:, p.joints[0] - 1]) for r in records])
         if np.mean(drives > found.fit.values[p.name]) < LIMITED:
             return True
     return False
@@ -139,57 +136,26 @@ def steepest_bend(model: Model, joint: int) -> float:
     return float(np.abs(slope).max()) / sensor.range.value
 
 
-def _may_be_timing(found: Fitted) -> bool:
+def _may_be_timing(found: Fitted, records: Sequence[RecordedMotion]) -> bool:
     """Whether this delay may be how the drive is formed and held: on some joint the lower end of its interval is not
     beyond what such a drive may be late by."""
     if holds_drive_between_samples(found.model.machine):
         return False
-    most = MOST * max(record.sampled for record in found.fit.balance.records)
+    most = MOST * max(record.sampled for record in records)
     estimates = found_values(found.fit, found.parameters).values()
     return any(e.low is None or e.low <= most for e in estimates)
 
 
-def _repeats_with_motion(found: Fitted, case: TorqueCase) -> bool:
+def _repeats_with_motion(found: Fitted, records: Sequence[RecordedMotion]) -> bool:
     """Whether a disturbance repeats as often as the motion itself: then it goes with the motion, as every torque that
     is a little wrong does."""
     if found.effect != REPEATING:
         return False
     rates = [found.fit.values[p.name] for p in found.parameters if p.part == "frequency"]
-    speeds = [record.speed for record in case.records]
-    return bool(own_frequencies(np.array(rates), speeds, case.records[0].period).any())
+    speeds = [record.speed for record in records]
+    return bool(own_frequencies(np.array(rates), speeds, records[0].period).any())
 
 
 def sizes_at_bounds(found: Fitted) -> list[Parameter]:
     """Sizes of an effect that ended at the end of what they may be."""
     return [p for p in found.parameters if ends_at_bound(p, found.fit.values[p.name])]
-
-
-def ends_at_bound(p: Parameter, value: float) -> bool:
-    """Whether a size, or the rate of a tone, ended at the end of what it may be, where a fit would go on: no machine
-    has it, and what it takes is something else. The slowest ripple is a spring."""
-    is_shape = p.effect is not None and p.null is None and p.rate_of is None
-    if is_shape or p.effect == LIMIT:  # records bound a limit
-        return False
-    ends = [bound for bound in (p.low, p.high) if math.isfinite(bound) and bound != p.null]
-    return any(abs(value - end) <= AT_END * max(abs(end), p.deviation or 0.0) for end in ends)
-
-
-def is_far_everywhere(stated: Sequence[Parameter], values: Mapping[str, float]) -> bool:
-    """Whether every joint of which the file states numbers has one that is far from that: an effect on several joints
-    names all of them. True where none are stated."""
-    joints = {p.joints for p in stated}
-    return joints == {p.joints for p in stated if is_far(p, values[p.name])}
-
-
-def is_far(p: Parameter, value: float) -> bool:
-    """Whether a number is far from what the file states.
-
-    Friction is stated to a share of itself, and that roughly: twice and half as much are then equally far. In distances
-    no number down to zero is far from one that is stated to a quarter of itself or worse; and a file that states a
-    third of a friction, to 30 % of that, is off by two of the deviations of what is there, and by seven of its own.
-    A machine's own numbers are far by their distance.
-    """
-    deviation = p.deviation or 0.0
-    if p.effect is None or p.low < 0.0 or p.value <= 0.0:
-        return abs(value - p.value) > FAR_OFF * deviation
-    return value <= 0.0 or abs(math.log(value / p.value)) > FAR_OFF * deviation / p.value

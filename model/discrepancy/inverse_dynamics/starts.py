@@ -3,49 +3,36 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from daq.contracts.machine import NoController
 from model import layout as at
 from model.arrays import Floats
-from model.discrepancy.candidates.library import MOST_OF_A_RECORD, TRIED_QUANTILES
-from model.discrepancy.candidates.tones import USUAL_TONES
+from model.discrepancy.engine.lifted import MOST_OF_A_RECORD, TRIED_QUANTILES
+from model.discrepancy.engine.probing import Start
 from model.discrepancy.excitation import own_frequencies
 from model.inverse_dynamics.drive_timing import MOST
 from model.inverse_dynamics.recorded_motion import RESOLVED, RecordedMotion
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
 
-Start = dict[str, float]
-
-
-@dataclass(frozen=True)
-class Trial:
-    """An effect on joints, with its own parameters and the starting values from which it is tried.
-
-    amplitudes: its parameters (full names) that measure its size; the others only shape it.
-    stated: those of its parameters that the file states, as it states them: the trial lifts their priors. Its starts
-        are then measured from where the tolerances' fit has them, `origin`, and not from nothing.
-    """
-
-    effect: str
-    joints: tuple[int, ...]
-    model: Model
-    parameters: tuple[Parameter, ...]
-    amplitudes: tuple[str, ...]
-    starts: tuple[Start, ...]
-    stated: tuple[Parameter, ...] = ()
-    origin: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def size(self) -> int:
-        """Parameters that the effect adds."""
-        return len(self.parameters)
-
-
+NONLINEAR = frozenset(
+    {
+        "dead_zone",
+        "amplifier_threshold",
+        "supply_limit",
+        "input_delay",
+        "motor_inductance",
+        "resistance_drift",
+        "resistance_rise",
+        "backlash",
+        "joint_compliance",
+    }
+)
+"""Effects whose torque is far from linear in their size."""
 LEAST_OF_WAVE = 0.8
 """Least share of a ripple's wave within the travel of a joint: a slower one is a spring."""
 
@@ -180,6 +167,8 @@ WINDING_SHARES = (0.01, 0.1)
 are tried."""
 PLAY_SHARES = (0.0005, 0.003, 0.02)
 """Free play that is tried, as a share of the joint's travel."""
+USUAL_TONES = 500
+"""Rates at which a tone is looked for."""
 FASTEST_RIPPLE = 1000.0
 """Fastest ripple that is tried, in rad of phase per rad (m)."""
 

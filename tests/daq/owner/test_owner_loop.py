@@ -21,8 +21,8 @@ from daq.link import Link, LinkState
 from daq.owner import long_orders, stop_socket
 from daq.owner import speaker as module
 from daq.owner.guardian import EndCause, Guardian
-from daq.owner.loop import serve
-from daq.owner.messages import BEGINS_WITHIN, REPORT, Answer, MoveGripper, Open, Reset, RunProgram
+from daq.owner.loop import _watch, serve
+from daq.owner.messages import BEGINS_WITHIN, REPORT, Answer, EventHappened, MoveGripper, Open, Reset, RunProgram
 from daq.owner.owned_robot import OwnedRobot
 from daq.owner.quick_orders import carry_out
 from daq.owner.speaker import Speaker
@@ -375,4 +375,44 @@ def test_a_reader_that_does_not_read_costs_no_time(pipe: tuple[int, int], monkey
         for _ in range(200):  # 2 MB: no pipe takes that, nor do 50 waiting reports
             speaker.progress(0.5, text)
         assert speaker.dropped > 0
-        os.close(reader)
+        with os.fdopen(reader, "rb") as heard:
+            told = next(line for line in heard if b'"missing"' in line)
+    assert isinstance(report := REPORT.validate_json(told), EventHappened)
+    assert f"{speaker.dropped} reports" in report.event.message
+
+
+def test_a_period_that_began_before_the_reset_is_no_new_stop(scene: Scene) -> None:
+    """The board computes for a while in each period, and then tells whether it was stopped when the period began."""
+    controller, board = scene.robot.controller, scene.endpoint.board
+    begun = board.tick
+    while board.tick == begun:
+        controller.clock.sleep_until(controller.clock.now() + 1e-3)
+    scene.reset(here=False)
+    _watch(scene.robot, None)
+    assert not scene.is_stopped()
+    board.freeze()
+    _watch(scene.robot, _watch(scene.robot, None))
+    assert scene.is_stopped()
+
+
+def test_watchers_get_every_period_that_passes_between_two_activities() -> None:
+    """While a move is planned or a file is opened, nobody asks for samples; the bridge keeps 64 of them."""
+    controller = WatchedController(Link(cast(Any, InProcess(Bridge, sample=True))))
+    ticks: list[int] = []
+    lost: list[tuple[int, int]] = []
+    controller.listener = lambda snapshot: ticks.append(snapshot.tick)
+    controller.lost = lambda count, tick: lost.append((count, tick))
+
+    def pass_periods(count: int) -> None:
+        controller.clock.sleep_until(controller.clock.now() + count * controller.period_s)
+        controller.next_snapshot()
+
+    for _ in range(3):
+        pass_periods(5)
+    assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
+    assert (controller.counters.late, controller.counters.missing_samples, lost) == (0, 0, [])
+    until = ticks[-1]
+    pass_periods(100)
+    ((count, tick),) = lost
+    assert ticks[ticks.index(until) + 1 :] == list(range(tick, ticks[-1] + 1))
+    assert tick - until - 1 == count > 0

@@ -16,10 +16,10 @@ from daq.contracts.errors import OrderFailedError
 from daq.contracts.experiment import ExperimentSpec, Pause
 from daq.driver import Controller
 from daq.link import LinkError
-from daq.owner import client
+from daq.owner import client, start
 from daq.owner.client import OwnerOnDemand
 from daq.owner.late_stop import deliver_late_stop
-from daq.owner.messages import Answer, CannotOpen, EventHappened, Finished, HaltRun, Report, RunExperiment
+from daq.owner.messages import REPORT, Answer, CannotOpen, EventHappened, Finished, HaltRun, Report, RunExperiment
 from daq.owner.stop_socket import request_stop
 from daq.traces.reader import read_trace
 from daq.traces.salvage import salvage_folder
@@ -234,6 +234,15 @@ def test_an_owner_that_is_killed_is_told_in_one_line(tmp_path: Path) -> None:
     assert lost.value.exit_code == exit_codes.PROGRAM_FAULT
 
 
+def test_an_owner_started_early_is_the_next_one_and_ends_with_a_client_that_needs_none(tmp_path: Path) -> None:
+    start.start_early()
+    (early,) = start._early
+    with OwnerOnDemand(opening(tmp_path)) as owner:
+        assert owner.pid == early.pid
+    output, _ = start.start_owner().communicate(timeout=60)
+    assert isinstance(REPORT.validate_json(output), CannotOpen)
+
+
 def test_an_owner_that_does_not_end_is_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The wait for it is given up; here at once."""
     deaf = """
@@ -241,7 +250,7 @@ import os, signal, sys, threading
 os.write(1, b'{"kind":"opened","identity":{"simulated":true,"protocol":1,"period":0.02,"boots":0}}\\n')
 threading.Event().wait(100)
 """
-    monkeypatch.setattr(client, "PROGRAM", (sys.executable, "-c", deaf))
+    monkeypatch.setattr(start, "PROGRAM", (sys.executable, "-c", deaf))
     monkeypatch.setattr(client, "OWN_GRACE", 0.0)
     before = threading.active_count()
     with OwnerOnDemand(opening(tmp_path)):

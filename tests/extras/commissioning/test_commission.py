@@ -25,7 +25,7 @@ from extras.commissioning.command.record import Record
 from extras.commissioning.command.sheet import acceptance_sheet, addresses_of, memory_picture
 from extras.commissioning.command.steps import STEPS, lacking, resting_on, step_named
 from extras.commissioning.memory.procedure import Task, is_alive, release, switched_off_and_on
-from extras.commissioning.person.memory_page import UnprovedWriteError, open_page
+from extras.commissioning.person.memory_page import open_page
 from extras.commissioning.person.pressed import KEEP_PRESSED, EmergencyStop
 from extras.commissioning.person.terminal_operator import Lines, TerminalOperator, words
 from extras.commissioning.potentiometer import Interval, Potentiometer
@@ -56,11 +56,11 @@ def test_without_a_robot_nothing_is_watched(daq: CommandLine) -> None:
 def test_a_byte_of_which_nothing_is_proved_is_not_written() -> None:
     with open_page(MOCK, default_memory_map()) as page:
         before = page.read_byte(0xFC00)
-        with pytest.raises(UnprovedWriteError, match="FC00"):
+        with pytest.raises(SafetyError, match="FC00"):
             page.write_byte(0xFC00, before)
         page.prove([0xFC00])
         page.write_byte(0xFC00, before)
-        with pytest.raises(UnprovedWriteError, match="FC01"):
+        with pytest.raises(SafetyError, match="FC01"):
             page.write_byte(0xFC01, 0)
 
 

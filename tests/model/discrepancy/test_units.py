@@ -9,17 +9,15 @@ import pytest
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
-from model.discrepancy.candidates.library import hypotheses
-from model.discrepancy.candidates.probing import probe
 from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.engine.fitting import evaluate
 from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.output_error.observation import observe
-from model.discrepancy.output_error.search import point_at
 from model.discrepancy.workflow import diagnose
 from model.machine_model.model import base_model
 from tests.model.discrepancy import outside_arm
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.discrepancy.inverse_dynamics.test_example import ROOT, written
+from tests.model.discrepancy.readings.cases import case_of, probes
 from tests.model.discrepancy.units import in_unit, recorded
 
 Rig = Callable[[Path], tuple[Machine, Sequence[Trace]]]
@@ -109,10 +107,11 @@ def test_what_probes_of_a_closed_loop_promise_is_the_same_in_every_unit(name: st
     promised = []
     for factor in (1.0, *FACTORS):
         known = base_model(in_unit(machine, factor))
-        observation, given = observe(known, [recorded(trace, factor)])
-        point = point_at(observation, given)
         kinds = ("dead_zone", "coulomb_friction", "resistance_drift", "spring_torque")
-        promised.append([p.gain for p in probe(point, hypotheses(known, kinds, scales=observation.scales))])
+        case = case_of(known, [recorded(trace, factor)], effects=kinds)
+        unknowns = case.unknowns(case.given, {})
+        given = evaluate(case.compared, unknowns, {u.name: u.start for u in unknowns}, np.ones(len(case.noise)))
+        promised.append([p.gain for p in probes(case, given)])
     for other in promised[1:]:
         assert np.array(other) == pytest.approx(np.array(promised[0]), rel=1e-3, abs=1e-3)
     assert max(promised[0]) > 10

@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from daq.contracts.machine import Machine
 from model.arrays import Floats
-from model.discrepancy.inverse_dynamics.fitting import stretches_of
+from model.discrepancy.inverse_dynamics.residual import samples_of
 from model.inverse_dynamics.recorded_motion import RecordedMotion, derivative, low_pass, turns_round
 from tests.model.discrepancy.inverse_dynamics.rigs import bench_machine, slide_machine
 from tests.model.inverse_dynamics.driven_slide import CUTOFF, PERIOD, TIME, controlled, motion_of
@@ -172,14 +172,14 @@ def test_dimensions_that_are_projected_away_count_as_no_samples() -> None:
     record, free, lost = (motion_of(d) for d in (standing(0.12, 0.8), 4.0 * np.sin(2.7 * TIME), standing(0.16, 0.32)))
     assert free.unknown_count.tolist() == [0]
     assert lost.unknown_count.tolist() == lost.moving.sum(axis=0).tolist()
-    own, every = (stretches_of([one]) for one in (record, free))
+    own, every = (samples_of([one]) for one in (record, free))
     rows = sum(r.stop - r.start for _, r in own.by_joint[0])
     assert 0 < record.unknown_count[0] < rows
     assert own.counts.tolist() == [rows - record.unknown_count[0]]
     white = np.random.default_rng(2).standard_normal((len(record.moving), 1))
     assert float(own.mean_squares([record.subtract_unknown(white)])[0]) == pytest.approx(1.0, abs=0.25)
     assert every.counts[0] == every.samples == sum(r.stop - r.start for _, r in every.by_joint[0])
-    assert np.isnan(stretches_of([lost]).mean_squares([lost.subtract_unknown(white)])[0])
+    assert np.isnan(samples_of([lost]).mean_squares([lost.subtract_unknown(white)])[0])
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from daq.contracts.machine import load_machine
 from daq.contracts.trace import Trace
 from mock_controller.board.parameters import default_board
 from mock_controller.hidden.sensors import draw_sensors
-from model.discrepancy.output_error.controller_evidence import check_controller
-from model.discrepancy.output_error.observation import STEP as STEP_OF_DIAGNOSES
+from model.discrepancy.controller.evidence import check_controller
+from model.discrepancy.readings.observation import STEP as STEP_OF_DIAGNOSES
 from model.effects.library import library
 from model.fitting.fit import fit
 from model.fitting.options import FitOptions

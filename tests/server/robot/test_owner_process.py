@@ -13,6 +13,7 @@ from daq.contracts.errors import DaqError, ReachError
 from daq.contracts.machine import load_machine
 from daq.owner.client import OwnerGoneError, OwnerProcess
 from daq.owner.messages import Open, ReadGains, Report, TeachingText
+from daq.owner.start import start_owner
 from daq.transport import ReconnectDelay
 from server.robot.keeper import Keeper
 from server.robot.robot import Robot, RobotPlace
@@ -28,7 +29,8 @@ Start = Callable[..., OwnerProcess]
 
 def killed_after(output: str) -> Start:
     """Starts an owner that is a program which writes something, reads its first order, and kills itself."""
-    return partial(OwnerProcess, program=("sh", "-c", f"printf '%s' '{output}'; read -r order; kill -9 $$"))
+    program = ("sh", "-c", f"printf '%s' '{output}'; read -r order; kill -9 $$")
+    return partial(OwnerProcess, process=start_owner(program))
 
 
 @pytest.mark.parametrize("output", [HALF, f"{HALF}\n", f"no JSON\n{HALF}", ""])

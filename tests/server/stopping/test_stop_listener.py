@@ -23,6 +23,7 @@ from sqlalchemy import text
 
 from daq.client import Client
 from daq.config.service import ServiceSettings
+from daq.contracts.errors import ReachError
 from daq.contracts.service.robot import StopResult
 from daq.owner.stop_socket import FOLDER_VARIABLE
 from server.access.caller import LOCAL, Caller
@@ -32,7 +33,7 @@ from server.access.sessions import SessionStore
 from server.access.stop_gate import StopGate, TokensCannotBeReadError
 from server.access.tokens import KnownTokens, TokenStore
 from server.problems import ProblemError
-from server.serve import ListenError, listening
+from server.serve import listening
 from server.stopping.door import StopDoor
 from server.stopping.listener import OnStop, Stop, StopListener
 from server.stopping.messages import Begin
@@ -485,5 +486,5 @@ def test_a_service_whose_stop_cannot_be_listened_for_does_not_start() -> None:
         taken.listen()
         port = taken.getsockname()[1]
         line = f"server.host 127.0.0.1, server.stop_port {port}: cannot be listened at"
-        with pytest.raises(ListenError, match=line), listening(ServiceSettings(port=0, stop_port=port)):
+        with pytest.raises(ReachError, match=line), listening(ServiceSettings(port=0, stop_port=port)):
             pass

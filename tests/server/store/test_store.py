@@ -5,9 +5,10 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
-from sqlalchemy import text
+from sqlalchemy import event, text
 
 from daq.config.service import ServiceSettings
+from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.experiments import ExperimentRequest
 from daq.contracts.service.jobs import DiagnoseRequest
@@ -16,7 +17,7 @@ from server.experiments.states import Event
 from server.problems import ProblemError
 from server.stopping.tokens import reader_of
 from server.store.address import address_of
-from server.store.engine import Store, StoreError
+from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.lock import sqlite_file
@@ -54,7 +55,7 @@ def test_a_folders_name_is_no_syntax_of_an_address(tmp_path: Path, name: str) ->
 def test_a_database_of_another_version_is_refused(store: Store) -> None:
     with store.writing() as session:
         session.execute(text("UPDATE alembic_version SET version_num='9999'"))
-    with pytest.raises(StoreError, match="cannot be brought up to date"):
+    with pytest.raises(SpecError, match="cannot be brought up to date"):
         store.migrate()
 
 
@@ -118,6 +119,24 @@ def test_what_ended_last_comes_first_whenever_it_was_submitted(store: Store) -> 
     found = [one.id for one in (*first.items, *rest.items)]
     assert (set(found[:2]), set(found[2:])) == ({made[4], made[1]}, {made[2], made[0]})
     assert rest.next is None
+
+
+def test_a_page_that_many_ask_for_is_read_once_until_something_is_written(store: Store) -> None:
+    experiments, traces, sent = ExperimentStore(store), TraceStore(store), []
+    experiments.submit("ma2000", ExperimentRequest(), NOW, "anna")
+    traces.insert(new_trace(1))
+    event.listen(store.engine, "before_cursor_execute", lambda *told: sent.append(told[2]))
+
+    def listed() -> tuple[int, int, int]:
+        before = len(sent)
+        counts = len(experiments.page("ma2000", (), None, None, 5).items), len(_found(traces))
+        return *counts, len(sent) - before
+
+    assert listed()[:2] == (1, 1)
+    assert listed() == (1, 1, 0)
+    experiments.submit("ma2000", ExperimentRequest(), NOW, "bert")
+    traces.remove("ma2000", new_trace(1).id)
+    assert listed()[:2] == (2, 0)
 
 
 def test_pages_leave_nothing_out_and_double_nothing_while_rows_come(store: Store) -> None:

@@ -251,3 +251,14 @@ def test_joints_that_a_machine_lacks_are_left_out_by_their_names(tmp_path: Path)
     assert (fitting.joints, fitting.record.joint_names) == ((3, 1, 2), ("elbow", "pan", "lift"))
     assert [fitting.position[0, fitting.column(joint)] for joint in (1, 2, 3)] == [1.0, 2.0, 3.0]
     assert import_bag(path, choice=Choice(numbering=("pan", "lift", "elbow"))).joints == (3, 1, 2)
+
+
+def test_rows_of_a_stretch_of_time_are_taken(tmp_path: Path) -> None:
+    path = bag(tmp_path / "run", [{}] * 10)
+    trace = imported(path, where="time=0.02..0.05")
+    np.testing.assert_allclose(trace.time, [0.02, 0.03, 0.04])
+    np.testing.assert_allclose(trace.position[:, 0], [0.2, 0.3, 0.4])
+    assert "Rows where time=0.02..0.05." in trace.record.notes
+    for where, says in (("time=1..2", "no row is left where time=1..2"), ("lap=1", "column 'lap' is missing")):
+        with pytest.raises(TraceError, match=says):
+            imported(path, where=where)

@@ -11,8 +11,6 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Literal
 from urllib.parse import urlsplit
 
-import boto3
-
 from extras.lab.archive.bucket import Bucket, Credentials
 from extras.lab.archive.settings import ArchiveSettings
 
@@ -59,6 +57,8 @@ class ObjectStore:
 @contextmanager
 def running_store(host: str = "127.0.0.1", port: int = 0) -> Iterator[ObjectStore]:
     """moto's server in a process of its own, and Amazon's client."""
+    import boto3  # here: the quick tests in this folder are collected without it
+
     process = subprocess.Popen(
         [sys.executable, "-c", STORE, host, str(port)],
         stdin=subprocess.PIPE,

@@ -17,6 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import select
 
+from daq.contracts.errors import ReachError, SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ExperimentRequest
@@ -24,7 +25,7 @@ from daq.teaching.program import Absolute, Program
 from extras.lab.archive.archived import Archived, ArchivedStore
 from extras.lab.backup.database import copy_database, head_of_audit, revision_of
 from extras.lab.backup.manifest import MANIFEST, verify
-from extras.lab.backup.places import DATABASE, BackupError, Places, places_of
+from extras.lab.backup.places import DATABASE, Places, places_of
 from extras.lab.backup.restore import restore
 from extras.lab.backup.write import back_up
 from extras.lab.notifications.tables import OutboxRow
@@ -32,7 +33,7 @@ from server.access.sessions import SessionStore
 from server.experiments.review import Given, Review
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
-from server.store.lock import InUseError, sole_use
+from server.store.lock import sole_use
 from server.store.programs import ProgramStore
 from server.store.queues import QueueState, QueueStore
 from server.store.schema import VERSION, migrations
@@ -158,7 +159,7 @@ def test_what_may_have_ended_since_does_not_come_back(tmp_path: Path) -> None:
 
 def test_a_backup_is_for_nobody_else_to_read_and_never_written_over(archive: Path, tmp_path: Path) -> None:
     assert archive.stat().st_mode & 0o077 == 0
-    with pytest.raises(BackupError, match="already exists"):
+    with pytest.raises(SpecError, match="already exists"):
         back_up(places_in(tmp_path / "here"), archive, NOW, quietly)
     assert verify(archive).count("traces") == 2
 
@@ -219,7 +220,7 @@ def test_nothing_is_written_over_unless_asked_for_and_then_it_is_put_aside(archi
     places = filled(tmp_path / "there")
     (places.traces["ma2000"] / "aaa.mcap").write_bytes(b"another trace of this number")
     before = everything(tmp_path / "there")
-    with pytest.raises(BackupError, match=r"already exist .*: with --overwrite they are moved aside"):
+    with pytest.raises(SpecError, match=r"already exist .*: with --overwrite they are moved aside"):
         restore(archive, places, NOW, quietly)
     assert everything(tmp_path / "there") == before
     restored = restore(archive, places, NOW, quietly, overwrite=True)
@@ -284,7 +285,7 @@ def test_what_is_not_a_whole_backup_of_this_robot_is_refused_before_anything_is_
     before = everything(tmp_path)
     _changed(archive, change)
     before["arm.zip"] = archive.read_bytes()
-    with pytest.raises(BackupError) as refused:
+    with pytest.raises(SpecError) as refused:
         restore(archive, places, NOW, quietly, overwrite=True)
     assert "\n" not in str(refused.value)
     assert everything(tmp_path) == before
@@ -335,7 +336,7 @@ def test_a_backup_whose_tables_are_not_this_programs_is_refused_and_the_log_too(
 ) -> None:
     _repacked(archive, *statements)
     places = places_in(tmp_path / "there")
-    with pytest.raises(BackupError, match=why):
+    with pytest.raises(SpecError, match=why):
         restore(archive, places, NOW, quietly)
     assert everything(tmp_path / "there") == {}
     with zipfile.ZipFile(archive) as pack:
@@ -377,7 +378,7 @@ def test_a_flipped_bit_or_a_cut_is_refused_or_harmless(
     shutil.rmtree(there, ignore_errors=True)
     try:
         restore(damaged, places_in(there), NOW, quietly)
-    except BackupError:
+    except SpecError:
         assert everything(there) == {}
     else:
         assert traces_in(places_in(there)) == ["aaa.mcap", "bbb.mcap"]
@@ -387,7 +388,7 @@ def test_a_flipped_bit_or_a_cut_is_refused_or_harmless(
 def test_a_restore_waits_for_no_service_that_runs(archive: Path, tmp_path: Path) -> None:
     places = filled(tmp_path / "there")
     before = everything(tmp_path / "there")
-    with sole_use(places.url), pytest.raises(InUseError, match="a service uses it; end that one first"):
+    with sole_use(places.url), pytest.raises(ReachError, match="a service uses it; end that one first"):
         restore(archive, places, NOW, quietly, overwrite=True)
     assert everything(tmp_path / "there") == before
     with sole_use(places.url):
@@ -395,9 +396,9 @@ def test_a_restore_waits_for_no_service_that_runs(archive: Path, tmp_path: Path)
 
 
 def test_a_disk_that_fills_up_leaves_no_half_backup_and_no_half_restore(archive: Path, tmp_path: Path) -> None:
-    with pytest.raises(BackupError, match="are free, a backup needs"):
+    with pytest.raises(SpecError, match="are free, a backup needs"):
         back_up(places_in(tmp_path / "here"), tmp_path / "second.zip", NOW, quietly, reserve=1 << 60)
-    with pytest.raises(BackupError, match="are needed"):
+    with pytest.raises(SpecError, match="are needed"):
         restore(archive, places_in(tmp_path / "there"), NOW, quietly, reserve=1 << 60)
     assert not (tmp_path / "second.zip").exists()
     assert everything(tmp_path / "there") == {}
@@ -461,7 +462,7 @@ def test_the_configured_places(tmp_path: Path) -> None:
     places = places_of(Settings(server=ServiceSettings(folder=tmp_path)))
     assert places.target(DATABASE) == tmp_path / "service.sqlite"
     assert places.target("jobs/0123456789ab/result.json") == tmp_path / "jobs" / "0123456789ab" / "result.json"
-    with pytest.raises(BackupError, match="is not a file"):
+    with pytest.raises(SpecError, match="is not a file"):
         places_of(Settings(server=ServiceSettings(database="postgresql://x/y")))
 
 
@@ -478,7 +479,7 @@ def test_several_robots_come_back_each_into_its_own_folder(tmp_path: Path) -> No
     task = {"request": {"kind": "fit"}, "traces": files, "models": {}}
     (job / "request.json").write_text(json.dumps(task))
     back_up(here, tmp_path / "arms.zip", NOW, quietly)
-    with pytest.raises(BackupError, match="is of robot 'left, right'; this configuration is for 'ma2000'"):
+    with pytest.raises(SpecError, match="is of robot 'left, right'; this configuration is for 'ma2000'"):
         restore(tmp_path / "arms.zip", places_in(tmp_path / "one"), NOW, quietly)
     restore(tmp_path / "arms.zip", there, NOW, quietly)
     assert [path.name for path in there.traces["left"].glob("*.mcap")] == ["aaa.mcap"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import ReachError, SpecError
 from daq.contracts.progress import CancelledError
 from daq.contracts.service.jobs import DiagnoseRequest, DiagnoseStudy, FitRequest
 from daq.executors import Workers
@@ -16,7 +16,7 @@ from daq.traces.catalogue import list_traces
 from daq.traces.query import TraceQuery
 from daq.traces.reader import read_trace
 from daq_cli.models.service_jobs import _given
-from extras.lab.batches.folder import BatchFolder, BatchInUseError, asked_of, opened
+from extras.lab.batches.folder import BatchFolder, asked_of, opened
 from extras.lab.batches.run import Chosen, Standing, chosen_traces, run_batch
 from extras.lab.batches.study import Answer, Common, SimulateStudy
 from model.discrepancy.options import DiagnosisOptions, torque_options
@@ -171,7 +171,7 @@ def test_another_batch_does_not_go_on_in_the_folder(tmp_path: Path, traces: Path
     elsewhere = COMMON.model_copy(update={"machine": MACHINE.model_copy(update={"name": "another"})})
     with pytest.raises(SpecError, match="another machine for traces that name none"):
         run(out, traces, common=elsewhere)
-    with opened(out, asked_of(COMMON)), pytest.raises(BatchInUseError, match="another batch is computing into it"):
+    with opened(out, asked_of(COMMON)), pytest.raises(ReachError, match="another batch is computing into it"):
         run(out, traces)
 
 

@@ -7,12 +7,13 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 
+from daq.contracts.errors import ReachError, SpecError
 from extras.lab.postgresql.lock import ServerLock
 from server.clock import SystemClock
 from server.stopping.tokens import reader_of
-from server.store.address import StoreError, open_engine
+from server.store.address import open_engine
 from server.store.engine import Store
-from server.store.lock import InUseError, sole_use
+from server.store.lock import sole_use
 from server.store.traces import TraceStore
 from tests.extras.lab.postgresql.server import PostgresServer
 from tests.server.inside import service_inside
@@ -28,7 +29,7 @@ def _must_not_be_called() -> None:
 def test_one_service_at_a_time_uses_a_database(postgresql: PostgresServer) -> None:
     first, other = postgresql.database(), postgresql.database()
     with sole_use(first):
-        with pytest.raises(InUseError, match="a service uses it; end that one first"), sole_use(first):
+        with pytest.raises(ReachError, match="a service uses it; end that one first"), sole_use(first):
             pass
         with sole_use(other):
             pass
@@ -38,7 +39,7 @@ def test_one_service_at_a_time_uses_a_database(postgresql: PostgresServer) -> No
 
 def test_a_server_that_cannot_be_reached_is_told_in_one_line() -> None:
     address = "postgresql+psycopg://anna:secret@/daq?host=/nowhere"
-    expected = pytest.raises(StoreError, match=r"database postgresql\+psycopg://anna:\*\*\*@/daq.*cannot be opened")
+    expected = pytest.raises(SpecError, match=r"database postgresql\+psycopg://anna:\*\*\*@/daq.*cannot be opened")
     with expected as told, sole_use(address):
         pass
     assert "\n" not in str(told.value)
@@ -54,7 +55,7 @@ def test_the_lock_is_taken_again_after_the_server_was_away_unless_another_servic
         assert lock.look()  # nobody else can have it
         postgresql.start()
         assert lock.look()
-        with pytest.raises(InUseError), sole_use(address):
+        with pytest.raises(ReachError), sole_use(address):
             pass
         postgresql.stop()
         postgresql.start()
@@ -104,5 +105,5 @@ def test_the_service_keeps_everything_in_it_and_refuses_what_it_cannot_hold(
     ],
 )
 def test_a_driver_that_is_missing_is_named(address: str, said: str) -> None:
-    with pytest.raises(StoreError, match=said):
+    with pytest.raises(SpecError, match=said):
         open_engine(address)

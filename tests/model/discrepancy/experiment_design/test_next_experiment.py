@@ -8,29 +8,20 @@ from numpy.typing import NDArray
 
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, OfferedExperiment, Ramp
-from daq.contracts.progress import Never, silent
 from daq.contracts.trace import Trace
 from daq.safety.planned import planned
 from daq.trajectories.offered import offered_experiments
-from model.discrepancy.candidates.candidate_fit import CandidateFit, judge, refit
-from model.discrepancy.candidates.library import Hypothesis
-from model.discrepancy.candidates.probing import Probe
-from model.discrepancy.candidates.ranking import Ranking, decide, rank
+from model.discrepancy.engine.candidate import Fitted
+from model.discrepancy.engine.fitting import LONG, Fit, fit
 from model.discrepancy.experiment_design.next_experiment import (
     ExperimentChooser,
     best_experiment,
     converge_rivals,
     most_information,
-    rivals_of,
 )
 from model.discrepancy.explanation.notes import note_words
-from model.discrepancy.options import DiagnosisOptions
-from model.discrepancy.output_error.calibration import Calibration
-from model.discrepancy.output_error.case import build_case
-from model.discrepancy.output_error.observation import observe
-from model.discrepancy.output_error.search import Point, converge, descend, point_at
-from model.discrepancy.thresholds import THRESHOLDS
 from model.machine_model.model import Model
+from tests.model.discrepancy.readings.cases import case_of, fitted, searched
 from tests.model.fitting import imagined
 from trials.blind.experiments import trial_experiment
 
@@ -54,16 +45,15 @@ def record(arm: Model, spec: ExperimentSpec, seed: int) -> Trace:
     return imagined.changed(imagined.trace(arm, seed=seed, points=points), error=None)
 
 
-def known(trace: Trace) -> Point:
+def known(trace: Trace) -> Fit:
     """The model without an effect, fitted."""
-    return converge(point_at(*observe(imagined.arm(), [trace])), 6)
+    return fitted(case_of(imagined.arm(), [trace])).with_slopes()
 
 
-def ranking(trace: Trace, effects: tuple[str, ...]) -> Ranking:
-    """These effects on joint 2, fitted and ranked."""
-    point = known(trace)
-    case = build_case(point.model, point, point, [trace], options=DiagnosisOptions(effects=effects, joints=(2,)))
-    return rank(case, judge(point), silent, Never())
+def found_on(trace: Trace, effects: tuple[str, ...], joint: int = 2) -> tuple[Fitted, ...]:
+    """These effects on one joint, fitted and ranked."""
+    case = case_of(imagined.arm(), [trace], effects=effects, joints=(joint,))
+    return searched(case, fitted(case)).fitted
 
 
 @pytest.fixture(scope="module")
@@ -73,15 +63,13 @@ def ramp_step() -> Trace:
 
 
 @pytest.fixture(scope="module")
-def friction(ramp_step: Trace) -> tuple[CandidateFit, ...]:
-    return tuple(converge_rivals(ranking(ramp_step, FRICTION).fitted))
+def friction(ramp_step: Trace) -> tuple[Fitted, ...]:
+    return tuple(converge_rivals(found_on(ramp_step, FRICTION)))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(400)
-def test_a_record_of_what_is_asked_for_separates_as_predicted(
-    ramp_step: Trace, friction: tuple[CandidateFit, ...]
-) -> None:
+def test_a_record_of_what_is_asked_for_separates_as_predicted(ramp_step: Trace, friction: tuple[Fitted, ...]) -> None:
     offered = [EXPERIMENTS["diagnostic-b"], EXPERIMENTS["diagnostic-d"]]
     asked = best_experiment(friction, ExperimentChooser(tuple(offered), plan, budget=60.0))
     assert asked.experiment is not None
@@ -92,33 +80,28 @@ def test_a_record_of_what_is_asked_for_separates_as_predicted(
     assert found.differs_at is not None
     squares = []
     for true, wrong in (friction, friction[::-1]):
-        records = [record(true.fit.point.fitted_model, found.spec, seed) for seed in (8, 9)]
+        records = [record(true.fit.fitted_model, found.spec, seed) for seed in (8, 9)]
         squares.append(np.mean([misfit(wrong, ramp_step, r) - misfit(true, ramp_step, r) for r in records]))
     measured = np.sqrt(min(squares))
     assert found.predicted_separation / 1.5 < measured < 1.5 * found.predicted_separation
 
 
-def misfit(rival: CandidateFit, before: Trace, new: Trace) -> float:
+def misfit(rival: Fitted, before: Trace, new: Trace) -> float:
     """What a new record adds to the cost of a rival that is fitted to it too."""
-    return again(rival.fit.point, [before, new]).cost - rival.fit.point.cost
+    case = case_of(rival.fit.fitted_model, [before, new])
+    own = {p.name for p in rival.parameters}
+    unknowns = [
+        *(u for u in rival.fit.unknowns if u.trace is None),
+        *(u for u in case.unknowns(case.given, {}) if u.trace is not None and u.name not in own),
+    ]
+    return fit(case.compared, unknowns, rival.fit.values, np.ones(3), rounds=LONG).cost - rival.fit.cost
 
 
-def again(point: Point, traces: list[Trace]) -> Point:
-    """A rival fitted anew to more traces, from where it was."""
-    observation, given = observe(point.model, traces)
-    shared = point.only([k for k, u in enumerate(point.unknowns) if u.trace is None])
-    starts = given.only([k for k, u in enumerate(given.unknowns) if u.trace is not None])
-    every, values = (*shared.unknowns, *starts.unknowns), np.concatenate([shared.values, starts.values])
-    return converge(point_at(observation, Calibration(point.model, every, values)), 6)
-
-
-def speed_law(trace: Trace, point: Point, effect: str) -> CandidateFit:
-    """The point with one law of speed freed from its prior, fitted."""
-    unknowns = tuple(replace(u, deviation=None) if u.name == SPEED_LAWS[effect] else u for u in point.unknowns)
-    found = descend(replace(point, unknowns=unknowns), 6)
-    hypothesis = Hypothesis(effect, (2,), point.model, (), (), True, {})
-    probe = Probe(hypothesis, 50.0, {}, np.zeros(len(unknowns)), np.zeros_like(found.weighted))
-    return CandidateFit(probe, judge(found.with_new_tangents()), 50.0)
+def speed_law(now: Fit, effect: str) -> Fitted:
+    """The fit with one law of speed freed from its prior."""
+    unknowns = [replace(u, deviation=None) if u.name == SPEED_LAWS[effect] else u for u in now.unknowns]
+    found = fit(now.compared, unknowns, now.values, now.memory)
+    return Fitted(effect, (2,), now.model, (), replace(found, known={}).with_slopes(), evidence=50.0)
 
 
 @pytest.mark.slow
@@ -127,8 +110,8 @@ def test_candidates_that_no_motion_separates_are_one_class_with_what_would_tell_
     arm = imagined.arm()
     trace = record(arm.with_values({coefficient: 1.5 * arm.parameter(coefficient).value}), trial_experiment("ramp"), 4)
     point = known(trace)
-    rivals = [speed_law(trace, point, effect) for effect in SPEED_LAWS]
-    moved = [r.fit.point.value(SPEED_LAWS[r.hypothesis.name]) for r in rivals]
+    rivals = [speed_law(point, effect) for effect in SPEED_LAWS]
+    moved = [r.fit.values[SPEED_LAWS[r.effect]] for r in rivals]
     assert moved[0] > 1.2 * arm.parameter(coefficient).value
     assert moved[1] > 1.02 * arm.parameter(SPEED_LAWS["weakened_magnet"]).value
     asked = best_experiment(rivals, ExperimentChooser((EXPERIMENTS["diagnostic-b"],), plan, search=6))
@@ -158,15 +141,8 @@ PAIRS = {
 def test_a_preset_separates_the_pair_that_it_is_made_for(name: str) -> None:
     effect, joint, size, rival = PAIRS[name]
     trace = record(imagined.arm().with_effect(effect, (joint,), size), trial_experiment("ramp"), 3)
-    point = known(trace)
-    options = DiagnosisOptions(effects=(effect, rival), joints=(joint,))
-    found = rank(build_case(point.model, point, point, [trace], options=options), judge(point), silent, Never())
-    fitted = {f.hypothesis.name: f for f in found.fitted}
-    for probed in found.probed:
-        tried = None if probed.hypothesis.name in fitted else refit(judge(point), probed)
-        if tried is not None:
-            fitted[probed.hypothesis.name] = tried
-    rivals = converge_rivals([fitted[effect], fitted[rival]])
+    found = {f.effect: f for f in found_on(trace, (effect, rival), joint)}
+    rivals = converge_rivals([found[effect], replace(found[rival], evidence=found[effect].evidence)])
     predicted = {}
     for offered in (name, "diagnostic-b", "diagnostic-d", "diagnostic-e"):
         asked = best_experiment(rivals, ExperimentChooser((EXPERIMENTS[offered],), plan))
@@ -194,7 +170,7 @@ def test_without_rivals_the_most_informative_experiment_is_asked_for_once(ramp_s
     assert within.duration <= 5.0
 
 
-def test_an_experiment_that_the_limits_forbid_is_not_asked_for(friction: tuple[CandidateFit, ...]) -> None:
+def test_an_experiment_that_the_limits_forbid_is_not_asked_for(friction: tuple[Fitted, ...]) -> None:
     def refused(spec: ExperimentSpec) -> NDArray[np.float64]:
         raise SpecError(f"{spec.name}: joint 2 would leave its range")
 
@@ -203,10 +179,8 @@ def test_an_experiment_that_the_limits_forbid_is_not_asked_for(friction: tuple[C
     assert asked.notes
 
 
-def test_a_name_with_a_close_second_has_rivals(friction: tuple[CandidateFit, ...]) -> None:
+def test_a_name_with_a_close_second_has_rivals(friction: tuple[Fitted, ...]) -> None:
     best, second = friction
-    far = replace(second, evidence=best.evidence - 100.0)
-    near = replace(second, evidence=best.evidence - 10.0)
-    for other, count in ((far, 0), (near, 2)):
-        ranked = Ranking((best, other), ())
-        assert len(rivals_of(ranked, decide(ranked, THRESHOLDS))) == count
+    for behind, count in ((100.0, 1), (10.0, 2)):
+        other = replace(second, evidence=best.evidence - behind)
+        assert len(converge_rivals([best, other])) == count

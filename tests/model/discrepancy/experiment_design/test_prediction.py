@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from model.discrepancy.engine.fitting import evaluate
 from model.discrepancy.experiment_design.separation import Prediction, imagine
-from model.discrepancy.output_error.observation import observe
-from model.discrepancy.output_error.search import point_at
+from model.discrepancy.readings.observation import observe
 from tests.model.discrepancy.experiment_design.test_next_experiment import EXPERIMENTS, plan, record
+from tests.model.discrepancy.readings.cases import case_of
 from tests.model.fitting import imagined
 
 COUNT = 0.0015
@@ -22,8 +23,9 @@ def test_an_imagined_arm_begins_at_rest_where_its_potentiometer_reads_the_set_po
 ) -> None:
     model = imagined.arm().with_effect(effect, (joint,), size)
     spec = EXPERIMENTS["ramp"].spec
-    observation, given = observe(model, [record(model, spec, 3)])
-    point = point_at(observation, given, np.zeros((len(given.unknowns), observation.samples)))
+    case = case_of(model, [record(model, spec, 3)])
+    unknowns = case.unknowns(case.given, {})
+    point = evaluate(case.compared, unknowns, {u.name: u.start for u in unknowns}, np.ones(3))
     there = imagine(model, spec, plan)
     assert there is not None
     predicted = Prediction(there, point).recorded()
@@ -31,13 +33,12 @@ def test_an_imagined_arm_begins_at_rest_where_its_potentiometer_reads_the_set_po
     resting = slice(0, 20)
     away = np.abs(own.measured[resting] - own.inputs.set_points[resting])
     assert away.max() < 6 * COUNT
-    begins = dict(zip((u.name for u in predicted.begun.unknowns), predicted.begun.values, strict=True))
-    assert abs(begins[f"initial.trace1.joint{joint}.position"]) > 0.02
+    assert abs(predicted.begun[f"initial.trace1.joint{joint}.position"]) > 0.02
 
 
 def test_starts_have_the_same_freedom_when_a_model_with_bent_potentiometers_is_observed_again() -> None:
     trace = record(imagined.arm(), EXPERIMENTS["ramp"].spec, 3)
-    _, first = observe(imagined.arm(), [trace])
-    _, again = observe(first.model, [trace])
-    starts = [[(u.low, u.deviation) for u in given.unknowns if u.trace is not None] for given in (first, again)]
+    _, model, first = observe(imagined.arm(), [trace])
+    _, _, again = observe(model, [trace])
+    starts = [[(u.low, u.deviation) for u in given if u.trace is not None] for given in (first, again)]
     assert starts[0] == starts[1]

@@ -11,32 +11,30 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.progress import CancelledError, Never
 from daq.safety.planned import planned
 from model.design.information import check_followed, imagined_trace
-from model.discrepancy.candidates.candidate_fit import CandidateFit, judge
-from model.discrepancy.candidates.library import Hypothesis
-from model.discrepancy.candidates.probing import Probe
+from model.discrepancy.engine.candidate import Fitted
+from model.discrepancy.engine.fitting import evaluate
 from model.discrepancy.experiment_design.next_experiment import ExperimentChooser, best_experiment, judge_experiments
-from model.discrepancy.output_error.observation import observe
-from model.discrepancy.output_error.search import point_at
 from tests.model.discrepancy.experiment_design.test_next_experiment import EXPERIMENTS, plan, record
+from tests.model.discrepancy.readings.cases import case_of
 from tests.model.discrepancy.recording import recorded
 from tests.model.fitting import imagined
 
 PAIR = (0, 1)
 
 
-def simple_rival(effect: str, joint: int, values: dict[str, float]) -> CandidateFit:
+def simple_rival(effect: str, joint: int, values: dict[str, float]) -> Fitted:
     """A model with an effect of a given size, as if it had been fitted to a short motion."""
     model = imagined.arm().with_effect(effect, (joint,), values)
     trace = record(model, EXPERIMENTS["ramp"].spec, 3)
-    point = point_at(*observe(model, [trace]))
+    case = case_of(model, [trace])
     free = tuple(p for p in model.parameters if p.effect == effect)
-    hypothesis = Hypothesis(effect, (joint,), model, free, (), True, {})
-    probe = Probe(hypothesis, 50.0, {}, np.zeros(len(point.unknowns)), np.zeros_like(point.weighted))
-    return CandidateFit(probe, judge(point), 50.0)
+    unknowns = case.unknowns(case.given, {})
+    found = evaluate(case.compared, unknowns, {u.name: u.start for u in unknowns}, np.ones(3))
+    return Fitted(effect, (joint,), case.given, free, found.with_slopes(), evidence=50.0)
 
 
 @pytest.fixture(scope="module")
-def rivals() -> tuple[CandidateFit, CandidateFit]:
+def rivals() -> tuple[Fitted, Fitted]:
     return (simple_rival("coulomb_friction", 2, {"torque": 6.0}), simple_rival("dead_zone", 2, {"width": 0.8}))
 
 
@@ -47,7 +45,7 @@ def chooser() -> ExperimentChooser:
 
 @pytest.mark.slow
 def test_what_is_asked_for_promises_no_less_than_what_is_offered(
-    rivals: tuple[CandidateFit, CandidateFit], chooser: ExperimentChooser
+    rivals: tuple[Fitted, Fitted], chooser: ExperimentChooser
 ) -> None:
     judged, tried = judge_experiments(rivals, chooser, [PAIR], Never())
     assert len(judged) == 2
@@ -63,7 +61,7 @@ def test_what_is_asked_for_promises_no_less_than_what_is_offered(
 
 
 def test_a_designed_motion_keeps_limits_and_budget_and_an_arm_follows_it(
-    rivals: tuple[CandidateFit, CandidateFit], chooser: ExperimentChooser, tmp_path: Path
+    rivals: tuple[Fitted, Fitted], chooser: ExperimentChooser, tmp_path: Path
 ) -> None:
     found = judge_experiments(rivals, replace(chooser, experiments=(), budget=8.0), [PAIR], Never())[0][0]
     assert found.there.duration <= 8.0
@@ -71,14 +69,14 @@ def test_a_designed_motion_keeps_limits_and_budget_and_an_arm_follows_it(
     assert isinstance(spec, ExperimentSpec)
     planned(spec, imagined.machine())
     for rival in rivals:
-        check_followed(rival.fit.point.fitted_model, imagined_trace(rival.fit.point.fitted_model, spec, plan))
+        check_followed(rival.fit.fitted_model, imagined_trace(rival.fit.fitted_model, spec, plan))
     (trace,) = recorded([spec], imagined.machine(), 4, tmp_path)
     assert trace.record.outcome == "complete"
     assert trace.time[-1] == pytest.approx(found.there.duration, abs=0.05)
 
 
 def test_nothing_is_designed_where_the_planner_refuses_all_and_a_cancelled_search_ends(
-    rivals: tuple[CandidateFit, CandidateFit], chooser: ExperimentChooser
+    rivals: tuple[Fitted, Fitted], chooser: ExperimentChooser
 ) -> None:
     def refused(spec: ExperimentSpec) -> np.ndarray:
         raise SpecError(f"{spec.name}: not today")

@@ -17,8 +17,8 @@ from model.discrepancy.explanation.notes import (
     on_unfinished,
 )
 from model.discrepancy.grounds import Method, Note, NoteKind, RefusalKind
-from model.discrepancy.output_error.noise_model import note_on_noise
-from model.discrepancy.output_error.observation import observe
+from model.discrepancy.readings.noise_model import note_on_noise
+from model.discrepancy.readings.observation import observe
 from model.fitting.unknowns import Unknown
 from tests.model.fitting import imagined
 
@@ -101,8 +101,8 @@ def test_a_note_reads_the_same_after_json() -> None:
 
 def test_noise_that_the_file_does_not_state_is_told_in_counts() -> None:
     arm = imagined.arm()
-    observation, _ = observe(arm, [imagined.trace(arm, seconds=3.0)])
-    rms = [3.0 * float(d) for d in observation.deviations]
+    observation, _, _ = observe(arm, [imagined.trace(arm, seconds=3.0)])
+    rms = 3.0 * observation.deviations
     assert note_on_noise(observation, rms, ()) == ()
     (note,) = note_on_noise(observation, rms, (2,))
     (joint,) = note.values["joints"]

@@ -7,9 +7,9 @@ from daq.contracts.machine import load_machine
 from daq.contracts.progress import Never, silent
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.engine.workflow import Workflow
+from model.discrepancy.inverse_dynamics.case import torque_case
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.fitting import TorqueCase
-from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
@@ -18,14 +18,14 @@ from tests.model.discrepancy.inverse_dynamics import rigs
 from trials.rigs.folder import write_rig
 
 
-def sliding(hidden: Mapping[str, float], options: TorqueOptions) -> TorqueWorkflow:
+def sliding(hidden: Mapping[str, float], options: TorqueOptions) -> Workflow:
     """The sliding axis with its stated numbers fitted, before anything is searched."""
     model = base_model(rigs.slide_machine())
     traces = [rigs.slide_trace(seed, hidden, duration=8.0) for seed in (1, 2)]
     cutoff = choose_cutoff(traces, model.machine)
     fitted, held = (recorded_motions([t], model.machine, cutoff) for t in traces)
-    case = TorqueCase(fitted, held, torque_noise(model, traces, cutoff), options)
-    return TorqueWorkflow(model, case, silent, Never())
+    case = torque_case(model, fitted, held, torque_noise(model, traces, cutoff), options)
+    return Workflow(case, 16.0, silent, Never())
 
 
 def diagnosed_rig(folder: Path, kind: str, seed: int, case: str | None = None, effect: str | None = None) -> Diagnosis:

@@ -14,8 +14,10 @@ from daq.contracts.progress import CancelledError
 from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.engine.fitting import evaluate
+from model.discrepancy.engine.holdout import share_removed
+from model.discrepancy.inverse_dynamics.case import torque_case
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.holdout import held_out_squares, relative_torque_error, share_removed
 from model.discrepancy.options import DiagnosisOptions, TorqueOptions
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motions
 from model.machine_model.model import Model, base_model
@@ -248,13 +250,19 @@ def test_a_real_double_pendulum(lab_data: Path) -> None:
     adopted = [(s.effect, s.joints) for s in found.steps if s.adopted]
     assert adopted[0] == ("coulomb_friction", (1, 2))
     held_out = recorded_motions(runs[4:], found.model_after.machine, 12.0)
-    assert relative_torque_error(found.model_after, {}, held_out) < 0.40
+    given = torque_case(found.model_after, held_out, (), np.ones(2), TorqueOptions())
+    assert given.torque_left(evaluate(given.compared, (), {}, np.ones(2))) < 0.40
     assert found.notes[0].startswith("Torque left unexplained on held-out traces: 67")
 
 
 # ---- Records that were not fitted to meet a disturbance at a phase of their own.
 
 CUTOFF = 8.0
+
+
+def left_of(model: Model, unseen: tuple[RecordedMotion, ...]) -> np.ndarray:
+    case = torque_case(model, unseen, unseen, np.ones(1), TorqueOptions())
+    return case.held_squares(evaluate(case.compared, (), {}, np.ones(1)))
 
 
 def records(*traces: Trace) -> tuple[RecordedMotion, ...]:
@@ -281,16 +289,16 @@ def hum() -> Trace:
 def test_a_record_may_begin_at_any_phase(hum: Trace) -> None:
     step = float(np.median(np.diff(hum.time)))
     whole = records(hum)
-    without = held_out_squares(base_model(rigs.slide_machine()), {}, whole)
+    without = left_of(base_model(rigs.slide_machine()), whole)
     starts = [round(share / rigs.SLIDE["hertz"] / step) for share in (0.25, 0.5, 0.8)]
     for others in (whole, *(records(later(hum, k)) for k in starts), records(hum, later(hum, starts[1]))):
-        assert held_out_squares(humming(3.0), {}, others)[0] < 0.05 * without[0]
+        assert left_of(humming(3.0), others)[0] < 0.05 * without[0]
 
 
 def test_a_disturbance_does_not_vanish_from_a_record_that_does_not_show_it() -> None:
     quiet = records(rigs.slide_trace(1, {}, duration=8.0))
-    without = held_out_squares(base_model(rigs.slide_machine()), {}, quiet)
-    assert held_out_squares(humming(3.0), {}, quiet)[0] > without[0] + 0.5 * 3.0**2 / 2
+    without = left_of(base_model(rigs.slide_machine()), quiet)
+    assert left_of(humming(3.0), quiet)[0] > without[0] + 0.5 * 3.0**2 / 2
 
 
 def test_held_out_records_speak_for_an_effect_that_is_there_and_not_for_one_that_is_not() -> None:

@@ -12,16 +12,10 @@ import pytest
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.engine.candidate import Fitted
+from model.discrepancy.engine.lifted import ends_at_bound, is_far, is_far_everywhere
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.resolution import (
-    MOST_UNEVEN,
-    _is_hardly_reached,
-    ends_at_bound,
-    is_far,
-    is_far_everywhere,
-    steepest_bend,
-)
-from model.discrepancy.inverse_dynamics.search import Fitted
+from model.discrepancy.inverse_dynamics.resolution import MOST_UNEVEN, _is_hardly_reached, steepest_bend
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
@@ -234,19 +228,12 @@ def test_a_sound_rig_of_another_world_is_sound(kind: str, seed: int, tmp_path: P
     assert found.verdict == "nothing-significant", found.summary
 
 
-class _Fit:
-    """A fit along one record whose drive is above 9 V in a share of its samples."""
-
-    def __init__(self, limit: float, above: float) -> None:
-        drive = np.where(np.arange(1000) < 1000 * above, 12.0, -3.0)[:, None]
-        self.balance = SimpleNamespace(records=[SimpleNamespace(commanded=drive)])
-        self.values = {"joint1.supply_limit.voltage": limit}
-
-
 @pytest.mark.parametrize(("above", "hardly"), [(0.003, True), (0.02, False)])
 def test_a_limit_that_the_drive_hardly_ever_exceeds_is_none(above: float, hardly: bool) -> None:
     """Spikes of one sample are smeared by the low-pass, and sound drives seem to be cut off there."""
     model = base_model(rigs.bench_machine()).with_effect("supply_limit", (1,))
     own = tuple(p for p in model.parameters if p.effect == "supply_limit")
-    fit: Any = _Fit(9.0, above)
-    assert _is_hardly_reached(Fitted("supply_limit", (1,), model, own, fit, 150.0)) == hardly
+    drive = np.where(np.arange(1000) < 1000 * above, 12.0, -3.0)[:, None]
+    records: Any = [SimpleNamespace(commanded=drive)]
+    fit: Any = SimpleNamespace(values={"joint1.supply_limit.voltage": 9.0})
+    assert _is_hardly_reached(Fitted("supply_limit", (1,), model, own, fit), records) == hardly

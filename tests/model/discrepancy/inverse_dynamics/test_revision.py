@@ -8,20 +8,15 @@ import pytest
 from daq.contracts.machine import Machine
 from daq.contracts.progress import Never, silent
 from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.engine import holdout
+from model.discrepancy.engine.candidate import FILE_IS_RIGHT, Fitted
+from model.discrepancy.engine.fitting import Fit
+from model.discrepancy.engine.search import prefer_fewer_joints, prefer_shorter_laws, search
+from model.discrepancy.engine.workflow import Workflow
 from model.discrepancy.explanation.answer_words import what_is_left
-from model.discrepancy.inverse_dynamics import holdout
 from model.discrepancy.inverse_dynamics.candidates import take_back
+from model.discrepancy.inverse_dynamics.case import torque_case
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.fitting import BalanceFit, TorqueCase
-from model.discrepancy.inverse_dynamics.localisation import locate
-from model.discrepancy.inverse_dynamics.search import (
-    FILE_IS_RIGHT,
-    Fitted,
-    prefer_fewer_joints,
-    prefer_shorter_laws,
-    search,
-)
-from model.discrepancy.inverse_dynamics.workflow import TorqueWorkflow
 from model.discrepancy.options import TorqueOptions
 from model.inverse_dynamics.readings import choose_cutoff, torque_noise
 from model.inverse_dynamics.recorded_motion import recorded_motions
@@ -62,8 +57,10 @@ def test_the_gap_shrinks_with_every_step() -> None:
     assert "Without the effect, fitted numbers alone leave" in gap.without.text
 
 
-def candidate(effect: str, flow: TorqueWorkflow, evidence: float, told: float = 0.0) -> Fitted:
-    return Fitted(effect, (1,), flow.model, (), flow.first, evidence, told=told, told_compared=told)
+def candidate(effect: str, flow: Workflow, evidence: float, told: float = 0.0) -> Fitted:
+    return Fitted(
+        effect, (1,), flow.found.model, (), flow.found.first, evidence=evidence, told=told, told_compared=told
+    )
 
 
 def test_the_file_is_trusted_against_an_effect_but_not_against_any_evidence() -> None:
@@ -81,25 +78,25 @@ def test_a_joint_that_brings_little_is_not_named_with_the_others() -> None:
         for evidence, joints in ((100.0, (1, 2)), (95.0, (1,)), (60.0, (2,)))
     )
     other = candidate("backlash", flow, 97.0)
-    assert [f.joints for f in prefer_fewer_joints([both, other, one, little])] == [(1,), (1, 2), (1,), (2,)]
-    assert prefer_fewer_joints([replace(both, evidence=110.0), one])[0].joints == (1, 2)
-    assert prefer_fewer_joints([other, both, one])[0] is other
-    assert prefer_fewer_joints([]) == []
+    assert [f.joints for f in prefer_fewer_joints([both, other, one, little], 12.0)] == [(1,), (1, 2), (1,), (2,)]
+    assert prefer_fewer_joints([replace(both, evidence=110.0), one], 12.0)[0].joints == (1, 2)
+    assert prefer_fewer_joints([other, both, one], 12.0)[0] is other
+    assert prefer_fewer_joints([], 12.0) == []
 
 
 def test_what_held_out_records_say_of_fits_is_counted_in_the_same_samples() -> None:
     """A fit as good as another one gets the same evidence, whatever the correlation of its own residual."""
     flow = sliding({"coulomb": 8.0}, TorqueOptions(effects=("coulomb_friction", "stribeck_friction")))
-    found = search(flow.model, flow.first, flow.case, silent, Never()).fitted
+    found = search(flow.found.first, flow.case, lambda *_: None, Never()).fitted
     coulomb = next(f.fit for f in found if f.effect == "coulomb_friction")
     other = next(f.fit for f in found if f.effect != "coulomb_friction")
-    alone = holdout.evidence(flow.first, [coulomb], flow.case.held_out, flow.case.noise)
-    both = holdout.evidence(flow.first, [coulomb, other, coulomb], flow.case.held_out, flow.case.noise)
+    alone = holdout.evidence(flow.case, flow.found.first, [coulomb])
+    both = holdout.evidence(flow.case, flow.found.first, [coulomb, other, coulomb])
     assert both[0] == both[2]
     assert both[0].compared > 30.0
     assert both[0].compared >= both[1].compared
     assert both[0].alone == alone[0].alone == alone[0].compared
-    assert holdout.evidence(flow.first, [], flow.case.held_out, flow.case.noise) == []
+    assert holdout.evidence(flow.case, flow.found.first, []) == []
 
 
 @pytest.mark.slow
@@ -108,15 +105,15 @@ def test_a_weakened_magnet_takes_back_what_the_constants_had_taken() -> None:
     model = base_model(weak_bench())
     cutoff = choose_cutoff(traces, model.machine)
     fitted, held = (recorded_motions([t], model.machine, cutoff) for t in traces)
-    case = TorqueCase(fitted, held, torque_noise(model, traces, cutoff), TorqueOptions())
-    flow = TorqueWorkflow(model, case, silent, Never())
+    case = torque_case(model, fitted, held, torque_noise(model, traces, cutoff), TorqueOptions())
+    flow = Workflow(case, 16.0, silent, Never())
     wider = model.with_effect("weakened_magnet", (1,))
     own = [p for p in wider.parameters if p.effect == "weakened_magnet"]
-    begun = take_back("weakened_magnet", own, flow.first)
+    begun = take_back("weakened_magnet", own, flow.found.first)
     assert begun[own[0].name] == pytest.approx(0.16, abs=0.03)
     for part in ("torque_constant", "back_emf_constant"):
         assert begun[f"joint1.motor.{part}"] == pytest.approx(0.05, rel=0.03)
-    assert take_back("viscous_friction", own, flow.first) == {}
+    assert take_back("viscous_friction", own, flow.found.first) == {}
     found = diagnose_torques(model, traces[:1], traces[1:])
     assert adopted(found) == {("weakened_magnet", (1,))}, found.summary
 
@@ -132,27 +129,27 @@ def weak_bench() -> Machine:
 class Imitating(Fitted):
     """A candidate that follows the torque of every other one."""
 
-    def imitates(self, other: Fitted, before: BalanceFit) -> bool:
+    def imitates(self, other: Fitted, before: Fit) -> bool:
         return True
 
 
 def test_a_longer_law_that_imitates_a_shorter_one_is_not_named_for_a_little_more_evidence() -> None:
     flow = sliding({"coulomb": 8.0}, TorqueOptions())
     scale = candidate("potentiometer_gain", flow, 95.0)
-    bent = Imitating("potentiometer_nonlinearity", (1,), flow.model, (), flow.first, 100.0)
+    bent = Imitating("potentiometer_nonlinearity", (1,), flow.found.model, (), flow.found.first, evidence=100.0)
     weight = candidate("payload", flow, 99.0)
-    assert prefer_shorter_laws([bent, scale], flow.first, 12.0) == [scale, bent]
-    assert prefer_shorter_laws([bent, scale], flow.first, 4.0) == [bent, scale]
-    assert prefer_shorter_laws([weight, scale], flow.first, 12.0) == [weight, scale]
-    assert prefer_shorter_laws([bent, replace(scale, joints=(2,))], flow.first, 12.0)[0] is bent
-    assert prefer_shorter_laws([], flow.first, 12.0) == []
+    assert prefer_shorter_laws([bent, scale], flow.found.first, 12.0) == [scale, bent]
+    assert prefer_shorter_laws([bent, scale], flow.found.first, 4.0) == [bent, scale]
+    assert prefer_shorter_laws([weight, scale], flow.found.first, 12.0) == [weight, scale]
+    assert prefer_shorter_laws([bent, replace(scale, joints=(2,))], flow.found.first, 12.0)[0] is bent
+    assert prefer_shorter_laws([], flow.found.first, 12.0) == []
 
 
 # ---- Where torques are missing most.
 
 
 @pytest.fixture(scope="module")
-def rubbing() -> TorqueWorkflow:
+def rubbing() -> Workflow:
     return sliding({"coulomb": 8.0}, TorqueOptions(effects=("coulomb_friction",)))
 
 
@@ -173,11 +170,11 @@ def test_friction_at_a_place_is_seen_where_it_is_and_is_unknown() -> None:
     assert what_is_left(found.remaining).startswith("friction at joint 1 of ")
 
 
-def test_the_joint_of_the_largest_residual_is_named(rubbing: TorqueWorkflow) -> None:
-    where = locate(rubbing.found.now, rubbing.case)
+def test_the_joint_of_the_largest_residual_is_named(rubbing: Workflow) -> None:
+    where = rubbing.case.where(rubbing.found.now)
     assert where.worst is not None
     assert (where.joint, where.worst.joint, where.largest) == (1, 1, None)
-    (sizes,) = (np.sqrt(rubbing.case.stretches.mean_squares(rubbing.found.now.residual)),)
+    sizes = np.sqrt(rubbing.found.now.squares)
     assert where.worst.rms == pytest.approx(sizes[0])
     assert where.worst.ratio == pytest.approx(sizes[0] / rubbing.case.noise[0])
 
@@ -187,10 +184,10 @@ def test_the_joint_of_the_largest_torque_is_told_beside_the_one_farthest_above_i
     model = base_model(rigs.six_machine())
     traces = [rigs.six_trace(1, {}, duration=6.0)]
     records = recorded_motions(traces, model.machine, 3.0)
-    case = TorqueCase(records, (), np.array([0.1, 0.1, 0.1, 0.1, 0.1, 1e-3]), TorqueOptions())
-    flow = TorqueWorkflow(model, case, silent, Never())
-    residual = [np.tile([0.1, 9.0, 0.1, 0.1, 0.1, 0.3], (len(r), 1)) for r in flow.found.now.residual]
-    where = locate(replace(flow.found.now, residual=residual), case)
+    case = torque_case(model, records, (), np.array([0.1, 0.1, 0.1, 0.1, 0.1, 1e-3]), TorqueOptions())
+    flow = Workflow(case, 16.0, silent, Never())
+    residual = [np.tile([0.1, 9.0, 0.1, 0.1, 0.1, 0.3], (len(r), 1)) for r in flow.found.now.signals]
+    where = case.where(replace(flow.found.now, signals=residual))
     assert where.worst is not None
     assert where.largest is not None
     assert (where.joint, where.worst.joint, where.largest.joint) == (6, 6, 2)

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.engine.priors import prior_cost, prior_distance
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
-from model.discrepancy.inverse_dynamics.tolerances import prior_cost, prior_distance
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter

@@ -14,11 +14,11 @@ from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.discrepancy.diagnosis import Diagnosis
+from model.discrepancy.engine.holdout import excess_removed
 from model.discrepancy.excitation import own_frequencies
-from model.discrepancy.inverse_dynamics import holdout
+from model.discrepancy.inverse_dynamics.case import TorqueCase
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.inverse_dynamics.starts import narrowed
-from model.discrepancy.inverse_dynamics.step_record import excess_removed
 from model.discrepancy.options import TorqueOptions
 from model.fitting.options import FitOptions
 from model.inverse_dynamics import repeats
@@ -110,7 +110,7 @@ def test_no_effect_is_named_beside_more_torque_than_there_is(
 ) -> None:
     """shares: left of the recorded torque by the model as given, with its numbers fitted, and at the end."""
     left = cycle(shares)
-    monkeypatch.setattr(holdout, "relative_torque_error", lambda *_: next(left))
+    monkeypatch.setattr(TorqueCase, "torque_left", lambda *_: next(left))
     found = of_slide(rigs.slide_trace(1, {"coulomb": 8.0}))
     (note,) = (note for note in found.notes_data if note.kind == "torque-left")
     assert (found.verdict, note.warning) == (verdict, doubted)

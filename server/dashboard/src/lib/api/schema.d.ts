@@ -1802,6 +1802,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/robots/{robot}/meshes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Meshes
+         * @description Returns the meshes of the URDF beside the robot's machine file.
+         */
+        get: operations["get_meshes"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/robots/{robot}/meshes/{number}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Mesh
+         * @description Returns the file of a mesh.
+         */
+        get: operations["get_mesh"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/healthz": {
         parameters: {
             query?: never;
@@ -4595,6 +4635,36 @@ export interface components {
             change: number;
             /** Relative */
             relative: boolean;
+        };
+        /**
+         * Mesh
+         * @description A mesh on the arm. `joint`: the one with which it moves, 0 for the base. `pose`: 4 × 4 by rows, from the file's
+         *     coordinates to that joint's Denavit–Hartenberg frame in m.
+         */
+        Mesh: {
+            /** Number */
+            number: number;
+            /** Joint */
+            joint: number;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "stl" | "dae" | "obj";
+            /** Pose */
+            pose: number[];
+        };
+        /**
+         * Meshes
+         * @description All meshes of a machine, and why some or all are missing; empty if none is.
+         */
+        Meshes: {
+            /** Machine */
+            machine: string;
+            /** Meshes */
+            meshes: components["schemas"]["Mesh"][];
+            /** Problem */
+            problem: string;
         };
         /**
          * Model
@@ -9994,6 +10064,53 @@ export interface operations {
                 };
                 content: {
                     "text/plain": unknown;
+                };
+            };
+        };
+    };
+    get_meshes: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Meshes"];
+                };
+            };
+        };
+    };
+    get_mesh: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                number: number;
+                /** @description Name of the robot. */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/octet-stream": unknown;
                 };
             };
         };

@@ -49,6 +49,7 @@ export type Macro = Told<Schemas['Macro']>;
 export type MacroReading = Told<Schemas['MacroReading']>;
 export type Macros = Told<Schemas['Macros']>;
 export type Me = Told<Schemas['Me']>;
+export type Meshes = Told<Schemas['Meshes']>;
 export type ModelAgreement = Told<Schemas['ModelAgreement']>;
 export type ModelDetails = Told<Schemas['ModelDetails']>;
 export type ModelEntry = Told<Schemas['ModelEntry']>;

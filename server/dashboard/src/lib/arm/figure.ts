@@ -15,6 +15,7 @@ import {
 } from 'three';
 import { BASE, framesOf, reachOf, type Chain, type Frame, type Vector } from './chain';
 import { handPose } from './hand';
+import type { PlacedMesh } from './geometries';
 
 /** Sizes as shares of the arm's reach. */
 const LINK_RADIUS = 0.042;
@@ -43,6 +44,8 @@ export class ArmFigure {
   private readonly fingers: Mesh[] = [];
   private readonly geometries: BufferGeometry[] = [];
   private readonly size: number;
+  /** Of a URDF, by joint; 0: the base. */
+  private readonly bodies = new Map<number, Group>();
 
   constructor(
     private readonly chain: Chain,
@@ -75,6 +78,7 @@ export class ArmFigure {
   /** Shows a posture: one value a joint, rad (m on a prismatic joint). */
   take(posture: readonly number[]): void {
     const frames = framesOf(this.chain, posture);
+    this.bodies.forEach((body, joint) => body.matrix.copy(matrixOf(frames[joint - 1] ?? BASE)));
     this.links.forEach((link, index) => {
       if (link) stretch(link, originBefore(frames, index), frames[index]!.origin);
     });
@@ -87,6 +91,18 @@ export class ArmFigure {
     const across = new Vector3(...hand.across);
     this.hand.setRotationFromMatrix(new Matrix4().makeBasis(forward, across, forward.clone().cross(across)));
     this.hand.position.set(...hand.origin);
+  }
+
+  /** Shows these in place of the plain arm. Their geometries remain the caller's. */
+  wear(meshes: readonly PlacedMesh[]): void {
+    this.group.clear();
+    for (const { joint, geometry } of meshes) {
+      const body = this.bodies.get(joint) ?? new Group();
+      body.matrixAutoUpdate = false;
+      body.add(new Mesh(geometry, this.materials.links[joint - 1] ?? this.materials.body));
+      this.bodies.set(joint, body);
+      this.group.add(body);
+    }
   }
 
   /** Opens or closes the fingers. */
@@ -147,6 +163,12 @@ export class ArmFigure {
 
 function originBefore(frames: readonly Frame[], index: number): Vector {
   return index === 0 ? BASE.origin : frames[index - 1]!.origin;
+}
+
+function matrixOf({ origin, x, y, z }: Frame): Matrix4 {
+  return new Matrix4()
+    .makeBasis(new Vector3(...x), new Vector3(...y), new Vector3(...z))
+    .setPosition(new Vector3(...origin));
 }
 
 /** Puts a cylinder of length 1 between two points. */

@@ -21,6 +21,7 @@ import type { Way } from '../trajectory/preview';
 import { reachOf, tipOf, type Chain, type Vector } from './chain';
 import type { ArmColours } from './colours';
 import { ArmFigure, type FigureMaterials } from './figure';
+import type { PlacedMesh } from './geometries';
 import { farthest, metresOfPixel, outlineOf } from './motion';
 import { Trail } from './trail';
 import { cameraAt, fittingDistance, turned, viewFrom, viewNamed, type View, type ViewName } from './views';
@@ -94,6 +95,7 @@ export class ArmScene {
   private isAwaited = false;
   private isDisposed = false;
   private chosen: ViewName | null = 'corner';
+  private worn: readonly PlacedMesh[] = [];
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -171,6 +173,13 @@ export class ArmScene {
     this.place(turned(viewFrom([x, y, z], this.target), azimuth, elevation, zoom, this.fitting));
   }
 
+  /** Shows the robot's own meshes in place of the plain arm, and disposes of them at the end. */
+  wear(meshes: readonly PlacedMesh[]): void {
+    this.worn = meshes;
+    for (const figure of [this.arm, this.ghost, this.shadow]) figure.wear(meshes);
+    this.invalidate();
+  }
+
   clearTrail(): void {
     this.trail.clear();
     this.invalidate();
@@ -183,6 +192,7 @@ export class ArmScene {
     this.observer.disconnect();
     this.controls.dispose();
     for (const part of [this.arm, this.ghost, this.shadow, this.trail, this.wayLine]) part.dispose();
+    for (const { geometry } of this.worn) geometry.dispose();
     this.disposeGround();
     this.renderer.dispose();
   }

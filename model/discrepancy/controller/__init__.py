@@ -1,0 +1,1 @@
+"""What a record says of its controller, without any model of the arm."""

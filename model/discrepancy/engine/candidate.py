@@ -1,0 +1,68 @@
+"""A fitted candidate: an effect on joints, with what fitted and held-out records say for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from model.discrepancy.engine.fitting import Fit
+from model.effects.library import find_named_effect
+from model.effects.machine_numbers import MACHINE_NUMBERS
+from model.machine_model.model import Model
+from model.machine_model.parameter import Parameter
+
+ALIKE = 0.97
+"""Correlation of what two effects change above which they count as the same."""
+FILE_IS_RIGHT = 2 * float(np.log(100.0))
+"""Handicap of a number of the machine file against effects of the library, as evidence. That a file states a number
+with a deviation and is wrong by many of them is assumed to be a hundred times rarer than an effect that it leaves out:
+on one axis a winding of twice the stated resistance does nearly what a payload does."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """An effect on joints with everything fitted again, and its evidence."""
+
+    effect: str
+    joints: tuple[int, ...]
+    model: Model
+    parameters: tuple[Parameter, ...]
+    fit: Fit
+    places: int = 1
+    """Starts that its own was chosen from."""
+    evidence: float = 0.0
+    cost: float = 0.0
+    """Cost of its parameters and of the places searched, which the evidence has paid."""
+    stated: tuple[Parameter, ...] = ()
+    """Those of its parameters that the file states, as it states them; their priors are lifted."""
+    relieved: float = 0.0
+    """Part of the evidence that is of priors: of numbers that no longer have to be off."""
+    told: float = 0.0
+    """What held-out records say for it, as evidence; 0 where there are none."""
+    told_compared: float = 0.0
+    """The same, counted as for all other candidates (`holdout.Told`)."""
+    ended: bool = False
+    """Whether its fit has derivatives of its own to its end."""
+
+    @property
+    def log_odds(self) -> float:
+        """Evidence of all records with the prior odds of its kind: what it competes with other candidates by."""
+        return self.evidence + self.told_compared - (FILE_IS_RIGHT if self.effect in MACHINE_NUMBERS else 0.0)
+
+    def rivals(self, other: Fitted) -> bool:
+        """Whether both explain the same joints by different effects."""
+        alike = not self.joints or not other.joints or bool(set(self.joints) & set(other.joints))
+        return self.effect != other.effect and alike
+
+    def imitates(self, other: Fitted, before: Fit) -> bool:
+        """Whether this effect is a longer law of the same family that changes the same as the other one.
+
+        Friction that falls with speed is Coulomb friction where it hardly falls: the shorter law is then its name. A
+        tilted base that gives the torque of friction by direction is another thing, whatever its parameters.
+        """
+        family, others = (find_named_effect(f.effect).shared_name.family for f in (self, other))
+        if len(self.parameters) <= len(other.parameters) or family != others:
+            return False
+        own, theirs = (before.weighted(f.fit.row - before.row) for f in (self, other))
+        return bool(own @ theirs > ALIKE * np.linalg.norm(own) * np.linalg.norm(theirs))

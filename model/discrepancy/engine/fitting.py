@@ -1,0 +1,283 @@
+"""Fits unknowns to what a model leaves of records: weighted least squares with priors, re-linearised until it settles.
+
+Derivatives take most of the time. They are computed where a fit begins and kept; every trial of a step corrects them
+along the step (Broyden 1965, in the metric of the information). They are computed anew only where a step has moved the
+residual otherwise than they said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from model.arrays import Floats
+from model.discrepancy.diagnosis import FoundValue
+from model.discrepancy.engine.priors import prior_cost, prior_rows
+from model.discrepancy.engine.residual import Residual, Signals, Values
+from model.fitting.bounded_step import bounded_step
+from model.fitting.covariance import sandwich
+from model.fitting.fit import INTERVAL
+from model.fitting.unknowns import Unknown
+from model.machine_model.model import Model
+from model.machine_model.parameter import Parameter
+
+Slopes = dict[str, Floats]
+"""Derivatives (N,) of the residual, by unknown."""
+
+ROUNDS = 8
+"""Most steps of a fit that begins near its end."""
+ATTEMPTS = ((1.0, 0.0), (1.0, 0.0), (0.4, 0.0), (1.0, 0.3), (0.12, 0.0), (1.0, 3.0))
+"""Steps that are tried until one is downhill, as a share of the whole one and a damping in shares of the information's
+diagonal (Marquardt 1963), each from derivatives that those before have corrected. A short step helps where the cost is
+strongly curved, a damped one where the records say little."""
+DAMPING = 0.01
+"""Damping of a step, over the scales of its unknowns. It decides only what the records do not: a tilt about an axis
+along gravity would be thrown to its bound otherwise, and all other numbers would stay where they are, since the step as
+a whole leads uphill."""
+LEAST_DAMPING = 1e-9
+"""The least of that damping: where derivatives are huge, one by the scales alone is lost in rounding."""
+LONG = 32
+"""Most steps of a fit that has to find its way."""
+STEPS_APART = 4
+"""Steps after which derivatives by all unknowns are computed anew, if corrected ones have led so far."""
+SETTLED = 0.3
+"""Fall of −2 log posterior below which a fit has settled: one unit is one standard deviation of one parameter."""
+FORETOLD = 0.1
+"""Share of the residual's change that derivatives may have missed and still hold."""
+LONGEST_MEMORY = 60
+"""Samples over which residuals are taken to be correlated: twenty periods of the cutoff of torques."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model whose unknowns have values.
+
+    signals, row: what it leaves of the compared records, as arrays and in a row. memory: (n,) samples that count as
+    one. by_joint: −2 log likelihood (n,); prior: −2 log prior. known: derivatives by every unknown, from values that
+    the last step hardly led away from; empty where none of its own are known.
+    """
+
+    compared: Residual
+    unknowns: tuple[Unknown, ...]
+    values: dict[str, float]
+    signals: Signals
+    row: Floats
+    memory: Floats
+    by_joint: Floats
+    prior: float
+    known: Slopes
+
+    @property
+    def model(self) -> Model:
+        """The model, with its numbers as they were before the fit."""
+        return self.compared.model
+
+    @property
+    def cost(self) -> float:
+        """−2 log posterior up to a constant of the records; infinite where a simulation did not stay finite."""
+        found = float(self.by_joint.sum()) + self.prior
+        return found if math.isfinite(found) else math.inf
+
+    @property
+    def model_values(self) -> dict[str, float]:
+        """The values of the model's parameters, without those of the records."""
+        return {name: value for name, value in self.values.items() if name in self.model.by_name}
+
+    @property
+    def fitted_model(self) -> Model:
+        """The model with these values."""
+        return self.model.with_values(self.model_values)
+
+    @cached_property
+    def squares(self) -> Floats:
+        """(n,) mean squares of what is left."""
+        return self.compared.samples.mean_squares(self.signals)
+
+    @cached_property
+    def deviations(self) -> Floats:
+        """(n,) with which samples are weighed."""
+        return self.compared.deviations(self.row)
+
+    def weighted(self, rows: Floats, joint: int | None = None) -> Floats:
+        """Rows (…, N) as this fit weighs them; of one joint (index) alone, where it is given."""
+        return self.compared.weighted(rows, self.deviations, self.memory, joint)
+
+    @cached_property
+    def standard_deviations(self) -> dict[str, float]:
+        """Of the unknowns that change the residual at all, by name."""
+        return standard_deviations(self)
+
+    def slopes(self) -> Slopes:
+        """Derivatives by every unknown."""
+        if self.known or not self.unknowns:
+            return self.known
+        rows = self.compared.slopes(self.values, self.unknowns)
+        return dict(zip((u.name for u in self.unknowns), rows, strict=True))
+
+    def with_slopes(self) -> Fit:
+        """The same with derivatives."""
+        return replace(self, known=self.slopes())
+
+
+def fit(
+    compared: Residual,
+    unknowns: Sequence[Unknown],
+    begin: Values,
+    memory: Floats | None = None,
+    known: Slopes | None = None,
+    rounds: int = ROUNDS,
+    goal: float = math.inf,
+) -> Fit:
+    """Values that make the residual most probable, starting from `begin` where it names an unknown.
+
+    Args:
+        memory: (n,) memory of the residual, where it is to be that of another fit, so that the two can be compared.
+        known: derivatives of a place near it, of another model with some of these unknowns. goal: a cost; the fit ends
+            where the steps that are left, each as good as the last, would not lead there.
+    """
+    values = start_values(unknowns, begin)
+    near = known or {}
+    slopes = {u.name: near[u.name] for u in unknowns if u.name in near}
+    first = evaluate(compared, unknowns, values, np.ones(len(compared.floor)) if memory is None else memory)
+    first = descend(first, slopes, rounds, goal)
+    if memory is not None:
+        return first
+    memory = compared.memory(first.row)
+    if np.array_equal(memory, first.memory):
+        return first
+    return descend(evaluate(compared, unknowns, first.values, memory), first.known, rounds, goal)
+
+
+def start_values(unknowns: Sequence[Unknown], begin: Values) -> dict[str, float]:
+    """Values of the unknowns within their bounds, as expected where `begin` names none."""
+    return {u.name: float(np.clip(begin.get(u.name, u.expected), u.low, u.high)) for u in unknowns}
+
+
+def evaluate(compared: Residual, unknowns: Sequence[Unknown], values: dict[str, float], memory: Floats) -> Fit:
+    """A model with these values, whatever they are."""
+    signals = compared.at(values)
+    row = compared.samples.flat(signals)
+    cost = compared.costs(row, memory)
+    return Fit(compared, tuple(unknowns), values, signals, row, memory, cost, prior_cost(unknowns, values), {})
+
+
+def descend(best: Fit, slopes: Slopes, rounds: int = ROUNDS, goal: float = math.inf) -> Fit:
+    """The fit after Gauss–Newton steps until it settles.
+
+    Args:
+        slopes: derivatives of a place near it, of some unknowns or of all. Those of all are computed anew where
+            steps by the corrected ones end; of some, they are only corrected, and all others are computed at every step
+            that they have not foretold.
+    """
+    if not best.unknowns or not math.isfinite(best.cost):
+        return best
+    names = [u.name for u in best.unknowns]
+    own = [k for k, name in enumerate(names) if name not in slopes]
+    partly = 0 < len(own) < len(names)
+    J = np.zeros((len(names), len(best.row)))
+    for k, name in enumerate(names):
+        if name in slopes:
+            J[k] = slopes[name]
+    due, since, begun = bool(own), 0, best.cost
+    for number in range(rounds):
+        if due:
+            which = own if partly else list(range(len(names)))
+            rows = best.compared.slopes(best.values, [best.unknowns[k] for k in which])
+            J[which] = np.where(np.isfinite(rows).all(axis=1, keepdims=True), rows, 0.0)  # none where it runs away
+            since, begun = 0, best.cost
+        following, J, foretold = _step(best, J)
+        fell = 0.0 if following is best else best.cost - following.cost
+        best = following
+        since, ends = since + 1, fell < SETTLED
+        if ends and (partly or begun - best.cost < SETTLED or (due and foretold)):
+            break
+        due = not foretold if partly else ends or since == STEPS_APART
+        if number > 0 and best.cost - fell * (rounds - number - 1) > goal:
+            break
+    return replace(best, known=dict(zip(names, J, strict=True)))
+
+
+def _step(now: Fit, J: Floats) -> tuple[Fit, Floats, bool]:
+    """A step that descends, or the same fit; derivatives (p, N) corrected by what was tried; and whether they had said
+    where it leads."""
+    scale, low, high = (np.array([getattr(u, side) for u in now.unknowns]) for side in ("scale", "low", "high"))
+    at = np.array([now.values[u.name] for u in now.unknowns])
+    rows, aims = prior_rows(now.unknowns, at)
+    rows = rows * scale
+    left = now.weighted(now.row)
+    A = now.weighted(J) * scale[:, None]
+    seen = A @ A.T
+    for share, damping in ATTEMPTS:
+        information = seen + rows.T @ rows
+        descent = rows.T @ aims - A @ left
+        curvature = information + np.diag(DAMPING**2 + (LEAST_DAMPING + damping) * np.diag(information))
+        step = share * bounded_step(curvature, descent, (low - at) / scale, (high - at) / scale)
+        if float(descent @ step) < 0.5 * SETTLED:
+            break
+        values = np.clip(at + step * scale, low, high)
+        named = {u.name: float(v) for u, v in zip(now.unknowns, values, strict=True)}
+        tried = evaluate(now.compared, now.unknowns, named, now.memory)
+        if not math.isfinite(tried.cost):
+            continue
+        moved = (values - at) / scale
+        missed = tried.row - now.row - (moved * scale) @ J
+        wrong, whole = (now.weighted(part) for part in (missed, tried.row - now.row))
+        foretold = float(wrong @ wrong) <= FORETOLD**2 * float(whole @ whole)
+        if foretold and tried.cost < now.cost:
+            return tried, J, True
+        metric = np.diag(information) * moved
+        if (length := float(metric @ moved)) > 0.0:
+            metric /= length
+            crossed = np.outer(A @ wrong, metric)
+            seen = seen + crossed + crossed.T + float(wrong @ wrong) * np.outer(metric, metric)
+            A = A + np.outer(metric, wrong)
+            J = J + np.outer(metric / scale, missed)
+        if tried.cost < now.cost:
+            return tried, J, foretold
+    return now, J, False
+
+
+def standard_deviations(now: Fit) -> dict[str, float]:
+    """Standard deviations, by name, of the unknowns that change the residual at all, for correlated residuals (White
+    1980): none where no joint moves."""
+    slopes, samples = now.slopes(), now.compared.samples
+    used = [u for u in now.unknowns if np.abs(slopes[u.name]).max(initial=0.0) > 0]
+    if not used:
+        return {}
+    scale = np.array([u.scale for u in used])
+    single = np.ones(len(now.memory))
+    J = np.stack([slopes[u.name] * u.scale for u in used])
+    J, left = (now.compared.weighted(part, now.deviations, single) for part in (J, now.row))
+    runs = [
+        (part.T, own)
+        for j in range(len(single))
+        for part, own in zip(samples.split(J, j), samples.split(left, j), strict=True)
+    ]
+    information = J @ J.T
+    prior = np.array([0.0 if u.deviation is None else (u.scale / u.deviation) ** 2 for u in used])
+    loose = 1e-12 * max(float(np.trace(information)), 1.0)  # a direction without any information gets no interval
+    scores = [part * own[:, None] for part, own in runs]
+    covariance = sandwich(information + loose * np.eye(len(used)), scores, prior, LONGEST_MEMORY)
+    return dict(zip([u.name for u in used], scale * np.sqrt(np.diag(covariance)), strict=True))
+
+
+def found_values(
+    now: Fit, parameters: Sequence[Parameter], bias: Mapping[str, float] | None = None
+) -> dict[str, FoundValue]:
+    """Estimates of an effect's parameters with 95 % intervals that hold for correlated residuals.
+
+    bias: by name, how far an estimate may be off beside what noise does; its square is added to the variance.
+    """
+    deviations, result = now.standard_deviations, {}
+    for p in parameters:
+        value, deviation = now.values[p.name], deviations.get(p.name)
+        if deviation is None or not np.isfinite(deviation):
+            result[p.name] = FoundValue.of(p, value)
+            continue
+        half = INTERVAL * math.hypot(deviation, (bias or {}).get(p.name, 0.0))
+        result[p.name] = FoundValue.of(p, value, max(value - half, p.low), min(value + half, p.high))
+    return result

@@ -1,0 +1,189 @@
+"""Steps of a diagnosis: find an effect that is missing, add it, check that it holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from daq.contracts.progress import Cancel, Progress, stop_if
+from model.discrepancy.diagnosis import Candidate, Suspicion
+from model.discrepancy.engine import holdout
+from model.discrepancy.engine.candidate import Fitted
+from model.discrepancy.engine.case import Case
+from model.discrepancy.engine.fitting import Fit
+from model.discrepancy.engine.judging import judge, share_of_rest, suspect
+from model.discrepancy.engine.search import (
+    Findings,
+    evidence,
+    improved,
+    order_by_odds,
+    prefer_fewer_joints,
+    prefer_shorter_laws,
+    search,
+)
+from model.discrepancy.engine.standing import Standing, begin
+from model.discrepancy.engine.step_record import list_tried, record_step, rivals_of
+from model.discrepancy.grounds import Note, Refusal
+from model.discrepancy.thresholds import CHANCES, LARGER_PART
+from model.discrepancy.verdict import withdrawn
+from model.effects.names import effect_on
+
+
+@dataclass
+class Workflow:
+    """State of a diagnosis: what was found so far, and the ranking of a step that added nothing.
+
+    recorded: s, time of all records. rivals: candidates close to the last effect that was added.
+    """
+
+    case: Case
+    recorded: float
+    progress: Progress
+    cancel: Cancel
+    first: Fit | None = None
+    """The fit of the given model, where it is known."""
+    tried: tuple[Candidate, ...] = ()
+    notes: list[Note] = field(default_factory=list)
+    suspicion: Suspicion | None = None
+    rivals: tuple[Fitted, ...] = ()
+    left: tuple[int, ...] = ()
+    """Joints on which more is left than noise, and is no noise."""
+
+    def __post_init__(self) -> None:
+        self._report(0.0, "fitting the tolerance parameters")
+        self.found = begin(self.case, self.first)
+
+    def run(self) -> None:
+        """Takes steps until nothing more is significant or holds."""
+        self._take_steps()
+        self._withdraw_lesser_ones()
+        self._withdraw_wrong_laws()
+        self.notes += [
+            Note(kind="taken-out-again", values={"effect": step.effect, "step": number})
+            for number, step in enumerate(self.found.steps, start=1)
+            if step.refusal is not None and step.refusal.kind == "superfluous"
+        ]
+
+    def _take_steps(self) -> None:
+        most = self.case.options.most_steps
+        for _ in range(2 * most):  # two effects may make each other superfluous in turn
+            if len(self.found.adopted) >= most:
+                break
+            self._report(0.1, "what is missing")
+            before, findings = self._searched()
+            self.found = self._adopt(before, findings)
+            if len(self.found.adopted) == len(before.adopted):
+                self.tried = list_tried(self.found, findings)
+                self.suspicion = suspect(self.found, findings, self.recorded)
+                break
+            self._report(0.9, "what is not needed any more")
+            self._prune(len(before.steps))
+
+    def _report(self, fraction: float, text: str) -> None:
+        stop_if(self.cancel)
+        found = getattr(self, "found", None)
+        steps, adopted = ((), ()) if found is None else (found.steps, found.adopted)
+        named = ", ".join(effect_on(s.effect, s.joints) for s in adopted if s.effect)
+        so_far = f"found so far: {named}; " if named else ""
+        share = (len(steps) + fraction) / (self.case.options.most_steps + 1)
+        self.progress(min(0.99, share), f"{so_far}step {len(steps) + 1}: {text}")
+
+    def _searched(self) -> tuple[Standing, Findings]:
+        """Where the diagnosis stands, and what a step finds there: from a better fit, if the best candidate leads to
+        one without its effect. That fall of the cost is no merit of the candidate."""
+        found = self.found
+        findings = self._search(found)
+        better = improved(found.now, findings.fitted[0].fit) if findings.fitted else None
+        if better is None:
+            return found, findings
+        found = replace(found, now=better, first=found.first if found.adopted else better)
+        return found, self._search(found)
+
+    def _search(self, found: Standing) -> Findings:
+        """What a step finds, without what the records do not resolve, the most probable by all records first."""
+        findings = search(found.now, self.case, self._report, self.cancel)
+        options = self.case.options
+        fitted = prefer_fewer_joints(
+            sorted(self._with_held_out(found, findings.fitted), key=order_by_odds), options.least_margin
+        )
+        fitted = prefer_shorter_laws(fitted, findings.now, options.least_margin)
+        resolved = [self.case.is_resolved(f, findings.now) for f in fitted]
+        return replace(
+            findings,
+            fitted=tuple(f for f, is_one in zip(fitted, resolved, strict=True) if is_one),
+            unresolved=tuple(f for f, is_one in zip(fitted, resolved, strict=True) if not is_one),
+        )
+
+    def _with_held_out(self, found: Standing, candidates: Sequence[Fitted]) -> list[Fitted]:
+        """Candidates with what held-out records say for them; those for which fitted records do not speak are left."""
+        asked = [c for c in candidates if self.case.held_out is not None and c.evidence > 0]
+        told = holdout.evidence(self.case, found.now, [c.fit for c in asked])
+        others = [c for c in candidates if not any(c is one for one in asked)]
+        return [
+            *(replace(c, told=one.alone, told_compared=one.compared) for c, one in zip(asked, told, strict=True)),
+            *others,
+        ]
+
+    def _adopt(self, found: Standing, findings: Findings) -> Standing:
+        """Adds the best candidate that holds, if there is one, and the steps that were refused before it."""
+        refused: list[Fitted] = []
+        passed_over: list[Fitted] = []  # they lack evidence, or explain noise
+        steps = list(found.steps)
+        for chosen in findings.fitted:
+            if len(refused) == CHANCES:
+                break
+            compared = judge(found, chosen, refused)
+            if compared is None:
+                passed_over.append(chosen)
+                continue
+            steps.append(record_step(found, findings, compared, [*refused, *passed_over]))
+            if compared.refusal is None:
+                self.rivals = (chosen, *rivals_of(found, findings, chosen, [*refused, *passed_over]))
+                return replace(found.take(chosen), steps=tuple(steps))
+            refused.append(chosen)
+        return replace(found, steps=tuple(steps))
+
+    def _prune(self, latest: int) -> None:
+        """Takes out effects of earlier steps that the latest one has made superfluous."""
+        for step in self.found.steps[:latest]:
+            if not step.adopted or step.effect is None:
+                continue
+            now, without = self.found.now, self.found.remove(step)
+            if evidence(without.now, now, len(step.parameters), 1) < 0:
+                gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
+                self.found = replace(without, steps=tuple(gone if s is step else s for s in self.found.steps))
+
+    def _withdraw_lesser_ones(self) -> None:
+        """Takes back, the least first, effects that explain less than half of what stays unexplained beside them.
+
+        A law that is not in the library is as large as what is left. It resembles one or another law of the library to
+        a part of its size, on every record, so that evidence does not tell: what it looks like is no name.
+        """
+        while self.found.adopted:
+            shares = [(share_of_rest(self.found, step), step) for step in self.found.adopted]
+            share, least = min(shares, key=lambda one: one[0])
+            if share >= LARGER_PART:
+                return
+            why = Refusal(kind="less-than-rest", numbers={"share": share})
+            gone = least.model_copy(update={"adopted": False, "refusal": why})
+            without = self.found.remove(least)
+            self.found = replace(without, steps=tuple(gone if s is least else s for s in without.steps))
+            self.suspicion, self.tried = None, ()  # they were of the model with this effect
+
+    def _withdraw_wrong_laws(self) -> None:
+        """Takes back the first effect whose law is of another form than what is there, and all effects after it."""
+        steps = self.found.steps
+        self.left = self._joints_left()
+        forms = ((k, self.case.wrong_on(self.found.now, s, self.left)) for k, s in enumerate(steps) if s.adopted)
+        first, wrong = next((found for found in forms if found[1]), (len(steps), ()))
+        if not wrong:
+            return
+        for step in steps[first:]:
+            if step.adopted:
+                now = tuple(withdrawn(s, wrong) if s is step else s for s in self.found.steps)
+                self.found = replace(self.found.remove(step), steps=now)
+        self.suspicion, self.tried = None, ()  # they were of the model with these effects
+        self.left = self._joints_left() or wrong
+
+    def _joints_left(self) -> tuple[int, ...]:
+        return self.case.joints_left(self.found.now, self.found.first, named=bool(self.found.adopted))

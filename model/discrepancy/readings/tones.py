@@ -1,0 +1,228 @@
+"""Spectra of the residual as a torque: they propose the rate of a ripple (waves a turn) or of a disturbance (Hz).
+
+The response of a joint's reading to a torque on it is described by a finite impulse response, fitted to what a few
+small simulated tones change. Because of friction it is right only on average, but a proposal is all that is needed: the
+fit that follows uses the model itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import fft, ifft, next_fast_len
+
+from model.arrays import Floats
+from model.discrepancy.engine.fitting import Fit
+from model.discrepancy.engine.probing import Projection, Trial
+from model.discrepancy.engine.residual import Samples
+from model.discrepancy.excitation import own_frequencies
+from model.discrepancy.readings.observation import DIFFERENCE, Observation
+from model.discrepancy.readings.residual import ReadingResidual
+from model.discrepancy.readings.trials import tone_trial
+from model.effects.effect import Tone
+from model.effects.library import effect, library
+from model.fitting.records import Record
+from model.machine_model.effect_parameters import effect_parameters
+from model.machine_model.model import Model
+
+RESPONSE = 1.5
+"""Length of the impulse response, s. In a simulation that follows the record, the controller hardly sees a deviation,
+so it decays slowly."""
+TRIAL_RATES = {Tone.OVER_POSITION: (23.0, 47.0), Tone.OVER_TIME: (0.7, 2.1, 4.3)}
+"""Rates of the tones that the response is fitted to: rad of phase per unit of the joint's travel; Hz."""
+USUAL_TONES = 500
+"""Tones tried per effect and joint. Longer records get more, so that no tone is skipped."""
+HIGHEST = 8.0
+"""Highest frequency that is tried, Hz: the arm follows no faster."""
+SHORTEST_WAVE = 4096 / 75
+"""Shortest wave that is tried, in counts of the sensor: an assumption. On 12 bits over 270° it is a hundredth of a
+joint turn, which the fastest ramp of the presets, 20 counts a period, still samples more than twice."""
+BLOCK = 4_000_000
+"""Samples of tones in memory at a time: 64 MB."""
+
+
+def propose_tones(clear: Projection, compared: ReadingResidual, joints: Sequence[int]) -> list[Trial]:
+    """The best ripple and the best disturbance of every joint; only the other one for a joint that has one of them
+    already."""
+    found = []
+    for joint in joints:
+        absent = _absent(clear.now.model, joint)
+        if not absent:
+            continue
+        shown_by = _most_moving(compared.observation, joint)
+        if shown_by is None:
+            continue
+        response = torque_response(clear.now, compared, joint, shown_by)
+        for name, over in absent.items():
+            best = _best_tone(clear, compared, name, over, joint, response)
+            if best is not None:
+                found.append(best)
+    return found
+
+
+def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
+    """Rates (k,) in equal steps: Hz of a disturbance, or rad of a ripple per unit of the joint's travel (waves a turn).
+    Empty if the joint moves by less than one wave.
+
+    Tones that differ by less than one over the record's duration (its travel) cannot be distinguished. Steps are half
+    (an eighth) of that; wider, up to that itself, where they would be more than USUAL_TONES.
+    """
+    machine = observation.machine
+    column = machine.modelled_joints.index(joint)
+    over = effect(name).tone
+    high = next(p.high for p in effect_parameters(machine, name, (joint,), shared=False) if p.part == over)
+    if over is Tone.OVER_POSITION:
+        travel = max(float(np.ptp(r.measured[:, column])) for r in observation.records)
+        sensor = machine.joint(joint).sensor
+        if sensor is not None and sensor.count and sensor.measures == "position":
+            high = min(high, 2 * np.pi / (SHORTEST_WAVE * sensor.count))
+        alike = 2 * np.pi / travel if travel > 0 else math.inf
+        low, step = alike / 2, alike / 8
+    else:
+        alike = 1 / max(len(r.inputs) * r.inputs.period for r in observation.records)
+        high = min(high, HIGHEST, 0.4 / observation.records[0].inputs.period)
+        low, step = 2 * alike, alike / 2
+    if not low < high:
+        return np.zeros(0)
+    span = high - low
+    return np.linspace(low, high, int(max(2.0, min(span / step, max(USUAL_TONES, math.ceil(span / alike) + 1)))))
+
+
+def _of_the_excitation(rates: Floats, observation: Observation) -> NDArray[np.bool_]:
+    """Which frequencies, (k,), are those of the motion that was asked for; of the motion itself without set points."""
+    asked = [r.inputs.set_points if r.inputs.has_set_points else r.measured for r in observation.records]
+    speeds = [np.diff(positions, axis=0) for positions in asked]
+    return own_frequencies(rates, speeds, observation.records[0].inputs.period)
+
+
+def _most_moving(observation: Observation, joint: int) -> int | None:
+    """The record in which a joint travels furthest, of those at least twice as long as a response; None without any."""
+    column = observation.machine.modelled_joints.index(joint)
+    travels = [
+        float(np.ptp(r.measured[:, column])) if len(r.measured) >= 2 * _samples(r) else -1.0
+        for r in observation.records
+    ]
+    best = int(np.argmax(travels))
+    return None if travels[best] < 0.0 else best
+
+
+def _samples(record: Record) -> int:
+    """Samples of an impulse response at a record's rate."""
+    return max(2, round(RESPONSE / record.inputs.period))
+
+
+def torque_response(now: Fit, compared: ReadingResidual, joint: int, record: int = 0) -> Floats:
+    """Impulse response (s,) of a joint's reading to a torque on it, rad/(N·m), as one record shows it.
+
+    It is found with kinds of tones that the joint does not have yet, because changing those it has would show what
+    their own amplitude does. Raises ValueError where it has both.
+    """
+    observation = compared.observation
+    column, model = now.model.machine.modelled_joints.index(joint), now.model
+    absent = _absent(model, joint)
+    if not absent:
+        raise ValueError(f"joint {joint} has every kind of tone already")
+    for name in absent:
+        model = model.with_effect(name, (joint,))
+    moved, sizes, waves = [], [], []
+    for name, over in absent.items():
+        for value in TRIAL_RATES[over]:
+            sine = model.parameter(f"joint{joint}.{name}.sine")
+            size = DIFFERENCE * (sine.deviation or 1.0)
+            rate = f"joint{joint}.{name}.{over}"
+            moved.append({**now.values, rate: value, sine.name: sine.value + size})
+            sizes.append(size)
+            waves.append(np.sin(_phase(now, observation, over, column, np.array([value]), record)[0]))
+    every = replace(compared, model=model, samples=whole_record(observation, record, column))
+    shown = -every.changes(now.values, moved) / np.array(sizes)[:, None]
+    count = _samples(observation.records[record])
+    rows = [_lagged(wave, count) for wave in waves]
+    regressor = np.concatenate([r[count:] for r in rows])
+    target = np.concatenate([s[count:] for s in shown])
+    gram = regressor.T @ regressor
+    gram[np.diag_indices_from(gram)] += 1e-6 * np.trace(gram) / count
+    return np.asarray(np.linalg.solve(gram, regressor.T @ target))
+
+
+def whole_record(observation: Observation, record: int, column: int) -> Samples:
+    """All samples of one joint (index) in one record, those that are not compared too."""
+    every = ((record, slice(0, len(observation.records[record].measured))),)
+    joints = len(observation.deviations)
+    return Samples(tuple(every if j == column else () for j in range(joints)), np.ones(joints))
+
+
+def _absent(model: Model, joint: int) -> dict[str, Tone]:
+    """The effects that are tones and that a joint does not have."""
+    known = {name: own.tone for name, own in library().items() if own.tone is not None}
+    return {n: t for n, t in known.items() if not any(u.name == n and joint in u.joints for u in model.effects)}
+
+
+def _lagged(wave: Floats, count: int) -> Floats:
+    padded = np.concatenate([np.zeros(count - 1), wave])
+    return np.ascontiguousarray(np.lib.stride_tricks.sliding_window_view(padded, count)[:, ::-1])
+
+
+def _phase(now: Fit, observation: Observation, over: Tone, column: int, values: Floats, record: int = 0) -> Floats:
+    """Phase (k, m) of tones of the given cycles or frequencies along a record."""
+    source = observation.records[record]
+    if over is Tone.OVER_POSITION:
+        angle = source.measured[:, column] - now.signals[record][:, column]
+        return values[:, None] * angle[None]
+    time = (source.inputs.rows + 0.0) * source.inputs.period
+    return 2 * np.pi * values[:, None] * time[None]
+
+
+def _passed(
+    now: Fit, observation: Observation, over: Tone, column: int, values: Floats, response: Floats, record: int
+) -> NDArray[np.complex128]:
+    """Readings (k, m) that tones of unit torque cause, the cosine as real part and the sine as imaginary part."""
+    source = observation.records[record]
+    waves = np.exp(1j * _phase(now, observation, over, column, values, record))
+    if over is Tone.OVER_POSITION:
+        samples = waves.shape[1]
+        room = next_fast_len(samples + len(response) - 1)
+        waves = ifft(fft(waves, room, axis=1) * fft(response, room), axis=1)[:, :samples]
+    else:  # a frequency passes a linear response as it is, but for its size and phase
+        lags = np.arange(len(response)) * source.inputs.period
+        waves *= np.exp(-2j * np.pi * values[:, None] * lags) @ response[:, None]
+    return np.concatenate([waves[:, run] for run in source.runs], axis=1)
+
+
+def _best_tone(
+    clear: Projection, compared: ReadingResidual, name: str, over: Tone, joint: int, response: Floats
+) -> Trial | None:
+    """The tone that explains most of what is left, once the tolerance parameters have moved too."""
+    now, observation = clear.now, compared.observation
+    column = now.model.machine.modelled_joints.index(joint)
+    rates = rates_tried(observation, name, joint)
+    if over is Tone.OVER_TIME:
+        rates = rates[~_of_the_excitation(rates, observation)]
+    columns = compared.samples.columns[column]
+    count = columns.stop - columns.start
+    best: tuple[float, float] | None = None
+    for own in np.array_split(rates, math.ceil(len(rates) * count / BLOCK)) if len(rates) else ():
+        waves = [_passed(now, observation, over, column, own, response, t) for t in range(len(observation.records))]
+        shown = np.concatenate(waves, axis=1)
+        sine, cosine = (now.weighted(-part, column) for part in (shown.imag, shown.real))
+        gains = _explained(clear, sine, cosine, columns)
+        k = int(np.argmax(gains))
+        if best is None or gains[k] > best[0]:
+            best = float(gains[k]), float(own[k])
+    if best is None:
+        return None
+    places = max(USUAL_TONES, len(rates))
+    model = now.fitted_model
+    return tone_trial(model, name, joint, {over.value: best[1]}, float(rates[0]), places, observation)
+
+
+def _explained(clear: Projection, sine: Floats, cosine: Floats, columns: slice) -> Floats:
+    """How much pairs of signals (k, m) take off the cost, (k,)."""
+    sines, cosines, mixed, by_sine, by_cosine = clear.pairs(sine, cosine, columns)
+    determinant = np.maximum(sines * cosines - mixed**2, 1e-9 * sines * cosines + 1e-30)
+    first = (cosines * by_sine - mixed * by_cosine) / determinant
+    second = (sines * by_cosine - mixed * by_sine) / determinant
+    return np.asarray(first * by_sine + second * by_cosine)

@@ -1,1 +1,0 @@
-"""A diagnosis by output error: effects are selected one after the other, each tested on held-out traces."""
