@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import resource
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -38,6 +37,8 @@ def most_connections(wanted: int) -> int:
 
     Half of the limit stays free, since a request may open a file too. First raises the soft limit to the hard one.
     """
+    import resource  # not on Windows, where the service's other modules are imported
+
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with suppress(OSError, ValueError):  # some systems allow less than they report
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))

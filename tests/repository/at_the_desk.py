@@ -26,7 +26,7 @@ OURS = ("daq.contracts", "daq.traces", "daq.config", "model", "daq_cli", "ma2000
 FOREIGN = (
     "asyncio concurrent.futures.process httpx jinja2 matplotlib.backends.backend_agg mcap.writer multiprocessing.pool "
     "mujoco numba pandas pint platformdirs pyarrow.parquet pydantic_settings rich.console rosbags.highlevel scipy.io "
-    "scipy.optimize scipy.signal serial.tools.list_ports typer websockets xarray"
+    "scipy.optimize scipy.signal serial.tools.list_ports typer tzlocal websockets xarray"
 )
 """Modules of others, imported before this Python loses what is POSIX's own."""
 POSIX_MODULES = "fcntl grp pty pwd resource syslog termios tty uvloop"
