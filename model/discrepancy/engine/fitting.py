@@ -30,10 +30,11 @@ Slopes = dict[str, Floats]
 
 ROUNDS = 8
 """Most steps of a fit that begins near its end."""
-ATTEMPTS = ((1.0, 0.0), (1.0, 0.0), (0.4, 0.0), (1.0, 0.3), (0.12, 0.0), (1.0, 3.0))
+ATTEMPTS = ((1.0, 0.0), (1.0, 1e-3), (0.4, 0.0), (1.0, 1e-2), (1.0, 0.1), (0.12, 0.0), (1.0, 1.0))
 """Steps that are tried until one is downhill, as a share of the whole one and a damping in shares of the information's
 diagonal (Marquardt 1963), each from derivatives that those before have corrected. A short step helps where the cost is
-strongly curved, a damped one where the records say little."""
+strongly curved. Along a valley in which records tell little a whole step is far too long; a little damping shortens it
+there alone."""
 DAMPING = 0.01
 """Damping of a step, over the scales of its unknowns. It decides only what the records do not: a tilt about an axis
 along gravity would be thrown to its bound otherwise, and all other numbers would stay where they are, since the step as

@@ -173,12 +173,12 @@ def test_dimensions_that_are_projected_away_count_as_no_samples() -> None:
     assert free.unknown_count.tolist() == [0]
     assert lost.unknown_count.tolist() == lost.moving.sum(axis=0).tolist()
     own, every = (samples_of([one]) for one in (record, free))
-    rows = sum(r.stop - r.start for _, r in own.by_joint[0])
+    rows = sum(r.stop - r.start for _, r in own.runs[0])
     assert 0 < record.unknown_count[0] < rows
-    assert own.counts.tolist() == [rows - record.unknown_count[0]]
+    assert own.told.tolist() == [rows - record.unknown_count[0]]
     white = np.random.default_rng(2).standard_normal((len(record.moving), 1))
     assert float(own.mean_squares([record.subtract_unknown(white)])[0]) == pytest.approx(1.0, abs=0.25)
-    assert every.counts[0] == every.samples == sum(r.stop - r.start for _, r in every.by_joint[0])
+    assert every.told[0] == sum(r.stop - r.start for _, r in every.runs[0])
     assert np.isnan(samples_of([lost]).mean_squares([lost.subtract_unknown(white)])[0])
 
 
