@@ -24,8 +24,12 @@ export class Comparison {
   fromStart = $state(true);
   /** How several traces are laid over each other: by the begins of their motions, or where they lie best. */
   alignment = $state<Alignment>('begin');
-  /** What is drawn beside the overlay. */
-  beside = $state<readonly BesideName[]>([]);
+  /** What is to be drawn beside the overlay. */
+  chosenBeside = $state<readonly BesideName[]>([]);
+  /** What is drawn beside it: a difference needs two traces. */
+  beside: readonly BesideName[] = $derived(
+    this.chosenBeside.filter((name) => name !== 'difference' || this.isOneJoint),
+  );
   /** Chosen by hand; empty for those that moved. */
   chosenJoints = $state.raw<readonly number[]>([]);
   loaded: readonly ShownTrace[] = $derived(this.traces.filter((trace) => trace.signals !== null));
