@@ -47,6 +47,21 @@ export function toldOf(
   });
 }
 
+/** The candidates of an answer: of the step that it adopted, or of the first one. */
+export function toldOfAnswer(found: DiagnosisData): Told[] {
+  const step = found.steps.find((one) => one.adopted) ?? found.steps[0];
+  return toldOf(
+    step ?? { candidates: found.candidates, group: [], effect: null, joints: [] },
+    found.significant,
+  );
+}
+
+/** A share of the probability, for people. */
+export function shareText(share: number): string {
+  if (share > 0.999) return '> 99.9 %';
+  return share < 0.001 ? '< 0.1 %' : `${fixed(100 * share, share < 0.1 ? 1 : 0)} %`;
+}
+
 function against(one: TriedEffect, fitted: readonly TriedEffect[], place: number, lead: number): string {
   const left =
     one.misfit === null || one.misfit < 1.1 ? '' : `leaves ${fixed(one.misfit, 2)} times the noise`;
