@@ -3,7 +3,7 @@
 import { untrack } from 'svelte';
 import { router } from '../../lib/router.svelte';
 import { wholeRange, type Range, type Signals } from '../../lib/traces/columns';
-import { bestShift } from '../../lib/traces/compare';
+import { besideOf, bestShift } from '../../lib/traces/compare';
 import { moved, within, zoomed } from '../../lib/traces/zoom';
 import { ShownTrace } from './shown_trace.svelte';
 
@@ -26,10 +26,8 @@ export class Comparison {
   alignment = $state<Alignment>('begin');
   /** What is to be drawn beside the overlay. */
   chosenBeside = $state<readonly BesideName[]>([]);
-  /** What is drawn beside it: a difference needs two traces. */
-  beside: readonly BesideName[] = $derived(
-    this.chosenBeside.filter((name) => name !== 'difference' || this.isOneJoint),
-  );
+  /** What is drawn beside it. */
+  beside: readonly BesideName[] = $derived(besideOf(this.chosenBeside, this.traces.length));
   /** Chosen by hand; empty for those that moved. */
   chosenJoints = $state.raw<readonly number[]>([]);
   loaded: readonly ShownTrace[] = $derived(this.traces.filter((trace) => trace.signals !== null));
