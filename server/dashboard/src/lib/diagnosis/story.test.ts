@@ -1,6 +1,15 @@
 import { describe, expect, it } from 'vitest';
 import type { DiagnosisStep, TriedEffect } from '../api/types';
-import { answeredJoints, besideAnswer, heatOverTime, scenesOf, shareText, shrunkOf, toldOf, worstMoment } from './story';
+import {
+  answeredJoints,
+  besideAnswer,
+  heatOverTime,
+  scenesOf,
+  shareText,
+  shrunkOf,
+  toldOf,
+  worstMoment,
+} from './story';
 
 const tried = (effect: string, evidence: number, misfit: number, refitted = true): TriedEffect =>
   ({
@@ -27,7 +36,12 @@ describe('candidates', () => {
     expect([best!.named, next!.named]).toEqual([true, false]);
     expect(best!.speaksAgainst).toBe('Nothing found: the next best has 4 less.');
     expect(next!.speaksFor).toBe('Evidence 96; 10 is enough for a name.');
-    expect([best!.share, 0.9996, 0.0004, 0.05].map(shareText)).toEqual(['88 %', '> 99.9 %', '< 0.1 %', '5.0 %']);
+    expect([best!.share, 0.9996, 0.0004, 0.05].map(shareText)).toEqual([
+      '88 %',
+      '> 99.9 %',
+      '< 0.1 %',
+      '5.0 %',
+    ]);
     expect(next!.speaksAgainst).toBe('Evidence 4 below the best, and leaves 1.40 times the noise.');
   });
 });

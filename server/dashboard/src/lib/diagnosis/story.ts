@@ -174,7 +174,10 @@ export function worstMoment(scene: Scene, joints: readonly number[], count: numb
 /** Why joints glow that are not those of the answer, at a moment with the given model; empty where none does. */
 export function besideAnswer(scene: Scene, answered: readonly number[], moment: number): string {
   const { drift, noise } = scene;
-  const [before, after] = [0, 1].map((closed) => heatAt(drift, noise, moment, closed)) as [number[], number[]];
+  const [before, after] = [0, 1].map((closed) => heatAt(drift, noise, moment, closed)) as [
+    number[],
+    number[],
+  ];
   const places = drift.joints.flatMap((joint, place) =>
     before[place]! > GLOWS && !answered.includes(joint) ? [place] : [],
   );
@@ -185,7 +188,9 @@ export function besideAnswer(scene: Scene, answered: readonly number[], moment: 
   const left = places.filter((place) => after[place]! > GLOWS);
   const gone = places.filter((place) => !left.includes(place));
   return [
-    gone.length > 0 ? `${called(gone)}: explained by the answer too, because the joints push each other.` : '',
+    gone.length > 0
+      ? `${called(gone)}: explained by the answer too, because the joints push each other.`
+      : '',
     left.length > 0 ? `${called(left)}: not explained by the answer at this moment.` : '',
   ]
     .filter((sentence) => sentence !== '')

@@ -37,7 +37,10 @@ it.each([
   ['after:yesterday', 'after: needs a date such as 2026-11-30'],
   ['after:2026-13-01', 'after: needs a date'],
   ['before:2026-02-31', 'before: needs a date'],
-  ['speed:3 x', 'speed: is not a filter; there are joint, effect, tag, source, outcome, kind, after, before.'],
+  [
+    'speed:3 x',
+    'speed: is not a filter; there are joint, effect, tag, source, outcome, kind, after, before.',
+  ],
   ['speed:', 'speed: is not a filter'],
   ['effect: backlash', 'effect: needs its value next to it'],
   ['joint:two', 'joint: needs a number from 1'],
