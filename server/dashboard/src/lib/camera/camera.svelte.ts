@@ -3,11 +3,13 @@
 import { api, ask, here, addressOf, asProblem } from '../api';
 import { currentToken } from '../api/token';
 import type { CameraStatus } from '../api/types';
-import { isOld } from './age';
+import { isOld, whyOld } from './age';
 
 /** s between two questions for a picture, while pictures come, and while there is none. */
 const EVERY = 0.1;
 const IDLE = 2;
+/** ms between two looks at how old the picture is, also while no answer comes. */
+const AGED_EVERY = 250;
 
 export class Camera {
   status = $state.raw<CameraStatus | null>(null);
@@ -18,15 +20,21 @@ export class Camera {
   private takenAt = -Infinity;
   private number = 0;
   private timer = 0;
+  /** s on this page's clock of the question without an answer; null for none. */
+  private askedAt: number | null = null;
   private isClosed = false;
   age = $state<number | null>(null);
   isStale: boolean = $derived(this.age === null || isOld(this.age));
+  /** Why the picture is old; empty while it is live. */
+  why = $state('');
 
   /** Shows pictures until the returned function is called. */
   follow(): () => void {
     void this.turn();
+    const aging = setInterval(() => this.grow(), AGED_EVERY);
     return () => {
       this.isClosed = true;
+      clearInterval(aging);
       clearTimeout(this.timer);
       this.picture?.close();
     };
@@ -34,6 +42,7 @@ export class Camera {
 
   private async turn(): Promise<void> {
     let isThere = false;
+    this.askedAt = performance.now() / 1000;
     try {
       if (document.visibilityState === 'visible') {
         isThere = await this.next();
@@ -45,10 +54,17 @@ export class Camera {
     } catch (error) {
       this.problem = asProblem(error).detail;
     }
-    this.age = Number.isFinite(this.takenAt) ? performance.now() / 1000 - this.takenAt : null;
+    this.askedAt = null;
+    this.grow();
     if (this.isClosed) return;
     const isIdle = this.problem !== '' || this.status?.source === 'none';
     this.timer = window.setTimeout(() => void this.turn(), (isIdle ? IDLE : EVERY) * 1000);
+  }
+
+  private grow(): void {
+    const now = performance.now() / 1000;
+    this.age = Number.isFinite(this.takenAt) ? now - this.takenAt : null;
+    this.why = this.isStale ? whyOld(this.problem, this.askedAt === null ? 0 : now - this.askedAt) : '';
   }
 
   /** Takes the next picture; whether there was one. Throws a Problem. */

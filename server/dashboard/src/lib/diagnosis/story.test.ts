@@ -1,6 +1,15 @@
 import { describe, expect, it } from 'vitest';
 import type { DiagnosisStep, TriedEffect } from '../api/types';
-import { heatOverTime, scenesOf, shrunkOf, toldOf } from './story';
+import {
+  answeredJoints,
+  besideAnswer,
+  heatOverTime,
+  scenesOf,
+  shareText,
+  shrunkOf,
+  toldOf,
+  worstMoment,
+} from './story';
 
 const tried = (effect: string, evidence: number, misfit: number, refitted = true): TriedEffect =>
   ({
@@ -27,6 +36,12 @@ describe('candidates', () => {
     expect([best!.named, next!.named]).toEqual([true, false]);
     expect(best!.speaksAgainst).toBe('Nothing found: the next best has 4 less.');
     expect(next!.speaksFor).toBe('Evidence 96; 10 is enough for a name.');
+    expect([best!.share, 0.9996, 0.0004, 0.05].map(shareText)).toEqual([
+      '88 %',
+      '> 99.9 %',
+      '< 0.1 %',
+      '5.0 %',
+    ]);
     expect(next!.speaksAgainst).toBe('Evidence 4 below the best, and leaves 1.40 times the noise.');
   });
 });
@@ -58,4 +73,40 @@ it('a joint is hot while its motion is not explained', () => {
   const [scene] = scenesOf({ signals, efforts: [], gap, rmse_fit: [] } as never);
   const [heat] = heatOverTime(scene!, 4, 0);
   expect([heat![0], heat![3]]).toEqual([0, 1]);
+});
+
+describe('where, once there is an answer for joint 3', () => {
+  const time = Array.from({ length: 201 }, (_, index) => index * 0.05);
+  const pulse = (from: number, size: number): number[] =>
+    time.map((at) => (at >= from && at < from + 2 ? size : 0));
+  const none = time.map(() => 0);
+  /** Joint 2 is off most, early; joint 3 later. */
+  const before = [pulse(2, 0.2), pulse(2, 0.04).map((one, index) => one + pulse(6, 0.1)[index]!)];
+  const sceneWith = (...residual: number[][][]) => {
+    const signals = [{ trace: 'a', joints: [2, 3], time, measured: [none, none], residual, held_out: false }];
+    const gap = { joints: [2, 3], noise: [0.01, 0.01], stages: [], units: [] };
+    return scenesOf({ signals, efforts: [], gap, rmse_fit: [] } as never)[0]!;
+  };
+  const steps = [
+    { adopted: true, joints: [3] },
+    { adopted: false, joints: [1] },
+  ];
+  const answered = answeredJoints({ steps } as never);
+
+  it('opens where its joint is worst, not where another joint glows', () => {
+    const scene = sceneWith(before, [none, none]);
+    expect(answered).toEqual([3]);
+    expect(worstMoment(scene, answered, 100)).toBeGreaterThan(6);
+    expect(worstMoment(scene, [], 100)).toBeLessThan(5);
+    expect(besideAnswer(scene, answered, worstMoment(scene, answered, 100))).toBe('');
+  });
+
+  it('says of another joint that glows whether the answer explains it', () => {
+    const explained = sceneWith(before, [none, none]);
+    expect(besideAnswer(explained, answered, 3.5)).toContain('Joint 2: explained by the answer too');
+    const left = sceneWith(before, [before[0]!, none]);
+    expect(besideAnswer(left, answered, 3.5)).toBe('Joint 2: not explained by the answer at this moment.');
+    expect(besideAnswer(sceneWith(before), answered, 3.5)).toContain('Joint 2 may glow');
+    expect(besideAnswer(explained, [], 3.5)).toBe('');
+  });
 });

@@ -1,7 +1,7 @@
 /** A diagnosis as a story: what speaks for and against each candidate, how much it shrinks, where and when. Pure. */
 
 import type { DiagnosisData, DiagnosisStep, Overlay, TriedEffect } from '../api/types';
-import { driftOf, heatAt, type Drift } from '../hidden/drift';
+import { driftOf, heatAt, timesNoiseAt, type Drift } from '../hidden/drift';
 import { fixed, significant } from '../format';
 import { shownUnit } from './overlay';
 
@@ -45,6 +45,21 @@ export function toldOf(
       speaksAgainst: against(one, fitted, place, lead),
     };
   });
+}
+
+/** The candidates of an answer: of the step that it adopted, or of the first one. */
+export function toldOfAnswer(found: DiagnosisData): Told[] {
+  const step = found.steps.find((one) => one.adopted) ?? found.steps[0];
+  return toldOf(
+    step ?? { candidates: found.candidates, group: [], effect: null, joints: [] },
+    found.significant,
+  );
+}
+
+/** A share of the probability, for people. */
+export function shareText(share: number): string {
+  if (share > 0.999) return '> 99.9 %';
+  return share < 0.001 ? '< 0.1 %' : `${fixed(100 * share, share < 0.1 ? 1 : 0)} %`;
 }
 
 function against(one: TriedEffect, fitted: readonly TriedEffect[], place: number, lead: number): string {
@@ -133,6 +148,53 @@ export function heatOverTime(scene: Scene, count: number, closed: number): numbe
     heatAt(scene.drift, scene.noise, ((index + 0.5) * scene.drift.duration) / count, closed),
   );
   return scene.drift.joints.map((_, joint) => heats.map((one) => one[joint]!));
+}
+
+/** From this heat on a joint glows. */
+export const GLOWS = 0.3;
+
+/** The joints that an answer names; none where nothing was adopted. */
+export function answeredJoints(found: Pick<DiagnosisData, 'steps'>): number[] {
+  const adopted = found.steps.filter((one) => one.adopted);
+  return [...new Set(adopted.flatMap((one) => one.joints))].sort((one, other) => one - other);
+}
+
+/** The middle of that of `count` stretches of a scene, s, in which `joints` are worst; all of them where none is there. */
+export function worstMoment(scene: Scene, joints: readonly number[], count: number): number {
+  const { drift, noise } = scene;
+  const own = drift.joints.flatMap((joint, place) => (joints.includes(joint) ? [place] : []));
+  const moments = Array.from({ length: count }, (_, index) => ((index + 0.5) * drift.duration) / count);
+  const worst = moments.map((moment) => {
+    const times = timesNoiseAt(drift, noise, moment, 0);
+    return Math.max(...(own.length > 0 ? own.map((place) => times[place]!) : times));
+  });
+  return moments[worst.indexOf(Math.max(...worst))] ?? 0;
+}
+
+/** Why joints glow that are not those of the answer, at a moment with the given model; empty where none does. */
+export function besideAnswer(scene: Scene, answered: readonly number[], moment: number): string {
+  const { drift, noise } = scene;
+  const [before, after] = [0, 1].map((closed) => heatAt(drift, noise, moment, closed)) as [
+    number[],
+    number[],
+  ];
+  const places = drift.joints.flatMap((joint, place) =>
+    before[place]! > GLOWS && !answered.includes(joint) ? [place] : [],
+  );
+  if (answered.length === 0 || places.length === 0) return '';
+  const called = (some: readonly number[]): string =>
+    `Joint${some.length > 1 ? 's' : ''} ${some.map((place) => drift.joints[place]).join(', ')}`;
+  if (drift.gap.length < 2) return `${called(places)} may glow because the joints push each other.`;
+  const left = places.filter((place) => after[place]! > GLOWS);
+  const gone = places.filter((place) => !left.includes(place));
+  return [
+    gone.length > 0
+      ? `${called(gone)}: explained by the answer too, because the joints push each other.`
+      : '',
+    left.length > 0 ? `${called(left)}: not explained by the answer at this moment.` : '',
+  ]
+    .filter((sentence) => sentence !== '')
+    .join(' ');
 }
 
 function total(one: { evidence: number; evidence_held_out: number | null }): number {

@@ -49,6 +49,11 @@ export class Demonstration {
     }
   }
 
+  /** Ends the search; the demonstration then ends without an answer. Throws a Problem. */
+  async cancel(job: string): Promise<void> {
+    await ask(api.POST('/api/v1/robots/{robot}/jobs/{job}/cancel', { params: { path: { ...here(), job } } }));
+  }
+
   private isGoingOn(hidden: Hidden): boolean {
     return hidden.state === 'recording' || hidden.state === 'diagnosing';
   }

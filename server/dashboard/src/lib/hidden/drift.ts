@@ -68,14 +68,25 @@ export function armsAt(
 
 /** By joint: 0 where the difference is no more than its noise, 1 where it is several times as large. */
 export function heatAt(drift: Drift, noise: readonly number[], moment: number, closed: number): number[] {
+  return timesNoiseAt(drift, noise, moment, closed).map((times) =>
+    Math.min(1, Math.max(0, (times - WARM) / (HOTTEST - WARM))),
+  );
+}
+
+/** By joint: how many times its noise the difference is, over the last moments. */
+export function timesNoiseAt(
+  drift: Drift,
+  noise: readonly number[],
+  moment: number,
+  closed: number,
+): number[] {
   return drift.joints.map((_, joint) => {
     const steps = Math.round(JUDGED / drift.step);
     const values = Array.from({ length: steps }, (__, back) =>
       gapAt(drift, joint, Math.max(0, moment - back * drift.step), closed),
     );
     const rms = Math.sqrt(values.reduce((sum, value) => sum + value ** 2, 0) / Math.max(1, steps));
-    const ratio = rms / (noise[joint] || Infinity);
-    return Math.min(1, Math.max(0, (ratio - WARM) / (HOTTEST - WARM)));
+    return rms / (noise[joint] || Infinity);
   });
 }
 

@@ -1,6 +1,6 @@
 import { expect, it } from 'vitest';
 import type { Signals } from './columns';
-import { bestShift, difference, valueAt } from './compare';
+import { besideOf, bestShift, difference, valueAt } from './compare';
 import { spectrumOf } from './spectrum';
 
 const PERIOD = 0.02;
@@ -62,4 +62,9 @@ it('is what the sum of its definition is', () => {
     const sum = windows.reduce((a, b) => a + b);
     expect(found.amplitude[k - 1]).toBeCloseTo((2 * Math.hypot(real, imaginary)) / sum, 9);
   }
+});
+
+it('a difference is there with two traces, a spectrum with one', () => {
+  expect(besideOf(['difference', 'spectrum'], 2)).toEqual(['difference', 'spectrum']);
+  expect(besideOf(['difference', 'spectrum'], 1)).toEqual(['spectrum']);
 });

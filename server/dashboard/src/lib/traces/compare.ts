@@ -10,6 +10,11 @@ const ROUNDS = 3;
 /** Moments at which two traces are compared: enough for a shift that a person can see. */
 const MOMENTS = 400;
 
+/** Of what can be drawn beside an overlay, what there is for so many traces: a difference needs two. */
+export function besideOf<Name extends string>(names: readonly Name[], traces: number): Name[] {
+  return names.filter((name) => name !== 'difference' || traces > 1);
+}
+
 /** The value of a column at a moment, between its samples; null before the first and after the last. */
 export function valueAt(time: readonly number[], column: readonly number[], moment: number): number | null {
   const last = time.length - 1;

@@ -10,11 +10,11 @@ const known = {
 
 it('free words are searched for, and filters are told apart from them', () => {
   const { search, problem } = searchOf(
-    'dry friction tag:"cold start" source:real outcome:fault kind:ramp joint:2 effect:backlash a:b',
+    'dry friction tag:"cold start" source:real outcome:fault kind:ramp joint:2 effect:backlash "a:b" 12:30',
   );
   expect(problem).toBe('');
   expect(search).toEqual({
-    q: 'dry friction a:b',
+    q: 'dry friction a:b 12:30',
     tag: 'cold start',
     source: 'real',
     outcome: 'fault',
@@ -33,11 +33,18 @@ it('days are midnights here', () => {
 });
 
 it.each([
-  ['source:moon', 'source: allowed are mock, real, imported'],
-  ['after:yesterday', 'after: a day is allowed, as 2026-11-30'],
-  ['after:2026-13-01', 'after: a day is allowed'],
-  ['joint:two', 'joint: a number from 1 is allowed'],
-  ['effect:Backlash', 'effect: a name is allowed'],
+  ['source:moon', 'source: needs one of mock, real, imported'],
+  ['after:yesterday', 'after: needs a date such as 2026-11-30'],
+  ['after:2026-13-01', 'after: needs a date'],
+  ['before:2026-02-31', 'before: needs a date'],
+  [
+    'speed:3 x',
+    'speed: is not a filter; there are joint, effect, tag, source, outcome, kind, after, before.',
+  ],
+  ['speed:', 'speed: is not a filter'],
+  ['effect: backlash', 'effect: needs its value next to it'],
+  ['joint:two', 'joint: needs a number from 1'],
+  ['effect:Backlash', 'effect: needs a name'],
   ['tag:a tag:b', 'tag: can be given once'],
 ])('%s is refused in one line', (line, problem) => {
   expect(searchOf(line).problem).toContain(problem);

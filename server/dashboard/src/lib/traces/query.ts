@@ -40,15 +40,28 @@ export function searchOf(line: string): { search: Search; problem: string } {
   const words: string[] = [];
   const given = new Set<string>();
   let problem = '';
-  for (const [whole, key, quoted, plain] of line.matchAll(WORD)) {
+  for (const match of line.matchAll(WORD)) {
+    const [whole, key, quoted, plain] = match;
+    const { index } = match;
     const value = quoted ?? plain ?? '';
-    if (key === undefined || !isKey(key)) {
-      if (!KEYS.some((one) => whole === `${one}:`)) words.push(whole.replaceAll('"', ''));
+    const half = quoted === undefined ? /^([A-Za-z]\w*):$/.exec(whole)?.[1] : undefined;
+    const named = half ?? (key !== undefined && /^[A-Za-z]/.test(key) ? key : undefined);
+    if (named === undefined) {
+      words.push(whole.replaceAll('"', ''));
       continue;
     }
-    if (given.has(key)) problem ||= `${key}: can be given once`;
-    given.add(key);
-    problem ||= taken(search, key, value);
+    if (!isKey(named)) {
+      problem ||= `${named}: is not a filter; there are ${KEYS.join(', ')}. Quotes make it words: "${whole.replaceAll('"', '')}"`;
+      continue;
+    }
+    // The last one is being typed.
+    if (half !== undefined) {
+      if (index + whole.length < line.trimEnd().length) problem ||= `${half}: needs its value next to it`;
+      continue;
+    }
+    if (given.has(named)) problem ||= `${named}: can be given once`;
+    given.add(named);
+    problem ||= taken(search, named, value);
   }
   if (words.length > 0) search.q = words.join(' ');
   return { search, problem };
@@ -62,7 +75,7 @@ function isKey(key: string): key is Key {
 function taken(search: Search, key: Key, value: string): string {
   const oneOf = <T extends string>(allowed: readonly T[], set: (one: T) => void): string => {
     const found = allowed.find((one) => one === value);
-    if (found === undefined) return `${key}: allowed are ${allowed.join(', ')}`;
+    if (found === undefined) return `${key}: needs one of ${allowed.join(', ')}`;
     set(found);
     return '';
   };
@@ -72,18 +85,19 @@ function taken(search: Search, key: Key, value: string): string {
     case 'outcome':
       return oneOf(OUTCOMES, (one) => (search.outcome = one));
     case 'joint':
-      if (!/^[1-9]\d?$/.test(value)) return 'joint: a number from 1 is allowed';
+      if (!/^[1-9]\d?$/.test(value)) return 'joint: needs a number from 1, such as joint:2';
       search.joint = Number(value);
       return '';
     case 'effect':
-      if (!EFFECT.test(value)) return 'effect: a name is allowed, as coulomb_friction';
+      if (!EFFECT.test(value)) return 'effect: needs a name such as coulomb_friction';
       search.effect = value;
       return '';
     case 'after':
     case 'before': {
       const moment = new Date(`${value}T00:00:00`);
-      if (!DAY.test(value) || Number.isNaN(moment.getTime()))
-        return `${key}: a day is allowed, as 2026-11-30`;
+      // A 31st of a shorter month would be taken for a day of the next one.
+      if (!DAY.test(value) || moment.getDate() !== Number(value.slice(-2)))
+        return `${key}: needs a date such as 2026-11-30`;
       search[key === 'after' ? 'since' : 'until'] = moment.toISOString();
       return '';
     }

@@ -116,7 +116,7 @@ describe('the check of a motion', () => {
 describe('what is said of a check', () => {
   const standing = (more: Partial<Standing>): Standing => ({
     check: { state: 'checked', motion: { violations: [] } },
-    wrong: 0,
+    wrong: {},
     isConnected: true,
     ...more,
   });
@@ -145,12 +145,16 @@ describe('what is said of a check', () => {
   });
 
   it('is neither “checking” nor of an old motion while a field needs another value', () => {
-    const one = ['not checked: one field needs another value', 'one field needs another value'];
-    expect(words({ wrong: 1, check: { state: 'unreadable' } })).toEqual(one);
-    expect(words({ wrong: 1, check: broken })).toEqual(one);
-    expect(words({ wrong: 3, check: { state: 'checking' } })[0]).toBe(
-      'not checked: 3 fields need another value',
-    );
+    const wrong = { name: 'letters and digits' };
+    const one = ['not checked: Name needs another value', 'Name: letters and digits'];
+    expect(words({ wrong, check: { state: 'unreadable' } })).toEqual(one);
+    expect(words({ wrong, check: broken })).toEqual(one);
+    const several = { 'trajectory.amplitude.2': '“x” is not a number', settle: 'too long', count: 'from 1' };
+    expect(words({ wrong: several, check: { state: 'checking' } })).toEqual([
+      'not checked: Amplitude needs another value; 2 more',
+      'Amplitude: “x” is not a number; 2 more',
+    ]);
+    expect(words({ wrong: { settle: 'too long' } })[1]).toBe('Hold before: too long');
   });
 
   it('is not good without a connection, whatever was found before', () => {

@@ -5,6 +5,7 @@
  */
 
 import { asProblem, type Problem } from '../api/problem';
+import { labelOf } from './fields';
 
 /** s without a key before the service is asked. */
 export const QUIET = 0.25;
@@ -62,8 +63,8 @@ export class MotionCheck<Spec, Motion> {
 /** What decides whether the motion may be sent. */
 export interface Standing {
   readonly check: Check<{ readonly violations: readonly unknown[] }>;
-  /** Fields that need another value. */
-  readonly wrong: number;
+  /** What is wrong, by field: those that need another value. */
+  readonly wrong: Readonly<Record<string, string>>;
   /** Whether the service can be reached now. */
   readonly isConnected: boolean;
 }
@@ -75,7 +76,9 @@ export interface Told {
 
 /** The word above a preview. */
 export function toldOf({ check, wrong, isConnected }: Standing): Told {
-  if (wrong > 0) return { tone: 'warn', text: `not checked: ${fieldsWrong(wrong)}` };
+  const fields = Object.keys(wrong).map(calledField);
+  if (fields.length > 0)
+    return { tone: 'warn', text: `not checked: ${fields[0]} needs another value${others(fields)}` };
   if (!isConnected) return { tone: 'warn', text: 'not checked: no connection' };
   switch (check.state) {
     case 'unreadable':
@@ -94,7 +97,8 @@ export function toldOf({ check, wrong, isConnected }: Standing): Told {
 
 /** Why the motion may not be sent; empty when it may. */
 export function hindranceOf({ check, wrong, isConnected }: Standing): string {
-  if (wrong > 0) return fieldsWrong(wrong);
+  const [first] = Object.entries(wrong);
+  if (first) return `${calledField(first[0])}: ${first[1]}${others(Object.keys(wrong))}`;
   if (!isConnected) return 'the service cannot be reached: nothing can be sent';
   switch (check.state) {
     case 'unreadable':
@@ -108,6 +112,22 @@ export function hindranceOf({ check, wrong, isConnected }: Standing): string {
   }
 }
 
-function fieldsWrong(count: number): string {
-  return count === 1 ? 'one field needs another value' : `${count} fields need another value`;
+/** Labels in the form of fields that are called otherwise in the specification. */
+const CALLED: Readonly<Record<string, string>> = {
+  settle: 'Hold before',
+  hold: 'Hold after',
+  at: 'Not before',
+  daily: 'Time',
+  count: 'Number of runs',
+  starts: 'First run',
+};
+
+/** A field as the form calls it: `trajectory.amplitude.2` is “Amplitude”. */
+function calledField(field: string): string {
+  const name = field.split('.').findLast((part) => !/^\d+$/.test(part)) ?? field;
+  return CALLED[name] ?? labelOf(name);
+}
+
+function others(fields: readonly string[]): string {
+  return fields.length > 1 ? `; ${fields.length - 1} more` : '';
 }

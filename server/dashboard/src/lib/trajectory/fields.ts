@@ -93,8 +93,14 @@ function kindOf(kind: string, schema: Schema): TrajectoryKind {
   };
 }
 
+/** How people call a field, by its last name. */
+export function labelOf(name: string): string {
+  return WORDS[name]?.[0] ?? sentence(name.replaceAll('_', ' '));
+}
+
 function fieldOf(name: string, schema: Schema): TrajectoryField {
-  const [label, unit, scale] = WORDS[name] ?? [sentence(name.replaceAll('_', ' ')), '', 1];
+  const [, unit, scale] = WORDS[name] ?? ['', '', 1];
+  const label = labelOf(name);
   const number = schema.anyOf?.find((branch) => branch.type === 'number');
   return {
     name,

@@ -84,6 +84,7 @@ export class Catalogue {
 
   /** Loads it anew, as far as it is shown. */
   async load(): Promise<void> {
+    if (this.asked.problem !== '') return; // the list waits for a line that can be searched
     const turn = ++this.turn;
     this.busy = true;
     const { search } = this.asked;

@@ -3,7 +3,7 @@
 import { untrack } from 'svelte';
 import { router } from '../../lib/router.svelte';
 import { wholeRange, type Range, type Signals } from '../../lib/traces/columns';
-import { bestShift } from '../../lib/traces/compare';
+import { besideOf, bestShift } from '../../lib/traces/compare';
 import { moved, within, zoomed } from '../../lib/traces/zoom';
 import { ShownTrace } from './shown_trace.svelte';
 
@@ -24,8 +24,10 @@ export class Comparison {
   fromStart = $state(true);
   /** How several traces are laid over each other: by the begins of their motions, or where they lie best. */
   alignment = $state<Alignment>('begin');
-  /** What is drawn beside the overlay. */
-  beside = $state<readonly BesideName[]>([]);
+  /** What is to be drawn beside the overlay. */
+  chosenBeside = $state<readonly BesideName[]>([]);
+  /** What is drawn beside it. */
+  beside: readonly BesideName[] = $derived(besideOf(this.chosenBeside, this.traces.length));
   /** Chosen by hand; empty for those that moved. */
   chosenJoints = $state.raw<readonly number[]>([]);
   loaded: readonly ShownTrace[] = $derived(this.traces.filter((trace) => trace.signals !== null));
