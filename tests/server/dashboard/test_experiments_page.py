@@ -69,7 +69,7 @@ def test_a_field_says_what_is_allowed_and_the_button_stays_under_the_pointer(for
     button.scroll_into_view_if_needed()
     place = button.bounding_box()
     duration.fill("0")
-    expect(form.get_by_text("allowed: more than 0, up to 3600 s")).to_be_visible()
+    expect(form.get_by_role("button", name="Duration: allowed: more than 0, up to 3600 s")).to_be_visible()
     assert button.bounding_box() == place
     assert place is not None
     form.mouse.click(place["x"] + 10, place["y"] + 10)
@@ -154,6 +154,7 @@ def test_what_runs_shows_its_progress_and_is_stopped_from_the_queue(dashboard: D
 
 
 def _add_schedule(form: Page) -> None:
+    expect(form.get_by_role("button", name="Add the schedule")).to_have_attribute("aria-disabled", "false")
     form.get_by_role("button", name="Add the schedule").click()
     expect(form.get_by_text(re.compile("would start by itself every"))).to_be_visible()
     form.get_by_role("button", name="Yes, add it").click()
@@ -167,7 +168,7 @@ def test_an_experiment_waits_for_its_time_and_one_is_run_every_so_often(dashboar
     form.get_by_role("radio", name="Repeatedly").check()
     form.get_by_role("textbox", name="Every", exact=True).fill("5")
     form.get_by_role("combobox", name="Unit").select_option("s")
-    expect(form.get_by_text("allowed: 10 s to 366 d")).to_be_visible()
+    expect(form.get_by_text("Every: allowed: 10 s to 366 d")).to_be_visible()
     form.get_by_role("combobox", name="Unit").select_option("h")
     dashboard.service.robot.post("/queue/pause")
     expect(form.get_by_text("Start from: choose what is to be run")).to_be_visible()
