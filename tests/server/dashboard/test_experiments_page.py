@@ -153,13 +153,6 @@ def test_what_runs_shows_its_progress_and_is_stopped_from_the_queue(dashboard: D
     assert dashboard.mock.ask("state")["frozen"]
 
 
-def _add_schedule(form: Page) -> None:
-    expect(form.get_by_role("button", name="Add the schedule")).to_have_attribute("aria-disabled", "false")
-    form.get_by_role("button", name="Add the schedule").click()
-    expect(form.get_by_text(re.compile("would start by itself every"))).to_be_visible()
-    form.get_by_role("button", name="Yes, add it").click()
-
-
 def test_an_experiment_waits_for_its_time_and_one_is_run_every_so_often(dashboard: Dashboard, form: Page) -> None:
     form.get_by_role("radio", name="At a time").check()
     form.get_by_role("button", name="Add to the queue").click()
@@ -171,15 +164,10 @@ def test_an_experiment_waits_for_its_time_and_one_is_run_every_so_often(dashboar
     expect(form.get_by_text("Every: allowed: 10 s to 366 d")).to_be_visible()
     form.get_by_role("combobox", name="Unit").select_option("h")
     dashboard.service.robot.post("/queue/pause")
-    expect(form.get_by_text("Start from: choose what is to be run")).to_be_visible()
-    form.get_by_role("combobox", name="Start from").select_option("ramp")
-    _add_schedule(form)
+    form.get_by_role("button", name="Add the schedule").click()
     row = form.get_by_role("row", name=re.compile("ramp"))
     expect(row).to_contain_text("5 h")
     expect(row).to_contain_text(re.compile(r"[01] / 10"))
-    form.get_by_role("textbox", name="Number of runs").fill("3")
-    form.get_by_role("button", name="Add the schedule").click()
-    expect(form.get_by_text("it is planned already: every 5 h")).to_be_visible()
     row.get_by_role("button", name="Turn off").click()
     expect(row).to_contain_text("off")
     row.get_by_role("button", name=re.compile("Delete the schedule")).click()
@@ -318,8 +306,7 @@ def test_an_experiment_that_has_ended_is_run_again_by_way_of_the_form(dashboard:
 def test_a_schedule_may_begin_later(dashboard: Dashboard, form: Page) -> None:
     form.get_by_label("Repeatedly").check()
     form.get_by_label("First run").fill("2199-01-02T03:04")
-    form.get_by_role("combobox", name="Start from").select_option("ramp")
-    _add_schedule(form)
+    form.get_by_role("button", name="Add the schedule").click()
     expect(form.get_by_text(re.compile("scheduled every .*, first 02 Jan 2199"))).to_be_visible()
     made = dashboard.service.robot.get("/schedules", params={"limit": 1}).json()["items"][0]
     assert made["next"].startswith(("2199-01-01", "2199-01-02"))

@@ -32,11 +32,6 @@ export async function addSchedule(
   return ask(api.POST('/api/v1/robots/{robot}/schedules', { params: { path: here() }, body }));
 }
 
-/** The newest schedules. */
-export async function schedules(): Promise<readonly Schedule[]> {
-  return (await ask(api.GET('/api/v1/robots/{robot}/schedules', { params: { path: here() } }))).items;
-}
-
 /** What became of an experiment, for its line. */
 export const toldQueued = (made: Experiment): string =>
   `${made.spec.name ?? made.spec.trajectory.kind} was added to the queue`;

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { cronOf, fromNow, interval, isSameTime, localMoment, momentOf, ruleOf } from './when';
+import { cronOf, fromNow, interval, localMoment, momentOf, ruleOf } from './when';
 
 describe('intervals', () => {
   it('are told in their largest even unit', () => {
@@ -41,12 +41,6 @@ describe('rules of the clock', () => {
     expect(cronOf('02:05', [0, 1, 2, 3, 4, 5, 6])).toBe('5 2 * * *');
     expect(told(cronOf('02:05'))).toBe('daily 02:05 (Europe/London)');
     expect(told(cronOf('22:00', [5, 1, 0]))).toBe('Mon, Fri, Sun 22:00 (Europe/London)');
-    const clock = (...days: number[]) => ({ every: null, cron: cronOf('02:00', days) });
-    expect(isSameTime(clock(), clock(2, 3))).toBe(true);
-    expect(isSameTime(clock(1), clock(2, 3))).toBe(false);
-    expect(isSameTime(clock(1), { every: null, cron: '30 2 * * 1' })).toBe(false);
-    expect(isSameTime({ every: 60 }, { every: 60 })).toBe(true);
-    expect(isSameTime({ every: 60 }, clock())).toBe(false);
     expect(told('0 2 1 * *')).toBe('0 2 1 * * (Europe/London)');
     expect(told('0 2 * * 1-5')).toBe('0 2 * * 1-5 (Europe/London)');
   });

@@ -42,8 +42,6 @@ export function cronOf(time: string, days: readonly number[] = []): string {
   return `${minute} ${hour} * * ${isDaily ? '*' : days.toSorted().join(',')}`;
 }
 
-const CLOCK = /^(\d+) (\d+) \* \* (\*|[0-6](?:,[0-6])*)$/;
-
 /** When a schedule runs: `every 30 min`, `daily 02:00 (Europe/London)`, `Mon, Fri 02:00 (…)`, or its cron expression. */
 export function ruleOf(schedule: {
   every: number | null;
@@ -51,30 +49,12 @@ export function ruleOf(schedule: {
   zone?: string | null;
 }): string {
   if (schedule.every !== null) return `every ${interval(schedule.every)}`;
-  const found = CLOCK.exec(schedule.cron ?? '');
+  const found = /^(\d+) (\d+) \* \* (\*|[0-6](?:,[0-6])*)$/.exec(schedule.cron ?? '');
   if (found === null) return `${schedule.cron} (${schedule.zone})`;
   const [, minute = '', hour = '', on = ''] = found;
   const days = WEEKDAYS.filter(([number]) => on.includes(String(number))).map(([, name]) => name);
   const when = on === '*' ? 'daily' : days.join(', ');
   return `${when} ${hour.padStart(2, '0')}:${minute.padStart(2, '0')} (${schedule.zone})`;
-}
-
-type Rule = { every: number | null; cron?: string | null };
-
-/** Whether two rules come at the same times: the same interval, or the same time of the clock on a day of both. */
-export function isSameTime(one: Rule, other: Rule): boolean {
-  if (one.every !== null || other.every !== null) return one.every === other.every;
-  const [own, others] = [clockOf(one.cron), clockOf(other.cron)];
-  if (own === null || others === null) return one.cron === other.cron;
-  return own.time === others.time && own.days.some((day) => others.days.includes(day));
-}
-
-function clockOf(cron: string | null | undefined): { time: string; days: readonly string[] } | null {
-  const found = CLOCK.exec(cron ?? '');
-  if (found === null) return null;
-  const on = found[3] ?? '*';
-  const days = on === '*' ? WEEKDAYS.map(([number]) => String(number)) : on.split(',');
-  return { time: `${found[1]} ${found[2]}`, days };
 }
 
 /** How long until a moment, or since: `in 5 min`, `2 h ago`, `now`. */

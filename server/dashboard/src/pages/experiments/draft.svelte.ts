@@ -29,8 +29,6 @@ export class Draft {
   form: SpecForm = $state()!;
   /** The preset that the fields were filled with, while nothing has been changed. */
   preset = $state('');
-  /** Whether a person has chosen the motion: the first preset fills the fields by itself. */
-  isChosen = $state(false);
   /** What the service says to what is in the fields now. */
   check = $state.raw<Check<MotionPreview>>({ state: 'unreadable' });
   /** The last motion that the service worked out; of what is in the fields only while `isCurrent`. */
@@ -60,7 +58,6 @@ export class Draft {
     readonly slides: Slides,
   ) {
     this.fill(presets[0]!.name);
-    this.isChosen = false;
   }
 
   /** Asks the service for presets, rules and machine. Throws a Problem. */
@@ -83,7 +80,6 @@ export class Draft {
 
   take(spec: Partial<Spec>): void {
     this.preset = '';
-    this.isChosen = true;
     this.form = formOf(spec, this.rules, this.slides);
     if (this.text !== null) this.text = written(spec);
   }
@@ -106,13 +102,6 @@ export class Draft {
     this.text = null;
     this.take(spec);
     this.preset = preset;
-  }
-
-  /** Whether a specification moves the same as the fields, however it was written. */
-  isAlike(spec: Partial<Spec>): boolean {
-    const written = (one: Partial<Spec>): string =>
-      JSON.stringify(specOf(formOf(one, this.rules, this.slides), this.rules, this.slides).spec);
-    return this.result.spec !== null && written(spec) === written(this.result.spec);
   }
 
   get spec(): ExperimentSpec | null {
