@@ -14,7 +14,7 @@ function preloaded(program: string): Plugin {
       handler(html, { bundle, chunk: entry, filename }) {
         if (!filename.endsWith('/index.html')) return [];
         const chunks = Object.values(bundle ?? {}).filter((one) => one.type === 'chunk');
-        const main = chunks.find((one) => one.moduleIds.some((id) => id.endsWith(program)));
+        const main = chunks.find((one) => one.facadeModuleId?.endsWith(program));
         if (main === undefined) throw new Error(`no part of the page is made from ${program}`);
         const scripts = [main.fileName, ...main.imports].filter((name) => name !== entry?.fileName);
         const styles = [...(main.viteMetadata?.importedCss ?? [])];
@@ -93,18 +93,7 @@ export default defineConfig(({ mode }) => ({
     reportCompressedSize: false,
     // The reference of the API comes as one large program, which only its own page loads.
     chunkSizeWarningLimit: 2000,
-    rolldownOptions: {
-      input: mode === 'gallery' ? ['gallery.html'] : ['index.html', 'reference.html'],
-      // The first page comes in two programs with all that they need: each further file is one more for the service.
-      output: {
-        codeSplitting: {
-          groups: [
-            { name: 'first', test: /src\/main\.ts$/, priority: 2 },
-            { name: 'app', test: /src\/app\.ts$/, priority: 1 },
-          ],
-        },
-      },
-    },
+    rolldownOptions: { input: mode === 'gallery' ? ['gallery.html'] : ['index.html', 'reference.html'] },
   },
   test: { environment: 'node', include: ['src/**/*.test.ts'], isolate: false },
 }));

@@ -2,9 +2,7 @@ import { mount } from 'svelte';
 import App from './App.svelte';
 import { live } from './lib/live/live.svelte';
 
-export function begin(): void {
-  const target = document.getElementById('app');
-  if (target === null) throw new Error('index.html has no element with the id "app"');
-  live.start();
-  mount(App, { target });
-}
+const target = document.getElementById('app');
+if (target === null) throw new Error('index.html has no element with the id "app"');
+live.start();
+mount(App, { target });

@@ -9,7 +9,6 @@ import {
   type Socket,
   type SocketState,
 } from './socket';
-import { HeldSocket } from './held';
 import type { LiveFrame } from './types';
 
 /** Time that is moved by hand, with everything that waits for it. */
@@ -46,10 +45,6 @@ const settle = async (): Promise<void> => {
   for (let turn = 0; turn < 5; turn += 1) await Promise.resolve();
 };
 
-function message(frame: Partial<LiveFrame>, timeStamp = Infinity): MessageEvent<string> {
-  return { data: JSON.stringify(frame), timeStamp } as MessageEvent<string>;
-}
-
 class FakeSocket implements Socket {
   onopen: Socket['onopen'] = null;
   onclose: Socket['onclose'] = null;
@@ -68,7 +63,7 @@ class FakeSocket implements Socket {
     this.onopen?.({} as Event);
   }
   says(frame: Partial<LiveFrame>): void {
-    this.onmessage?.(message(frame));
+    this.onmessage?.({ data: JSON.stringify(frame) } as MessageEvent<string>);
   }
   breaks(reason = ''): void {
     this.onclose?.({ reason } as CloseEvent);
@@ -79,26 +74,25 @@ let clock: HandClock;
 let sockets: FakeSocket[];
 let states: SocketState[];
 let frames: LiveFrame[];
-let ages: number[];
 let tickets: number;
 let ticketProblem: Error | null;
 let live: LiveSocket;
 
 beforeEach(async () => {
   clock = new HandClock();
-  [sockets, states, frames, ages, tickets, ticketProblem] = [[], [], [], [], 0, null];
+  [sockets, states, frames, tickets, ticketProblem] = [[], [], [], 0, null];
   live = new LiveSocket({
-    open: async () => {
+    ticket: async () => {
       if (ticketProblem !== null) throw ticketProblem;
-      const socket = new FakeSocket(`ticket-${(tickets += 1)}`);
+      return `ticket-${(tickets += 1)}`;
+    },
+    open: (ticket) => {
+      const socket = new FakeSocket(ticket);
       sockets.push(socket);
       return socket;
     },
     wanted: () => ({ subscribe: ['samples'], history: 60 }),
-    frame: (frame, at) => {
-      frames.push(frame);
-      ages.push(at);
-    },
+    frame: (frame) => frames.push(frame),
     state: (state) => states.push(state),
     now: () => clock.now,
     after: (seconds, call) => clock.after(seconds, call),
@@ -197,7 +191,7 @@ describe('the live socket', () => {
     first.breaks();
     await clock.pass(1);
     newest().opens();
-    late?.(message({ now: 1, messages: [] }));
+    late?.({ data: JSON.stringify({ now: 1, messages: [] }) } as MessageEvent<string>);
     expect(frames).toEqual([]);
   });
 
@@ -213,31 +207,6 @@ describe('the live socket', () => {
     await clock.pass(60);
     expect(sockets).toHaveLength(1);
     expect(sockets[0]?.closed).toBe(true);
-  });
-});
-
-describe('a socket that is opened before anybody listens', () => {
-  it('asks at once, keeps what it hears with its time, and is asked only for other things', () => {
-    const real = new FakeSocket('early');
-    const held = new HeldSocket(real, 'history');
-    real.opens();
-    real.says({ now: 1 });
-    expect(real.sent).toEqual(['history']);
-    const heard: unknown[] = [];
-    held.onopen = () => held.send('history');
-    held.onmessage = ({ data }) => heard.push(JSON.parse(data));
-    held.heed();
-    real.says({ now: 2 });
-    held.send('history');
-    expect(heard).toEqual([{ now: 1 }, { now: 2 }]);
-    expect(real.sent).toEqual(['history', 'history']);
-  });
-
-  it('says what it has kept as of when it came', async () => {
-    newest().opens();
-    await clock.pass(1);
-    newest().onmessage?.(message({ now: 5, messages: [] }, 200));
-    expect(ages).toEqual([0.2]);
   });
 });
 

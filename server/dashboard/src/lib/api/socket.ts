@@ -1,7 +1,7 @@
 /**
- * The live WebSocket: opens, says what it wants, and comes back by itself when it is lost.
+ * The live WebSocket: asks for a ticket, opens, says what it wants, and comes back by itself when it is lost.
  *
- * Knows nothing about a browser: what opens sockets and tells the time is handed in.
+ * Knows nothing about a browser: what opens sockets, asks for tickets and tells the time is handed in.
  */
 
 import type { LiveFrame, LiveRequest } from './types';
@@ -28,13 +28,11 @@ export interface Socket {
   onmessage: ((event: MessageEvent<string>) => void) | null;
   send(text: string): void;
   close(): void;
-  /** Called once all is set that listens. */
-  heed?(): void;
 }
 
 export interface SocketParts {
-  /** A new socket, with a ticket of its own. */
-  open(): Promise<Socket>;
+  ticket(): Promise<string>;
+  open(ticket: string): Socket;
   /** What is asked for whenever the socket has opened. */
   wanted(): LiveRequest;
   frame(frame: LiveFrame, at: number): void;
@@ -100,17 +98,15 @@ export class LiveSocket {
     this.attempt += 1;
     this.parts.state({ phase: 'connecting', attempt: this.attempt });
     this.timer(OPEN_WITHIN, () => this.lost('the service does not answer'));
-    let socket: Socket;
+    let ticket: string;
     try {
-      socket = await this.parts.open();
+      ticket = await this.parts.ticket();
     } catch (error) {
       if (turn === this.turn) this.lost(error instanceof Error ? error.message : String(error));
       return;
     }
-    if (turn !== this.turn) {
-      socket.close();
-      return;
-    }
+    if (turn !== this.turn) return;
+    const socket = this.parts.open(ticket);
     this.socket = socket;
     socket.onopen = () => {
       if (turn !== this.turn) return;
@@ -125,14 +121,11 @@ export class LiveSocket {
     socket.onmessage = (event) => {
       if (turn !== this.turn) return;
       this.heard = this.parts.now();
-      // What was held has come earlier.
-      const at = Math.min(this.heard, event.timeStamp / 1000);
-      this.parts.frame(JSON.parse(event.data) as LiveFrame, at);
+      this.parts.frame(JSON.parse(event.data) as LiveFrame, this.heard);
     };
     socket.onclose = (event) => {
       if (turn === this.turn) this.lost(event.reason || 'the connection was closed');
     };
-    socket.heed?.();
   }
 
   /** A connection can be dead without being closed: after some silence the service is asked for something small. */

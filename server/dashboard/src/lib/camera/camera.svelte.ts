@@ -46,8 +46,7 @@ export class Camera {
     try {
       if (document.visibilityState === 'visible') {
         isThere = await this.next();
-        // Also once beside pictures: a drawn one is called so.
-        if (this.status === null || (!isThere && (this.age === null || isOld(this.age))))
+        if (!isThere && (this.age === null || isOld(this.age)))
           this.status = await ask(api.GET('/api/v1/robots/{robot}/camera', { params: { path: here() } }));
         this.problem = this.status?.problem ?? '';
       }

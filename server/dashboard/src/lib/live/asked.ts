@@ -1,19 +1,11 @@
 /**
- * What has to be known before anything is shown, and the live socket. `main.ts` asks before the program of the page is
+ * What has to be known before anything is shown, asked for all at once. `main.ts` asks before the program of the page is
  * loaded, so that the service answers while the browser reads it.
  */
 
-import { api, ask, here, root, showRobot } from '../api/client';
-import { HeldSocket } from '../api/held';
+import { api, ask, here, showRobot } from '../api/client';
 import { Problem } from '../api/problem';
-import type { LiveRequest, Machine, Me, SystemStatus } from '../api/types';
-
-/** What the live socket is asked for: `history` is in s. */
-export const WANTED: LiveRequest = {
-  subscribe: ['samples', 'robot', 'link', 'queue', 'jobs', 'events', 'teaching'],
-  history: 60,
-  points: 1200,
-};
+import type { Machine, Me, SystemStatus } from '../api/types';
 
 export interface Asked {
   /** The robot's name; from then on `here()` tells it. */
@@ -21,8 +13,8 @@ export interface Asked {
   readonly machine: Promise<Machine>;
   readonly me: Promise<Me>;
   readonly system: Promise<SystemStatus>;
-  /** The first live socket, asked for WANTED. */
-  readonly socket: Promise<HeldSocket>;
+  /** Opens one socket. */
+  readonly ticket: Promise<string>;
 }
 
 let early: Asked | null = null;
@@ -43,23 +35,20 @@ export async function askSystem(): Promise<SystemStatus> {
   return ask(api.GET('/api/v1/system'));
 }
 
-/** Opens a live socket of the robot that is shown; `robot`: once it is known. */
-export async function openSocket(robot: Promise<unknown> = Promise.resolve()): Promise<HeldSocket> {
-  const [{ ticket }] = await Promise.all([ask(api.POST('/api/v1/tickets')), robot]);
-  const path = `/api/v1/robots/${encodeURIComponent(here().robot)}/live`;
-  const socket = new WebSocket(`${root.replace(/^http/, 'ws')}${path}?ticket=${ticket}`);
-  return new HeldSocket(socket, JSON.stringify(WANTED));
+export async function newTicket(): Promise<string> {
+  return (await ask(api.POST('/api/v1/tickets'))).ticket;
 }
 
 function askAll(): Asked {
   const system = askSystem(); // the second door of a stop: nothing is asked before it
   const robot = chosenRobot();
-  const socket = openSocket(robot);
-  const machine = robot.then(() =>
-    ask(api.GET('/api/v1/robots/{robot}/machine', { params: { path: here() } })),
-  );
-  const me = ask(api.GET('/api/v1/me'));
-  const found: Asked = { robot, machine, me, system, socket };
+  const found: Asked = {
+    robot,
+    machine: robot.then(() => ask(api.GET('/api/v1/robots/{robot}/machine', { params: { path: here() } }))),
+    me: ask(api.GET('/api/v1/me')),
+    system,
+    ticket: newTicket(),
+  };
   // A refusal is told to whoever waits for the answer; until then nobody has missed it.
   for (const answer of Object.values(found) as Promise<unknown>[]) answer.catch(() => {});
   return found;

@@ -5,9 +5,9 @@
  * what is shown as numbers (`live.sample`) follows ten times a second. Charts draw in `onFrame`.
  */
 
-import { here, isFleet } from '../api/client';
+import { here, isFleet, root } from '../api/client';
 import { asProblem, type Problem } from '../api/problem';
-import { isMissing, LiveSocket, SILENT_AFTER, type Socket, type SocketState } from '../api/socket';
+import { isMissing, LiveSocket, SILENT_AFTER, type SocketState } from '../api/socket';
 import type {
   Job,
   LinkMessage,
@@ -27,13 +27,15 @@ import { armNow } from '../stop/standing';
 import { fleet } from '../fleet/fleet.svelte';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
-import { asked, askSystem, openSocket, WANTED } from './asked';
+import { asked, askSystem, newTicket } from './asked';
 import { SampleRate } from './rate';
 import { Recording } from './recording';
 
 const SHOWN_EVERY = 100;
-/** s of samples that are kept. */
+/** s of samples that are kept, and s that are asked for at the start. */
 const KEPT = 300;
+const AT_START = 60;
+const POINTS = 1200;
 const EVENTS_KEPT = 100;
 const LINES_KEPT = 20;
 /** s until the service is asked again what it has not said about itself. */
@@ -156,12 +158,12 @@ class Live {
   }
 
   private async begin(): Promise<void> {
-    const { robot, machine, me, system, socket } = asked();
+    const { robot, machine, me, system, ticket } = asked();
     try {
       await robot;
       this.isOfSeveral = isFleet();
       if (this.isOfSeveral) fleet.start();
-      this.connection = this.connect(socket);
+      this.connection = this.connect(ticket);
       this.connection.start();
       const [known, caller] = await Promise.all([machine, me]);
       this.me = caller;
@@ -199,19 +201,25 @@ class Live {
     for (const [frame, at] of unheard) this.hear(frame, at);
   }
 
-  /** `first`: what was opened already. */
-  private connect(first: Promise<Socket>): LiveSocket {
-    let given: Promise<Socket> | null = first;
+  /** `first`: the ticket of the first connection. */
+  private connect(first: Promise<string>): LiveSocket {
+    let given: Promise<string> | null = first;
+    const path = `/api/v1/robots/${encodeURIComponent(here().robot)}/live`;
     return new LiveSocket({
-      open: () => {
-        const socket = given ?? openSocket();
+      ticket: () => {
+        const ticket = given ?? newTicket();
         given = null;
-        return socket.then(
-          (opened) => this.admitted(opened),
+        return ticket.then(
+          (known) => this.admitted(known),
           (error: unknown) => this.notAdmitted(error),
         );
       },
-      wanted: () => ({ ...WANTED, history: this.missing() }),
+      open: (ticket) => new WebSocket(`${root.replace(/^http/, 'ws')}${path}?ticket=${ticket}`),
+      wanted: () => ({
+        subscribe: ['samples', 'robot', 'link', 'queue', 'jobs', 'events', 'teaching'],
+        history: this.missing(),
+        points: POINTS,
+      }),
       frame: (frame, at) => this.hear(frame, at),
       state: (state) => {
         this.socket = state;
@@ -225,9 +233,9 @@ class Live {
     });
   }
 
-  private admitted(socket: Socket): Socket {
+  private admitted(ticket: string): string {
     if (this.problem?.status === 401) this.problem = null;
-    return socket;
+    return ticket;
   }
 
   /** A session that has ended, or a token that was revoked, leads to the sign-in. */
@@ -241,7 +249,7 @@ class Live {
   private missing(): number {
     const newest = this.recording?.newest ?? null;
     const age = newest === null ? null : this.clock.age(newest, seconds());
-    return age === null ? WANTED.history! : Math.min(KEPT, age + 1);
+    return age === null ? AT_START : Math.min(KEPT, age + 1);
   }
 
   private hear(frame: LiveFrame, at: number): void {
