@@ -52,7 +52,7 @@ class TorqueCase(Case):
     method: ClassVar[Method] = "inverse-dynamics"
     measure = "torques"
     noise_error = 0.1
-    law_error = 0.0  # a share of noise stands for it
+    law_error = 0.0  # `UNSURE_NOISE` asks for three times the evidence instead
     unresolved_kind = OF_CHANGES
 
     def unknowns(self, model: Model, added: Mapping[str, Parameter]) -> tuple[Unknown, ...]:

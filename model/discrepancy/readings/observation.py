@@ -46,8 +46,8 @@ State = tuple[Floats, list[Floats]]
 """What a simulation begins with: the model's flat vector, and initial states (n, 2) of every record."""
 
 STEP, COARSE_STEP = 2e-3, 7e-3
-"""Longest step of integration, s: ten steps per control period of 20 ms, and three for derivatives and probes, which
-are differences and need no more. With steps longer than the first, a delay explains an inductance as well."""
+"""Longest step of integration, s: ten steps per control period of 20 ms, and three for probes, which are
+differences and need no more. With steps longer than the first, a delay explains an inductance as well."""
 HALVINGS = 2
 """How often the step of integration is halved at most, for runs that do not stay finite."""
 DIFFERENCE = 0.05
