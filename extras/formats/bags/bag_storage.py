@@ -393,7 +393,7 @@ def _recovered(file: Path, folder: Path) -> Path:
     wal, journal = (Path(f"{file}{end}") for end in JOURNALS)
     beside = journals_of(file)
     if journal in beside:  # SQLite would apply it, and delete whatever file it names at its end
-        raise TraceError(f"{file}: was left in the middle of a change; `sqlite3 {file.name} .tables` undoes it")
+        raise TraceError(f"{file}: was left in the middle of a change; `sqlite3 {file.name} .dump` undoes it")
     if not beside:
         return file
     copy = folder / "copy.db3"
