@@ -5,6 +5,7 @@ A channel of another program is never decoded, so its definitions cannot prevent
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
 import struct
@@ -40,6 +41,10 @@ JOURNALS = "-wal", "-journal"
 SQLITE_MAGIC = b"SQLite format 3\0"
 ROS_1_MAGIC = b"#ROSBAG V"
 
+_JOURNAL = bytes.fromhex("d9d505f920a163d7")
+"""First bytes of a rollback journal of SQLite; they are zero when its change has ended."""
+_WAL_HEAD, _FRAME_HEAD = 32, 24
+"""Bytes before the frames of SQLite's write-ahead log, and before the page of each (https://sqlite.org/fileformat2.html#walformat)."""
 _MESSAGE = struct.Struct("<HIQQ")
 
 
@@ -324,7 +329,7 @@ def _name(fields: Fields) -> str:
 
 def _sqlite(file: Path, found: Contents, limits: TraceLimits) -> None:
     with TemporaryDirectory() as folder:
-        path = _recovered(file, Path(folder))
+        path = _recovered(file, Path(folder), found)
         try:
             with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as database:
                 database.text_factory = lambda raw: raw.decode("utf-8", "replace")
@@ -379,33 +384,58 @@ def _hold_to_its_own_metadata(
         found.hold(before, topics, _text(file.name))
 
 
+def _is_plain(journal: Path) -> bool:
+    """Whether a journal has a valid beginning and names no other file.
+
+    SQLite would delete the file that is named at the end of a journal of several databases.
+    """
+    with journal.open("rb") as stream:
+        begin = stream.read(8)
+        stream.seek(-min(8, stream.seek(0, os.SEEK_END)), os.SEEK_END)
+        return begin in (_JOURNAL, bytes(8)) and stream.read(8) != _JOURNAL
+
+
 def journals_of(file: Path) -> list[Path]:
     """Returns the non-empty SQLite journals beside a file."""
     beside = (Path(f"{file}{end}") for end in JOURNALS)
     return [one for one in beside if one.is_file() and one.stat().st_size]
 
 
-def _recovered(file: Path, folder: Path) -> Path:
-    """Returns the database with its write-ahead log applied: itself, or a copy that SQLite has recovered.
+def _recovered(file: Path, folder: Path, found: Contents) -> Path:
+    """Returns the database with its journals applied: itself, or a copy that SQLite has recovered.
 
-    Raises TraceError if the database is being written, or was left in the middle of a change, OSError.
+    Raises TraceError if the database is being written or a journal cannot be applied, OSError.
     """
     wal, journal = (Path(f"{file}{end}") for end in JOURNALS)
-    beside = journals_of(file)
-    if journal in beside:  # SQLite would apply it, and delete whatever file it names at its end
-        raise TraceError(f"{file}: was left in the middle of a change; `sqlite3 {file.name} .dump` undoes it")
-    if not beside:
+    if not (beside := journals_of(file)):
         return file
     copy = folder / "copy.db3"
-    copies = {file: copy, wal: Path(f"{copy}-wal")}
+    copies = {file: copy} | {one: Path(f"{copy}{one.name.removeprefix(file.name)}") for one in beside}
     states = [(one.stat().st_size, one.stat().st_mtime_ns) for one in copies]
+    if journal in beside and not _is_plain(journal):
+        raise TraceError(f"{file}: was left in the middle of a change, and the damaged {journal.name} cannot undo it")
     for one, target in copies.items():
         shutil.copyfile(one, target)
     if states != [(one.stat().st_size, one.stat().st_mtime_ns) for one in copies]:
         raise TraceError(f"{file}: is being written; import it when its recording has ended")
+    whole = _frames(wal) if wal in beside else 0
     with closing(sqlite3.connect(copy)) as database:
-        database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
+        database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        _, applied, _ = database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()  # the others report 0 pages
+        if whole > max(applied, 0):
+            line = f"{whole - max(applied, 0)} of {whole} pages of {beside[0].name} are damaged or were never committed"
+            found.missing.append(f"{line}; rows in them are missing")
     return copy
+
+
+def _frames(wal: Path) -> int:
+    """Returns the number of pages in the present generation of a write-ahead log, valid or not."""
+    data = memoryview(wal.read_bytes())
+    if len(data) < _WAL_HEAD:
+        return 0
+    page, salt = int.from_bytes(data[8:12], "big"), bytes(data[16:24])
+    begins = range(_WAL_HEAD, len(data), _FRAME_HEAD + page)
+    return next((n for n, at in enumerate(begins) if bytes(data[at + 8 : at + 16]) != salt), len(begins))
 
 
 # ---- ROS 1

@@ -9,14 +9,13 @@ import re
 from collections.abc import Callable
 from concurrent.futures import Future
 from datetime import datetime
-from typing import Any
+from typing import Any, Protocol
 
 from starlette.types import Message, Receive, Scope, Send
 
 from daq.contracts.service.audit import AuditNote, Outcome
 from extras.lab.audit.words import content_of, line_of
 from extras.lab.audit.writer import AuditWriter
-from server.access.caller import Caller
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 CHANGE_NOTHING = frozenset(["preview_experiment"])
@@ -32,6 +31,20 @@ LONGEST_ANSWER = 65536
 ROW_WITHIN = 1.0
 """Time (s) for which the answer to a change waits for its row. A stop never waits for its row."""
 _ROBOT = re.compile(r"/api/v1/robots/([a-z0-9][a-z0-9_-]{0,31})(/|$)")
+
+
+class Asker(Protocol):
+    """Sender of a request, as admitted by the gate."""
+
+    @property
+    def name(self) -> str:
+        """The name of their token."""
+        ...
+
+    @property
+    def role(self) -> str:
+        """Their role."""
+        ...
 
 
 def asked_request(
@@ -109,7 +122,7 @@ class AskedRequest:
 
     def _made(self, action: str) -> AuditNote:
         scope, answer = self._scope, self._told()
-        caller: Caller | None = scope["state"].get("caller")
+        caller: Asker | None = scope["state"].get("caller")
         robot = _ROBOT.match(scope["path"])
         client = scope.get("client")
         return AuditNote(

@@ -5,6 +5,7 @@ SQLite itself leaves the journals, and the library mcap writes the files of MCAP
 
 import shutil
 import sqlite3
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -64,19 +65,35 @@ def test_rows_in_a_write_ahead_log_are_read_and_the_recorders_death_is_told(tmp_
     assert trace.record.notes.startswith(
         "INCOMPLETE: a.db3: its recording was never ended, so unwritten data is missing"
     )
+    assert "pages of" not in trace.record.notes
     assert before == {one: one.read_bytes() for one in path.parent.glob("a.db3*")}  # nobody's files are changed
+    wal = path.with_name("a.db3-wal")
+    damaged = bytearray(wal.read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    wal.write_bytes(damaged)
+    assert "pages of a.db3-wal are damaged or were never committed" in imported(path).record.notes
 
 
-def test_a_database_in_the_middle_of_a_change_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
+def test_rows_that_were_never_committed_are_taken_back(tmp_path: Path) -> None:
     path = database(tmp_path / "a", "DELETE", 50, lambda writer: insert(writer, 50, 2000))
     journal = path.with_name("a.db3-journal")
-    before = {one: one.read_bytes() for one in (path, journal)}
-    with pytest.raises(TraceError, match="was left in the middle of a change"):
-        imported(path)
+    assert journal.stat().st_size
+    assert len(imported(path)) == 50
     most = DEFAULT_TRACE_LIMITS.model_copy(update={"file_bytes": path.stat().st_size + journal.stat().st_size - 1})
     with pytest.raises(TraceError, match="has more than"):
         imported(path, limits=most)
-    assert before == {one: one.read_bytes() for one in before}
+    # The name of another file at the end, as of a change to several databases: SQLite would delete that file.
+    other, sound = path.with_name("other"), journal.read_bytes()
+    other.write_bytes(b"somebody's")
+    name = str(other).encode()
+    sizes = struct.pack(">II", len(name), sum(name))
+    journal.write_bytes(sound + (0x40000000 // 4096 + 1).to_bytes(4, "big") + name + sizes + sound[:8])
+    with pytest.raises(TraceError, match="cannot undo it"):
+        imported(path)
+    assert other.exists()
+    journal.write_bytes(b"x" * journal.stat().st_size)
+    with pytest.raises(TraceError, match=r"the damaged a\.db3-journal cannot undo it"):
+        imported(path)
 
 
 def test_what_metadata_promise_and_a_storage_lacks_is_told(tmp_path: Path) -> None:
