@@ -66,6 +66,13 @@ MANY = 2048
 WANTED = 2 * 240 / 1e6 / 100
 """Processor time (s) of a period for a million runs of 2 s in four minutes on two cores."""
 ENGINE = f"MuJoCo's {STEPS} steps"
+CACHED = """import numba, numpy, pydantic
+@numba.njit(cache=True)
+def total(values):
+    return values.sum()
+total(numpy.zeros(3))
+"""
+"""What no simulation with compiled code can start faster than."""
 FITTED = (
     *(f"joint{joint}.motor.{name}" for joint in (1, 2, 3) for name in ("back_emf_constant", "rotor_inertia")),
     *(f"joint{joint}.viscous_friction.coefficient" for joint in (1, 2, 3)),
@@ -176,10 +183,12 @@ def simulated(times: int) -> Iterator[Entry]:
             "import ma2000; ma2000.simulate(ma2000.base_model(ma2000.load_machine('ma2000')), ma2000.read_trace({!r}))"
         )
         fresh = of_program("-c", first.format(str(path)), times=times)
-    libraries = of_program("-c", "import numba, numpy, pydantic", times=times)
+        cached = Path(path.parent, "cached.py")
+        cached.write_text(CACHED, "utf-8")
+        compiler = of_program(str(cached), times=times)
     yield Entry("lock-step, a period with its trace", min(periods), ENGINE, engine, PERIOD_US * 1e-6 / 40 / engine)
     yield Entry("lock-step, the mock alone", alone, ENGINE, engine, PERIOD_US * 1e-6 / 150 / engine)
-    yield Entry("a first simulation", fresh, "its libraries' import", libraries)
+    yield Entry("a first simulation", fresh, "numba's first call of a cached function", compiler)
     model = base_model(load_machine("ma2000"))
     inputs = inputs_of(trace, model.machine)
     free = [model.parameter(name) for name in FITTED]
