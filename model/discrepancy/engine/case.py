@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -81,8 +82,8 @@ class Case(ABC):
         """
 
     @abstractmethod
-    def least_gain(self, trial: Trial) -> float:
-        """What a probe must promise for its trial to be fitted."""
+    def least_gain(self, trial: Trial, needed: float) -> float:
+        """What a probe must promise for its trial to be fitted, where so much evidence is needed."""
 
     @abstractmethod
     def is_resolved(self, found: Fitted, before: Fit) -> bool:
@@ -137,16 +138,18 @@ class Case(ABC):
         """The model of a fit where the file states its numbers."""
         return evaluate(now.compared, now.unknowns, expected_values(now), now.memory)
 
-    def from_expected(self, compared: Residual, unknowns: Sequence[Unknown], begin: Values, memory: Floats) -> Fit:
+    def from_expected(
+        self, compared: Residual, unknowns: Sequence[Unknown], begin: Values, memory: Floats, goal: float = math.inf
+    ) -> Fit:
         """A fit that begins where the file states its numbers, far from where they are."""
-        return fit(compared, unknowns, begin, memory)
+        return fit(compared, unknowns, begin, memory, goal=goal)
 
-    def or_from_expected(self, ended: Fit) -> Fit:
+    def or_from_expected(self, ended: Fit, goal: float = math.inf) -> Fit:
         """The fit; if it has left numbers far from what the file states, a better one that begins with them as
         stated."""
         if not is_strained(ended):
             return ended
-        again = self.from_expected(ended.compared, ended.unknowns, expected_values(ended), ended.memory)
+        again = self.from_expected(ended.compared, ended.unknowns, expected_values(ended), ended.memory, goal)
         return min(ended, again, key=lambda one: one.cost)
 
     def held(self, now: Fit) -> Signals:

@@ -135,20 +135,25 @@ def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Comp
     if chosen.evidence <= 0:
         return None
     unsure = standing.case.options.least_evidence / THRESHOLDS.significant - 1.0  # priors have no noise in them
-    if chosen.evidence + chosen.told + unsure * chosen.relieved < needed_evidence(standing, chosen):
+    if chosen.evidence + chosen.told + unsure * chosen.relieved < needed_evidence(standing, chosen.joints):
         return None
     if any(chosen.rivals(one) and chosen.evidence < LARGER_PART * one.evidence for one in refused):
         return None
     return compare(standing, chosen)
 
 
-def needed_evidence(standing: Standing, chosen: Fitted) -> float:
-    """Evidence from which a candidate is named: what counts as found, and a share of what effects have explained on its
-    joints (on any, for an effect of the whole machine), since no law is exactly the machine's."""
-    own = set(chosen.joints)
+def needed_evidence(standing: Standing, joints: Sequence[int]) -> float:
+    """Evidence from which a candidate on these joints is named: what counts as found, and what other laws leave."""
+    return standing.case.options.least_evidence + left_by_laws(standing, joints)
+
+
+def left_by_laws(standing: Standing, joints: Sequence[int]) -> float:
+    """A share of what effects have explained on these joints (on any, for an effect of the whole machine), since no law
+    is exactly the machine's."""
+    own = set(joints)
     near = (s for s in standing.adopted if not own or not s.joints or own & set(s.joints))
     explained = sum(max(0.0, s.evidence + (s.evidence_held_out or 0.0)) for s in near)
-    return standing.case.options.least_evidence + standing.case.law_error * explained
+    return standing.case.law_error * explained
 
 
 SUSPECTED_SHARE = 0.05
@@ -161,18 +166,20 @@ ROUNDED = 5.0
 def suspect(standing: Standing, found: Findings, recorded: float) -> Suspicion | None:
     """The best candidate that was not named for want of evidence alone; None where there is none.
 
-    What speaks for it grows in proportion to the time `recorded`, s, and its cost hardly does.
+    What speaks for it and what the laws of other effects leave grow in proportion to the time `recorded`, s; its cost
+    hardly does.
     """
     case = standing.case
     for chosen in found.fitted[:CHANCES]:
         total = chosen.evidence + chosen.told
-        needed = needed_evidence(standing, chosen)
-        if chosen.evidence <= 0 or not THRESHOLDS.significant <= total < needed:
+        laws = left_by_laws(standing, chosen.joints)
+        least, needed = case.options.least_evidence, needed_evidence(standing, chosen.joints)
+        if chosen.evidence <= 0 or not max(THRESHOLDS.significant, laws) <= total < needed:
             continue
         comparison = compare(standing, chosen)
         if comparison is None or comparison.removed < max(SUSPECTED_SHARE, case.options.least_share):
             continue
-        seconds = recorded * ((needed + chosen.cost) / (total + chosen.cost) - 1)
+        seconds = recorded * ((least + chosen.cost) / (total + chosen.cost - laws) - 1)
         return Suspicion(
             effect=chosen.effect,
             joints=chosen.joints,

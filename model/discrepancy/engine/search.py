@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,8 +50,13 @@ class Findings:
     unresolved: tuple[Fitted, ...] = ()
 
 
-def search(now: Fit, case: Case, progress: Progress, cancel: Cancel) -> Findings:
+def search(
+    now: Fit, case: Case, needed: Callable[[tuple[int, ...]], float], progress: Progress, cancel: Cancel
+) -> Findings:
     """Tries every effect that the model lacks, or that the file states, against what a fit leaves.
+
+    Args:
+        needed: evidence from which a candidate on some joints would be named.
 
     Raises CancelledError when asked to end.
     """
@@ -63,7 +68,7 @@ def search(now: Fit, case: Case, progress: Progress, cancel: Cancel) -> Findings
         progress(0.3, f"trying {effect_on(trial.effect, trial.joints)}")
         probes.append(clear.probe(trial))
     probes.sort(key=lambda p: -p.gain)
-    hopeful = [p for p in probes if p.gain > case.least_gain(p.trial)]
+    hopeful = [p for p in probes if p.gain > case.least_gain(p.trial, needed(p.trial.joints))]
     _tell(case, probes, ())
     work = _Search(now, case, now.slopes())
     singles, several = _shortlist(hopeful, now, case.options.least_margin)
@@ -90,6 +95,7 @@ def search(now: Fit, case: Case, progress: Progress, cancel: Cancel) -> Findings
             break
         fits = work.weigh([work.fit_effect(p, work.goal(found)) for p in fewer])
         found = work.weigh([*found, *work.refined(fits, cancel, found)])
+    found = work.narrowed(found)
     _tell(case, probes, found)
     return Findings(now, tuple(found), tuple(probes))
 
@@ -180,6 +186,7 @@ class _Search:
         every = list(found)
         for probe in best.values():
             trial, own = probe.trial, {p.name for p in probe.trial.parameters}
+            goal = self.goal(every)
             kept = (u for u in case.kept(now, trial.model) if u.name not in own)
             unknowns = (*kept, *(free_unknown(p) for p in trial.parameters))
             compared = now.compared.of_model(trial.model)
@@ -187,11 +194,24 @@ class _Search:
                 [{**there.values, **start} for start in (probe.start, *trial.starts)], there, trial, unknowns
             )
             if there.compared is now.compared:
-                fitted = fit(compared, unknowns, begin, now.memory, clear.now.known)
+                fitted = fit(compared, unknowns, begin, now.memory, clear.now.known, goal=goal)
             else:
-                fitted = case.from_expected(compared, unknowns, begin, now.memory)
+                fitted = case.from_expected(compared, unknowns, begin, now.memory, goal)
             every.append(Fitted(trial.effect, trial.joints, trial.model, trial.parameters, fitted, trial.places))
-        return _best_of_each(self.weigh(every))
+        return best_of_each(self.weigh(every))
+
+    def narrowed(self, found: Sequence[Fitted]) -> list[Fitted]:
+        """The candidates, with each that stands beside the same effect on more joints fitted from where that is, too:
+        fits of a periodic law end in one of many minima, and records not fitted to have yet to tell the right one."""
+        again = []
+        for one in found:
+            wider = (f for f in found if f.effect == one.effect and one.joints and set(one.joints) < set(f.joints))
+            for other in wider:
+                if other.log_odds >= LARGER_PART * found[0].log_odds:
+                    last = one.fit
+                    values = {name: other.fit.values.get(name, value) for name, value in last.values.items()}
+                    again.append(replace(one, fit=fit(last.compared, last.unknowns, values, last.memory, rounds=LONG)))
+        return self.weigh([*found, *again])
 
     def slopes_without(self, free: set[str]) -> Slopes:
         """Derivatives but those by a candidate's own parameters."""
@@ -208,10 +228,11 @@ class _Search:
             last, ended = one.fit, [f for f in (*found, *every, *refined) if f.ended]
             near = one.log_odds >= min(best - THRESHOLDS.close, LARGER_PART * best)
             if near and one.evidence > -THRESHOLDS.close and not one.ended:
-                goal = self.goal(ended)
-                now = fit(last.compared, last.unknowns, last.values, last.memory, rounds=LONG, goal=goal)
+                goal, now = self.goal(ended), last
                 if all(is_strained(f.fit) for f in ended):
-                    now = self.case.or_from_expected(now)
+                    now = self.case.or_from_expected(last, goal)
+                if now is last or is_strained(now):
+                    now = fit(now.compared, now.unknowns, now.values, now.memory, rounds=LONG, goal=goal)
                 one = replace(one, fit=now, ended=True)  # noqa: PLW2901
             refined.append(one)
         return [*refined, *found[REFINED:]]
@@ -311,7 +332,7 @@ def _shortlist(probes: Sequence[Probe], now: Fit, lead: float) -> tuple[list[lis
     return singles, wider
 
 
-def _best_of_each(found: Sequence[Fitted]) -> list[Fitted]:
+def best_of_each(found: Sequence[Fitted]) -> list[Fitted]:
     """Of several fits of one effect at one place, the best first: the first."""
     kept: dict[tuple[str, tuple[int, ...]], Fitted] = {}
     for one in found:

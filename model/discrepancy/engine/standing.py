@@ -52,7 +52,7 @@ class Standing:
         added, stated = (
             {name: p for name, p in own.items() if name not in step.parameters} for own in (self.added, self.stated)
         )
-        now = self._fit(self.model_without(step, self.model), self.now, added)
+        now = self._fit(self.model_without(step, self.model), self.now, added) if added else self.first
         return replace(self, now=now, added=added, stated=stated)
 
     def model_without(self, step: Step, model: Model) -> Model:

@@ -91,7 +91,7 @@ def list_tried(standing: Standing, found: Findings) -> tuple[Candidate, ...]:
         return listed
     best = max(range(min(len(found.fitted), SHOWN)), key=lambda k: listed[k].total)
     chosen = found.fitted[best]
-    needed = needed_evidence(standing, chosen)
+    needed = needed_evidence(standing, chosen.joints)
     told = {"evidence_held_out": chosen.told} if standing.case.held_out is not None else {}
     return (*listed[:best], listed[best].model_copy(update={"needed": needed, **told}), *listed[best + 1 :])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from daq.contracts.progress import Cancel, Progress, stop_if
 from model.discrepancy.diagnosis import Candidate, Suspicion
@@ -11,9 +12,10 @@ from model.discrepancy.engine import holdout
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case
 from model.discrepancy.engine.fitting import Fit
-from model.discrepancy.engine.judging import judge, share_of_rest, suspect
+from model.discrepancy.engine.judging import judge, needed_evidence, share_of_rest, suspect
 from model.discrepancy.engine.search import (
     Findings,
+    best_of_each,
     evidence,
     improved,
     order_by_odds,
@@ -101,11 +103,10 @@ class Workflow:
 
     def _search(self, found: Standing) -> Findings:
         """What a step finds, without what the records do not resolve, the most probable by all records first."""
-        findings = search(found.now, self.case, self._report, self.cancel)
+        findings = search(found.now, self.case, partial(needed_evidence, found), self._report, self.cancel)
         options = self.case.options
-        fitted = prefer_fewer_joints(
-            sorted(self._with_held_out(found, findings.fitted), key=order_by_odds), options.least_margin
-        )
+        ranked = sorted(self._with_held_out(found, findings.fitted), key=order_by_odds)
+        fitted = prefer_fewer_joints(best_of_each(ranked), options.least_margin)
         fitted = prefer_shorter_laws(fitted, findings.now, options.least_margin)
         resolved = [self.case.is_resolved(f, findings.now) for f in fitted]
         return replace(

@@ -83,7 +83,7 @@ class TorqueCase(Case):
         """Values with which an effect has taken over what a fit has made of stated numbers, as stated again."""
         return take_back(effect, own, now)
 
-    def least_gain(self, trial: Trial) -> float:  # noqa: ARG002 (of all)
+    def least_gain(self, trial: Trial, needed: float) -> float:  # noqa: ARG002 (of all)
         """Nothing: on a joint whose residual is large and slow, no effect promises much before it is fitted."""
         return 0.0
 

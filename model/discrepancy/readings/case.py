@@ -19,7 +19,7 @@ from model.discrepancy.engine.case import Case, Watch, expected_values
 from model.discrepancy.engine.fitting import LONG, STEPS_APART, Fit, evaluate, fit
 from model.discrepancy.engine.lifted import is_far_everywhere
 from model.discrepancy.engine.priors import free_unknown, prior_distance, strain
-from model.discrepancy.engine.probing import Probe, Projection, Start, Trial
+from model.discrepancy.engine.probing import Probe, Projection, Start, Trial, projection
 from model.discrepancy.engine.residual import Residual, Signals, Values
 from model.discrepancy.engine.step_record import signal_errors
 from model.discrepancy.grounds import Method
@@ -36,6 +36,7 @@ from model.discrepancy.readings.trials import list_trials
 from model.discrepancy.thresholds import FEEDBACK_SHARE, LARGER_PART, THRESHOLDS
 from model.discrepancy.verdict import Errors, unexplained
 from model.effects.library import effect
+from model.fitting.covariance import inverse
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Kind, Parameter
@@ -138,7 +139,7 @@ class ReadingCase(Case):
         for probe in probed:
             if probe.row is not None:
                 self._responses[probe.trial.effect, probe.trial.joints, probe.trial.law] = probe.row
-        yield from (t for t in flexible if best[t.joints[0]] >= least)
+        yield from (t for t in flexible if best[t.joints[0]] >= least and self._is_promising(clear, t))
 
     def _is_promising(self, clear: Projection, trial: Trial) -> bool:
         row = self._responses.get((trial.effect, trial.joints, trial.law))
@@ -152,14 +153,16 @@ class ReadingCase(Case):
         closed = self.compared.on(self.compared.observation.with_feedback_share(0.0)).of_model(now.model)
         return evaluate(closed, now.unknowns, expected_values(now), now.memory)
 
-    def from_expected(self, compared: Residual, unknowns: Sequence[Unknown], begin: Values, memory: Floats) -> Fit:
+    def from_expected(
+        self, compared: Residual, unknowns: Sequence[Unknown], begin: Values, memory: Floats, goal: float = math.inf
+    ) -> Fit:
         """A fit that begins where the file states its numbers: in the closed loop first, which stays near the record
         whatever is missing."""
         assert isinstance(compared, ReadingResidual)
         closed = compared.on(compared.observation.with_feedback_share(0.0))
         there = fit(closed, unknowns, begin, memory, rounds=STEPS_APART)
         begun = there.values if math.isfinite(there.cost) else begin
-        return fit(compared, unknowns, begun, memory, rounds=LONG)
+        return fit(compared, unknowns, begun, memory, rounds=LONG, goal=goal)
 
     def take_back(self, effect: str, own: Sequence[Parameter], now: Fit) -> Start:
         """An effect that has all of the distance of a number far from its expectation, while that is as expected."""
@@ -185,10 +188,10 @@ class ReadingCase(Case):
         size = float(np.clip((main[0].null or 0.0) + distance, main[0].low, main[0].high))
         return {main[0].name: size, **{u.name: u.expected for u in near}}
 
-    def least_gain(self, trial: Trial) -> float:
+    def least_gain(self, trial: Trial, needed: float) -> float:
         """Half of what would make it significant."""
         price = trial.size * math.log(float(self.compared.samples.told.sum())) + 2 * math.log(trial.places)
-        return LARGER_PART * (self.options.least_evidence + price)
+        return LARGER_PART * (needed + price)
 
     def is_resolved(self, found: Fitted, before: Fit) -> bool:  # noqa: ARG002 (the other kind asks)
         """Whether what the file states of it is really off."""
@@ -235,8 +238,24 @@ class ReadingCase(Case):
             return fitted, ()
         if named:
             floor_held = np.maximum(floor_held, noise_floor(self.held_out.of_model(now.model), now.values))
-        before, after = (self.held_squares(f) for f in (first, now))
+        before, after = (self._held_beyond_numbers(f) for f in (first, now))
         return fitted, signal_errors(self, before, after, floor_held)
+
+    def _held_beyond_numbers(self, now: Fit) -> Floats:
+        """(n,) mean squares that held-out records leave where the numbers may still follow them, as far as the fitted
+        records leave their values open: a short record fits some of them to its noise."""
+        assert self.held_out is not None
+        clear = projection(now.with_slopes())
+        own = [k for k, u in enumerate(now.unknowns) if u.kind is not Kind.INITIAL_POSITION]
+        numbers = [now.unknowns[k] for k in own]
+        held, scale = replace(self.held_out, own=()).of_model(now.model), np.array([u.scale for u in numbers])
+        rows, left = held.slopes(now.values, numbers), held.samples.flat(self.held(now))
+        if not (np.isfinite(rows).all() and np.isfinite(left).all()):
+            return self.held_squares(now)
+        J, r = held.weighted(rows, held.floor, now.memory) * scale[:, None], held.weighted(left, held.floor, now.memory)
+        step = np.linalg.solve(inverse(clear.inverse[np.ix_(own, own)]) + J @ J.T, J @ r)
+        left = left - (step * scale) @ rows
+        return np.array([np.mean(left[c] ** 2) for c in held.samples.columns])
 
     @cached_property
     def _counts(self) -> tuple[int, int]:

@@ -148,7 +148,7 @@ class Observation:
         alone = tuple(
             replace(p, following=0.0, noise=own)
             .with_setting(at.DRIVE_RECORDED, 0)
-            .with_setting(at.QUANTISE, at.DRIVE_ROUNDED if forms_rounded_drive(self.machine, p.gains) else 0)
+            .with_setting(at.QUANTISE, at.DRIVE_ROUNDED if forms_rounded_drive(model, p.gains) else 0)
             for p, own in zip(self.prepared, noise, strict=True)
         )
         outputs = replace(self, prepared=alone).outputs(model, [state])
@@ -278,7 +278,7 @@ def observe(
         prepare(
             problem.model,
             r.inputs,
-            Options(quantise=False, following=feedback_share, recorded_drive=_drive_is_input(model.machine, r)),
+            Options(quantise=False, following=feedback_share, recorded_drive=_drive_is_input(model, r)),
         )
         for r in problem.records
     )
@@ -303,23 +303,25 @@ def _recorded_scales(model: Model, records: Sequence[Record]) -> dict[int, Joint
     return found
 
 
-def _drive_is_input(machine: Machine, record: Record) -> bool:
+def _drive_is_input(model: Model, record: Record) -> bool:
     """Whether the record says what moved the arm in every period: its drive, however the controller came to it.
 
     The drive of a board that rounds nothing is simulated as it is: that it is recorded brings nothing then
     (docs/decisions/0033).
     """
-    return forms_rounded_drive(machine, record.inputs.gains) and record.inputs.drive_of_every_period
+    return forms_rounded_drive(model, record.inputs.gains) and record.inputs.drive_of_every_period
 
 
-def forms_rounded_drive(machine: Machine, gains: Floats) -> bool:
+def forms_rounded_drive(model: Model, gains: Floats) -> bool:
     """Whether a controller with these gains (n, GAINS) may round its drive, so that a simulation without rounding has
-    another. A board's power for whole counts of error is whole as long as its gains are, and it sums up no errors."""
-    if isinstance(machine.controller, SampledPid):
+    another. A board's power for whole counts of error is whole as long as its gains are, with the errors that the model
+    has of them, and it sums up no errors."""
+    if isinstance(model.machine.controller, SampledPid):
         return True
-    if not isinstance(machine.controller, BoardPid):
+    if not isinstance(model.machine.controller, BoardPid):
         return False
-    of_counts = gains[:, [pid.P, pid.D]] * gains[:, [pid.SCALE]]
+    errors = model.vector[[at.slot(j, at.GAIN_ERROR) for j in model.machine.modelled_joints]]
+    of_counts = gains[:, [pid.P, pid.D]] * (gains[:, pid.SCALE] * (1.0 + errors))[:, None]
     return bool(np.any(gains[:, pid.I]) or np.any(np.abs(of_counts - np.round(of_counts)) > WHOLE))
 
 

@@ -26,7 +26,7 @@ def rubbing() -> Workflow:
 
 @pytest.fixture(scope="module")
 def found(rubbing: Workflow) -> tuple[Fitted, ...]:
-    return search(rubbing.found.now, rubbing.case, lambda *_: None, Never()).fitted
+    return search(rubbing.found.now, rubbing.case, lambda _: 0.0, lambda *_: None, Never()).fitted
 
 
 def probe(workflow: Workflow, effect: str, joint: int, gain: float) -> Probe:

@@ -26,7 +26,7 @@ from tests.model.fitting import imagined
 from trials.blind.experiments import trial_experiment
 
 EXPERIMENTS = {e.name: e for e in offered_experiments()}
-FRICTION = ("coulomb_friction", "stribeck_friction")
+FRICTION = ("coulomb_friction", "gravity_torque_friction")
 SPEED_LAWS = {
     "viscous_friction": "joint2.viscous_friction.coefficient",
     "weakened_magnet": "joint2.motor.back_emf_constant",
@@ -58,8 +58,8 @@ def found_on(trace: Trace, effects: tuple[str, ...], joint: int = 2) -> tuple[Fi
 
 @pytest.fixture(scope="module")
 def ramp_step() -> Trace:
-    """Coulomb friction of 10 N·m on joint 2, on the ramp step alone."""
-    return record(imagined.arm().with_effect("coulomb_friction", (2,), {"torque": 10.0}), trial_experiment("ramp"), 3)
+    """Coulomb friction of 4 N·m on joint 2, on the ramp step alone."""
+    return record(imagined.arm().with_effect("coulomb_friction", (2,), {"torque": 4.0}), trial_experiment("ramp"), 3)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_a_record_of_what_is_asked_for_separates_as_predicted(ramp_step: Trace, 
     asked = best_experiment(friction, ExperimentChooser(tuple(offered), plan, budget=60.0))
     assert asked.experiment is not None
     found = asked.experiment
-    assert set(found.separates) == {"Coulomb friction on joint 2", "Stribeck friction on joint 2"}
+    assert set(found.separates) == {"Coulomb friction on joint 2", "gravity-torque friction on joint 2"}
     assert found.description == next(e.description for e in offered if e.name == found.name)
     assert set(found.hardest) == set(found.separates)
     assert found.differs_at is not None
@@ -131,7 +131,7 @@ def test_candidates_that_no_motion_separates_are_one_class_with_what_would_tell_
 
 PAIRS = {
     "pseudo-random": ("motor_inductance", 1, {"inductance": 0.03}, "input_delay"),
-    "sweep": ("potentiometer_nonlinearity", 3, {"bend_1": 0.03}, "potentiometer_offset"),
+    "sweep": ("potentiometer_nonlinearity", 3, {"bend_1": 0.1}, "potentiometer_offset"),
 }
 """Presets, and the effect, joint, size and rival that each is made for."""
 

@@ -43,12 +43,12 @@ def first(found: Diagnosis) -> tuple[str | None, tuple[int, ...]]:
     return next(((step.effect, step.joints) for step in found.steps if step.adopted), (None, ()))
 
 
-def check_found(found: Diagnosis, effect: str, joints: tuple[int, ...]) -> None:
+def check_found(found: Diagnosis, effect: str, joints: tuple[int, ...], verdict: str = "named") -> None:
     assert first(found) == (effect, joints), found.summary
     step = found.steps[0]
     assert step.adopted
     assert not step.group
-    assert found.verdict == "named"
+    assert found.verdict == verdict
     assert all(e.after < e.before * (1.01 if joints and e.joint not in joints else 1.0) for e in step.rmse_holdout)
     assert Diagnosis.model_validate_json(found.model_dump_json()) == found
 
@@ -128,8 +128,9 @@ def test_free_play() -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_payload_on_a_six_joint_arm() -> None:
+    """Its friction where six joints turn leaves more than ten times the noise below 3 Hz, which is told."""
     found = diagnosed("six", {"payload": 1.0}, TorqueOptions(cutoff=3.0, most_steps=1))
-    check_found(found, "payload", ())
+    check_found(found, "payload", (), "partly")
     assert found.steps[0].parameters["load.payload.mass"].value == pytest.approx(1.0, rel=0.1)
 
 

@@ -87,7 +87,7 @@ def test_a_joint_that_brings_little_is_not_named_with_the_others() -> None:
 def test_what_held_out_records_say_of_fits_is_counted_in_the_same_samples() -> None:
     """A fit as good as another one gets the same evidence, whatever the correlation of its own residual."""
     flow = sliding({"coulomb": 8.0}, TorqueOptions(effects=("coulomb_friction", "stribeck_friction")))
-    found = search(flow.found.first, flow.case, lambda *_: None, Never()).fitted
+    found = search(flow.found.first, flow.case, lambda _: 0.0, lambda *_: None, Never()).fitted
     coulomb = next(f.fit for f in found if f.effect == "coulomb_friction")
     other = next(f.fit for f in found if f.effect != "coulomb_friction")
     alone = holdout.evidence(flow.case, flow.found.first, [coulomb])

@@ -40,4 +40,4 @@ def probes(case: ReadingCase, now: Fit) -> list[Probe]:
 
 def searched(case: ReadingCase, now: Fit) -> Findings:
     """What one step finds."""
-    return search(now, case, lambda *_: None, Never())
+    return search(now, case, lambda _: case.options.least_evidence, lambda *_: None, Never())

@@ -16,7 +16,7 @@ from model.discrepancy.readings.case import ReadingCase, noise_floor, weighed_by
 from model.discrepancy.readings.observation import Observation, forms_rounded_drive
 from model.discrepancy.readings.trials import list_trials
 from model.discrepancy.thresholds import FEEDBACK_SHARE
-from model.machine_model.model import Lineage, Model
+from model.machine_model.model import Lineage, Model, base_model
 from model.machine_model.parameter import Kind
 from model.simulation.inputs import gains_of
 from tests.model.discrepancy.readings.cases import case_of, fitted, searched
@@ -111,9 +111,11 @@ def test_a_board_rounds_its_drive_unless_whole_errors_make_whole_counts_of_power
     own: Any = machine.controller
     ratio = own.dac_counts_per_adc_count.model_copy(update={"value": 0.27})
     coarse = machine.model_copy(update={"controller": own.model_copy(update={"dac_counts_per_adc_count": ratio})})
-    assert not forms_rounded_drive(machine, gains_of(machine, None))
-    assert forms_rounded_drive(coarse, gains_of(coarse, None))
-    assert forms_rounded_drive(machine, gains_of(machine, None) + np.eye(9)[1]), "it integrates"
+    model, gains = base_model(machine), gains_of(machine, None)
+    assert not forms_rounded_drive(model, gains)
+    assert forms_rounded_drive(base_model(coarse), gains_of(coarse, None))
+    assert forms_rounded_drive(model, gains + np.eye(9)[1]), "it integrates"
+    assert forms_rounded_drive(model.with_effect("wrong_gain", (1,), {"relative": 0.15}), gains)
 
 
 # ---- Noise: as stated, or as records show it.
