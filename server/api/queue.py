@@ -49,7 +49,7 @@ def list_queue(rig: RobotDep, experiments: Experiments, _: Viewer) -> tuple[Expe
 @router.post("/queue/pause", tags=["queue"])
 def pause_queue(rig: RobotDep, caller: Operator) -> QueueStatus:
     """Pauses the queue: no further experiment begins, and a running one continues."""
-    rig.queue.pause(f"by {caller.name}", caller.name)
+    rig.queue.pause(f"{caller.name} paused it", caller.name)
     return rig.queue.status()
 
 

@@ -28,12 +28,13 @@ export function limitsOf(
   return { error, drive };
 }
 
-/** Whether an earlier trace is a whole run of the same experiment, on the same kind of arm. */
+/** Whether an earlier trace is a whole run of the same experiment on the same arm. */
 export function isSameExperiment(one: TraceDetails, other: TraceDetails): boolean {
-  const { spec, source } = one.record;
+  const { spec, source, robot } = one.record;
   return (
     spec != null &&
     other.record.source === source &&
+    other.record.robot === robot &&
     other.entry.outcome === 'complete' &&
     JSON.stringify(spec) === JSON.stringify(other.record.spec)
   );

@@ -6,7 +6,7 @@ import { COMPARED, isSameExperiment } from './earlier';
 /** Entries that are looked through: the newest before it. */
 const LISTED = 50;
 
-/** Figures of the newest whole runs before a trace, of the same experiment on the same kind of arm. Throws a Problem. */
+/** Figures of the newest whole runs before a trace, of the same experiment on the same arm. Throws a Problem. */
 export async function figuresBefore(details: TraceDetails): Promise<TraceDetails['figures'][]> {
   const { entry, record } = details;
   if (record.spec == null) return [];
