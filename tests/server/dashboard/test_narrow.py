@@ -94,6 +94,9 @@ def test_stop_is_whole_on_every_page_at_every_width(dashboard: Dashboard) -> Non
     expect(page.get_by_title("A mock controller: nothing real moves")).to_be_visible()
     line.robot("disconnected")
     expect(page.get_by_role("banner").get_by_text("robot not connected")).to_be_visible()
+    # Fingers get larger buttons, of which Stop must not become a smaller one.
+    page.context.new_cdp_session(page).send("Emulation.setTouchEmulationEnabled", {"enabled": True})
+    assert page.evaluate("matchMedia('(pointer: coarse)').matches")
     places: dict[int, set[tuple[float, float]]] = {}
     found = _faults(dashboard, "live", places)
     for path in PAGES[1:]:
