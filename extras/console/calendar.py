@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from datetime import datetime, timedelta
+from itertools import islice, takewhile
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.experiments import Experiment, Schedule
 from extras.console.messages import PlannedRun
-from server.experiments.schedule import Plan, following, least_length
+from server.experiments.schedule import Plan, following, least_length, times
 
 MOST = 500
 """Most runs of one schedule in an answer; later ones are left out."""
@@ -30,16 +31,12 @@ def planned(
 
 def _times(one: Schedule, begin: datetime, end: datetime) -> Iterator[datetime]:
     plan = Plan(one.starts, one.every or 0.0, one.count, one.cron, one.zone)
-    at, submitted, found = one.next, one.submitted_runs, 0
+    at = one.next
     if at is not None and at < begin and one.count is None:
         # A schedule without an end: its runs before `begin` need not be counted.
-        at = following(plan, submitted, at, begin - timedelta(microseconds=1))
-    while at is not None and at < end and found < MOST:
-        if at >= begin:
-            found += 1
-            yield at
-        submitted += 1
-        at = following(plan, submitted, at, at)
+        at = following(plan, one.submitted_runs, at, begin - timedelta(microseconds=1))
+    coming = takewhile(lambda at: at < end, times(plan, one.submitted_runs, at))
+    return islice((at for at in coming if at >= begin), MOST)
 
 
 def _run(

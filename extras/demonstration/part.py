@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from daq.contracts.errors import DaqError
 from daq.contracts.service.hidden import Hidden, HideRequest, HidingPlace
 from daq.contracts.service.jobs import MACHINE, CompareRequest, DiagnoseRequest, Job
+from daq.contracts.service.traces import TraceChange
 from daq.owner.client import OwnerOnDemand
 from daq.trajectories.set_points import control_period
 from daq.transport import parse_port_url
@@ -31,6 +32,8 @@ LOOK_EVERY = 0.2
 """Time (s) between two checks for the end of the diagnosis."""
 REAL_ARM = "a demonstration needs the mock: this robot is a real arm, or another machine"
 ENDED = ("done", "failed", "cancelled", "interrupted")
+TAG = "demonstration"
+"""Of its traces: they are of another arm than the page's."""
 log = logging.getLogger("server.demonstration")
 
 
@@ -38,7 +41,7 @@ class Demonstrations(Part):
     """Hides effects and lets the service's own jobs look for them. Safe to use from any thread."""
 
     def __init__(self, services: Services) -> None:
-        self._jobs, self._clock = services.jobs, services.clock
+        self._jobs, self._clock, self._traces = services.jobs, services.clock, services.traces
         self._lock = threading.Lock()
         self._latest: dict[str, Hidden] = {}
         self._counts: dict[str, tuple[int, int]] = {}
@@ -129,6 +132,7 @@ class Demonstrations(Part):
         number = rig.catalogue.add(Path(finished.trace))
         if number is None:
             raise HidingError("the recorded trace could not be taken in; the service's log says why")
+        self._traces.change(rig.robot.name, number, TraceChange(tags=(TAG,)))
         return number, finished.samples * control_period(rig.robot.machine)
 
     def _hold(self, owner: OwnerOnDemand) -> None:

@@ -49,7 +49,7 @@ def list_queue(rig: RobotDep, experiments: Experiments, _: Viewer) -> tuple[Expe
 @router.post("/queue/pause", tags=["queue"])
 def pause_queue(rig: RobotDep, caller: Operator) -> QueueStatus:
     """Pauses the queue: no further experiment begins, and a running one continues."""
-    rig.queue.pause(f"by {caller.name}", caller.name)
+    rig.queue.pause(f"{caller.name} paused it", caller.name)
     return rig.queue.status()
 
 
@@ -82,8 +82,7 @@ def create_schedule(
     request = with_preset(request)
     require_possible(motions, rig, request.spec)
     made = schedules.create(rig.robot.name, request, rig.robot.clock.utc(), caller.name)
-    when = f"every {made.every:g} s" if made.every is not None else f"at {made.cron} of {made.zone}"
-    rig.record_event("schedule", f"schedule {made.id}: {when}", actor=caller.name)
+    rig.record_event("schedule", f"{_name(made)} was planned: {made.rule}", actor=caller.name)
     rig.queue.wake()
     return rig.queue.with_review(made)
 
@@ -111,7 +110,7 @@ def change_schedule(
     _require_own(schedules, rig, caller, schedule)
     changed = schedules.switch(rig.robot.name, schedule, active=change.active, now=rig.robot.clock.utc())
     state = "on" if change.active else "off"
-    rig.record_event("schedule", f"schedule {schedule} switched {state}", actor=caller.name)
+    rig.record_event("schedule", f"{_name(changed)}, {changed.rule}: switched {state}", actor=caller.name)
     rig.queue.wake()
     return rig.queue.with_review(changed)
 
@@ -123,7 +122,7 @@ def approve_schedule(
     """Approves exactly this content of a schedule: its later runs may move a real arm. Its maker cannot."""
     given = rig.approval(caller, request.content)
     approved = schedules.approve(rig.robot.name, schedule, rig.queue.review, given, rig.robot.clock.utc())
-    rig.record_event("review", f"schedule {schedule} approved", actor=caller.name)
+    rig.record_event("review", f"{_name(approved)}, {approved.rule}: approved", actor=caller.name)
     rig.queue.wake()
     return rig.queue.with_review(approved)
 
@@ -133,7 +132,7 @@ def withdraw_schedule_approval(schedule: Identity, rig: RobotDep, schedules: Sch
     """Withdraws the approval of a schedule. Waiting runs keep theirs. Every operator may do this."""
     found, ended = schedules.withdraw_approval(rig.robot.name, schedule)
     if ended is not None:
-        line = f"schedule {schedule}: approval of {ended} withdrawn"
+        line = f"{_name(found)}, {found.rule}: approval of {ended} withdrawn"
         rig.record_event("review", line, actor=caller.name)
     return rig.queue.with_review(found)
 
@@ -141,16 +140,21 @@ def withdraw_schedule_approval(schedule: Identity, rig: RobotDep, schedules: Sch
 @router.delete("/schedules/{schedule}", tags=["queue"], status_code=204)
 def delete_schedule(schedule: Identity, rig: RobotDep, schedules: Schedules, caller: Operator) -> Response:
     """Deletes a schedule: the caller's own or, for owners of the robot, anybody's. Its experiments are kept."""
-    _require_own(schedules, rig, caller, schedule)
+    found = _require_own(schedules, rig, caller, schedule)
     schedules.remove(rig.robot.name, schedule)
-    rig.record_event("schedule", f"schedule {schedule} deleted", actor=caller.name)
+    rig.record_event("schedule", f"{_name(found)}, {found.rule}: deleted from the plan", actor=caller.name)
     return Response(status_code=204)
 
 
-def _require_own(schedules: ScheduleStore, rig: RobotServices, caller: Caller, schedule: str) -> None:
-    """Raises a 403 unless the caller may change this schedule, and a 404."""
+def _require_own(schedules: ScheduleStore, rig: RobotServices, caller: Caller, schedule: str) -> Schedule:
+    """Returns it. Raises a 403 unless the caller may change this schedule, and a 404."""
     found = schedules.get(rig.robot.name, schedule)
     rig.require_own(caller, found.created_by, f"schedule {found.spec.name or found.id}")
+    return found
+
+
+def _name(schedule: Schedule) -> str:
+    return schedule.spec.name or schedule.spec.trajectory.kind
 
 
 @router.get("/control", tags=["control"])

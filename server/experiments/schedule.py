@@ -6,8 +6,11 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from itertools import islice
 from typing import assert_never
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
@@ -87,6 +90,11 @@ def _of(trajectory: Trajectory) -> float:
 
 
 MOMENT = timedelta(microseconds=1)
+MINUTE = timedelta(minutes=1)
+LOOK_AHEAD = 400
+"""Runs of a schedule that are computed in advance: more than a year of daily ones."""
+UNITS = ((86400.0, "d"), (3600.0, "h"), (60.0, "min"))
+WEEKDAYS = ("Mon", "Tue", "Wed", "Thu", "Fri", "Sat", "Sun")
 HOURS = 24
 FIELDS = 5
 """Minute, hour, day, month, weekday. A sixth field, seconds, would allow runs too close together."""
@@ -149,6 +157,54 @@ def following(plan: Plan, submitted: int, last: datetime, now: datetime) -> date
         steps += 1
         moment = plan.starts + timedelta(seconds=steps * plan.every)
     return moment
+
+
+def times(plan: Plan, submitted: int, next_run: datetime | None) -> Iterator[datetime]:
+    """The times of the next run and of all later ones, if each is submitted when it is due."""
+    while next_run is not None:
+        yield next_run
+        submitted += 1
+        next_run = following(plan, submitted, next_run, next_run)
+
+
+def last(plan: Plan, submitted: int, next_run: datetime | None) -> datetime | None:
+    """Returns the time of the last run; None if there is none, or more than `LOOK_AHEAD` are left."""
+    if plan.count is None or plan.count - submitted > LOOK_AHEAD:
+        return None
+    return next(islice(times(plan, submitted, next_run), plan.count - submitted - 1, None), None)
+
+
+def together(one: Iterator[datetime], other: Iterator[datetime]) -> datetime | None:
+    """Returns the first of the coming times of `one` that is less than a minute from one of `other`: on a clock that
+    shows minutes it is the same. None if there is none among `LOOK_AHEAD` times of the two."""
+    mine, theirs = next(one, None), next(other, None)
+    for _ in range(LOOK_AHEAD):
+        if mine is None or theirs is None:
+            return None
+        if abs(mine - theirs) < MINUTE:
+            return mine
+        if mine < theirs:
+            mine = next(one, None)
+        else:
+            theirs = next(other, None)
+    return None
+
+
+def in_words(plan: Plan) -> str:
+    """The rule for people: `every 30 min`, `daily at 02:00 (UTC)`, `Tue-Sun at 02:00 (Europe/London)`, or the cron
+    expression if it says something else."""
+    if plan.cron is None:
+        size, unit = next((one for one in UNITS if plan.every >= one[0] and plan.every % one[0] == 0), (1.0, "s"))
+        return f"every {plan.every / size:g} {unit}"
+    zone = f"({(plan.zone or 'UTC').removeprefix('Etc/')})"
+    found = re.fullmatch(r"(\d+) (\d+) \* \* (\*|[0-6](?:,[0-6])*)", plan.cron)
+    if found is None:
+        return f"at {plan.cron} {zone}"
+    chosen = [day for day in range(len(WEEKDAYS)) if found[3] == "*" or str((day + 1) % 7) in found[3]]
+    is_range = len(chosen) > 2 and chosen[-1] - chosen[0] == len(chosen) - 1
+    days = [WEEKDAYS[day] for day in chosen]
+    on = "daily" if len(days) == len(WEEKDAYS) else f"{days[0]}-{days[-1]}" if is_range else ", ".join(days)
+    return f"{on} at {int(found[2]):02}:{int(found[1]):02} {zone}"
 
 
 def is_due(next_run: datetime | None, now: datetime) -> bool:

@@ -138,7 +138,7 @@ class Notices:
 
     def stop_asked(self, name: str) -> None:
         """Notes that a person requested a stop, even if it was not delivered, or no arm is connected."""
-        self.note(f"{name} requested a stop: look at the arm, reset it if it is stopped, then resume the queue")
+        self.note(f"{name} asked for a stop: {LOOK_FIRST}")
 
     def operator_left(self) -> None:
         """Notes that an operator's confirmed presence has expired."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+from collections.abc import Iterator
 from datetime import datetime
 
 from sqlalchemy import select
@@ -12,8 +13,19 @@ from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Schedule, ScheduleRequest
 from server.experiments.review import Given, Review, digest_of
-from server.experiments.schedule import Plan, broken, first, following, is_due, zone_here
-from server.problems import not_found
+from server.experiments.schedule import (
+    Plan,
+    broken,
+    first,
+    following,
+    in_words,
+    is_due,
+    last,
+    times,
+    together,
+    zone_here,
+)
+from server.problems import ProblemError, not_found
 from server.store.engine import Store
 from server.store.pages import newest_first
 from server.store.submitted import approval_of, approve, given_to, require_approvable, void
@@ -27,7 +39,7 @@ class ScheduleStore:
         self._store = store
 
     def create(self, robot: str, request: ScheduleRequest, now: datetime, by: str) -> Schedule:
-        """Creates an active schedule. Raises a 422 if it would never run."""
+        """Creates an active schedule. Raises a 422 if it would never run, and a 409 as `_require_alone` does."""
         zone = None if request.cron is None else request.zone or zone_here()
         plan = Plan(request.starts or now, request.every or 0.0, request.count, request.cron, zone)
         begins = first(plan)
@@ -50,6 +62,7 @@ class ScheduleStore:
             created_by=by,
         )
         with self._store.writing() as session:
+            _require_alone(session, row)
             session.add(row)
             session.flush()
             return _schedule(row)
@@ -65,11 +78,13 @@ class ScheduleStore:
         return newest_first(self._store, query, ScheduleRow.sequence, cursor, limit, _schedule)
 
     def switch(self, robot: str, identity: str, *, active: bool, now: datetime) -> Schedule:
-        """Switches a schedule on or off. Runs that were due while it was off are skipped. Raises a 404."""
+        """Switches a schedule on or off. Runs that were due while it was off are skipped. Raises a 404, and to switch
+        it on a 409 as `_require_alone` does."""
         with self._store.writing() as session:
             row = _row(session, robot, identity)
             if active and not row.active:
                 _leave_out_missed(row, now)
+                _require_alone(session, row)
             row.active = active
             session.flush()
             return _schedule(row)
@@ -151,6 +166,22 @@ def _leave_out_missed(row: ScheduleRow, now: datetime) -> bool:
     return True
 
 
+def _require_alone(session: Session, row: ScheduleRow) -> None:
+    """Raises a 409 if another active schedule has the same experiment at one of the coming times: a form that was sent
+    twice."""
+    if broken(_plan(row)):
+        return
+    same = select(ScheduleRow).filter_by(robot=row.robot, active=True).where(ScheduleRow.id != row.id)
+    for other in session.scalars(same):
+        if other.spec == row.spec and not broken(_plan(other)) and together(_times(row), _times(other)) is not None:
+            line = f"this experiment is planned already, {in_words(_plan(other))}, by {other.created_by}"
+            raise ProblemError(409, "planned-already", line, f"choose other times, or delete schedule {other.id} first")
+
+
+def _times(row: ScheduleRow) -> Iterator[datetime]:
+    return times(_plan(row), row.submitted_runs, row.next)
+
+
 def _plan(row: ScheduleRow) -> Plan:
     return Plan(row.starts, row.every, row.count, row.cron, row.zone)
 
@@ -169,7 +200,9 @@ def _schedule(row: ScheduleRow) -> Schedule:
         priority=row.priority,
         active=row.active,
         submitted_runs=row.submitted_runs,
+        rule=in_words(_plan(row)),
         next=row.next if row.active and not problem else None,
+        last=last(_plan(row), row.submitted_runs, row.next) if row.active and not problem else None,
         problem=problem,
         created=row.created,
         created_by=row.created_by,

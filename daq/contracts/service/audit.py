@@ -33,7 +33,7 @@ class AuditNote(Wire):
     status: int | None = None
     """HTTP status of the response."""
     detail: str = ""
-    """Why it was refused, or the arm's answer."""
+    """Why it was refused, the arm's answer, or the name and times of an experiment that was added."""
     content: str | None = None
     """Body of the request: JSON without secrets. For a long body, its size and SHA-256."""
     request_id: str | None = None

@@ -171,8 +171,12 @@ class Schedule(Wire):
     priority: int
     active: bool
     submitted_runs: int
+    rule: str = ""
+    """Its times for people, such as `Tue-Sun at 02:00 (Europe/London)`."""
     next: AwareDatetime | None
     """When the next run is due; None if there is none."""
+    last: AwareDatetime | None = None
+    """When the last run is due; None if there is none, or more than 400 are left."""
     problem: str = ""
     """Why the service's computer cannot compute the next run, such as an unknown time zone; empty if it can."""
     created: AwareDatetime

@@ -174,7 +174,7 @@ def _subject(scope: Scope, answer: dict[str, Any]) -> str | None:
 
 
 def _detail(answer: dict[str, Any]) -> str:
-    """Returns why a request was refused, or an arm's answer.
+    """Returns why a request was refused, an arm's answer, or the name (and times) of an experiment that was added.
 
     Of invalid fields it contains only the names: the problem repeats their values, and `content` has those that are no
     secrets.
@@ -182,4 +182,9 @@ def _detail(answer: dict[str, Any]) -> str:
     if isinstance(answer.get("type"), str) and "detail" in answer:
         fields = [str(one.get("field")) for one in answer.get("fields") or () if isinstance(one, dict)]
         return line_of(f"{answer['type'].rpartition('#')[2]}: {', '.join(fields) or answer['detail']}")
-    return line_of(answer["text"]) if isinstance(answer.get("text"), str) else ""
+    if isinstance(answer.get("text"), str):
+        return line_of(answer["text"])
+    if not isinstance(spec := answer.get("spec"), dict):
+        return ""
+    kind = spec["trajectory"]["kind"] if isinstance(spec.get("trajectory"), dict) else ""
+    return line_of(", ".join(str(one) for one in (spec.get("name") or kind, answer.get("rule")) if one))

@@ -62,7 +62,7 @@ def test_a_running_experiment_is_cancelled_by_a_stop_and_the_queue_waits_for_a_p
     assert service.end_of(following["id"])["state"] == "done"
 
 
-def test_a_preset_may_be_named_and_actions_need_no_body(service: Service) -> None:
+def test_a_preset_may_be_named_actions_need_no_body_and_nothing_is_planned_twice(service: Service) -> None:
     assert service.robot.post("/queue/pause").status_code == 200
     known = {one["name"]: one["spec"] for one in service.robot.get("/presets").json()}
     made = service.robot.post("/experiments", json={"preset": "held-out"})
@@ -70,6 +70,9 @@ def test_a_preset_may_be_named_and_actions_need_no_body(service: Service) -> Non
     assert service.robot.post("/experiments/preview", json={"preset": "ramp"}).json()["duration"] > 0
     nightly = service.robot.post("/schedules", json={"preset": "ramp", "cron": "0 2 * * *"}).json()
     assert (nightly["spec"], nightly["every"]) == (known["ramp"], None)
+    twice = service.robot.post("/schedules", json={"preset": "ramp", "cron": "0 2 * * 1,2", "zone": nightly["zone"]})
+    assert (twice.status_code, twice.json()["type"].rpartition("#")[2]) == (409, "planned-already")
+    assert nightly["rule"] in twice.json()["detail"]
     assert service.robot.delete(f"/schedules/{nightly['id']}").status_code == 204
     for body in ({"preset": "rmap"}, {"preset": "ramp", "spec": SHORT}):
         assert service.robot.post("/experiments", json=body).status_code == 422

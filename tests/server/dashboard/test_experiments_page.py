@@ -167,6 +167,13 @@ def test_an_experiment_waits_for_its_time_and_one_is_run_every_so_often(dashboar
     form.get_by_role("button", name="Add the schedule").click()
     row = form.get_by_role("row", name=re.compile("ramp"))
     expect(row).to_contain_text("5 h")
+    expect(form.get_by_role("link", name="Show the plan")).to_be_visible()
+    form.get_by_role("radio", name="On days").check()
+    expect(form.get_by_text("Days: choose at least one day")).to_be_visible()  # none is armed by one press
+    form.get_by_role("radio", name="Repeatedly").check()
+    form.get_by_role("button", name="Add the schedule").click()
+    expect(form.get_by_text("this experiment is planned already, every 5 h")).to_be_visible()
+    dashboard.forgive()  # a refused request is an error on the console
     expect(row).to_contain_text(re.compile(r"[01] / 10"))
     row.get_by_role("button", name="Turn off").click()
     expect(row).to_contain_text("off")
@@ -307,7 +314,7 @@ def test_a_schedule_may_begin_later(dashboard: Dashboard, form: Page) -> None:
     form.get_by_label("Repeatedly").check()
     form.get_by_label("First run").fill("2199-01-02T03:04")
     form.get_by_role("button", name="Add the schedule").click()
-    expect(form.get_by_text(re.compile("scheduled: every 30 min, first 02 Jan 2199"))).to_be_visible()
+    expect(form.get_by_text(re.compile("Planned: every 30 min, next on 02 Jan 2199"))).to_be_visible()
     made = dashboard.service.robot.get("/schedules", params={"limit": 1}).json()["items"][0]
     assert made["next"].startswith(("2199-01-01", "2199-01-02"))
     dashboard.service.robot.delete(f"/schedules/{made['id']}")

@@ -32,7 +32,7 @@ def test_what_the_mock_hides_is_looked_for_and_its_seal_holds(browser: Browser, 
     tab = watched(context, service)
     page = tab.open("diagnosis")
     page.get_by_role("link", name=re.compile("Hide something from me")).click()
-    page.get_by_text("Pick the effect yourself").click()
+    page.get_by_text("Choose yourself what is hidden").click()
     page.get_by_role("combobox", name="Effect").select_option("viscous_friction")
     page.get_by_role("combobox", name="Joint").select_option("2")
     page.get_by_role("button", name="Hide this").click()

@@ -50,7 +50,7 @@ def test_a_layout_is_arranged_kept_shared_and_saved(dashboard: Dashboard, tmp_pa
     assert bar is not None
     page.mouse.move(bar["x"] + bar["width"] / 2, bar["y"] + bar["height"] / 2)
     page.mouse.down()
-    page.mouse.move(bar["x"] + bar["width"] / 2, bar["y"] + 150, steps=8)
+    page.mouse.move(bar["x"] + bar["width"] / 2, bar["y"] + 300, steps=8)
     page.mouse.up()
     page.get_by_role("button", name="Remove Link").click()
     assert all(page.locator(".body").evaluate_all("all => all.map((one) => one.inert)"))  # nothing moves the arm
@@ -64,7 +64,7 @@ def test_a_layout_is_arranged_kept_shared_and_saved(dashboard: Dashboard, tmp_pa
     expect(page.get_by_role("heading", name=re.compile("^J2 position"))).to_have_count(2)
     expect(page.locator("[data-kind=link]")).to_have_count(0)
     places = _places(page)
-    assert places["number"]["left"] > places["chart"]["left"]
+    assert places["number"]["left"] > places["charts"]["left"]
     assert places["hand"]["top"] > places["charts"]["bottom"]
     assert faults_of(page) == []
     _see_it_elsewhere(dashboard, page, tmp_path)

@@ -53,7 +53,7 @@ def test_an_experiment_becomes_a_macro_whose_form_keeps_to_its_bounds(dashboard:
     dashboard.service.end_of(made["id"])
     robot.post("/queue/pause", json={})
     page = dashboard.open("experiments")
-    page.get_by_role("link", name=re.compile("As macro.*seed")).first.click()
+    page.get_by_role("link", name=re.compile("Keep as macro.*seed")).first.click()
     page.get_by_role("textbox", name="Name", exact=True).fill("two-steps")
     page.get_by_role("button", name=re.compile("^amplitude .* parameter")).click()
     bounds = page.get_by_role("group", name="{amplitude}")

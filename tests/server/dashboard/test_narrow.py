@@ -69,11 +69,14 @@ class Line:
         self.say({**self._robot, "connection": connection})
 
 
-def _faults(dashboard: Dashboard, where: str) -> list[str]:
+def _faults(dashboard: Dashboard, where: str, places: dict[int, set[tuple[float, float]]] | None = None) -> list[str]:
+    """What is wrong with Stop and the links at every width. `places`: where Stop was at each, to which it is added."""
     page, found = dashboard.page, []
+    places = {} if places is None else places
     for width in WIDTHS:
         page.set_viewport_size({"width": width, "height": 700})
         seen = page.evaluate(STOP)
+        places.setdefault(width, set()).add((seen["left"], seen["top"]))
         if seen["left"] < 0 or seen["right"] > seen["inside"] or seen["top"] < 0 or seen["covered"]:
             found.append(f"{where} at {width} px: Stop is cut off or covered: {seen}")
         if seen["width"] < 96:
@@ -91,11 +94,18 @@ def test_stop_is_whole_on_every_page_at_every_width(dashboard: Dashboard) -> Non
     expect(page.get_by_title("A mock controller: nothing real moves")).to_be_visible()
     line.robot("disconnected")
     expect(page.get_by_role("banner").get_by_text("robot not connected")).to_be_visible()
-    found = _faults(dashboard, "live")
+    # Fingers get larger buttons, of which Stop must not become a smaller one.
+    page.context.new_cdp_session(page).send("Emulation.setTouchEmulationEnabled", {"enabled": True})
+    assert page.evaluate("matchMedia('(pointer: coarse)').matches")
+    places: dict[int, set[tuple[float, float]]] = {}
+    found = _faults(dashboard, "live", places)
     for path in PAGES[1:]:
         dashboard.open(path)
-        found += _faults(dashboard, path)
+        found += _faults(dashboard, path, None if path == "kiosk" else places)
+    dashboard.open("experiments").get_by_label("Name").focus()
+    found += _faults(dashboard, "typing", places)
     assert found == []
+    assert {width: len(one) for width, one in places.items()} == dict.fromkeys(WIDTHS, 1)  # a hand finds it unseen
 
 
 def test_stop_is_whole_beside_every_badge(dashboard: Dashboard) -> None:

@@ -100,7 +100,7 @@ def test_traces_are_found_and_laid_over_each_other(dashboard: Dashboard, traces:
         page.get_by_role("button", name=name).click()
     expect(page.get_by_role("img", name="Difference of the positions of joint 1")).to_be_visible()
     expect(page.get_by_role("img", name="Amplitude spectrum of the error of joint 1")).to_be_visible()
-    expect(page.get_by_text(re.compile(r"^rms 2: \d+\.\d+ °"))).to_be_visible()
+    expect(page.get_by_text(re.compile(r"^rms of trace 2 small: \d+\.\d+°"))).to_be_visible()
     assert faults_of(page) == []
 
 
@@ -169,7 +169,7 @@ def test_tags_and_notes_are_kept_and_searched(dashboard: Dashboard, traces: tupl
     line = page.get_by_role("combobox", name="Search words")
     expect(line).to_have_value("tag:wear-study")
     line.fill("source:moon")
-    expect(page.get_by_text("source: allowed are mock, real, imported")).to_be_visible()
+    expect(page.get_by_text("source: needs one of mock, real, imported")).to_be_visible()
     line.fill("belt was source:mock")
     expect(page.get_by_role("list", name="Traces found").get_by_role("listitem")).to_have_count(1)
 
@@ -193,7 +193,7 @@ def test_a_trace_is_downloaded_in_both_forms_and_deleted(dashboard: Dashboard, t
 def test_a_table_from_elsewhere_is_taken_in_and_shown(dashboard: Dashboard, tmp_path: Path) -> None:
     table = tmp_path / "rig.csv"
     rows = [f"{row / 50},{0.5 if row > 10 else 0},{0.5 * (1 - 0.9 ** max(0, row - 10))}" for row in range(100)]
-    table.write_text("time,set_point_1,position_1\n" + "\n".join(rows), "utf-8")
+    table.write_text("time,set_point_1,position_1\n" + "\n".join(rows) + "\n", "utf-8")
     page = dashboard.open("traces")
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Import a file").click()

@@ -14,7 +14,20 @@ from daq.contracts.experiment import ExperimentSpec, Trajectory
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ENDS
 from daq.trajectories.planner import plan, start_angles
-from server.experiments.schedule import LONGEST, Plan, first, following, is_due, least_length, points_of, zone_here
+from server.experiments.schedule import (
+    LONGEST,
+    Plan,
+    first,
+    following,
+    in_words,
+    is_due,
+    last,
+    least_length,
+    points_of,
+    times,
+    together,
+    zone_here,
+)
 from server.experiments.states import Event, IllegalEventError, Waiting, advance, after_restart, next_due
 from server.problems import ProblemError
 
@@ -111,6 +124,37 @@ def test_the_following_run_is_later_and_on_the_grid(
     assert found >= starts
     steps = (found - starts).total_seconds() / every
     assert abs(steps - round(steps)) * every < 1e-3
+
+
+def test_rules_are_told_in_words_with_their_last_run_and_those_that_share_a_minute_are_found() -> None:
+    def plan(cron: str | None, every: float = 0.0, count: int | None = None, zone: str = "Europe/London") -> Plan:
+        return Plan(START, every, count, cron, zone if cron else None)
+
+    daily, most = plan("0 2 * * *", count=10), plan("0 2 * * 0,2,3,4,5,6")
+    assert [in_words(one) for one in (daily, most, plan("30 22 * * 1,5", zone="Etc/UTC"), plan("0 2 1 * *"))] == [
+        "daily at 02:00 (Europe/London)",
+        "Tue-Sun at 02:00 (Europe/London)",
+        "Mon, Fri at 22:30 (UTC)",
+        "at 0 2 1 * * (Europe/London)",
+    ]
+    assert [in_words(plan(None, every)) for every in (10, 90, 1800, 172800)] == [
+        "every 10 s",
+        "every 90 s",
+        "every 30 min",
+        "every 2 d",
+    ]
+    assert last(daily, 3, first(daily)) == datetime(2026, 1, 7, 2, tzinfo=UTC)
+    assert last(most, 0, first(most)) is None
+
+    def meet(one: Plan, other: Plan) -> datetime | None:
+        return together(times(one, 0, first(one)), times(other, 0, first(other)))
+
+    assert meet(daily, most) == START + timedelta(hours=2)
+    assert meet(most, plan("0 2 * * 1")) is None
+    assert meet(daily, plan("0 2 12 1 *")) is None  # ten runs are over by then
+    again = Plan(START + timedelta(seconds=5), 1800, None)
+    assert meet(plan(None, 1800), again) == START  # pressed twice
+    assert meet(plan(None, 1800), Plan(START + timedelta(minutes=10), 1800, None)) is None
 
 
 @given(moments, intervals, st.integers(1, 20))

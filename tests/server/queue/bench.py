@@ -1,5 +1,6 @@
 """A queue on stores of its own, with a clock turned by hand and an arm that answers what a test says."""
 
+import itertools
 import sqlite3
 import threading
 import time
@@ -37,6 +38,7 @@ _BUSY.sqlite_errorcode = sqlite3.SQLITE_BUSY
 LOCKED = OperationalError("INSERT", {}, _BUSY)
 SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
 
+_NUMBERS = itertools.count()
 ONLY_WHEN_WOKEN = 3600.0
 """s: a queue that looks so rarely shows whether what happens wakes it."""
 AT_ONCE = 0.01
@@ -181,7 +183,8 @@ class Bench:
 
     def schedule(self, every: float = 3600) -> Schedule:
         """One whose first run is due now, and then every hour."""
-        request = ScheduleRequest(spec=SPEC, every=every)
+        spec = SPEC.model_copy(update={"notes": str(next(_NUMBERS))})  # the same one twice at the same time is refused
+        request = ScheduleRequest(spec=spec, every=every)
         made: Schedule = self.schedules.create("ma2000", request, self.clock.utc(), "anna")
         return made
 

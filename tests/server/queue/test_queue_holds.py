@@ -133,7 +133,7 @@ def test_a_connection_that_ends_and_the_word_for_the_arm_that_was_there(bench: B
 def test_a_stop_that_reaches_no_arm_holds_what_a_schedule_brings(bench: Bench) -> None:
     bench.queue.stop_asked("anna")
     bench.schedule()
-    _is_held(bench, "anna requested a stop: look at the arm, reset it if it is stopped, then resume the queue")
+    _is_held(bench, "anna asked for a stop: look at the arm, then resume the queue")
 
 
 @pytest.mark.parametrize("taken", [True, False])
@@ -146,8 +146,8 @@ def test_what_nobody_had_seen_when_the_queue_was_resumed_holds_it_again(bench: B
     if taken:
         bench.queue.notices.pop_reason()
     bench.queue.resume("anna", moves_real_arm=False, asked=asked)
-    assert bench.queue.status().reason.startswith("bert requested")
-    _is_held(bench, "bert requested a stop: look at the arm, reset it if it is stopped, then resume the queue")
+    assert bench.queue.status().reason.startswith("bert asked for a stop")
+    _is_held(bench, "bert asked for a stop: look at the arm, then resume the queue")
 
 
 def test_a_word_that_was_given_for_one_connection_is_none_for_the_next(bench: Bench) -> None:

@@ -309,7 +309,7 @@ def test_runs_of_a_schedule_have_its_approval(people: dict[str, Person]) -> None
     path = f"/schedules/{every['id']}/approval"
     assert kind_of(anna.ask("PUT", path, {"content": every["content"]})) == (403, "own-experiment")
     assert bert.ask("PUT", path, {"content": every["content"]}).json()["needs_approval_of"] is None
-    now = anna.ask("POST", "/schedules", {"spec": SPEC, "every": 86400, "starts": "2100-01-01T00:00:00Z"}).json()
+    now = anna.ask("POST", "/schedules", {"spec": SPEC, "every": 86400, "starts": "2100-01-01T05:00:00Z"}).json()
     assert now["approval"] is None, "another schedule of the same is another one"
     assert bert.ask("DELETE", path).json()["approval"] is None
 

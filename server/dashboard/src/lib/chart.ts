@@ -78,6 +78,9 @@ export function padded(low: number, high: number, least = 0): [number, number] {
 
 const PLAIN = new Intl.NumberFormat('en-GB', { maximumFractionDigits: 9 });
 
+/** px between two numbers of the vertical axis: low charts would have one alone, which is no scale. */
+const ROOM_OF_A_NUMBER = 20;
+
 /** A number at an axis: with a true minus sign, as everywhere. */
 function plain(value: number): string {
   return PLAIN.format(value).replace('-', '−');
@@ -125,7 +128,7 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
           ? {}
           : { splits: (plot, __, low, high) => withRoom(places(low, high), plot.width) }),
       },
-      { ...axis, size: 56, gap: 6, ...written(axes.y) },
+      { ...axis, size: 56, gap: 6, space: ROOM_OF_A_NUMBER, ...written(axes.y) },
     ],
     series: [
       {},

@@ -6208,8 +6208,15 @@ export interface components {
             active: boolean;
             /** Submitted Runs */
             submitted_runs: number;
+            /**
+             * Rule
+             * @default
+             */
+            rule?: string;
             /** Next */
             next: string | null;
+            /** Last */
+            last?: string | null;
             /**
              * Problem
              * @default

@@ -5,7 +5,7 @@ import {
   layoutOf,
   movedInOrder,
   packed,
-  panelBelow,
+  addedPanel,
   STANDARD,
   unpacked,
   within,
@@ -16,8 +16,11 @@ import {
 const bare = (layout: Layout) => layout.panels.map(({ id: _, ...panel }) => panel);
 
 it('comes back from a file and from a link as it was, with ids of its own', async () => {
-  const notes = panelBelow(STANDARD.panels, 'notes', { text: 'payload 2 kg, °C – "quoted" <b>' });
-  const layout = { name: 'Bench', panels: [...STANDARD.panels, notes, panelBelow([], 'number')] };
+  const notes = addedPanel(STANDARD.panels, 'notes', { text: 'payload 2 kg, °C – "quoted" <b>' });
+  // Beside the link's, not below it; a second one beside the first.
+  expect(notes).toMatchObject({ x: 0, y: 18 });
+  expect(addedPanel([...STANDARD.panels, notes], 'camera')).toMatchObject({ x: 4, y: 18 });
+  const layout = { name: 'Bench', panels: [...STANDARD.panels, notes, addedPanel([], 'number')] };
   for (const back of [layoutOf(written(layout)), await unpacked(await packed(layout))]) {
     expect(back.name).toBe('Bench');
     expect(bare(back)).toEqual(bare(layout));

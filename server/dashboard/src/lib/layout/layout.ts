@@ -93,16 +93,20 @@ export function within(kind: Kind, place: Place): Place {
   return { x: Math.min(COLUMNS - w, Math.max(0, place.x)), y: Math.max(0, place.y), w, h };
 }
 
-/** A new panel of a kind, below all others. */
-export function panelBelow(
+/** A new panel of a kind, in the first place that is free: the highest, of those the leftmost. */
+export function addedPanel(
   panels: readonly LayoutPanel[],
   kind: Kind,
   more: Partial<LayoutPanel> = {},
 ): LayoutPanel {
-  const y = Math.max(0, ...panels.map((one) => one.y + one.h));
+  const { w, h } = KINDS[kind];
+  const isFree = (x: number, y: number): boolean =>
+    panels.every((one) => one.x + one.w <= x || x + w <= one.x || one.y + one.h <= y || y + h <= one.y);
+  let [x, y] = [0, 0];
+  while (!isFree(x, y)) [x, y] = x + w < COLUMNS ? [x + 1, y] : [0, y + 1];
   const options: Partial<LayoutPanel> =
     kind === 'number' ? { signal: 'position', joints: [1] } : kind === 'chart' ? { signal: 'position' } : {};
-  return withId({ kind, x: 0, y, w: KINDS[kind].w, h: KINDS[kind].h, ...options, ...more });
+  return withId({ kind, x, y, w, h, ...options, ...more });
 }
 
 /** The panel one place earlier (-1) or later (1) in the order of narrow screens. */

@@ -16,7 +16,7 @@ const FIGURES: readonly (readonly [counter: string, name: string, meaning: strin
   ['retries', 'Retries', 'Requests written again because no whole reply came'],
   ['damaged', 'CRC errors', 'Pieces of input that were no whole reply: checksum, stuffing or length'],
   ['timeouts', 'Time-outs', 'Waits for a reply that ended without one'],
-  ['torn', 'Torn', 'Readings caught with the bytes of two periods; none was delivered'],
+  ['torn', 'Torn readings', 'Readings caught with the bytes of two periods; none was delivered'],
   [
     'missed_set_points',
     'Missed set points',

@@ -147,6 +147,11 @@ class Live {
     return this.isOperator && (this.isOwner || this.me?.name === owner);
   }
 
+  /** A name as the person at this page reads it. */
+  who(name: string | null | undefined): string {
+    return name == null ? 'unknown' : name === this.me?.name ? 'you' : name;
+  }
+
   /** Time of day at the service, ms since 1970. Reactive: it grows. */
   get wall(): number {
     return this.clock.wall(this.now) ?? Date.now();

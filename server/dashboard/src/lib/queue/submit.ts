@@ -3,7 +3,7 @@
 import { api, ask, here, type ConsoleOrder, type Experiment, type ExperimentSpec } from '../api';
 import type { MotionPreview, Schedule } from '../api';
 import { dayAndTime, duration } from '../format';
-import { ruleOf } from '../trajectory/when';
+import { fromNow } from '../trajectory/when';
 
 /** What a specification would move. Nothing is queued. */
 export async function previewOf(spec: ExperimentSpec): Promise<MotionPreview> {
@@ -36,15 +36,17 @@ export async function addSchedule(
 export const toldQueued = (made: Experiment): string =>
   `${made.spec.name ?? made.spec.trajectory.kind} was added to the queue`;
 
-/** What became of a schedule, for its line. */
-export function toldScheduled(made: Schedule): string {
-  return `scheduled: ${ruleOf(made)}${made.next ? `, first ${dayAndTime(made.next)}` : ''}`;
+/** What became of a schedule, for its line. `now`: ms, by the service's clock. */
+export function toldScheduled(made: Schedule, now: number): string {
+  const next = made.next ? `next ${fromNow(made.next, now)}` : 'no run is left';
+  const runs = made.count === null ? 'without an end' : `${made.count} run${made.count === 1 ? '' : 's'}`;
+  return `Planned: ${made.rule}, ${next}, ${runs}${made.last ? `, last on ${dayAndTime(made.last)}` : ''}`;
 }
 
-/** Hands over what a line of `run` asks for, and says what became of it. */
-export async function submit(order: ConsoleOrder, key: string): Promise<string> {
+/** Hands over what a line of `run` asks for, and says what became of it. `now` as for `toldScheduled`. */
+export async function submit(order: ConsoleOrder, key: string, now: number): Promise<string> {
   const spec = order.spec as unknown as ExperimentSpec;
-  if (order.cron !== null) return toldScheduled(await addSchedule(spec, { cron: order.cron }));
+  if (order.cron !== null) return toldScheduled(await addSchedule(spec, { cron: order.cron }), now);
   return toldQueued(await addToQueue(spec, key));
 }
 

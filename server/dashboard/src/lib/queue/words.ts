@@ -65,7 +65,7 @@ export function queueState(queue: Queue, isConnected: boolean): { head: string; 
   if (queue.waiting_for) return { head: 'Waiting:', text: `${queue.waiting_for}.` };
   if (queue.running) return { head: '', text: 'One experiment is running.' };
   if (!isConnected) return { head: '', text: 'Nothing can run until the robot is connected.' };
-  return { head: '', text: 'Experiments run one at a time, as soon as they are added.' };
+  return { head: '', text: 'Experiments run one at a time, when their turn comes.' };
 }
 
 /** A sign and a word for the queue. */

@@ -15,6 +15,12 @@ class Stop {
   /** Time of day at which `state` was told. */
   private time = $state('');
   words = $derived(wordsOf(this.state, this.standing, this.arm, this.time));
+  /** Whether the arm is stopped now by a press on this page. */
+  isOwn = $derived(
+    (this.state.kind === 'confirmed' || this.state.kind === 'delivered') && this.standing === 'holds',
+  );
+  /** Whether the stop was reset on this page, and the queue, which it paused, may still have to be resumed. */
+  isReset = $state(false);
   /** The port of the listener that takes stops alone; null until the service has told it. */
   port: number | null = null;
   /** The last press. */
@@ -30,6 +36,7 @@ class Stop {
   /** At once, and without a question: for all arms of the service, unless one is named. */
   press(robot = isFleet() ? '' : here().robot): void {
     this.call?.leave();
+    this.isReset = false;
     this.target = robot;
     const address = robot === '' ? '/fleet/stop' : `/robots/${encodeURIComponent(robot)}/stop`;
     const service = (): Promise<StopResult> => sendToService(robot);

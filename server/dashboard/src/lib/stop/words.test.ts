@@ -9,7 +9,7 @@ describe('the message about a stop', () => {
   it('is green only while it holds', () => {
     expect(wordsOf(confirmed, 'holds', 'stopped', '12:00:00')).toMatchObject({
       look: 'confirmed',
-      head: 'Stopped, confirmed by the board · 30 ms',
+      head: 'Stopped, confirmed by the board after 30 ms',
       text: 'Frozen at tick 7.',
     });
     expect(wordsOf(confirmed, 'unknown', 'unknown', '12:00:00')).toMatchObject({

@@ -21,15 +21,15 @@ export function wordsOf(state: StopState, standing: Standing, arm: ArmNow, time:
   if (state.kind === 'not delivered') {
     return { look: 'not-delivered', sign: '✕', head: 'Stop NOT DELIVERED', text };
   }
-  const after = `${Math.round(state.seconds * 1000)} ms`;
+  const after = `after ${Math.round(state.seconds * 1000)} ms`;
   if (state.kind === 'delivered') {
-    return { look: 'delivered', sign: '▲', head: `Stop sent, NOT CONFIRMED · ${after}`, text };
+    return { look: 'delivered', sign: '▲', head: `Stop sent, NOT CONFIRMED ${after}`, text };
   }
   if (standing === 'unknown') {
     const head = `Stopped at ${time}, confirmed by the board then`;
     return { look: 'delivered', sign: '▲', head, text: 'How the arm is now is not known.' };
   }
-  return { look: 'confirmed', sign: '✓', head: `Stopped, confirmed by the board · ${after}`, text };
+  return { look: 'confirmed', sign: '✓', head: `Stopped, confirmed by the board ${after}`, text };
 }
 
 function pastOf(kind: 'confirmed' | 'delivered' | 'not delivered', arm: ArmNow, time: string): StopWords {

@@ -20,7 +20,7 @@ export const STOPS: readonly Stop[] = [
   },
   {
     title: 'What you see is live',
-    text: 'Position, error and drive of each joint, with their age. Arrange the panels as you like them.',
+    text: 'The charts show position, error and drive of each joint as they come. Arrange the panels as you like them.',
     about: '[data-kind="charts"], [data-kind="chart"], .panels',
   },
   {

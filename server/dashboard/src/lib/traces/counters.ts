@@ -11,18 +11,27 @@ const ORDINARY = new Set([
   ...TIMES,
 ]);
 
+/** As on Live. */
+const NAMES: Readonly<Record<string, string>> = {
+  timeouts: 'time-outs',
+  late: 'late samples',
+  damaged: 'CRC errors',
+  torn: 'torn readings',
+};
+
 /** One line: everything that was counted and is not in order, then the round trip; empty where nothing was counted. */
 export function linkInWords(counters: Readonly<Record<string, number>>): string {
   const wrong = Object.entries(counters)
     .filter(([name, count]) => count !== 0 && !ORDINARY.has(name))
-    .map(([name, count]) => `${name.replaceAll('_', ' ')} ${count}`);
+    .map(([name, count]) => `${count} ${NAMES[name] ?? name.replaceAll('_', ' ')}`);
   const [usual, slow] = TIMES.map((name) => counters[name]);
   const trip =
     usual === undefined || slow === undefined
       ? []
       : [`round trip ${milliseconds(usual)}, 99 % within ${milliseconds(slow)}`];
   const requests = counters.requests === undefined ? [] : [`${counters.requests} requests`];
-  return [...requests, ...wrong, ...trip].join(', ');
+  const all = requests.length > 0 && wrong.length === 0 ? ['all answered in time'] : wrong;
+  return [...requests, ...all, ...trip].join(', ');
 }
 
 function milliseconds(seconds: number): string {

@@ -1,5 +1,7 @@
 /** Moments and intervals of experiments: as they are chosen in a form, and as they are told. */
 
+import { dayAndTime } from '../format';
+
 export const UNITS = { s: 1, min: 60, h: 3600, d: 86400 } as const;
 export type Unit = keyof typeof UNITS;
 
@@ -42,28 +44,14 @@ export function cronOf(time: string, days: readonly number[] = []): string {
   return `${minute} ${hour} * * ${isDaily ? '*' : days.toSorted().join(',')}`;
 }
 
-/** When a schedule runs: `every 30 min`, `daily 02:00 (Europe/London)`, `Mon, Fri 02:00 (…)`, or its cron expression. */
-export function ruleOf(schedule: {
-  every: number | null;
-  cron?: string | null;
-  zone?: string | null;
-}): string {
-  if (schedule.every !== null) return `every ${interval(schedule.every)}`;
-  const found = /^(\d+) (\d+) \* \* (\*|[0-6](?:,[0-6])*)$/.exec(schedule.cron ?? '');
-  if (found === null) return `${schedule.cron} (${schedule.zone})`;
-  const [, minute = '', hour = '', on = ''] = found;
-  const days = WEEKDAYS.filter(([number]) => on.includes(String(number))).map(([, name]) => name);
-  const when = on === '*' ? 'daily' : days.join(', ');
-  return `${when} ${hour.padStart(2, '0')}:${minute.padStart(2, '0')} (${schedule.zone})`;
-}
-
-/** How long until a moment, or since: `in 5 min`, `2 h ago`, `now`. */
+/** How long until a moment, or since: `in 5 min`, `2 h ago`, `now`; from a day ahead its date. */
 export function fromNow(moment: string, now: number): string {
   const seconds = (Date.parse(moment) - now) / 1000;
   const size = Math.abs(seconds);
   if (size < 1) return 'now';
+  if (seconds >= UNITS.d) return `on ${dayAndTime(moment)}`;
   const rounded =
     size < 60 ? Math.round(size) : size < 3600 ? Math.round(size / 60) * 60 : Math.round(size / 3600) * 3600;
-  const text = rounded >= 2 * 86400 ? `${Math.round(size / 86400)} d` : interval(rounded);
+  const text = rounded >= 2 * UNITS.d ? `${Math.round(size / UNITS.d)} d` : interval(rounded);
   return seconds > 0 ? `in ${text}` : `${text} ago`;
 }

@@ -10,7 +10,6 @@ import { previewOf, submit, toldMotion } from '../../lib/queue/submit';
 import { queueState } from '../../lib/queue/words';
 import { linkTo } from '../../lib/router.svelte';
 import { stop } from '../../lib/stop/stop.svelte';
-import { ruleOf } from '../../lib/trajectory/when';
 
 export interface Told {
   readonly text: string;
@@ -135,7 +134,7 @@ async function run(order: ConsoleOrder, isDry: boolean): Promise<Answer> {
   if (isDry) return { told: [...told, say('no limit is violated; nothing was sent', 'good')] };
   const key = newKey();
   const answer = async (): Promise<Told[]> => [
-    { text: await submit(order, key), tone: 'good', href: linkTo('experiments') },
+    { text: await submit(order, key, live.wall), tone: 'good', href: linkTo('experiments') },
     ...waiting(),
   ];
   if (!live.isRealArm) return { told: [...told, ...(await answer())] };
@@ -251,7 +250,7 @@ const ORDERS: Readonly<Record<string, Known>> = {
       const { items } = await ask(api.GET('/api/v1/robots/{robot}/schedules', { params: path() }));
       const rows = items.map(
         (one) =>
-          `${one.id}  ${one.spec.name ?? one.spec.trajectory.kind}: ${ruleOf(one)}, ${one.next ? `next ${dayAndTime(one.next)}` : one.problem || 'off or complete'}`,
+          `${one.id}  ${one.spec.name ?? one.spec.trajectory.kind}: ${one.rule}, ${one.next ? `next ${dayAndTime(one.next)}` : one.problem || 'off or complete'}`,
       );
       return { told: rows.length > 0 ? rows.map((text) => say(text)) : [say('no schedules')] };
     },

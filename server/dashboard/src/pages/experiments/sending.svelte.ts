@@ -1,9 +1,10 @@
 /** When an experiment is to be run, and handing it to the service: once, however often the button is pressed. */
 
+import { live } from '../../lib/live/live.svelte';
 import { asProblem, newKey, type Experiment, type ExperimentSpec, type Problem } from '../../lib/api';
 import { addSchedule, addToQueue, toldQueued, toldScheduled } from '../../lib/queue/submit';
 import { typedNumber, type NumberRule } from '../../lib/trajectory/numbers';
-import { cronOf, localMoment, momentOf, UNITS, type Unit, WEEKDAYS } from '../../lib/trajectory/when';
+import { cronOf, localMoment, momentOf, UNITS, type Unit } from '../../lib/trajectory/when';
 
 export type When = 'now' | 'at' | 'daily' | 'every';
 
@@ -26,8 +27,8 @@ export class Sending {
   starts = $state('');
   /** Time of day, at the arm's computer. */
   daily = $state('02:00');
-  /** Weekdays by cron's numbers. */
-  days = $state<number[]>(WEEKDAYS.map(([number]) => number));
+  /** Weekdays by cron's numbers: none, until they are chosen. */
+  days = $state<number[]>([]);
   every = $state('30');
   unit = $state<Unit>('min');
   count = $state('10');
@@ -80,7 +81,8 @@ export class Sending {
       this.when === 'daily'
         ? { cron: cronOf(this.daily, this.days) }
         : { every: this.seconds(), starts: momentOf(this.starts) };
-    return toldScheduled(await addSchedule(spec, { ...when, count, priority: Number(this.priority) }));
+    const made = await addSchedule(spec, { ...when, count, priority: Number(this.priority) });
+    return toldScheduled(made, live.wall);
   }
 
   private seconds(): number {

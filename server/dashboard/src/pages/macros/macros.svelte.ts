@@ -12,6 +12,7 @@ import {
   type MacroReading,
   type Problem,
 } from '../../lib/api';
+import { live } from '../../lib/live/live.svelte';
 import { fieldsOf, valuesOf, type MacroField } from '../../lib/macros/form';
 import { previewOf, submit, toldMotion } from '../../lib/queue/submit';
 
@@ -143,7 +144,7 @@ export class MacroDesk {
       let sent = 0;
       try {
         for (const order of orders) {
-          await submit(order, newKey());
+          await submit(order, newKey(), live.wall);
           sent += 1;
         }
       } finally {
