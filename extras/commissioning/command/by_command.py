@@ -198,9 +198,9 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     from model.discrepancy.explanation.answer_words import headline
     from model.discrepancy.options import DiagnosisOptions
     from model.discrepancy.workflow import diagnose
+    from model.reports.diagnosis_data import told
     from model.reports.page import write_page
     from model.reports.saved_report import saved_report
-    from server.jobs.diagnosis_data import told
     from server.jobs.next_experiment import experiment_chooser
 
     bench.operator.show(
