@@ -17,10 +17,11 @@ from daq.contracts.service.experiments import Experiment, ExperimentOrder, Exper
 from daq.traces.naming import new_trace_id
 from server.experiments.review import Given, Review, digest_of
 from server.experiments.states import Event, IllegalEventError, Waiting, advance, after_restart
-from server.problems import conflict, not_found
+from server.problems import conflict
 from server.store.engine import Store
 from server.store.labels import experiment_label
 from server.store.pages import Cursor, KeptPages, newest_first, page_of
+from server.store.rows import as_record, row_of
 from server.store.submitted import approval_of, approve, given_to, made_before, new_columns, require_approvable, void
 from server.store.submitted import digest_of as digest_of_request
 from server.store.tables import ExperimentRow
@@ -91,7 +92,7 @@ class ExperimentStore:
     def get(self, robot: str, identity: str) -> Experiment:
         """Returns an experiment. Raises a 404."""
         with self._store.reading() as session:
-            return as_experiment(_row(session, robot, identity))
+            return as_experiment(row_of(session, ExperimentRow, robot, identity))
 
     def page(
         self,
@@ -175,7 +176,7 @@ class ExperimentStore:
         """Marks an experiment as running. Raises IllegalEventError if it was cancelled meanwhile, and NotApprovedError
         if the review does not permit its present content."""
         with self._changing(robot) as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, ExperimentRow, robot, identity)
             if review is not None and not _may_begin(row, review):
                 raise NotApprovedError
             row.state = advance(_state(row), Event.TAKEN)
@@ -188,7 +189,7 @@ class ExperimentStore:
     ) -> Experiment:
         """Marks an experiment as ended by `event`. Raises IllegalEventError."""
         with self._changing(robot) as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, ExperimentRow, robot, identity)
             row.state = advance(_state(row), event)
             row.ended, row.reason = now, reason
             row.outcome = outcome or row.outcome  # its trace may have been found before its end was reported
@@ -310,24 +311,12 @@ def as_experiment(row: ExperimentRow) -> Experiment:
     the robot's machine."""
     has_trace = row.outcome is not None or row.state == "running"
     spec = ExperimentSpec.model_validate(row.spec)
-    return Experiment(
-        id=row.id,
-        robot=row.robot,
+    return as_record(
+        Experiment,
+        row,
         spec=spec,
-        state=_state(row),
-        priority=row.priority,
-        at=row.at,
-        schedule=row.schedule,
-        submitted=row.submitted,
-        submitted_by=row.submitted_by,
-        owner=row.owner,
-        changed_by=row.changed_by,
         content=digest_of(spec, row.at) if row.state == "queued" else "",
         approval=approval_of(row),
-        started=row.started,
-        ended=row.ended,
-        outcome=row.outcome,
-        reason=row.reason,
         trace=row.trace if has_trace else None,
     )
 
@@ -345,7 +334,7 @@ def _may_begin(row: ExperimentRow, review: Review) -> bool:
 
 
 def _queued(session: Session, robot: str, identity: str) -> ExperimentRow:
-    row = _row(session, robot, identity)
+    row = row_of(session, ExperimentRow, robot, identity)
     if row.state != "queued":
         line = f"{experiment_label(row)} is {row.state}"
         raise conflict("experiment-state", line, "only an experiment that is queued can be changed or approved")
@@ -364,10 +353,3 @@ def _count_waiting(session: Session, robot: str) -> int:
 
 def _state(row: ExperimentRow) -> ExperimentState:
     return row.state  # type: ignore[return-value]
-
-
-def _row(session: Session, robot: str, identity: str) -> ExperimentRow:
-    row = session.scalar(select(ExperimentRow).filter_by(robot=robot, id=identity))
-    if row is None:
-        raise not_found(f"experiment {identity!r}", "GET …/experiments lists those there are")
-    return row

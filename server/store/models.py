@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 
 from sqlalchemy import select, tuple_
 from sqlalchemy.orm import Session
@@ -12,9 +12,10 @@ from sqlalchemy.orm import Session
 from daq.contracts.documents import shown
 from daq.contracts.service.base import Page
 from daq.contracts.service.jobs import ModelChange, ModelEntry
-from server.problems import ProblemError, conflict, not_found
+from server.problems import ProblemError, conflict
 from server.store.engine import Store
 from server.store.pages import Cursor, page_of
+from server.store.rows import as_record, row_of
 from server.store.tables import ModelRow, TraceRow, TraceUseRow
 
 MOST_ANCESTORS = 100
@@ -68,18 +69,18 @@ class ModelStore:
     def get(self, robot: str, identity: str) -> ModelEntry:
         """Returns a model's entry. Raises a 404."""
         with self._store.reading() as session:
-            return _entry(session, _row(session, robot, identity))
+            return _entry(session, row_of(session, ModelRow, robot, identity))
 
     def file_of(self, robot: str, identity: str) -> str:
         """Returns the name of a model's file. Raises a 404."""
         with self._store.reading() as session:
-            return _row(session, robot, identity).file
+            return row_of(session, ModelRow, robot, identity).file
 
     def ancestors(self, robot: str, identity: str) -> tuple[ModelEntry, ...]:
         """Returns the ancestors of a model, the nearest first, as far as they are in the database."""
         found: list[ModelEntry] = []
         with self._store.reading() as session:
-            row: ModelRow | None = _row(session, robot, identity)
+            row: ModelRow | None = row_of(session, ModelRow, robot, identity)
             while row is not None and row.parent is not None and len(found) < MOST_ANCESTORS:
                 row = session.get(ModelRow, (row.parent, robot))
                 if row is not None and row.id not in {one.id for one in found}:
@@ -97,8 +98,7 @@ class ModelStore:
         query = select(ModelRow).where(ModelRow.robot == robot)
         if cursor is not None:
             place = Cursor.parse(cursor)
-            moment = datetime.fromtimestamp(place.number, UTC)
-            query = query.where(tuple_(ModelRow.created, ModelRow.id) < tuple_(moment, place.identity))
+            query = query.where(tuple_(ModelRow.created, ModelRow.id) < tuple_(place.moment, place.identity))
         query = query.order_by(ModelRow.created.desc(), ModelRow.id.desc()).limit(limit + 1)
         with self._store.reading() as session:
             rows = list(session.scalars(query))
@@ -109,7 +109,7 @@ class ModelStore:
     def change(self, robot: str, identity: str, change: ModelChange) -> ModelEntry:
         """Changes the name or the notes. Raises a 404."""
         with self._store.writing() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, ModelRow, robot, identity)
             row.name = row.name if change.name is None else change.name
             row.notes = row.notes if change.notes is None else change.notes
             session.flush()
@@ -122,7 +122,7 @@ class ModelStore:
         robot has the model too, and needs the file.
         """
         with self._store.writing() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, ModelRow, robot, identity)
             child = session.scalar(select(ModelRow.name).filter_by(robot=robot, parent=identity))
             if child is not None:
                 raise conflict("model-in-use", f"model {child!r} was made from {row.name!r}", "delete that one first")
@@ -148,21 +148,4 @@ def _require_traces(session: Session, traces: Sequence[str], robots: Collection[
 
 def _entry(session: Session, row: ModelRow) -> ModelEntry:
     traces = session.scalars(select(TraceUseRow.trace).filter_by(used_by=f"model {row.id}"))
-    return ModelEntry(
-        id=row.id,
-        robot=row.robot,
-        name=row.name,
-        created=row.created,
-        created_by=row.created_by,
-        parent=row.parent,
-        job=row.job,
-        traces=tuple(sorted(traces)),
-        notes=row.notes,
-    )
-
-
-def _row(session: Session, robot: str, identity: str) -> ModelRow:
-    row = session.get(ModelRow, (identity, robot))
-    if row is None:
-        raise not_found(f"model {identity!r}", "GET …/models lists those there are")
-    return row
+    return as_record(ModelEntry, row, traces=tuple(sorted(traces)))

@@ -13,10 +13,11 @@ from sqlalchemy.orm import Session
 from daq.contracts.labels import Outcome, Source
 from daq.contracts.service.base import Page
 from daq.contracts.service.traces import CatalogueEntry, TraceChange
-from server.problems import conflict, not_found
+from server.problems import conflict
 from server.store.engine import Store
 from server.store.labels import label_of_row, trace_label, user_label
 from server.store.pages import Cursor, KeptPages, page_of
+from server.store.rows import as_record, row_of
 from server.store.tables import JobRow, TraceRow, TraceTagRow, TraceUseRow, spaced
 
 
@@ -122,7 +123,7 @@ class TraceStore:
     def file_of(self, robot: str, identity: str) -> str:
         """Returns the name of a trace's file. Raises a 404."""
         with self._store.reading() as session:
-            return _row(session, robot, identity).file
+            return row_of(session, TraceRow, robot, identity).file
 
     def files_of(self, robot: str, identities: Iterable[str]) -> dict[str, str]:
         """Returns the names of the files of traces, those that are in the table."""
@@ -133,7 +134,7 @@ class TraceStore:
     def get(self, robot: str, identity: str) -> CatalogueEntry:
         """Returns a trace's entry. Raises a 404."""
         with self._store.reading() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, TraceRow, robot, identity)
             return self._entry(session, row, _tags(session, [row.id]).get(row.id, ()))
 
     def is_archived(self, identity: str) -> bool:
@@ -171,7 +172,7 @@ class TraceStore:
     def change(self, robot: str, identity: str, change: TraceChange) -> CatalogueEntry:
         """Changes tags or notes. Raises a 404."""
         with self._store.writing() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, TraceRow, robot, identity)
             if change.notes is not None:
                 row.notes = change.notes
             if change.tags is not None:
@@ -190,7 +191,7 @@ class TraceStore:
         without a file can be deleted later; a file without a row would be added again without its tags.
         """
         with self._store.writing() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, TraceRow, robot, identity)
             users = list(session.scalars(select(TraceUseRow.used_by).filter_by(trace=identity).limit(5)))
             if users:
                 line = f"{label_of_row(row)} is used by {', '.join(user_label(session, user) for user in users)}"
@@ -206,13 +207,6 @@ class TraceStore:
 
     def _entry(self, session: Session, row: TraceRow, tags: tuple[str, ...]) -> CatalogueEntry:
         return _entry(row, tags, archived=bool(self._archived(session, [row.id])))
-
-
-def _row(session: Session, robot: str, identity: str) -> TraceRow:
-    row = session.get(TraceRow, identity)
-    if row is None or row.robot != robot:
-        raise not_found(f"trace {identity!r}", "GET …/traces lists those there are")
-    return row
 
 
 def _tags(session: Session, identities: list[str]) -> dict[str, tuple[str, ...]]:
@@ -265,9 +259,12 @@ def _searched(row: TraceRow, tags: Iterable[str]) -> str:
 
 
 def _entry(row: TraceRow, tags: tuple[str, ...], *, archived: bool) -> CatalogueEntry:
-    own = CatalogueEntry.model_fields.keys() - {"tags", "joints", "moved", "missing", "archived", "local"}
-    return CatalogueEntry.model_validate(
-        {name: getattr(row, name) for name in own}
-        | {"tags": tags, "joints": tuple(row.joints), "moved": tuple(map(int, row.moved.split()))}
-        | {"missing": row.missing and not archived, "archived": archived, "local": not row.missing}
+    return as_record(
+        CatalogueEntry,
+        row,
+        tags=tags,
+        moved=tuple(map(int, row.moved.split())),
+        missing=row.missing and not archived,
+        archived=archived,
+        local=not row.missing,
     )

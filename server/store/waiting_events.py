@@ -20,6 +20,7 @@ from daq.contracts.service.events import ServiceEvent
 from server.database_errors import is_value, one_line
 from server.store.engine import Store
 from server.store.pages import newest_first
+from server.store.rows import as_record
 from server.store.tables import EventRow
 
 
@@ -48,9 +49,7 @@ class EventStore:
 
 
 def _event(row: EventRow) -> ServiceEvent:
-    return ServiceEvent(
-        number=row.sequence, at=row.at, kind=row.kind, text=row.text, actor=row.actor, experiment=row.experiment
-    )
+    return as_record(ServiceEvent, row, number=row.sequence)
 
 
 MOST_WAITING = 10_000
