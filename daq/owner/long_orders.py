@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SafetyError
+from daq.contracts.frozen import like
 from daq.contracts.joint_text import speed_unit
 from daq.contracts.limp import limp_line
 from daq.contracts.sample import SampleRow
@@ -56,14 +57,7 @@ def run(robot: OwnedRobot, order: RunExperiment) -> Answer:
     )
     if not robot.opening.watched:
         result = _with_late_stop(robot, result)
-    finished = Finished(
-        outcome=result.outcome,
-        trace=result.trace,
-        samples=result.samples,
-        missing=result.missing,
-        counters=result.counters,
-        reason=result.reason,
-    )
+    finished = like(Finished, result)
     return Answer(number=order.number, finished=finished, exit_code=exit_codes.OF_OUTCOME[result.outcome])
 
 

@@ -41,7 +41,7 @@ from server.api.dependencies import (
     Viewer,
 )
 from server.api.upload import store_model
-from server.jobs.service import REPORT, RESULT
+from server.jobs.mailbox import REPORT, RESULT
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS
 from server.routes import Router

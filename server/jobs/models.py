@@ -12,7 +12,8 @@ from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, EffectInModel, ModelDetails, ModelParameter
 from daq.contracts.whole_file import replacing
 from server.clock import Clock
-from server.store.models import ModelStore, NewModel
+from server.store.models import ModelStore
+from server.store.tables import ModelRow
 
 if TYPE_CHECKING:
     from model.machine_model.model import EffectUse, Model
@@ -46,7 +47,7 @@ class Models:
         `robots`: the model's traces must belong to these; None: to any. Raises a 422 otherwise, SpecError if another
         model has its ID.
         """
-        new = NewModel(
+        new = ModelRow(
             id=made.identity,
             robot=self._robot,
             name=name[:64],
@@ -55,18 +56,17 @@ class Models:
             created_by=by,
             parent=made.parent,
             job=job,
-            traces=made.traces,
         )
 
         def write() -> None:
-            path = self.folder / new.file
+            path = self.folder / f"{made.identity}.json"
             if _is_stored(path, made):
                 return
             self.folder.mkdir(parents=True, exist_ok=True)
             with replacing(path) as part:
                 part.write_text(made.text, "utf-8")
 
-        return self.store.insert(new, write, robots)
+        return self.store.insert(new, made.traces, write, robots)
 
     def path_of(self, identity: str) -> Path:
         """Returns a model's file. Raises a 404."""

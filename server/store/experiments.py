@@ -11,6 +11,7 @@ from sqlalchemy import func, or_, select, tuple_
 from sqlalchemy.orm import Session
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.frozen import like
 from daq.contracts.labels import Outcome
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, ExperimentOrder, ExperimentRequest, ExperimentState
@@ -21,7 +22,7 @@ from server.problems import conflict
 from server.store.engine import Store
 from server.store.labels import experiment_label
 from server.store.pages import Cursor, KeptPages, newest_first, page_of
-from server.store.rows import as_record, row_of
+from server.store.rows import row_of
 from server.store.submitted import approval_of, approve, given_to, made_before, new_columns, require_approvable, void
 from server.store.submitted import digest_of as digest_of_request
 from server.store.tables import ExperimentRow
@@ -311,7 +312,7 @@ def as_experiment(row: ExperimentRow) -> Experiment:
     the robot's machine."""
     has_trace = row.outcome is not None or row.state == "running"
     spec = ExperimentSpec.model_validate(row.spec)
-    return as_record(
+    return like(
         Experiment,
         row,
         spec=spec,

@@ -8,7 +8,7 @@ from datetime import datetime
 from pydantic import TypeAdapter
 from sqlalchemy import ColumnElement, String, cast, or_, select
 
-from daq.contracts.frozen import WHEN_USED
+from daq.contracts.frozen import WHEN_USED, like
 from daq.contracts.service.base import Page
 from daq.contracts.service.jobs import (
     CompareRequest,
@@ -25,7 +25,7 @@ from server.problems import conflict, not_found
 from server.store.engine import Store
 from server.store.labels import job_label
 from server.store.pages import newest_first
-from server.store.rows import as_record, row_of
+from server.store.rows import row_of
 from server.store.submitted import digest_of, made_before, new_columns
 from server.store.tables import JobRow, TraceRow, TraceUseRow, spaced
 
@@ -176,7 +176,7 @@ class JobStore:
 
 def as_job(row: JobRow) -> Job:
     """Converts a row for clients."""
-    return as_record(Job, row, has_report=row.state == "done")
+    return like(Job, row, has_report=row.state == "done")
 
 
 def _concerns(model: str) -> ColumnElement[bool]:

@@ -2,40 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
-from datetime import datetime
+from collections.abc import Callable, Collection, Iterable, Sequence
 
 from sqlalchemy import select, tuple_
 from sqlalchemy.orm import Session
 
 from daq.contracts.documents import shown
+from daq.contracts.frozen import like
 from daq.contracts.service.base import Page
 from daq.contracts.service.jobs import ModelChange, ModelEntry
 from server.problems import ProblemError, conflict
 from server.store.engine import Store
 from server.store.pages import Cursor, page_of
-from server.store.rows import as_record, row_of
+from server.store.rows import row_of
 from server.store.tables import ModelRow, TraceRow, TraceUseRow
 
 MOST_ANCESTORS = 100
 AT_ONCE = 500
 """Number of traces per query; SQLite allows 32 766 values in one."""
-
-
-@dataclass(frozen=True)
-class NewModel:
-    """The columns of a new row, and the traces to which the model was fitted."""
-
-    id: str
-    robot: str
-    name: str
-    file: str
-    created: datetime
-    created_by: str
-    parent: str | None
-    job: str | None
-    traces: tuple[str, ...]
 
 
 class ModelStore:
@@ -44,10 +28,17 @@ class ModelStore:
     def __init__(self, store: Store) -> None:
         self._store = store
 
-    def insert(self, new: NewModel, also: Callable[[], None], robots: Collection[str] | None = None) -> bool:
+    def insert(
+        self,
+        new: ModelRow,
+        traces: Iterable[str],
+        also: Callable[[], None] = lambda: None,
+        robots: Collection[str] | None = None,
+    ) -> bool:
         """Adds a model; returns False if the robot has it already. Equal models have equal IDs.
 
         Args:
+            traces: those to which the model was fitted.
             also: stores the file. Called last before the transaction is written: if it raises, there is no row.
             robots: the model's traces must belong to these; None for a model made by the service itself. Raises a 422
                 otherwise.
@@ -55,11 +46,10 @@ class ModelStore:
         with self._store.writing() as session:
             if session.get(ModelRow, (new.id, new.robot)) is not None:
                 return False
-            traces = tuple(dict.fromkeys(new.traces))
+            traces = tuple(dict.fromkeys(traces))
             if robots is not None:
                 _require_traces(session, traces, robots)
-            fields = {name: value for name, value in vars(new).items() if name != "traces"}
-            session.add(ModelRow(**fields, notes=""))
+            session.add(new)
             for trace in traces:
                 session.merge(TraceUseRow(trace=trace, used_by=f"model {new.id}"))
             session.flush()
@@ -148,4 +138,4 @@ def _require_traces(session: Session, traces: Sequence[str], robots: Collection[
 
 def _entry(session: Session, row: ModelRow) -> ModelEntry:
     traces = session.scalars(select(TraceUseRow.trace).filter_by(used_by=f"model {row.id}"))
-    return as_record(ModelEntry, row, traces=tuple(sorted(traces)))
+    return like(ModelEntry, row, traces=tuple(sorted(traces)))

@@ -7,12 +7,13 @@ from datetime import datetime
 from sqlalchemy import func, select
 from sqlalchemy.orm import defer
 
+from daq.contracts.frozen import like
 from daq.contracts.service.base import Wire
 from daq.contracts.service.teaching import ProgramEntry
 from daq.teaching.program import Program
 from server.problems import conflict
 from server.store.engine import Store
-from server.store.rows import as_record, row_of
+from server.store.rows import row_of
 from server.store.tables import ProgramRow
 
 MOST_PROGRAMS = 1000
@@ -38,13 +39,13 @@ class ProgramStore:
         query = select(ProgramRow).options(defer(ProgramRow.program)).filter_by(robot=robot)
         query = query.order_by(ProgramRow.changed.desc(), ProgramRow.name)
         with self._store.reading() as session:
-            return tuple(as_record(ProgramEntry, row) for row in session.scalars(query))
+            return tuple(like(ProgramEntry, row) for row in session.scalars(query))
 
     def get(self, robot: str, name: str) -> StoredProgram:
         """Returns a program. Raises a 404."""
         with self._store.reading() as session:
             row = row_of(session, ProgramRow, robot, name, "name")
-            return StoredProgram(entry=as_record(ProgramEntry, row), program=Program.model_validate(row.program))
+            return StoredProgram(entry=like(ProgramEntry, row), program=Program.model_validate(row.program))
 
     def put(
         self, robot: str, name: str, program: Program, revision: int | None, now: datetime, by: str
@@ -60,7 +61,7 @@ class ProgramStore:
         with self._store.writing() as session:
             there = session.get(ProgramRow, (robot, program.name))
             if there is not None and there.program == content:
-                return as_record(ProgramEntry, there)
+                return like(ProgramEntry, there)
             if revision is None:
                 if there is not None:
                     raise _taken(program.name)
@@ -80,7 +81,7 @@ class ProgramStore:
             row.instructions = len(program.instructions)
             row.changed, row.changed_by = now, by
             session.flush()
-            return as_record(ProgramEntry, row)
+            return like(ProgramEntry, row)
 
     def remove(self, robot: str, name: str) -> None:
         """Deletes a program permanently. Raises a 404."""

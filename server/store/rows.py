@@ -1,10 +1,9 @@
-"""Finds one row of a robot, and converts rows to records for clients."""
+"""Finds one row of a robot."""
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from pydantic import BaseModel
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
@@ -12,7 +11,6 @@ from server.problems import not_found
 from server.store.tables import Table
 
 Row = TypeVar("Row", bound=Table)
-Record = TypeVar("Record", bound=BaseModel)
 
 
 def row_of(session: Session, table: type[Row], robot: str, identity: str, key: str = "id") -> Row:
@@ -22,9 +20,3 @@ def row_of(session: Session, table: type[Row], robot: str, identity: str, key: s
         name = table.__tablename__
         raise not_found(f"{name.removesuffix('s')} {identity!r}", f"GET …/{name} lists those there are")
     return row
-
-
-def as_record(kind: type[Record], row: Table, **others: Any) -> Record:
-    """Returns a record with the row's columns of the same names. `others`: its fields that differ from the row."""
-    own = {name: getattr(row, name) for name in kind.model_fields if name not in others and hasattr(row, name)}
-    return kind.model_validate(own | others)

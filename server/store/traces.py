@@ -10,42 +10,20 @@ from typing import Protocol
 from sqlalchemy import Select, delete, or_, select, update
 from sqlalchemy.orm import Session
 
+from daq.contracts.frozen import like
 from daq.contracts.labels import Outcome, Source
 from daq.contracts.service.base import Page
 from daq.contracts.service.traces import CatalogueEntry, TraceChange
+from daq.traces.catalogue import TraceSummary
 from server.problems import conflict
 from server.store.engine import Store
 from server.store.labels import label_of_row, trace_label, user_label
 from server.store.pages import Cursor, KeptPages, page_of
-from server.store.rows import as_record, row_of
+from server.store.rows import row_of
 from server.store.tables import JobRow, TraceRow, TraceTagRow, TraceUseRow, spaced
 
-
-@dataclass(frozen=True)
-class NewTrace:
-    """The columns of a new row."""
-
-    id: str
-    robot: str
-    file: str
-    created: datetime
-    source: str
-    kind: str | None
-    name: str | None
-    joints: tuple[int, ...]
-    moved: tuple[int, ...]
-    outcome: Outcome | None
-    samples: int | None
-    duration: float | None
-    size: int
-    operator: str | None
-    experiment: str | None
-    notes: str
-
-    @property
-    def label(self) -> str:
-        """Name of the trace in messages."""
-        return trace_label(self.name, self.kind, self.file, self.created)
+_OF_SUMMARY = ("created", "kind", "name", "outcome", "samples", "duration", "size", "operator")
+"""Columns that are fields of a summary."""
 
 
 @dataclass(frozen=True)
@@ -86,21 +64,36 @@ class TraceStore:
         """None if there is no archive."""
         self._pages: KeptPages[CatalogueEntry] = KeptPages(store)
 
-    def insert(self, new: NewTrace, file_exists: Callable[[str], bool] = lambda _file: True) -> None:
-        """Adds a trace. If its row exists and the row's file is gone, the row gets the new file, and keeps its tags and
-        notes. Raises a 409 if the row already refers to another existing file."""
-        columns = {**new.__dict__, "joints": list(new.joints), "moved": spaced(new.moved), "missing": False}
+    def insert(
+        self,
+        robot: str,
+        new: TraceSummary,
+        experiment: str | None = None,
+        file_exists: Callable[[str], bool] = lambda _file: True,
+    ) -> None:
+        """Adds a finished trace. If its row exists and the row's file is gone, the row gets the new file, and keeps its
+        tags and notes. Raises a 409 if the row already refers to another existing file."""
+        assert new.created is not None
+        columns = {name: getattr(new, name) for name in _OF_SUMMARY} | {
+            "file": new.path.name,
+            "source": new.source or "imported",
+            "joints": list(new.joints),
+            "moved": spaced(new.moved or ()),
+            "missing": False,
+        }
         with self._store.writing() as session:
-            row = session.get(TraceRow, new.id)
+            row = session.get(TraceRow, new.trace_id)
             tags: tuple[str, ...] = ()
             if row is None:
-                row = TraceRow(**columns, searched="")
-            elif row.robot == new.robot and (row.file == new.file or not file_exists(row.file)):
+                own = {"id": new.trace_id, "robot": robot, "experiment": experiment, "notes": new.notes}
+                row = TraceRow(**own, **columns, searched="")
+            elif row.robot == robot and (row.file == new.path.name or not file_exists(row.file)):
                 tags = _tags(session, [row.id]).get(row.id, ())
-                for name in columns.keys() - {"notes", "experiment"}:
-                    setattr(row, name, columns[name])
+                for name, value in columns.items():
+                    setattr(row, name, value)
             else:
-                line = f"{new.label} is in the catalogue already, as {row.file}"
+                label = trace_label(new.name, new.kind, new.path.name, new.created)
+                line = f"{label} is in the catalogue already, as {row.file}"
                 raise conflict("trace-exists", line, "it is the same trace: nothing needs to be done")
             session.add(row)
             row.searched = _searched(row, tags)
@@ -259,7 +252,7 @@ def _searched(row: TraceRow, tags: Iterable[str]) -> str:
 
 
 def _entry(row: TraceRow, tags: tuple[str, ...], *, archived: bool) -> CatalogueEntry:
-    return as_record(
+    return like(
         CatalogueEntry,
         row,
         tags=tags,

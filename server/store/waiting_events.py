@@ -15,12 +15,12 @@ from datetime import datetime
 from sqlalchemy import select
 from sqlalchemy.exc import DatabaseError, IntegrityError, SQLAlchemyError
 
+from daq.contracts.frozen import like
 from daq.contracts.service.base import Page
 from daq.contracts.service.events import ServiceEvent
 from server.database_errors import is_value, one_line
 from server.store.engine import Store
 from server.store.pages import newest_first
-from server.store.rows import as_record
 from server.store.tables import EventRow
 
 
@@ -49,7 +49,7 @@ class EventStore:
 
 
 def _event(row: EventRow) -> ServiceEvent:
-    return as_record(ServiceEvent, row, number=row.sequence)
+    return like(ServiceEvent, row, number=row.sequence)
 
 
 MOST_WAITING = 10_000
