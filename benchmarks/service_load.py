@@ -27,16 +27,7 @@ from urllib.parse import urlsplit
 from benchmarks.figures import Figure, at_most, none, quantile, show
 from benchmarks.mock_process import MockControl, started_mock
 from benchmarks.service_clients import Seen, clients
-from benchmarks.service_process import (
-    ROBOT,
-    RunningService,
-    child,
-    children,
-    dice,
-    ramp,
-    started_service,
-    sway,
-)
+from benchmarks.service_process import ROBOT, RunningService, child, children, dice, ramp, started_service, sway
 from benchmarks.stop_latency import record_of_stop
 from daq.contracts.processor import processor_time
 from daq.contracts.service.system import stop_port_after

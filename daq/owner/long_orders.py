@@ -14,16 +14,7 @@ from daq.contracts.sample import SampleRow
 from daq.link import LinkState
 from daq.owner.guardian import EndCause
 from daq.owner.late_stop import deliver_late_stop
-from daq.owner.messages import (
-    Answer,
-    Finished,
-    JogBegin,
-    JogDrive,
-    LeadBegin,
-    QuickOrder,
-    RunExperiment,
-    RunProgram,
-)
+from daq.owner.messages import Answer, Finished, JogBegin, JogDrive, LeadBegin, QuickOrder, RunExperiment, RunProgram
 from daq.owner.owned_robot import OwnedRobot
 from daq.owner.quick_orders import carry_out
 from daq.runner.arm_control import StoppedError

@@ -7,17 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from daq.contracts.experiment import (
-    Cubic,
-    ExperimentSpec,
-    Gain,
-    Multisine,
-    Pause,
-    Ramp,
-    Segment,
-    Sequence,
-    SlowRamp,
-)
+from daq.contracts.experiment import Cubic, ExperimentSpec, Gain, Multisine, Pause, Ramp, Segment, Sequence, SlowRamp
 from daq.contracts.machine import BoardPid, Machine
 
 MARGIN = math.radians(5.0)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.frozen import like
 from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, EffectInModel, ModelDetails, ModelParameter
 from daq.contracts.whole_file import replacing
@@ -131,15 +132,7 @@ def _parameters(model: Model) -> tuple[ModelParameter, ...]:
     from model.machine_model.parameter_words import words_of
 
     return tuple(
-        ModelParameter(
-            name=one.name,
-            words=words_of(one),
-            unit=one.unit,
-            value=one.value,
-            low=_finite(one.low),
-            high=_finite(one.high),
-            deviation=one.deviation,
-        )
+        like(ModelParameter, one, words=words_of(one), low=_finite(one.low), high=_finite(one.high))
         for one in model.parameters
     )
 

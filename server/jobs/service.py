@@ -167,8 +167,7 @@ class JobService:
             return job.model_copy(update={"progress_text": _words_of(fetched.transfer)})
         if job.state != "running":
             return job
-        reported = self._reported(job.id)
-        reported = reported or Reported(0.0, "starting")
+        reported = self._reported(job.id) or Reported(0.0, "starting")
         told = {"progress": reported.fraction, "progress_text": reported.text, "leading": reported.leading}
         return job.model_copy(update=told)
 
@@ -284,15 +283,11 @@ class JobService:
                 executor = self._given_to[identity] = self._workers.executor(lane)
                 return executor.submit(carry_out, self._folder(identity))
             except BrokenExecutor:
-                self._give_up(identity, lane)
+                self._workers.give_up(lane, self._given_to.get(identity))
             except Exception as error:
                 log.exception("job %s: no worker takes it", identity)
                 return _failed(error)
         return _failed(BrokenExecutor())
-
-    def _give_up(self, identity: str, lane: Lane) -> None:
-        """Closes the executor with which a job was lost."""
-        self._workers.give_up(lane, self._given_to.get(identity))
 
     def _collect(self) -> bool:
         """Records the end of finished jobs. If one cannot be written, the others are not delayed. Returns whether any
@@ -320,7 +315,7 @@ class JobService:
         try:
             ended = future.result()
         except BrokenExecutor:
-            self._give_up(identity, lane)
+            self._workers.give_up(lane, self._given_to.get(identity))
             event, reason = Event.LOST, "its worker process ended: it was killed, or ran out of memory"
         except Exception as error:
             log.exception("job %s", identity)

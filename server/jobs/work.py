@@ -15,7 +15,7 @@ from daq.contracts.service.jobs import MACHINE, CompareRequest, DiagnoseRequest,
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.reader import read_trace
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
-from server.jobs.options import options_of, with_effects
+from server.jobs.options import options_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -104,7 +104,7 @@ class _Worker:
         from server.jobs.results import FitJobResult
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
-        begin, options = with_effects(self._model(request.model), request.effects), options_of(request, FitOptions)
+        begin, options = self._model(request.model).with_effects(request.effects), options_of(request, FitOptions)
         found = fit(begin, traces, options, lambda f, text: self._tell(0, FIT_SHARE, f, text), self.mailbox)
         comparison = self._compared(
             [("before", begin), ("fitted", found.model)],

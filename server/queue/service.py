@@ -147,20 +147,17 @@ class QueueService:
         self.wake()
 
     def on_report(self, report: Report) -> None:
-        """Handles a report of the robot's owner."""
+        """Handles a report of the robot's owner: a stop, a fault or a lost link pauses the queue. Must not block."""
         if isinstance(report, Progress):
-            self.progressed(report.fraction, report.text)
+            if (running := self.running) is not None:
+                running.progress, running.text = report.fraction, report.text
         elif isinstance(report, ArmReport):
-            self.on_arm_report(report)
+            self.notices.arm_reported(report)
+            self.wake()
         elif isinstance(report, Opened):
             self.connection_made()
         elif isinstance(report, EventHappened):
             self.wake()
-
-    def on_arm_report(self, arm: ArmReport) -> None:
-        """Handles a report of the arm: a stop, a fault or a lost link pauses the queue. Must not block."""
-        self.notices.arm_reported(arm)
-        self.wake()
 
     def stop_asked(self, name: str) -> None:
         """Pauses the queue, whether or not the stop reaches an arm. Must not block."""
@@ -190,12 +187,6 @@ class QueueService:
     def wake(self) -> None:
         """Wakes the worker thread after a change that may let the next experiment begin."""
         self._changed.set()  # nothing else, since callers must not wait for a disk
-
-    def progressed(self, fraction: float, text: str) -> None:
-        """Records the progress of the running experiment."""
-        running = self.running
-        if running is not None:
-            running.progress, running.text = fraction, text
 
     def with_progress(self, experiment: Experiment) -> Experiment:
         """Returns `experiment` for clients: while it runs, with its progress; while it waits, with its content on this

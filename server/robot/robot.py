@@ -30,15 +30,7 @@ from daq.owner.messages import (
 )
 from daq.owner.start import start_owner
 from daq.owner.stop_socket import StopAnswer
-from daq.transport import (
-    PortBusyError,
-    SerialPort,
-    Terminal,
-    TransportError,
-    parse_port_url,
-    require_same,
-    terminal_at,
-)
+from daq.transport import PortBusyError, SerialPort, Terminal, TransportError, parse_port_url, require_same, terminal_at
 from server.clock import Clock
 from server.stopping.arm import Reach
 

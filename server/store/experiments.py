@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 
-from sqlalchemy import func, or_, select, tuple_
+from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
 from daq.contracts.experiment import ExperimentSpec
@@ -21,7 +21,7 @@ from server.experiments.states import Event, IllegalEventError, Waiting, advance
 from server.problems import conflict
 from server.store.engine import Store
 from server.store.labels import experiment_label
-from server.store.pages import Cursor, KeptPages, newest_first, page_of
+from server.store.pages import Cursor, KeptPages, latest_first, newest_first, page_of
 from server.store.rows import row_of
 from server.store.submitted import approval_of, approve, given_to, made_before, new_columns, require_approvable, void
 from server.store.submitted import digest_of as digest_of_request
@@ -106,32 +106,21 @@ class ExperimentStore:
     ) -> Page[Experiment]:
         """Returns a page of the list, the last submitted first; with the order `ended` only ended experiments, the last
         ended first."""
-        asked = (robot, tuple(states), schedule, cursor, limit, order)
-        return self._pages.page(asked, lambda: self._read_page(robot, states, schedule, cursor, limit, order))
-
-    def _read_page(
-        self,
-        robot: str,
-        states: Sequence[ExperimentState],
-        schedule: str | None,
-        cursor: str | None,
-        limit: int,
-        order: ExperimentOrder,
-    ) -> Page[Experiment]:
         query = select(ExperimentRow).where(ExperimentRow.robot == robot)
         if states:
             query = query.where(ExperimentRow.state.in_(states))
         if schedule is not None:
             query = query.where(ExperimentRow.schedule == schedule)
-        if order == "submitted":
-            return newest_first(self._store, query, ExperimentRow.sequence, cursor, limit, as_experiment)
-        query = query.where(ExperimentRow.ended.is_not(None))
-        if cursor is not None:
-            place = Cursor.parse(cursor)
-            query = query.where(tuple_(ExperimentRow.ended, ExperimentRow.id) < tuple_(place.moment, place.identity))
-        query = query.order_by(ExperimentRow.ended.desc(), ExperimentRow.id.desc()).limit(limit + 1)
-        with self._store.reading() as session:
-            return page_of(list(session.scalars(query)), limit, as_experiment, _place_by_end)
+
+        def read() -> Page[Experiment]:
+            if order == "submitted":
+                return newest_first(self._store, query, ExperimentRow.sequence, cursor, limit, as_experiment)
+            ended = query.where(ExperimentRow.ended.is_not(None))
+            ended = latest_first(ended, ExperimentRow.ended, ExperimentRow.id, cursor).limit(limit + 1)
+            with self._store.reading() as session:
+                return page_of(list(session.scalars(ended)), limit, as_experiment, _place_by_end)
+
+        return self._pages.page((robot, tuple(states), schedule, cursor, limit, order), read)
 
     def due(self, robot: str, now: datetime, *, approved: bool = False) -> list[Waiting]:
         """Returns the first queued and due experiment, if any; with `approved`, the first approved one. Reads one row,

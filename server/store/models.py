@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 
-from sqlalchemy import select, tuple_
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from daq.contracts.documents import shown
@@ -13,7 +13,7 @@ from daq.contracts.service.base import Page
 from daq.contracts.service.jobs import ModelChange, ModelEntry
 from server.problems import ProblemError, conflict
 from server.store.engine import Store
-from server.store.pages import Cursor, page_of
+from server.store.pages import Cursor, latest_first, page_of
 from server.store.rows import row_of
 from server.store.tables import ModelRow, TraceRow, TraceUseRow
 
@@ -79,19 +79,15 @@ class ModelStore:
 
     def newest(self, robot: str, most: int) -> tuple[ModelEntry, ...]:
         """Returns up to `most` models, newest first."""
-        query = select(ModelRow).filter_by(robot=robot).order_by(ModelRow.created.desc(), ModelRow.id.desc())
+        query = latest_first(select(ModelRow).filter_by(robot=robot), ModelRow.created, ModelRow.id, None)
         with self._store.reading() as session:
             return tuple(_entry(session, row) for row in session.scalars(query.limit(most)))
 
     def page(self, robot: str, cursor: str | None, limit: int) -> Page[ModelEntry]:
         """Returns a page of the list, newest first."""
-        query = select(ModelRow).where(ModelRow.robot == robot)
-        if cursor is not None:
-            place = Cursor.parse(cursor)
-            query = query.where(tuple_(ModelRow.created, ModelRow.id) < tuple_(place.moment, place.identity))
-        query = query.order_by(ModelRow.created.desc(), ModelRow.id.desc()).limit(limit + 1)
+        query = latest_first(select(ModelRow).where(ModelRow.robot == robot), ModelRow.created, ModelRow.id, cursor)
         with self._store.reading() as session:
-            rows = list(session.scalars(query))
+            rows = list(session.scalars(query.limit(limit + 1)))
             return page_of(
                 rows, limit, lambda row: _entry(session, row), lambda row: Cursor(row.created.timestamp(), row.id)
             )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Protocol
 
-from sqlalchemy import Select, delete, or_, select, update
+from sqlalchemy import Select, delete, select, update
 from sqlalchemy.orm import Session
 
 from daq.contracts.frozen import like
@@ -18,7 +18,7 @@ from daq.traces.catalogue import TraceSummary
 from server.problems import conflict
 from server.store.engine import Store
 from server.store.labels import label_of_row, trace_label, user_label
-from server.store.pages import Cursor, KeptPages, page_of
+from server.store.pages import Cursor, KeptPages, latest_first, page_of
 from server.store.rows import row_of
 from server.store.tables import JobRow, TraceRow, TraceTagRow, TraceUseRow, spaced
 
@@ -147,12 +147,11 @@ class TraceStore:
         return self._pages.page(asked, lambda: self._read_page(robot, search, cursor, limit))
 
     def _read_page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
-        place = None if cursor is None else Cursor.parse(cursor)
         # PostgreSQL rejects NUL in text; nothing can match
         if any("\0" in one for one in (search.text, search.tag, search.kind) if one):
             return Page(items=())
         with self._store.reading() as session:
-            rows = list(session.scalars(_query(robot, search, place).limit(limit + 1)))
+            rows = list(session.scalars(_query(robot, search, cursor).limit(limit + 1)))
             tags = _tags(session, [row.id for row in rows])
             archived = self._archived(session, [row.id for row in rows])
         return page_of(
@@ -210,7 +209,7 @@ def _tags(session: Session, identities: list[str]) -> dict[str, tuple[str, ...]]
     return found
 
 
-def _query(robot: str, search: TraceSearch, place: Cursor | None) -> Select[TraceRow]:
+def _query(robot: str, search: TraceSearch, cursor: str | None) -> Select[TraceRow]:
     """The traces of a robot that match a search, after a place in the list, newest first.
 
     The query stops once a page is full. A text that matches nothing scans all rows.
@@ -239,11 +238,7 @@ def _query(robot: str, search: TraceSearch, place: Cursor | None) -> Select[Trac
         query = query.where(TraceRow.created >= search.since)
     if search.until is not None:
         query = query.where(TraceRow.created < search.until)
-    if place is not None:
-        # The first condition lets the database use the index; the second breaks ties of the time.
-        query = query.where(TraceRow.created <= place.moment)
-        query = query.where(or_(TraceRow.created < place.moment, TraceRow.id < place.identity))
-    return query.order_by(TraceRow.created.desc(), TraceRow.id.desc())
+    return latest_first(query, TraceRow.created, TraceRow.id, cursor)
 
 
 def _searched(row: TraceRow, tags: Iterable[str]) -> str:

@@ -13,8 +13,9 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Trajectory
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ENDS
+from daq.trajectories.length import least_length, points_of
 from daq.trajectories.planner import plan, start_angles
-from server.experiments.schedule import LONGEST, Plan, first, following, is_due, least_length, points_of, zone_here
+from server.experiments.schedule import LONGEST, Plan, first, following, is_due, zone_here
 from server.experiments.states import Event, IllegalEventError, Waiting, advance, after_restart, next_due
 from server.problems import ProblemError
 
