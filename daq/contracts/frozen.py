@@ -17,7 +17,7 @@ WHEN_USED = ConfigDict(defer_build=True)
 Record = TypeVar("Record", bound=BaseModel)
 
 
-def like(kind: type[Record], source: object, **others: Any) -> Record:
+def like(kind: type[Record], source: object, /, **others: Any) -> Record:
     """Returns a record of `kind` with the attributes of `source` that have the names of its fields. `others`: its
     fields that differ."""
     own = {name: getattr(source, name) for name in kind.model_fields if name not in others and hasattr(source, name)}

@@ -18,7 +18,7 @@ from mock_controller.hidden.sizes import LATER_SIZES, OPEN_SIZES, SHARED_SIZES, 
 from mock_controller.hidden.tolerances import deviating_board, deviating_plant, draw_deviations, tolerances
 from mock_controller.modifications import Modification, build_modifications
 from mock_controller.modifications.changes import change_body
-from mock_controller.modifications.registry import known_modifications
+from mock_controller.modifications.registry import is_shared
 from mock_controller.plant import PlantParameters
 
 SEED_LIMIT = 2**63
@@ -77,7 +77,7 @@ class HiddenEffect:
     @property
     def known_as(self) -> str:
         """Returns its name in the shared list, or UNKNOWN."""
-        return self.name if known_modifications()[self.name].shared else UNKNOWN
+        return self.name if is_shared(self.name) else UNKNOWN
 
     def modifications(self) -> tuple[Modification, ...]:
         """Returns the effect as modifications of the mock."""
