@@ -54,7 +54,8 @@ def moments(time: NDArray[Number], first: NDArray[np.int64]) -> NDArray[Number]:
 def extremes(signal: Floats, first: NDArray[np.int64]) -> Floats:
     """Returns (2 · intervals, j): minimum and maximum of every interval; the maximum first if the signal falls. NaN
     counts only where a whole interval is NaN."""
-    low, high = np.fmin.reduceat(signal, first), np.fmax.reduceat(signal, first)
+    least, most = (np.fmin, np.fmax) if np.isnan(signal).any() else (np.minimum, np.maximum)  # these are much quicker
+    low, high = least.reduceat(signal, first), most.reduceat(signal, first)
     falling = signal[first] > signal[_last(len(signal), first)]
     pairs = np.stack([np.where(falling, high, low), np.where(falling, low, high)], axis=1)
     return pairs.reshape(-1, signal.shape[1])
