@@ -61,8 +61,7 @@ DETECTABLE = "the same without those of which d′ is known to be below 5"
 
 class RigsRegistration(RegisteredCode):
     """Arms of several kinds of test rig. `cases` take turns; an answer that takes more than `longest` s counts as
-    none.
-    """
+    none."""
 
     kinds: tuple[str, ...]
     cases: tuple[str, ...]

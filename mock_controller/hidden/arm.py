@@ -49,8 +49,7 @@ class Kind(IntEnum):
 
 OF_ANY = tuple(kind for kind in Kind if Kind.ANY < kind <= Kind.WRONG_PRIORS)
 """Kinds that `ANY` draws. Later kinds, and later effects of the library, are not included, so that a seed keeps its
-arm.
-"""
+arm."""
 
 
 class Load(IntEnum):
@@ -189,8 +188,7 @@ def _effects(random: Random, kind: Kind) -> tuple[HiddenEffect, ...]:
 
 def _pair(random: Random) -> tuple[HiddenEffect, ...]:
     """Draws two different effects. Backlash and compliance are never drawn on the same joint: its gear can have only
-    one.
-    """
+    one."""
     first, second = (_one(random, size) for size in random.sample(SHARED_SIZES, 2))
     gives = ("backlash", "joint_compliance")
     while first.name in gives and second.name in gives and first.joints == second.joints:

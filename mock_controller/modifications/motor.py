@@ -17,8 +17,7 @@ _COPPER_PER_KELVIN = 0.0039
 @dataclass
 class WeakenedMagnet:
     """The magnet of `joint`'s motor has lost a share of its flux: less torque per ampere, and less back-EMF per
-    turn.
-    """
+    turn."""
 
     name: ClassVar[str] = "weakened_magnet"
     line: ClassVar[str] = "Φ → (1 − f) Φ: K_T and K_b are both in proportion to Φ"

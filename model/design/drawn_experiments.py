@@ -54,8 +54,7 @@ def _start(rng: np.random.Generator, machine: Machine) -> dict[int, float]:
 
 def _gains(rng: np.random.Generator, machine: Machine) -> dict[int, Gain]:
     """Returns the machine's own gains, with P one step lower or higher on some joints, so that gain and load can be
-    distinguished.
-    """
+    distinguished."""
     if not isinstance(machine.controller, BoardPid):
         return {}
     gains = {}

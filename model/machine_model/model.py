@@ -212,8 +212,7 @@ class Model(FrozenRecord):
 
     def without_effect(self, name: str, joints: tuple[int, ...] | None = None) -> Model:
         """Returns the model without an effect, on the given joints or anywhere. Raises SpecError if it lacks the
-        effect.
-        """
+        effect."""
         uses = [u for u in self.effects if u.name == name and (joints is None or set(u.joints) & set(joints))]
         if not uses:
             raise SpecError(

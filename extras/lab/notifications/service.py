@@ -133,8 +133,7 @@ class Notifier:
 
     def warnings(self) -> list[str]:
         """Returns problems that need a person, one line each: unreachable destinations, and messages that were given
-        up.
-        """
+        up."""
         found = []
         for key, count in self._counts.items():
             if count.problem:
