@@ -24,6 +24,11 @@ def at_most(name: str, value: float, limit: float, unit: str, beside: str = "") 
     return Figure(name, f"{value:.3g} {unit}", f"≤ {limit:g} {unit}", value <= limit, beside)
 
 
+def none(name: str, count: int, beside: str = "") -> Figure:
+    """Returns a count that must be 0."""
+    return Figure(name, f"{count}", "0", count == 0, beside)
+
+
 def show(title: str, command: str, figures: Sequence[Figure]) -> int:
     """Prints the measurements as a table; returns the exit code: 1 when a target was missed."""
     rows = [("figure", "measured", "target", "met", "beside")]

@@ -31,7 +31,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.figures import Figure, show
+from benchmarks.figures import Figure, none, show
 from benchmarks.mock_process import MockControl, RunningMock, environment_of, is_kept, started_mock
 from benchmarks.service_process import COMMAND, ENDS, RunningService, child, ramp, started_service
 from daq.contracts.errors import DaqError
@@ -402,7 +402,7 @@ def main() -> int:
     met = "; ".join(f"{what} {count}" for what, count in sorted(findings.met.items()))
     figures = [
         Figure("ended", f"{sum(findings.met.values())}", beside=met),
-        Figure("wrong", f"{len(findings.wrong)}", "0", not findings.wrong, "left running, port, arm, traces, states"),
+        none("wrong", len(findings.wrong), "left running, port, arm, traces, states"),
         Figure("traces compared with the answers" if given.service else "samples compared", f"{findings.samples}"),
         Figure("everything had ended, or was available again, after at most", f"{findings.slowest:.1f} s"),
     ]

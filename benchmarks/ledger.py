@@ -109,14 +109,16 @@ def least(act: Callable[[], object], times: int) -> float:
 
 
 def of_program(*arguments: str, times: int) -> float:
-    """Least processor time (s) of a Python program and its children, from its start to its end."""
+    """Least processor time (s) of a Python program and its children, from its start to its end. Raises RuntimeError."""
     found = []
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(times):
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
             command = [sys.executable, *arguments]
             environment = environment_of(Path(folder))
-            subprocess.run(command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL)
+            done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+            if done.returncode:
+                raise RuntimeError(f"{' '.join(arguments)}: {done.stderr.strip()}")
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
             found.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
     return min(found)

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.figures import Figure, show
+from benchmarks.figures import Figure, none, show
 from benchmarks.mock_process import MockControl, is_kept, started_mock
 from daq.contracts.experiment import ExperimentSpec, Sine
 from daq.contracts.machine import Machine, load_machine
@@ -120,29 +120,23 @@ def accuracy_figures(done: Recorded, machine: Machine) -> list[Figure]:
     frames = bridge["frames_received"] + bridge["damaged"] + dropped + bridge["frames_sent"]
     return [
         Figure("outcome", done.report.outcome, "complete", done.report.outcome == "complete", done.report.reason),
-        Figure("ticks lost", f"{trace.missing}", "0", trace.missing == 0, f"of {len(trace)}"),
-        Figure("wrong samples", f"{wrong}", "0", wrong == 0, "against the board's own record"),
-        Figure("samples the record lacks", f"{unknown}", "0", unknown == 0, "not compared"),
+        none("ticks lost", trace.missing, f"of {len(trace)}"),
+        none("wrong samples", wrong, "against the board's own record"),
+        none("samples the record lacks", unknown, "not compared"),
         Figure("frames affected", f"{struck}", beside=f"{100 * struck / (frames or 1):.2f} % of {frames} frames"),
-        Figure(
+        none(
             "affected and not noticed",
-            f"{max(0, struck - timeouts)}",
-            "0",
-            timeouts >= struck,
+            max(0, struck - timeouts),
             f"{timeouts} time-outs, of which {max(0, timeouts - struck)} for a late answer",
         ),
-        Figure(
+        none(
             "flipped to the host, not found damaged",
-            f"{max(0, flips_in - damaged)}",
-            "0",
-            damaged >= flips_in,
+            max(0, flips_in - damaged),
             f"{damaged} pieces found damaged, {flips_in} flipped",
         ),
-        Figure(
+        none(
             "flipped to the board, not found damaged",
-            f"{max(0, flips_out - seen_by_board)}",
-            "0",
-            seen_by_board >= flips_out,
+            max(0, flips_out - seen_by_board),
             f"{seen_by_board} pieces found damaged, {flips_out} flipped",
         ),
     ]

@@ -16,12 +16,12 @@ import numpy as np
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import Machine
-from daq.contracts.sample import SampleRow
-from daq.contracts.trace import Trace, TraceEvent
+from daq.contracts.trace import Trace
 from daq.driver import Controller
 from daq.runner.arm_control import ArmControl
 from daq.runner.experiment import RunSetup, StopRequests, run_experiment
 from daq.runner.preparation import Consent
+from daq.runner.recorder import RunListener
 from daq.traces.reader import read_trace
 from model.machine_model.model import base_model
 
@@ -45,17 +45,8 @@ joints.
 FRICTION_ARMS = tuple(f"joint{j}.load_dependent_friction.arm" for j in (1, 2, 3))
 
 
-class Unheard:
+class Unheard(RunListener):
     """A run listener that ignores everything."""
-
-    def progress(self, fraction: float, text: str) -> None:
-        """Ignores the progress."""
-
-    def sampled(self, joints: tuple[int, ...], row: SampleRow) -> None:
-        """Ignores a recorded control period."""
-
-    def happened(self, event: TraceEvent) -> None:
-        """Ignores an event."""
 
 
 def hidden_parameters(machine: Machine, seed: int) -> dict[str, float]:

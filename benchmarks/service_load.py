@@ -24,19 +24,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from benchmarks.figures import Figure, at_most, quantile, show
+from benchmarks.figures import Figure, at_most, none, quantile, show
 from benchmarks.mock_process import MockControl, started_mock
 from benchmarks.service_clients import Seen, clients
-from benchmarks.service_process import (
-    ROBOT,
-    RunningService,
-    child,
-    children,
-    dice,
-    ramp,
-    started_service,
-    sway,
-)
+from benchmarks.service_process import ROBOT, RunningService, child, children, dice, ramp, started_service, sway
 from benchmarks.stop_latency import record_of_stop
 from daq.contracts.processor import processor_time
 from daq.contracts.service.system import stop_port_after
@@ -249,28 +240,24 @@ def figures_of(found: Measured) -> list[Figure]:
     busy = ", ".join(f"{name} {100 * share:.0f} %" for name, share in found.busy.items())
     own = f"the clients' own lateness p99 {quantile(late, 0.99):.1f} ms"
     return [
-        Figure("experiments not completed", f"{len(found.endings)}", "0", not found.endings, "; ".join(found.endings)),
-        Figure("ticks lost", f"{lost}", "0", lost == 0, f"of {count}"),
+        none("experiments not completed", len(found.endings), "; ".join(found.endings)),
+        none("ticks lost", lost, f"of {count}"),
         at_most(
             "tick jitter added, p99", loaded - idle, JITTER_TARGET_MS, "ms", f"p99 {loaded:.2f} ms, alone {idle:.2f} ms"
         ),
         *stops,
-        Figure(
+        none(
             "stops without confirmation",
-            f"{found.unconfirmed}",
-            "0",
-            found.unconfirmed == 0,
+            found.unconfirmed,
             f"a fit ran beside {found.fitting} of {sum(map(len, found.used.values()))}",
         ),
         at_most("plain GET, p99", quantile(gets, 0.99), GET_TARGET_MS, "ms", f"{spread(gets)}, {len(gets)} requests"),
-        Figure("requests refused", f"{seen.refused}", "0", seen.refused == 0, own),
+        none("requests refused", seen.refused, own),
         Figure("processor time, of one core", f"{100 * sum(found.busy.values()):.0f} %", beside=busy),
         Figure("until all watchers had the last 60 s", f"{seen.joining:.2f} s", beside="all of them join at once"),
-        Figure(
+        none(
             "samples that a watcher did not get",
-            f"{seen.samples_missed}",
-            "0",
-            seen.samples_missed == 0,
+            seen.samples_missed,
             f"of {seen.samples}, {seen.watchers} watchers, {seen.ended_early} dropped",
         ),
     ]

@@ -91,8 +91,7 @@ class LineStageDialect:
 
     def again(self, request: Request, frame: bytes) -> bytes:
         """Returns only the state request for set points from before a stop: after its release the stage would use
-        them.
-        """
+        them."""
         for job in self._jobs:
             if job.request is request:
                 job.freed = False

@@ -174,8 +174,7 @@ class Control:
 
     def _emergency_stop(self, request: Answer) -> Answer:
         """Presses the emergency stop ("pressed": true) or releases it. The drives lose their power, and a hand holds
-        the arm at the answer's "degrees".
-        """
+        the arm at the answer's "degrees"."""
         pressed = request.get("pressed")
         if not isinstance(pressed, bool):
             raise ControlError('"pressed": true or false is needed')
@@ -186,8 +185,7 @@ class Control:
 
     def _hand(self, request: Answer) -> Answer:
         """Moves joints by hand while the emergency stop is pressed: "to": {joint: angle in degrees, or "low" or "high"
-        for an end stop}, "seconds".
-        """
+        for an end stop}, "seconds"."""
         to, seconds = request.get("to"), request.get("seconds", 0.0)
         if not isinstance(to, dict) or not all(key in _JOINTS and _is_place(value) for key, value in to.items()):
             raise ControlError('"to": degrees by joint are needed, as in {"1": 90}, or "low" or "high" for an end stop')

@@ -25,8 +25,7 @@ _NUMBERS = 2**48
 
 def seed_that_hides(random: Random, effect: str | None = None, joint: int | None = None) -> int:
     """Returns a drawn seed whose arm hides only this effect on this joint, clearly. Raises SecretError if no arm
-    does.
-    """
+    does."""
     fitting = [size for size in (*SHARED_SIZES, *LATER_SIZES) if effect in (None, size.effect)]
     if not any(joint is None or joint in _joints(size) for size in fitting):
         on = "" if joint is None else f" on joint {joint}"

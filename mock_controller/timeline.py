@@ -25,8 +25,7 @@ class Timeline:
 
     def next_period_us(self) -> int:
         """Returns when the controller's next period begins, computed from the last one; without one, the controller's
-        next event.
-        """
+        next event."""
         newest = self.board.snapshots.newest()
         if newest is None:
             return self.board.next_event_us

@@ -41,6 +41,5 @@ def joint_unit(machine: Machine, joint: int) -> str:
 
 def squared(units: Iterable[str]) -> str:
     """Returns the unit of a sum of squares over joints of these units; rad² + m² shows that different quantities are
-    summed.
-    """
+    summed."""
     return " + ".join(f"({unit})²" if "/" in unit else f"{unit}²" for unit in dict.fromkeys(units))

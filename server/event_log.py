@@ -11,7 +11,7 @@ from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.live import EventMessage
 from server.clock import Clock
 from server.live.hub import Hub
-from server.store.waiting_events import EventStore, WaitingEvents
+from server.store.waiting_events import EventStore, NewEvent, WaitingEvents
 
 log = logging.getLogger("server")
 
@@ -47,7 +47,7 @@ class EventLog:
         """
         log.info("%s: %s: %s", robot, kind, text, extra={"actor": actor, "experiment": experiment})
         self._counted(robot, kind)
-        self._waiting.add(robot, kind, text, at or self._clock.utc(), actor, experiment)
+        self._waiting.add(NewEvent(robot, kind, text, at or self._clock.utc(), actor, experiment))
         if (hub := self.hubs.get(robot)) is not None:
             hub.look()
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
+from daq.contracts.frozen import like
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from daq.transport import PortBusyError
 from firmware_protocol.invalid import message_of
@@ -137,15 +138,8 @@ def of_exit_code(exit_code: int, line: str) -> ProblemError:
 
 def details_of(problem: ProblemError, request_id: str | None = None, base: str = "") -> ProblemDetails:
     """Returns the body of a problem's response. base: prefix of the service's paths."""
-    return ProblemDetails(
-        type=f"{base}{PATH}#{problem.kind}",
-        title=TITLES.get(problem.status, "Problem"),
-        status=problem.status,
-        detail=problem.detail,
-        advice=problem.advice,
-        fields=problem.fields,
-        request_id=request_id,
-    )
+    title = TITLES.get(problem.status, "Problem")
+    return like(ProblemDetails, problem, type=f"{base}{PATH}#{problem.kind}", title=title, request_id=request_id)
 
 
 def response(request: Request, problem: ProblemError) -> JSONResponse:

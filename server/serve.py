@@ -23,6 +23,7 @@ from fastapi import FastAPI
 from daq.config.service import ServiceSettings
 from daq.config.settings import Settings
 from daq.contracts.errors import ReachError, SpecError
+from daq.contracts.frozen import like
 from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.system import stop_port_after
 from server.access.caller import Caller
@@ -245,14 +246,11 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
 def _note_of_stop(news: Stopped) -> AuditNote:
     """Returns the note for plug-ins about a stop at the listener. The stop is done; `detail` contains the arm's
     answer."""
-    return AuditNote(
-        at=news.at,
-        actor=news.actor,
-        role=news.role,
-        origin=news.origin,
+    return like(
+        AuditNote,
+        news,
         action="stop_fleet" if news.address.endswith("/fleet/stop") else "stop_robot",
         request=f"POST {news.address} at the stop listener",
-        robot=news.robot,
         outcome="done",
         status=200,
         detail=news.text,

@@ -236,7 +236,6 @@ class Services:
                 models=models,
                 clock=self.clock,
                 changed=lambda job: self._job_changed(hub, job),
-                at_once=settings.server.jobs_at_once,
                 workers=self.workers,
             )
         )

@@ -64,8 +64,7 @@ SIZES: dict[str, tuple[_Size, ...]] = {
 
 def covered(truth: Json, answer: Json | None) -> list[bool]:
     """Returns whether each interval of a single effect covers the true size, if it was named at its joint, alone or in
-    a group.
-    """
+    a group."""
     if truth["case"] != "single" or answer is None:
         return []
     hidden = truth["hidden"][0]

@@ -33,12 +33,7 @@ from model.discrepancy.diagnosis import Diagnosis
 from model.trial.rates import rate
 from model.trial.registration import RegisteredCode
 from model.trial.score import excess_removed_whole
-from trials.blind.registered import (
-    REGISTERED,
-    library_versions,
-    registering_commit,
-    tree_hashes,
-)
+from trials.blind.registered import REGISTERED, library_versions, registering_commit, tree_hashes
 from trials.intervals import covered
 from trials.judge import QUESTIONS, TOLD_APART, diagnose, names_of, score
 from trials.rigs.folder import write_rig
@@ -66,8 +61,7 @@ DETECTABLE = "the same without those of which d′ is known to be below 5"
 
 class RigsRegistration(RegisteredCode):
     """Arms of several kinds of test rig. `cases` take turns; an answer that takes more than `longest` s counts as
-    none.
-    """
+    none."""
 
     kinds: tuple[str, ...]
     cases: tuple[str, ...]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
-from typing import Any
+
+from pydantic import ConfigDict, TypeAdapter
 
 HERE = Path(__file__).parent
 
@@ -44,8 +45,8 @@ class Record:
     """
 
     files: tuple[str, ...]
-    start: float
-    end: float
+    start: float = -inf
+    end: float = inf
     part: str = ""
 
 
@@ -68,9 +69,9 @@ class Alteration:
 
     what: str
     question: Question
-    set: Mapping[str, float]
-    remove: tuple[str, ...]
-    add: Torque | None
+    set: Mapping[str, float] = field(default_factory=dict)
+    remove: tuple[str, ...] = ()
+    add: Torque | None = None
 
 
 @dataclass(frozen=True)
@@ -84,71 +85,21 @@ class Rig:
     licence: str
     machine: Path
     drive_unit: str
-    joints: int
-    folder: str
     fitted: tuple[Record, ...]
     held_out: tuple[Record, ...]
     map: Mapping[str, str]
     questions: tuple[Question, ...]
     plausible: frozenset[str]
     alteration: Alteration
-    offset: bool
+    joints: int = 1
+    folder: str = ""
+    offset: bool = True
+
+
+_RIGS = TypeAdapter(list[Rig], config=ConfigDict(extra="forbid"))
 
 
 def load_rigs(path: Path = HERE / "rigs.toml") -> tuple[Rig, ...]:
     """Returns every entry of a file."""
-    return tuple(_rig(entry, path.parent) for entry in tomllib.loads(path.read_text("utf-8"))["rig"])
-
-
-def _rig(entry: Mapping[str, Any], folder: Path) -> Rig:
-    altered = entry["alteration"]
-    return Rig(
-        entry["name"],
-        entry["title"],
-        entry["repository"],
-        entry["commit"],
-        entry["licence"],
-        folder / entry["machine"],
-        entry["drive_unit"],
-        entry.get("joints", 1),
-        entry.get("folder", ""),
-        _records(entry["fitted"]),
-        _records(entry["held_out"]),
-        entry["map"],
-        tuple(_question(each) for each in entry["question"]),
-        frozenset(entry["plausible"]),
-        Alteration(
-            altered["what"],
-            _question(altered["question"]),
-            altered.get("set", {}),
-            tuple(altered.get("remove", ())),
-            Torque(**altered["add"]) if "add" in altered else None,
-        ),
-        entry.get("offset", True),
-    )
-
-
-def _records(entries: Sequence[Mapping[str, Any]]) -> tuple[Record, ...]:
-    return tuple(
-        Record(tuple(each["files"]), each.get("from", -inf), each.get("to", inf), each.get("part", ""))
-        for each in entries
-    )
-
-
-def _question(entry: Mapping[str, Any]) -> Question:
-    return Question(
-        entry["what"],
-        tuple(entry["names"]),
-        tuple(entry["joints"]),
-        entry["known"],
-        _number(entry.get("number")),
-        _number(entry.get("moved")),
-        entry.get("lacking", False),
-    )
-
-
-def _number(entry: Mapping[str, Any] | None) -> Number | None:
-    if entry is None:
-        return None
-    of = (entry["of"],) if isinstance(entry["of"], str) else tuple(entry["of"])
-    return Number(of, entry["low"], entry["high"], entry["unit"])
+    found = _RIGS.validate_python(tomllib.loads(path.read_text("utf-8"))["rig"])
+    return tuple(replace(rig, machine=path.parent / rig.machine) for rig in found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -12,6 +12,16 @@ from firmware_protocol.invalid import first_invalid
 
 WHEN_USED = ConfigDict(defer_build=True)
 """For a `TypeAdapter`: pydantic builds its validator on first use, as it does for `FrozenRecord`."""
+
+
+Record = TypeVar("Record", bound=BaseModel)
+
+
+def like(kind: type[Record], source: object, /, **others: Any) -> Record:
+    """Returns a record of `kind` with the attributes of `source` that have the names of its fields. `others`: its
+    fields that differ."""
+    own = {name: getattr(source, name) for name in kind.model_fields if name not in others and hasattr(source, name)}
+    return kind.model_validate(own | others)
 
 
 class FrozenRecord(BaseModel):

@@ -36,18 +36,7 @@ from daq.contracts.machine_units import (
     require_unit,
     require_units,
 )
-from daq.contracts.quantity import (
-    Inertia,
-    JointValue,
-    Kilogram,
-    Metre,
-    Plain,
-    Quantity,
-    Radian,
-    Second,
-    Volt,
-    in_unit,
-)
+from daq.contracts.quantity import Inertia, JointValue, Kilogram, Metre, Plain, Quantity, Radian, Second, Volt, in_unit
 from daq.contracts.refused import refusals
 from daq.contracts.toml_places import places_of
 from firmware_protocol.units import POSTURE_UNITS, DriveScale, JointCalibration

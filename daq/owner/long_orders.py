@@ -7,22 +7,14 @@ from dataclasses import replace
 
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError, SafetyError
+from daq.contracts.frozen import like
 from daq.contracts.joint_text import speed_unit
 from daq.contracts.limp import limp_line
 from daq.contracts.sample import SampleRow
 from daq.link import LinkState
 from daq.owner.guardian import EndCause
 from daq.owner.late_stop import deliver_late_stop
-from daq.owner.messages import (
-    Answer,
-    Finished,
-    JogBegin,
-    JogDrive,
-    LeadBegin,
-    QuickOrder,
-    RunExperiment,
-    RunProgram,
-)
+from daq.owner.messages import Answer, Finished, JogBegin, JogDrive, LeadBegin, QuickOrder, RunExperiment, RunProgram
 from daq.owner.owned_robot import OwnedRobot
 from daq.owner.quick_orders import carry_out
 from daq.runner.arm_control import StoppedError
@@ -56,14 +48,7 @@ def run(robot: OwnedRobot, order: RunExperiment) -> Answer:
     )
     if not robot.opening.watched:
         result = _with_late_stop(robot, result)
-    finished = Finished(
-        outcome=result.outcome,
-        trace=result.trace,
-        samples=result.samples,
-        missing=result.missing,
-        counters=result.counters,
-        reason=result.reason,
-    )
+    finished = like(Finished, result)
     return Answer(number=order.number, finished=finished, exit_code=exit_codes.OF_OUTCOME[result.outcome])
 
 

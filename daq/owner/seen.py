@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from daq.contracts.frozen import like
 from daq.contracts.service.robot import LinkStatus, RobotIdentity, Sample
 from daq.owner.messages import ArmReport, LiveSample
 from daq.runner.line_status import with_rates
@@ -19,15 +20,4 @@ def link_of(arm: ArmReport, age: float, url: str, identity: RobotIdentity) -> Li
 def sample_of(sample: LiveSample, now: float, utc: float) -> Sample:
     """Returns a sample with its age. `now` (monotonic) and `utc` (wall clock) are the same moment (s)."""
     age = now - sample.host_time
-    return Sample(
-        tick=sample.tick,
-        host_time=sample.host_time,
-        utc=utc - age,
-        age=age,
-        joints=sample.joints,
-        set_point=sample.set_point,
-        position=sample.position,
-        error=sample.error,
-        drive=sample.drive,
-        frozen=bool(sample.status & StatusFlag.FROZEN.value),
-    )
+    return like(Sample, sample, utc=utc - age, age=age, frozen=bool(sample.status & StatusFlag.FROZEN.value))

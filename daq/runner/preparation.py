@@ -69,7 +69,7 @@ def prepare(
     NoSampleError, ControllerRestartedError; nothing has changed on the board then."""
     consent.require(controller)
     require_matching_machine(controller, machine)
-    _require_period(controller, machine)
+    require_period(controller, machine)
     require_not_stopped(controller)
     _require_driven(controller, spec, machine)
     here = _look(controller, machine)
@@ -130,7 +130,7 @@ def require_matching_machine(controller: Controller, machine: Machine) -> None:
             )
 
 
-def _require_period(controller: Controller, machine: Machine) -> None:
+def require_period(controller: Controller, machine: Machine) -> None:
     """Raises SafetyError if the period differs: speeds are planned as set points per period, so the arm would move at
     another speed."""
     planned = control_period(machine)

@@ -5,30 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
-from daq.contracts.errors import SafetyError
 from daq.contracts.experiment import Gain
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleRow
 from daq.driver import Controller, ControllerRestartedError, HardwareFaultError, NoSampleError
 from daq.link import LinkError, RequestRefusedError
 from daq.runner.arm_control import ArmControl, StoppedError
-from daq.runner.preparation import PERIOD_TOLERANCE, require_matching_machine
+from daq.runner.preparation import require_matching_machine, require_period
 from daq.runner.rows import RowMaker
 from daq.safety import Event
 from daq.teaching import halting
 from daq.teaching.arm import TeachingError
-from daq.trajectories.set_points import control_period
-
-
-def require_period(controller: Controller, machine: Machine) -> None:
-    """Raises SafetyError if the controller's period differs from the machine file's: speeds are planned as set points
-    per period."""
-    planned = control_period(machine)
-    if abs(controller.period_s - planned) > PERIOD_TOLERANCE * planned:
-        raise SafetyError(
-            f"{controller.link.url} has a control period of {controller.period_s * 1e3:g} ms, the machine file "
-            f"{machine.name} says {planned * 1e3:g} ms: speeds would be wrong; correct controller.period there"
-        )
 
 
 class ControllerArm:

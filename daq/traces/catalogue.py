@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from daq.contracts.errors import TraceError
-from daq.contracts.frozen import FrozenRecord
+from daq.contracts.frozen import FrozenRecord, like
 from daq.contracts.labels import Outcome
 from daq.contracts.trace import TraceRecord
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
@@ -143,23 +143,18 @@ def _summary(
     duration: float | None,
 ) -> TraceSummary:
     spec = record.spec
-    return TraceSummary(
-        moved=None if spec is None else tuple(spec.joints),
+    return like(
+        TraceSummary,
+        record,
         path=path,
         state=state,
         size=size,
-        trace_id=record.trace_id,
-        created=record.created,
-        source=record.source,
-        robot=record.robot,
+        moved=None if spec is None else tuple(spec.joints),
         kind=spec.trajectory.kind if spec else None,
         name=spec.name if spec else None,
         joints=joints,
-        outcome=record.outcome,
         samples=samples,
         duration=duration,
-        operator=record.operator,
-        notes=record.notes,
     )
 
 

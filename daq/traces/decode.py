@@ -113,8 +113,7 @@ class _Decoder:
 
     def contents(self, chunks: list[bytes]) -> list[_Contents]:
         """Returns what chunks contain. Those of one size that are laid out alike are read at once. Raises ValueError,
-        struct.error.
-        """
+        struct.error."""
         found: dict[int, _Contents] = {}
         sizes: dict[int, list[int]] = {}
         for number, chunk in enumerate(chunks):

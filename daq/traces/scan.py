@@ -187,8 +187,7 @@ def fills(chunk: bytes, at: list[Place]) -> bool:
 
 def alike(chunk: bytes, others: NDArray[np.uint8], at: list[Place]) -> NDArray[np.bool_]:
     """Returns which chunks of the same size, rows of `others`, have their messages at the same places as a chunk that
-    has nothing else.
-    """
+    has nothing else."""
     starts = np.array([place.record for place in at])
     heads = (starts[:, None] + np.arange(HEAD.size + _CHANNEL.size)).ravel()
     return np.asarray((others[:, heads] == np.frombuffer(chunk, np.uint8)[heads]).all(axis=1))

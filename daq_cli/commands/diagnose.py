@@ -206,9 +206,9 @@ def _beginning(
 def _written(found: Diagnosis, begin: Model, traces: Sequence[Trace], path: Path) -> Path:
     """Writes the report, with the models before and after on every trace if these can be simulated."""
     from daq.plugins import report_sections
+    from model.reports.diagnosis_data import told
     from model.reports.page import write_page
     from model.reports.saved_report import saved_report
-    from server.jobs.diagnosis_data import told
 
     page = saved_report(told(found, begin, traces), files_of(traces), report_sections(found, traces))
     return write_page(page, path)

@@ -10,7 +10,7 @@ import typer
 
 from daq.contracts.errors import SpecError
 from daq_cli.app.context import JsonOption, console, print_json
-from daq_cli.app.output_file import check_folder, replacing
+from daq_cli.app.output_file import PICTURES, replacing, table_or_picture
 from daq_cli.models.effect_choice import bounds, patterns, with_effects
 from daq_cli.models.model_input import (
     MODEL_HELP,
@@ -34,17 +34,6 @@ if TYPE_CHECKING:
     from model.fitting.result import FitResult
 
 app = typer.Typer(add_completion=False)
-
-PICTURES = (".png", ".svg", ".pdf")
-
-
-def _file(path: Path | None) -> Path | None:
-    """Rejects an unsuitable or unwritable file before the computation."""
-    if path is not None:
-        if path.suffix not in (".csv", *PICTURES):
-            raise SpecError(f"--output {path}: profiles are written as .csv, or as a picture ({', '.join(PICTURES)})")
-        check_folder(path, "--output")
-    return path
 
 
 @app.command()
@@ -75,7 +64,8 @@ def profile(
     ] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the starting values.")] = 0,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", callback=_file, help="The profiles: .csv, or .png, .svg, .pdf.")
+        Path | None,
+        typer.Option("--output", "-o", callback=table_or_picture, help="The profiles: .csv, or .png, .svg, .pdf."),
     ] = None,
     report: ReportOption = None,
     folder: TraceFolderOption = None,

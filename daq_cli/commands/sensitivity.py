@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from daq.contracts.errors import SpecError
 from daq_cli.app.context import JsonOption, console, print_json
-from daq_cli.app.output_file import check_folder, replacing
+from daq_cli.app.output_file import PICTURES, replacing, table_or_picture
 from daq_cli.models.effect_choice import patterns
 from daq_cli.models.model_input import (
     MODEL_HELP,
@@ -30,17 +29,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer(add_completion=False)
 
-PICTURES = (".png", ".svg", ".pdf")
-
-
-def _file(path: Path | None) -> Path | None:
-    """Rejects an unsuitable or unwritable file before the computation."""
-    if path is not None:
-        if path.suffix not in (".csv", *PICTURES):
-            raise SpecError(f"--output {path}: curves are written as .csv, or as a picture ({', '.join(PICTURES)})")
-        check_folder(path, "--output")
-    return path
-
 
 @app.command()
 def sensitivity(
@@ -53,7 +41,8 @@ def sensitivity(
         str | None, typer.Option(help="Names or patterns (default: those that were fitted, else all uncertain).")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", callback=_file, help="The curves: .csv, or .png, .svg, .pdf.")
+        Path | None,
+        typer.Option("--output", "-o", callback=table_or_picture, help="The curves: .csv, or .png, .svg, .pdf."),
     ] = None,
     open_loop: Annotated[
         bool,

@@ -24,26 +24,14 @@ def with_effects(model: Model, text: str) -> Model:
     Names may be abbreviated if unique. Without joints, an effect acts on every possible joint, or on the whole machine.
     Raises a one-line SpecError.
     """
-    from model.effects.library import effect
-
-    if text.strip() == NO_EFFECT:
-        return model
-    for part in text.split(","):
-        name, _, joints = part.strip().partition(":")
-        found = effect_name(name)
-        if effect(found).whole_machine:
-            if joints:
-                raise SpecError(f"effect {found}: belongs to the whole machine; write it without {':' + joints!r}")
-            model = model.with_effect(found)
-        else:
-            model = model.with_effect(found, parse_joints(joints) if joints else _joints_of(found, model))
-    return model
+    return model.with_effects(effect_choices(text))
 
 
 def effect_choices(text: str | None, files: Sequence[Path] | None = None) -> tuple[EffectChoice, ...]:
     """Returns effects written as for `with_effects`, for traces whose models are not yet known; effect files are loaded
     first. Raises SpecError."""
     from daq.contracts.service.jobs import EffectChoice
+    from model.effects.library import effect
 
     load_effects(files or ())
     if text is None or text.strip() == NO_EFFECT:
@@ -51,7 +39,10 @@ def effect_choices(text: str | None, files: Sequence[Path] | None = None) -> tup
     found = []
     for part in text.split(","):
         name, _, joints = part.strip().partition(":")
-        found.append(EffectChoice(name=effect_name(name), joints=tuple(parse_joints(joints)) if joints else ()))
+        one = EffectChoice(name=effect_name(name), joints=tuple(parse_joints(joints)) if joints else ())
+        if one.joints and effect(one.name).whole_machine:
+            raise SpecError(f"effect {one.name}: belongs to the whole machine; write it without {':' + joints!r}")
+        found.append(one)
     return tuple(found)
 
 
@@ -59,14 +50,6 @@ def candidate_effects(text: str | None, files: Sequence[Path] | None = None) -> 
     """Returns the candidates of a diagnosis in the same way; None for all effects."""
     load_effects(files or ())
     return None if text is None else effect_names(text)
-
-
-def _joints_of(name: str, model: Model) -> tuple[int, ...]:
-    """Returns every joint on which the effect may act."""
-    from model.effects.library import effect
-
-    own = effect(name).joints
-    return tuple(j for j in model.machine.modelled_joints if not own or j in own)
 
 
 def effect_name(text: str) -> str:

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from model.discrepancy.options import DiagnosisOptions
     from model.fitting.options import FitOptions
     from model.machine_model.model import Model
-    from server.jobs.results import ComparisonData, FitData, JobResult, ValidationData
+    from model.reports.result_data import ComparisonData, FitData, ValidationData
+    from server.jobs.results import JobResult
 
 LOOK_EVERY = 1.0
 """Time (s) between two polls of a job's progress."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from mock_controller.hidden.sizes import LATER_SIZES, OPEN_SIZES, SHARED_SIZES, SizeRange
 from mock_controller.modifications.parameter import fields_of
-from mock_controller.modifications.registry import known_modifications
+from mock_controller.modifications.registry import is_shared, known_modifications
 
 from .command_line import plain
 
@@ -33,7 +33,7 @@ def page() -> str:
             _sizes(sizes.get(name)),
             plain(kind.source),
         )
-        rows[kind.shared].append(f"| {' | '.join(cells)} |")
+        rows[is_shared(name)].append(f"| {' | '.join(cells)} |")
     return "\n".join([BEGIN, SHARED, HEAD, *rows[True], "", OPEN, HEAD, *rows[False], ""])
 
 

@@ -80,8 +80,7 @@ def find(
 ) -> None:
     """Find positions, set points, errors, powers, gains and inputs, with evidence. Asks you to move the arm by hand.
     Writes only set points at proved addresses, and these only at the end. If the search ends while the emergency stop
-    is pressed, this is noted beside the memory map, and the next call begins with the safe release.
-    """
+    is pressed, this is noted beside the memory map, and the next call begins with the safe release."""
     from daq.config.robot_files import load_memory_map
     from daq_cli.app.output_file import check_folder
     from extras.commissioning.command.record import Record

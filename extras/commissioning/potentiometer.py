@@ -29,8 +29,7 @@ NORMAL_95 = 1.96
 BEND_SHARE, BEND_LENGTH = 0.5, 550.0
 """Share of the variance that is smooth, and its correlation length in ADC counts (standard deviation of a Gaussian).
 Both are assumptions. With them intervals contained the truth in 92 to 98 % of simulated sensors, whose angles were read
-to half a degree, with a scatter of half a degree, or exactly. With independent scatter it was 85 to 96 %.
-"""
+to half a degree, with a scatter of half a degree, or exactly. With independent scatter it was 85 to 96 %."""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from itertools import islice, takewhile
 
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.service.experiments import Experiment, Schedule
+from daq.trajectories.length import least_length
 from extras.console.messages import PlannedRun
-from server.experiments.schedule import Plan, following, least_length, times
+from server.experiments.schedule import Plan, following, times
 
 MOST = 500
 """Most runs of one schedule in an answer; later ones are left out."""

@@ -1,6 +1,5 @@
 """The demonstration: the mock hides an effect, a diagnosis looks for it, and the secret is revealed beside the
-answer.
-"""
+answer."""
 
 from daq.plugins import Command, Plugin
 

@@ -115,8 +115,7 @@ class Demonstrations(Part):
 
     def _recorded(self, rig: RobotServices, sealed: Sealed, hidden: Hidden, by: str) -> Hidden:
         """Records both experiments, enters their traces in the catalogue, and compares the first with the machine file
-        while the second is recorded.
-        """
+        while the second is recorded."""
         fitted, held_out = EXPERIMENTS
         trace, motion = self._trace(rig, sealed, fitted)
         compare = CompareRequest(traces=(trace,), models=(MACHINE,))

@@ -23,6 +23,5 @@ def hide_effect(body: HideRequest, rig: RobotDep, made: Demonstration, caller: O
 @router.get("")
 def get_hiding_place(rig: RobotDep, made: Demonstration, _: Viewer, _turn: Turn) -> HidingPlace:
     """Returns the effects that can be hidden, and the latest demonstration; its secret once the diagnosis has
-    answered.
-    """
+    answered."""
     return made.place(rig)

@@ -42,14 +42,12 @@ class ArmInLoop:
 
     def readings(self, candidates: Sequence[Floats]) -> Floats:
         """Returns readings (r, k, n) for r candidates of set points, nothing rounded. Raises SpecError for an unstable
-        loop.
-        """
+        loop."""
         return self._run([self._loaded(self.smooth, one) for one in candidates])
 
     def rounded_readings(self, set_points: Floats, draws: int) -> Floats:
         """Returns readings (r, k, n) of the board, with rounded set points, readings and powers, and `draws` draws of
-        the stated noise.
-        """
+        the stated noise."""
         machine = self.model.machine
         sensors = [machine.joint(joint).sensor for joint in machine.modelled_joints]
         counts = np.array([s.noise.value if s is not None and s.noise is not None else 0.0 for s in sensors])

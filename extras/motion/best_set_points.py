@@ -13,8 +13,7 @@ from model.arrays import Floats, Mask
 
 ROUGHNESS = 0.01
 """Weight of a correction's squared second difference relative to the squared error. It keeps set points smooth at
-frequencies that hardly reach the arm, where a model is least certain.
-"""
+frequencies that hardly reach the arm, where a model is least certain."""
 RELAXATION = 1.6
 """Over-relaxation of the alternating directions (Boyd et al. 2011, section 3.4.3, recommend 1.5 to 1.8)."""
 MOST_STEPS = 300

@@ -152,8 +152,7 @@ def _rows(
     source: Feedforward | None, machine: Machine, reached: Mapping[int, TrackingError] | None = None
 ) -> list[dict[str, object]]:
     """Returns errors of each joint in degrees (mm for a sliding joint): before, expected and reached, as far as
-    known.
-    """
+    known."""
     found = []
     known: dict[str, Mapping[int, TrackingError]] = {}
     known |= {} if source is None else {"before": source.before, "expected": source.expected}

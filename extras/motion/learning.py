@@ -33,8 +33,7 @@ from model.simulation.inputs import RunInputs, inputs_of
 
 SLOWEST, FASTEST = 0.5, 60.0
 """Bounds (rad/s) of the loop's natural frequency; the upper one is that of a loop sampled about five times per
-period.
-"""
+period."""
 LEAST_DAMPING, MOST_DAMPING = 0.05, 5.0
 MOST_DELAY = 5.0
 """Longest dead time, in periods."""
@@ -80,8 +79,7 @@ def estimated_loop(set_points: Floats, readings: Floats, period: float) -> Secon
 
 def _pulse_response(loop: Sequence[float] | Floats, count: int, period: float) -> Floats:
     """Returns (count,) readings after a set point that is one for one period and else zero, at the beginnings of
-    periods.
-    """
+    periods."""
     frequency, damping, delay = loop
     edges = period * (np.arange(count + 1) - 1.0 - delay)
     return np.diff(_step_response(frequency, damping, np.maximum(edges, 0.0)))
@@ -103,8 +101,7 @@ WORSE = 1.1
 """Ratio to the error of the previous attempt above which learning counts as diverging; below, it is noise."""
 FINEST = 0.3
 """Error (rms), in posture units, that rounding alone causes: nothing remains to be learned. An error of up to twice
-that may grow by chance, which is no divergence.
-"""
+that may grow by chance, which is no divergence."""
 
 
 def learn(
@@ -177,8 +174,7 @@ def _require_converging(trace: Trace, reached: Mapping[int, TrackingError], moti
 
 def asked_of(trace: Trace, machine: Machine) -> ExperimentSpec:
     """Returns the experiment whose motion a trace attempted. Raises TraceError unless it is a whole attempt on this
-    machine.
-    """
+    machine."""
     record, called = trace.record, _called(trace)
     if record.spec is None or record.machine is None:
         raise TraceError(f"{called}: does not state its experiment: learn from a trace that `daq run` recorded")

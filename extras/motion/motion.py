@@ -108,8 +108,7 @@ def with_rest(motion: Motion) -> Motion:
 
 def gains_for(motion: Motion, present: Mapping[int, Gain] | None) -> dict[int, Gain]:
     """Returns P, I and D of the joints whose set points are computed: those of the motion, else `present` ones, else
-    the machine's.
-    """
+    the machine's."""
     controller = motion.machine.controller
     if not isinstance(controller, BoardPid):
         return {}

@@ -11,8 +11,7 @@ from model.arrays import Floats
 
 FOLLOWING_SHARE = 0.6
 """Largest distance of a set point from the simulated arm, as a share of the error at which set points pause. It leaves
-a margin for an arm that is slower than its model; beyond half of that error the MA2000's drive saturates anyway.
-"""
+a margin for an arm that is slower than its model; beyond half of that error the MA2000's drive saturates anyway."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +33,7 @@ class Scale:
 @dataclass(frozen=True)
 class Allowed:
     """Limits of a joint, in posture units: whole numbers from `low` to `high`, which change by at most `step` from one
-    period to the next and stay within `ahead` of the arm (infinite where there is no such limit).
-    """
+    period to the next and stay within `ahead` of the arm (infinite where there is no such limit)."""
 
     low: float
     high: float
@@ -52,8 +50,7 @@ def scale_of(machine: Machine, joints: tuple[int, ...]) -> Scale:
 
 def effective_postures(machine: Machine, joint: int) -> Floats:
     """Returns (units,) the value of each posture unit for the controller, in posture units: the board rounds set points
-    to counts of its sensor.
-    """
+    to counts of its sensor."""
     own = machine.calibration(joint)
     postures = np.arange(float(own.posture_units))
     if isinstance(machine.controller, BoardPid):

@@ -261,8 +261,7 @@ def ladder_checks(steps: Sequence[LadderStep]) -> tuple[Check, ...]:
 
 def not_recovered(ladder: Ladder) -> str:
     """Returns a sentence that names the parameters of the last model that are far from those of the plant, table
-    7.9.
-    """
+    7.9."""
     last = ladder.steps[-1]
     truth = last.published_values
     off = [s for s, v in last.values.items() if abs(v / truth[s] - 1) > RECOVERED]

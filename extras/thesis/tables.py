@@ -189,8 +189,7 @@ FRICTION_SYMBOLS = ("v_eff1", "v_eff2", "v_eff3", "μ̃")
 
 def model_of(published: PublishedModel, machine: Machine, *, published_inertia: bool = True) -> Model:
     """Converts a table of chapter 7 to a model of the machine. Raises SpecError for a machine that is not the MA2000's
-    arm.
-    """
+    arm."""
     return _with_values(structure_of(published, machine, published_inertia=published_inertia), published.values)
 
 

@@ -74,8 +74,7 @@ class TorqueAnalysis(FrozenRecord):
 
 def torques_of_run(model: Model, trace: Trace) -> TorqueAnalysis:
     """Computes torques along the model's own motion for the set points of a trace, with accelerations of its exact
-    speeds.
-    """
+    speeds."""
     run = simulate(model, trace, Options(quantise=False))
     period = float(np.median(np.diff(run.time)))
     acceleration = np.gradient(run.velocity, period, axis=0)
@@ -151,8 +150,7 @@ def _without_moments(chain: ChainArrays) -> ChainArrays:
 
 def _as_published(chain: ChainArrays) -> ChainArrays:
     """Returns the arm with link 3 and its load as one shifted rod, (7.20) to (7.28), whose inertia is 13 to 22 % too
-    high.
-    """
+    high."""
     inertial = chain.inertial.copy()
     mass, length = inertial[2, 0], chain.geometry[2, 2]
     beyond = -inertial[2, 1] / mass  # s_3x: from the common centre of mass to the end of the link

@@ -14,27 +14,12 @@ from firmware_protocol.codes import PROTOCOL_VERSION, Capability, Refusal, Statu
 from firmware_protocol.dynamixel.control_table import COUNTS_A_TURN, TICKS, Table
 from firmware_protocol.dynamixel.instructions import sync_read, sync_write
 from firmware_protocol.dynamixel.packets import LARGEST_ID, OVERHEAD, STATUS, Packet, PacketDecoder, encode
-from firmware_protocol.dynamixel.readings import (
-    BLOCK,
-    GAINS,
-    STOP_MARK,
-    WHOLE,
-    Servo,
-    ServoSettings,
-    faults,
-)
+from firmware_protocol.dynamixel.readings import BLOCK, GAINS, STOP_MARK, WHOLE, Servo, ServoSettings, faults
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.joints import joints_of
 from firmware_protocol.memory_map import JOINTS
 from firmware_protocol.message import Reply, Request
-from firmware_protocol.replies import (
-    ExplainedRefusal,
-    HelloReply,
-    Released,
-    SetPointsTaken,
-    Snapshot,
-    Status,
-)
+from firmware_protocol.replies import ExplainedRefusal, HelloReply, Released, SetPointsTaken, Snapshot, Status
 from firmware_protocol.requests import Hello, ReadStatus, Release, ReportGains, Sample, Stop, WriteSetPoints
 from firmware_protocol.scale import LineScale
 from firmware_protocol.wide import WideGains, WideStopped

@@ -148,8 +148,7 @@ class Board:
 
     def write_set_points(self, postures: Mapping[int, int]) -> None:
         """Writes set points (posture units 0–999) of joints (from 1) in one access; takes time. Ignored while
-        frozen.
-        """
+        frozen."""
         for joint, posture in postures.items():
             if not (1 <= joint <= JOINTS and 0 <= posture < POSTURE_UNITS):
                 limit = POSTURE_UNITS - 1

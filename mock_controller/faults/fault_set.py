@@ -105,8 +105,7 @@ class FaultSet:
 
     def on_the_wire(self, data: bytes, direction: Direction) -> list[Chunk]:
         """Returns the chunks into which one encoded frame is changed now: all faults of the line act in the order of
-        switching on.
-        """
+        switching on."""
         chunks = [Chunk(data)]
         if not self.active:
             return chunks

@@ -18,7 +18,7 @@ from mock_controller.hidden.sizes import LATER_SIZES, OPEN_SIZES, SHARED_SIZES, 
 from mock_controller.hidden.tolerances import deviating_board, deviating_plant, draw_deviations, tolerances
 from mock_controller.modifications import Modification, build_modifications
 from mock_controller.modifications.changes import change_body
-from mock_controller.modifications.registry import known_modifications
+from mock_controller.modifications.registry import is_shared
 from mock_controller.plant import PlantParameters
 
 SEED_LIMIT = 2**63
@@ -49,8 +49,7 @@ class Kind(IntEnum):
 
 OF_ANY = tuple(kind for kind in Kind if Kind.ANY < kind <= Kind.WRONG_PRIORS)
 """Kinds that `ANY` draws. Later kinds, and later effects of the library, are not included, so that a seed keeps its
-arm.
-"""
+arm."""
 
 
 class Load(IntEnum):
@@ -77,7 +76,7 @@ class HiddenEffect:
     @property
     def known_as(self) -> str:
         """Returns its name in the shared list, or UNKNOWN."""
-        return self.name if known_modifications()[self.name].shared else UNKNOWN
+        return self.name if is_shared(self.name) else UNKNOWN
 
     def modifications(self) -> tuple[Modification, ...]:
         """Returns the effect as modifications of the mock."""
@@ -189,8 +188,7 @@ def _effects(random: Random, kind: Kind) -> tuple[HiddenEffect, ...]:
 
 def _pair(random: Random) -> tuple[HiddenEffect, ...]:
     """Draws two different effects. Backlash and compliance are never drawn on the same joint: its gear can have only
-    one.
-    """
+    one."""
     first, second = (_one(random, size) for size in random.sample(SHARED_SIZES, 2))
     gives = ("backlash", "joint_compliance")
     while first.name in gives and second.name in gives and first.joints == second.joints:

@@ -70,8 +70,7 @@ def readings(
     parts: LoopParts, experiment: Experiment, noise_seed: int = 0, step_us: int = STEP_US
 ) -> NDArray[np.float64]:
     """Returns readings (counts, one row per period, joints 1 to 6) of the experiment, without the settling before
-    it.
-    """
+    it."""
     board = parts.board
     for change in of_kind(parts.modifications, ChangesBoard):
         board = change.change_board(board)

@@ -104,8 +104,7 @@ def ramp_step() -> Experiment:
 
 def reference_set() -> Experiment:
     """Returns 55 s: one joint at a time, slow reversals, a staircase, fast moves of many sizes, and a second
-    posture.
-    """
+    posture."""
     path = _Path()
     path.hold(0.5)
     for joint in range(3):  # one at a time, there and back

@@ -214,8 +214,7 @@ def separation(
 
 def project(difference: NDArray[np.float64], known: Tangents) -> Separation:
     """Returns d′ of a difference of readings (in their standard deviations, periods·3) after one refit along the
-    tangents.
-    """
+    tangents."""
     moved = _step(difference, np.zeros(len(known.names)), known.matrix)
     return _separation_of(float(np.linalg.norm(difference)), difference - known.matrix @ moved, moved, known)
 
@@ -280,8 +279,7 @@ def move_parameters(
     parts: LoopParts, known: Tangents, moved: NDArray[np.float64], step_us: int
 ) -> tuple[LoopParts, NDArray[np.float64]]:
     """Returns the arm with its tolerance parameters moved by a number of their standard deviations, and the remainder
-    of the moves, which is applied along the tangents.
-    """
+    of the moves, which is applied along the tangents."""
     rest = np.zeros(len(known.names))
     deviations = dict(zip(known.names, (moved * known.deviations).tolist(), strict=True))
     if not any(deviations.values()):

@@ -119,8 +119,7 @@ SHARED_SIZES: tuple[SizeRange, ...] = (
     SizeRange("lost_set_points", "share", _alike(0.01, 0.4), also={"seed": (0, 2**31)}),
 )
 """Sizes of the effects with shared names, except those of `LATER_SIZES`. Joints whose readings do not depend on the
-effect are left out.
-"""
+effect are left out."""
 
 LATER_SIZES: tuple[SizeRange, ...] = (
     SizeRange("gravity_torque_friction", "share", _alike(0.06, 0.6), joints=(2, 3)),
@@ -138,8 +137,7 @@ LATER_SIZES: tuple[SizeRange, ...] = (
     SizeRange("constant_torque", "torque", ((0.07, 2), (0.16, 5), (0.04, 1.2)), signed=True),
 )
 """Sizes of effects with shared names that came after eight trials had been registered. They are a separate kind of arm,
-so that every seed of those trials keeps its secret.
-"""
+so that every seed of those trials keeps its secret."""
 
 OPEN_SIZES: tuple[SizeRange, ...] = (
     SizeRange(

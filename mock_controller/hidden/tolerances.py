@@ -50,8 +50,7 @@ class Tolerance:
 @cache
 def tolerances() -> tuple[Tolerance, ...]:
     """Returns every quantity of the arm that may deviate: `m1` … `a3`, `resistance_1` … `coulomb_arm_3`,
-    `computing_delay`.
-    """
+    `computing_delay`."""
     text = resources.files("mock_controller.hidden").joinpath("tolerances.toml").read_text("utf-8")
     reader = QuantityReader(text, "tolerances.toml")
 

@@ -15,7 +15,6 @@ class DeadZone:
     """Output of `joint`'s amplifier is zero within ±`width` volts and smaller by that width outside."""
 
     name: ClassVar[str] = "dead_zone"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "u → u − w sign u where |u| > w, else 0"
     source: ClassVar[str] = "cross-over of a push-pull stage"
     joint: int = joint_parameter()
@@ -34,7 +33,6 @@ class AmplifierThreshold:
     """`joint`'s amplifier gives nothing for a command of up to `width` volts, and all of a larger one."""
 
     name: ClassVar[str] = "amplifier_threshold"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "u → u where |u| > w, else 0"
     source: ClassVar[str] = "least pulse of a switched output stage"
     joint: int = joint_parameter()
@@ -49,7 +47,6 @@ class SupplyLimit:
     """`joint`'s amplifier gives at most `reduction` volts less than the supply limit of the data file."""
 
     name: ClassVar[str] = "supply_limit"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "|u| ≤ u_max − Δ"
     source: ClassVar[str] = "drop across output stage and cable"
     joint: int = joint_parameter()
@@ -67,7 +64,6 @@ class SlewRateLimit:
     """The output of `joint`'s amplifier needs `time_per_volt` seconds to change by a volt."""
 
     name: ClassVar[str] = "amplifier_slew_rate"
-    shared: ClassVar[bool] = False
     line: ClassVar[str] = "|du/dt| ≤ 1/s"
     source: ClassVar[str] = "slew rate of a power stage with an output filter"
     joint: int = joint_parameter()
@@ -91,7 +87,6 @@ class DriveCoupling:
     """A `share` of the volts at `joint`'s amplifier appears at the amplifier of joint `onto` as well."""
 
     name: ClassVar[str] = "drive_coupling"
-    shared: ClassVar[bool] = False
     line: ClassVar[str] = "u_b → u_b + s u_a"
     source: ClassVar[str] = "a common ground lead between two power stages"
     joint: int = joint_parameter()

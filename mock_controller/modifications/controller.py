@@ -20,7 +20,6 @@ class InputDelay:
     """
 
     name: ClassVar[str] = "input_delay"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "u(t) → u(t − τ)"
     source: ClassVar[str] = "computing time, or a buffered output"
     joint: int = joint_parameter()
@@ -47,7 +46,6 @@ class WrongGain:
     """`joint`'s controller gives `factor` times the power of its gains, before the limit of the DAC."""
 
     name: ClassVar[str] = "wrong_gain"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "power → limit(f · PID)"
     source: ClassVar[str] = "section 6.4: adjustable gains are not the physical ones"
     joint: int = joint_parameter()
@@ -67,7 +65,6 @@ class LostSetPoints:
     """
 
     name: ClassVar[str] = "lost_set_points"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "set point of the previous period, in a share of periods"
     source: ClassVar[str] = "section 6.3: the controller does not wait"
     joint: int = joint_parameter()

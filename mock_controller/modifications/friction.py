@@ -17,7 +17,6 @@ class ViscousFriction:
     """Adds torque −`coefficient` · q̇ at `joint`; converted to the motor's side by n² as in (7.30)."""
 
     name: ClassVar[str] = "viscous_friction"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "torque = −c q̇"
     source: ClassVar[str] = "(7.30)"
     joint: int = joint_parameter()
@@ -34,7 +33,6 @@ class CoulombFriction:
     """Adds `torque` of Coulomb friction at `joint`, whatever its load; the arm's own bristle carries it."""
 
     name: ClassVar[str] = "coulomb_friction"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "level + C, through Dahl's bristle"
     source: ClassVar[str] = "Dahl (1968), A solid friction model"
     joint: int = joint_parameter()
@@ -50,7 +48,6 @@ class LoadDependentFriction:
     """Adds `arm` to the effective arm μ̃ at `joint`: friction in proportion to the weights that it carries."""
 
     name: ClassVar[str] = "load_dependent_friction"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "level + Δμ̃ |projected weights|"
     source: ClassVar[str] = "(7.32)–(7.34)"
     joint: int = joint_parameter(3)
@@ -71,7 +68,6 @@ class GravityTorqueFriction:
     """
 
     name: ClassVar[str] = "gravity_torque_friction"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "level + μ |gravity's torque|"
     source: ClassVar[str] = "load torque in Bittencourt and Gunnarsson (2012), J. Dyn. Sys. Meas. Control 134(5)"
     joint: int = joint_parameter()
@@ -86,7 +82,6 @@ class StribeckFriction:
     """Adds at `joint` friction `torque` at rest, which fades as the speed exceeds `speed`."""
 
     name: ClassVar[str] = "stribeck_friction"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "level + F exp(−|q̇|/v)"
     source: ClassVar[str] = "Tustin (1947), here (7.31)"
     joint: int = joint_parameter()
@@ -106,7 +101,6 @@ class Stiction:
     """
 
     name: ClassVar[str] = "stiction"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "dF/dt = σ (q̇ − |q̇| F/g(q̇)), g = B exp(−(q̇/v)²)"
     source: ClassVar[str] = "Canudas de Wit et al. (1995), IEEE Trans. Automatic Control 40(3)"
     joint: int = joint_parameter()
@@ -137,7 +131,6 @@ class DirectionDependentFriction:
     """Adds at `joint` |`torque`| of Coulomb friction in one direction only: that of the sign of `torque`."""
 
     name: ClassVar[str] = "direction_dependent_friction"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "level + |D| in the direction of D only, through a bristle of its own"
     source: ClassVar[str] = "Armstrong-Hélouvry (1991), Control of Machines with Friction"
     joint: int = joint_parameter()
@@ -159,7 +152,6 @@ class DirectionDependentViscousFriction:
     """Adds at `joint` |`coefficient`| of viscous friction in one direction only: that of the sign of `coefficient`."""
 
     name: ClassVar[str] = "direction_dependent_viscous_friction"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "torque = −|c| q̇ in the direction of c only"
     source: ClassVar[str] = "Canudas de Wit, Åström and Braun (1987), IEEE J. Robotics and Automation 3(6)"
     joint: int = joint_parameter()

@@ -16,7 +16,6 @@ class Payload:
     """Adds `mass` to MLOAD, its centre `offset` beyond the wrist along the hand."""
 
     name: ClassVar[str] = "payload"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "MLOAD → MLOAD + m, centre moved to the common one"
     source: ClassVar[str] = "rigid body"
     mass: float = parameter(-1.0, 5.0, unit="kg", null=0.0)
@@ -34,7 +33,6 @@ class LinkMass:
     """Link `joint` is heavier by `mass`, distributed like its own mass."""
 
     name: ClassVar[str] = "link_mass"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "m_i → m_i + Δm"
     source: ClassVar[str] = "rigid body"
     joint: int = joint_parameter(3)
@@ -50,7 +48,6 @@ class CentreOfMass:
     """The centre of mass of link `joint` (2 or 3) lies `shift` further out along the link."""
 
     name: ClassVar[str] = "centre_of_mass"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "a/2 → a/2 + s, inertia about the centre unchanged"
     source: ClassVar[str] = "rigid body, parallel axes"
     joint: int = joint_parameter(3, low=2)
@@ -66,7 +63,6 @@ class BaseTilt:
     """The base is tilted: gravity is turned by `about_x`, then by `about_y`, of the base's axes."""
 
     name: ClassVar[str] = "base_tilt"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "g → R_y R_x g"
     source: ClassVar[str] = "rotation of the base frame"
     about_x: float = parameter(-0.5, 0.5, default=0.0, unit="rad", null=0.0)
@@ -85,7 +81,6 @@ class SpringTorque:
     """A spring or cable of `stiffness` pulls `joint` towards `neutral`."""
 
     name: ClassVar[str] = "spring_torque"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "torque = −k (q − q₀)"
     source: ClassVar[str] = "linear spring"
     joint: int = joint_parameter()
@@ -101,7 +96,6 @@ class OneSidedSpring:
     """A cable of |`stiffness`| pulls `joint` back to `slack` from beyond it, or, if negative, from before it."""
 
     name: ClassVar[str] = "one_sided_spring"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "torque = −|k| (q − q₀) on the side of q₀ that k's sign says, else 0"
     source: ClassVar[str] = "a cable that hangs slack on one side"
     joint: int = joint_parameter()
@@ -120,7 +114,6 @@ class ConstantTorque:
     """A preload turns `joint` with `torque`, at any angle."""
 
     name: ClassVar[str] = "constant_torque"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "torque + T"
     source: ClassVar[str] = "a preload"
     joint: int = joint_parameter()
@@ -135,7 +128,6 @@ class PeriodicDisturbance:
     """Something outside pushes `joint` with `amplitude` at `frequency`, whatever the arm does."""
 
     name: ClassVar[str] = "periodic_disturbance"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "torque + A sin(2π f t + φ)"
     source: ClassVar[str] = "an unbalanced machine on the same bench"
     joint: int = joint_parameter()

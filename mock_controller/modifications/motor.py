@@ -17,11 +17,9 @@ _COPPER_PER_KELVIN = 0.0039
 @dataclass
 class WeakenedMagnet:
     """The magnet of `joint`'s motor has lost a share of its flux: less torque per ampere, and less back-EMF per
-    turn.
-    """
+    turn."""
 
     name: ClassVar[str] = "weakened_magnet"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "Φ → (1 − f) Φ: K_T and K_b are both in proportion to Φ"
     source: ClassVar[str] = "demagnetisation by heat or by a stalled motor's current; data sheets of DC motors"
     joint: int = joint_parameter()
@@ -42,7 +40,6 @@ class MotorInductance:
     """The winding of `joint`'s motor has `inductance`: the current follows the voltage with L/R."""
 
     name: ClassVar[str] = "motor_inductance"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "L di/dt = u − R i − K_b ω, advanced by its exact exponential"
     source: ClassVar[str] = "third-order motor, chapter 3"
     joint: int = joint_parameter()
@@ -62,7 +59,6 @@ class ResistanceDrift:
     """
 
     name: ClassVar[str] = "resistance_drift"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "τ dT/dt = θ R i² − T, R = R₀ (1 + α T)"
     source: ClassVar[str] = "first-order thermal model of motor data sheets; α of copper"
     joint: int = joint_parameter()
@@ -103,7 +99,6 @@ class ResistanceRise:
     """
 
     name: ClassVar[str] = "resistance_rise"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "R = R₀ (1 + r (1 − exp(−t/τ))), whatever the current"
     source: ClassVar[str] = "a housing that a neighbour warms, of one thermal mass"
     joint: int = joint_parameter()

@@ -1,7 +1,7 @@
 """Finds modifications by name, and checks their parameters.
 
-A modification class is a dataclass; its fields are its parameters. It also states its `name`, whether that name is
-`shared` with those who diagnose, one `line` of physics, and its `source`.
+A modification class is a dataclass; its fields are its parameters. It also states its `name`, one `line` of physics,
+and its `source`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import cache
 from typing import Any
 
 from mock_controller.modification import Modification
-from mock_controller.modifications.library import LIBRARY
+from mock_controller.modifications.library import LIBRARY, SHARED
 from mock_controller.modifications.parameter import fields_of
 
 
@@ -25,6 +25,11 @@ class ModificationError(ValueError):
 def known_modifications() -> Mapping[str, type[Any]]:
     """Returns every modification class of the library by its name."""
     return {kind.name: kind for kind in LIBRARY}
+
+
+def is_shared(name: str) -> bool:
+    """Whether those who diagnose know this name too."""
+    return known_modifications()[name] in SHARED
 
 
 def build_modification(name: str, values: Mapping[str, object]) -> Modification:
@@ -61,7 +66,7 @@ def table() -> str:
     """Returns all modifications with their parameters, for people."""
     lines = []
     for name, kind in known_modifications().items():
-        lines.append(f"{name}{'' if kind.shared else '  (not in the shared list)'}: {kind.line}")
+        lines.append(f"{name}{'' if is_shared(name) else '  (not in the shared list)'}: {kind.line}")
         for key, field in fields_of(kind).items():
             facts = field.metadata
             null = "" if facts["null"] is None else f", absent at {facts['null']:g}"

@@ -15,7 +15,6 @@ class PotentiometerGain:
     """`joint`'s reading is too large by the share `error` of its distance from the middle of the range."""
 
     name: ClassVar[str] = "potentiometer_gain"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "shown = mid + (1 + e)(q − mid)"
     source: ClassVar[str] = "reference voltage, trimmed at posture 500"
     joint: int = joint_parameter()
@@ -34,7 +33,6 @@ class PotentiometerOffset:
     """`joint`'s reading is too large by `angle`."""
 
     name: ClassVar[str] = "potentiometer_offset"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "shown = q + o"
     source: ClassVar[str] = "wiper turned on its shaft"
     joint: int = joint_parameter()
@@ -53,7 +51,6 @@ class PotentiometerNonlinearity:
     """
 
     name: ClassVar[str] = "potentiometer_nonlinearity"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "shown x/(1 + k x(1 − x)); fed from the other end where k < 0"
     source: ClassVar[str] = "voltage divider with a loaded wiper"
     joint: int = joint_parameter()
@@ -75,7 +72,6 @@ class PotentiometerZeroDrift:
     """`joint`'s reading drifts by `drift` as the track warms, with `time_constant`, from power-up on."""
 
     name: ClassVar[str] = "potentiometer_zero_drift"
-    shared: ClassVar[bool] = False
     line: ClassVar[str] = "shown = q + d (1 − exp(−t/τ))"
     source: ClassVar[str] = "warming of the electronics after power-up"
     joint: int = joint_parameter()
@@ -100,7 +96,6 @@ class ConverterBitWeight:
     """Bit `bit` of `joint`'s converter weighs `error` counts too much: the reading jumps at its edges."""
 
     name: ClassVar[str] = "converter_bit_weight"
-    shared: ClassVar[bool] = False
     line: ClassVar[str] = "reading + ε where bit b is set"
     source: ClassVar[str] = "integral nonlinearity of a successive-approximation converter"
     joint: int = joint_parameter()
@@ -116,7 +111,6 @@ class StuckConverterBit:
     """Bit `bit` of `joint`'s converter always reads 0 (`level` 0) or 1 (`level` 1). It has no size."""
 
     name: ClassVar[str] = "stuck_converter_bit"
-    shared: ClassVar[bool] = False
     line: ClassVar[str] = "bit b of the reading is stuck"
     source: ClassVar[str] = "a broken output latch"
     joint: int = joint_parameter()

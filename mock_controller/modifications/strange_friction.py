@@ -16,7 +16,6 @@ class TightSpot:
     """Adds at `joint` viscous friction `coefficient` around the angle `centre`, within about ±`width`."""
 
     name: ClassVar[str] = "tight_spot"
-    shared: ClassVar[bool] = False
     line: ClassVar[str] = "torque = −c q̇ exp(−½((q − q₀)/w)²)"
     source: ClassVar[str] = "a bent shaft or a damaged tooth"
     joint: int = joint_parameter()
@@ -34,7 +33,6 @@ class QuadraticDrag:
     """Adds at `joint` friction that rises with the square of speed."""
 
     name: ClassVar[str] = "quadratic_drag"
-    shared: ClassVar[bool] = False
     line: ClassVar[str] = "torque = −c q̇ |q̇|"
     source: ClassVar[str] = "churning of grease or a fan"
     joint: int = joint_parameter()
@@ -49,7 +47,6 @@ class CableHysteresis:
     """A bundle of cables at `joint` that gives way over `reach`: elastic at first, then dragging with `torque`."""
 
     name: ClassVar[str] = "cable_hysteresis"
-    shared: ClassVar[bool] = False
     line: ClassVar[str] = "torque = −T z, dz/dq = (1 − z sign q̇)/r with r of degrees"
     source: ClassVar[str] = "rate-independent hysteresis (Bouc–Wen with n = 1)"
     joint: int = joint_parameter()
@@ -75,7 +72,6 @@ class AgeingFriction:
     """
 
     name: ClassVar[str] = "ageing_friction"
-    shared: ClassVar[bool] = False
     line: ClassVar[str] = "level + T ln(1 + a/a₀), da/dt = 1 − |q̇| a/D"
     source: ClassVar[str] = "Dieterich (1979), Ruina (1983): rate-and-state friction"
     joint: int = joint_parameter()

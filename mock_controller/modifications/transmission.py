@@ -17,7 +17,6 @@ class Backlash:
     """`joint`'s gear has free `play` (full width) between teeth of `stiffness` and `damping`."""
 
     name: ClassVar[str] = "backlash"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "rotor and link apart; torque only beyond ± half the play, and teeth only push"
     source: ClassVar[str] = "dead-band spring with contact damping (Nordin and Gutman 2002, Automatica 38)"
     joint: int = joint_parameter()
@@ -34,7 +33,6 @@ class JointCompliance:
     """A spring of 1/`compliance` between `joint`'s rotor and link, with `damping`."""
 
     name: ClassVar[str] = "joint_compliance"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "torque = (θ_rotor − θ_link)/κ + d (rates)"
     source: ClassVar[str] = "elastic joint, Spong (1987), J. Dyn. Sys. Meas. Control 109"
     joint: int = joint_parameter()
@@ -50,7 +48,6 @@ class TorqueRipple:
     """At `joint` a torque of `amplitude`, `periods` times per joint turn."""
 
     name: ClassVar[str] = "torque_ripple"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "torque + A sin(N q + φ)"
     source: ClassVar[str] = "meshing error of the last gear stages (6 to 12 pinion turns per joint turn)"
     joint: int = joint_parameter()
@@ -67,7 +64,6 @@ class DetentCogging:
     """At `joint` a torque locked to the pinion, sharp like a detent: four harmonics of `periods` per joint turn."""
 
     name: ClassVar[str] = "detent_cogging"
-    shared: ClassVar[bool] = False
     line: ClassVar[str] = "torque + A Σ_{k=1..4} sin(k N q)/√k / 1.6"
     source: ClassVar[str] = "slot harmonics of a cogging torque"
     joint: int = joint_parameter()
@@ -87,7 +83,6 @@ class GearLoss:
     """
 
     name: ClassVar[str] = "gear_loss"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "level + η |torque through the gear|"
     source: ClassVar[str] = "tooth friction in proportion to tooth load"
     joint: int = joint_parameter()
@@ -116,7 +111,6 @@ class DirectionDependentGearLoss:
     """
 
     name: ClassVar[str] = "direction_dependent_gear_loss"
-    shared: ClassVar[bool] = True
     line: ClassVar[str] = "|Δ| |torque through the gear| against the motion, only where power flows as Δ's sign says"
     source: ClassVar[str] = "load-dependent friction of four quadrants, Hamon, Gautier and Garrec (2010), IROS"
     joint: int = joint_parameter()

@@ -200,8 +200,7 @@ class Plant:
 
     def place(self, angles: Sequence[float], duration_us: int) -> None:
         """Puts the arm at rest at six angles (rad) after `duration_us`, during which something else held and moved
-        it.
-        """
+        it."""
         self._q[:] = angles
         self._v[:] = 0.0
         self._bristle = [0.0] * JOINTS
@@ -228,8 +227,7 @@ class Plant:
 
     def _step_modified(self, asked: list[float]) -> None:
         """Does one step with everything that a modification or an inductance may add; `asked` are the amplifiers'
-        volts.
-        """
+        volts."""
         v: list[float] = self._v.tolist()
         q: list[float] = self._q.tolist()
         time_s = self.time_us * 1e-6
@@ -296,8 +294,7 @@ class Plant:
 
     def _free_rotors(self) -> dict[int, FreeRotor]:
         """Returns rotors that a modification has separated from their links, by index; their inertia leaves the rigid
-        body.
-        """
+        body."""
         rotors: dict[int, FreeRotor] = {}
         for change in of_kind(self._modifications, ChangesTransmission):
             index = _index(change.joint)

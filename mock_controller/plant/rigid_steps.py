@@ -19,8 +19,7 @@ _SIX = struct.Struct("6d")
 
 class RigidSteps:
     """One arm. `half_damping` (N·m·s/rad) is the half of each joint's damping that is applied as a force;
-    `presliding_rate` (rad/s) covers the presliding displacement in one step.
-    """
+    `presliding_rate` (rad/s) covers the presliding displacement in one step."""
 
     def __init__(
         self,

@@ -43,8 +43,7 @@ class FreeRotor:
 
     def advance(self, drive_torque: float, link_angle: float, link_rate: float, step_s: float) -> float:
         """Does one step under `drive_torque` (N·m, back-EMF and viscous friction excluded); returns the torque on the
-        link.
-        """
+        link."""
         coupling = self.transmission.torque(self.angle - link_angle, self.rate - link_rate)
         accelerating = drive_torque - self._damping * self.rate - coupling
         self.rate += step_s * accelerating / (self._inertia + 0.5 * step_s * self._damping)

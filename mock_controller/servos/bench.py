@@ -7,13 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from firmware_protocol.dynamixel.control_table import COUNTS_A_TURN, HardwareError, Table
-from firmware_protocol.dynamixel.instructions import (
-    Instruction,
-    StatusError,
-    areas_read,
-    areas_written,
-    status,
-)
+from firmware_protocol.dynamixel.instructions import Instruction, StatusError, areas_read, areas_written, status
 from firmware_protocol.dynamixel.packets import BROADCAST, STATUS, Packet, PacketDecoder, encode
 from firmware_protocol.errors import ProtocolError
 from mock_controller.servos.plant import STEP_US, Head, Motor, PanTilt

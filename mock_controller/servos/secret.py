@@ -52,8 +52,7 @@ class Secret:
 
     def torque(self, joint: int, angle: float, speed: float) -> float:
         """Returns the torque at a joint (from 0) that the healthy bench lacks, N·m; `angle` from its first posture,
-        rad.
-        """
+        rad."""
         return -self._at("viscous_friction", joint) * speed - self._at("spring_torque", joint) * angle
 
     def friction(self, joint: int, speed: float) -> float:

@@ -1,6 +1,5 @@
 """Computes the base parameters of a machine by QR of a regressor at random admissible postures, and which of them
-records determine.
-"""
+records determine."""
 
 from __future__ import annotations
 
@@ -93,8 +92,7 @@ def base_parameters(model: Model, traces: Sequence[Trace] = (), *, seed: int = 0
 
 def regressor(chain: ChainArrays, standards: Sequence[Standard], motion: Motion) -> Floats:
     """Returns columns (k, n, p) of joint torques by standard parameters: all of `link_parameters`, then some of
-    joints.
-    """
+    joints."""
     links = 10 * len(chain.geometry)
     return np.concatenate((inertial_regressor(chain, motion), joint_regressor(standards[links:], motion)), axis=2)
 

@@ -1,6 +1,5 @@
 """Determines which base parameters records determine: their columns along the recorded motion, weighted by the residual
-torque.
-"""
+torque."""
 
 from __future__ import annotations
 
@@ -27,14 +26,12 @@ from model.simulation.chain_of_model import chain_of
 
 TOLD = 0.1
 """Largest deviation of a base parameter that counts as determined, as a share of its size. The size is the largest
-value of its unit at its joint, so that a moment of zero can be determined to be zero.
-"""
+value of its unit at its joint, so that a moment of zero can be determined to be zero."""
 STANDS = 10.0
 """Counts of its sensor that a joint must move in a record for its torques to contain information on its friction."""
 LEAST_LEFT = 1e-6
 """Least residual torque used as a weight of a record, as a share of its torque: a record without noise leaves almost
-none.
-"""
+none."""
 
 
 def excitation_of(

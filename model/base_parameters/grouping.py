@@ -18,8 +18,7 @@ from model.base_parameters.standard import Standard
 
 DEPENDENT = 1e-7
 """Largest part of a column outside the span of others, as a share of the column, that counts as rounding. Published
-geometry is itself rounded: π as 3.1416 is 7e-6 off.
-"""
+geometry is itself rounded: π as 3.1416 is 7e-6 off."""
 ZERO = 1e-9
 """Largest coefficient of a dependent column, in columns scaled to one size, that counts as zero."""
 _FIRST, _LAST = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY"), ("YY", "MZ", "m")

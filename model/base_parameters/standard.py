@@ -96,8 +96,7 @@ def joint_parameters(model: Model) -> tuple[Standard, ...]:
 
 def inertial_regressor(chain: ChainArrays, motion: Motion) -> Floats:
     """Returns columns (k, n, 10 n) of joint torques by the links' inertial parameters, in the order of
-    `link_parameters`.
-    """
+    `link_parameters`."""
     joints = chain.geometry.shape[0]
     columns = np.empty((*motion.position.shape, 10 * joints))
     rest = np.zeros(joints)
@@ -118,8 +117,7 @@ def inertial_regressor(chain: ChainArrays, motion: Motion) -> Floats:
 
 def to_link_frame(chain: ChainArrays, link: int) -> Floats:
     """Returns (10, 10) from inertial parameters about the joint's own axis to those about the origin of the link's
-    frame.
-    """
+    frame."""
     return np.stack([_moved(chain, link, unit, to_axis=False) for unit in np.eye(10)], axis=1)
 
 

@@ -7,17 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from daq.contracts.experiment import (
-    Cubic,
-    ExperimentSpec,
-    Gain,
-    Multisine,
-    Pause,
-    Ramp,
-    Segment,
-    Sequence,
-    SlowRamp,
-)
+from daq.contracts.experiment import Cubic, ExperimentSpec, Gain, Multisine, Pause, Ramp, Segment, Sequence, SlowRamp
 from daq.contracts.machine import BoardPid, Machine
 
 MARGIN = math.radians(5.0)
@@ -64,8 +54,7 @@ def _start(rng: np.random.Generator, machine: Machine) -> dict[int, float]:
 
 def _gains(rng: np.random.Generator, machine: Machine) -> dict[int, Gain]:
     """Returns the machine's own gains, with P one step lower or higher on some joints, so that gain and load can be
-    distinguished.
-    """
+    distinguished."""
     if not isinstance(machine.controller, BoardPid):
         return {}
     gains = {}

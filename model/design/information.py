@@ -39,8 +39,7 @@ planning belongs to `daq`.
 
 FOLLOWING_SHARE = 0.6
 """Largest following error of a design, as a share of the error at which set points pause. It leaves a margin for a real
-arm that is slower than the model.
-"""
+arm that is slower than the model."""
 
 
 class ParameterGain(FrozenRecord):
@@ -107,8 +106,7 @@ def log_det(information: Floats) -> float:
 
 def prior_information(unknowns: Sequence[Unknown]) -> Floats:
     """Returns (p, p) information of the priors in natural sizes; without a stated deviation, that of 100 natural
-    sizes.
-    """
+    sizes."""
     precision = prior_precision(tuple(unknowns)) * scales(tuple(unknowns)) ** 2
     return np.diag(np.maximum(precision, 1e-4))
 

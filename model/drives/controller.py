@@ -74,8 +74,7 @@ def sampled_pid(error: complex, period: complex, gains: NDArray[Any], memory: ND
 @compiled_borrowing
 def cascade(error: complex, speed: complex, period: complex, gains: NDArray[Any], memory: NDArray[Any]) -> Any:
     """Returns the drive of a cascade in SI units: an outer PID on position gives a speed set point for an inner PID on
-    speed.
-    """
+    speed."""
     inner_error = sampled_pid(error, period, gains, memory) - speed
     memory[INNER_SUM] += inner_error * period
     slope = (inner_error - memory[LAST_INNER_ERROR]) / period

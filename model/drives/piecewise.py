@@ -9,8 +9,7 @@ from model.dynamics.wide_numbers import where, whole
 
 EDGE = 0.1
 """Width of the edge that replaces a jump in derivatives, in thresholds. It is wide enough for a record to have samples
-within it: a drive that swings evenly by ten thresholds has one in a hundred there.
-"""
+within it: a drive that swings evenly by ten thresholds has one in a hundred there."""
 
 
 @inlined

@@ -90,6 +90,19 @@ class EffectParameter:
         return evaluate_size(chosen, scale)
 
 
+def torque_parameter(name: str, column: int, *, only_against: bool = False) -> EffectParameter:
+    """Returns a torque of up to the drive's strongest, in both directions or `only_against` the motion. On a machine
+    that has it, 2 % of the rated torque are expected."""
+    return EffectParameter(
+        name,
+        column,
+        "N·m",
+        low=0.0 if only_against else lambda s: -s.strongest,
+        high=lambda s: s.strongest,
+        deviation=lambda s: 0.02 * s.torque,
+    )
+
+
 class Tone(StrEnum):
     """Whether a sinusoidal torque repeats over position or time; the value is the name of its rate parameter."""
 

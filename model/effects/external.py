@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from model import layout as at
-from model.effects.effect import Effect, EffectParameter, Tone
+from model.effects.effect import Effect, EffectParameter, Tone, torque_parameter
 
 EXTERNAL = (
     Effect(
@@ -42,16 +42,7 @@ EXTERNAL = (
         "constant_torque",
         physics="τ = T",
         source="a preload, a counterweight on an axis that stays level, or an offset of a current or torque sensor",
-        parameters=(
-            EffectParameter(
-                "torque",
-                at.CONSTANT_TORQUE,
-                "N·m",
-                low=lambda s: -s.strongest,
-                high=lambda s: s.strongest,
-                deviation=lambda s: 0.02 * s.torque,
-            ),
-        ),
+        parameters=(torque_parameter("torque", at.CONSTANT_TORQUE),),
     ),
     # Its phase counts from the start of a record, so each record needs a phase of its own. Held-out records get one
     # (`model.discrepancy.output_error.holdout`). Records that are fitted together share one, which is exact only for a
@@ -62,22 +53,8 @@ EXTERNAL = (
         source="harmonic force",
         tone=Tone.OVER_TIME,
         parameters=(
-            EffectParameter(
-                "sine",
-                at.DISTURBANCE_SINE,
-                "N·m",
-                low=lambda s: -s.strongest,
-                high=lambda s: s.strongest,
-                deviation=lambda s: 0.02 * s.torque,
-            ),
-            EffectParameter(
-                "cosine",
-                at.DISTURBANCE_COSINE,
-                "N·m",
-                low=lambda s: -s.strongest,
-                high=lambda s: s.strongest,
-                deviation=lambda s: 0.02 * s.torque,
-            ),
+            torque_parameter("sine", at.DISTURBANCE_SINE),
+            torque_parameter("cosine", at.DISTURBANCE_COSINE),
             EffectParameter(
                 "frequency",
                 at.DISTURBANCE_FREQUENCY,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from model import layout as at
-from model.effects.effect import Effect, EffectParameter, JointScale
+from model.effects.effect import Effect, EffectParameter, JointScale, torque_parameter
 
 
 def noticeable_damping(scale: JointScale) -> float:
@@ -33,11 +33,7 @@ FRICTION = (
         "coulomb_friction",
         physics="τ = −T_c z",
         source="Coulomb 1785; contact as an elastic, perfectly plastic element (Prandtl 1928)",
-        parameters=(
-            EffectParameter(
-                "torque", at.COULOMB, "N·m", low=0.0, high=lambda s: s.strongest, deviation=lambda s: 0.02 * s.torque
-            ),
-        ),
+        parameters=(torque_parameter("torque", at.COULOMB, only_against=True),),
     ),
     Effect(
         "load_dependent_friction",
@@ -56,9 +52,7 @@ FRICTION = (
         physics="τ = −F_s exp(−|q̇|/V) z: friction F_s above its value at speed, falling over V",
         source="(7.31)",
         parameters=(
-            EffectParameter(
-                "torque", at.STRIBECK, "N·m", low=0.0, high=lambda s: s.strongest, deviation=lambda s: 0.02 * s.torque
-            ),
+            torque_parameter("torque", at.STRIBECK, only_against=True),
             EffectParameter(
                 "speed",
                 at.STRIBECK_SPEED,
@@ -75,32 +69,14 @@ FRICTION = (
         "stiction",
         physics="at rest the joint holds T_b above Coulomb friction, then breaks away; it sticks again when it stops",
         source="Karnopp 1985 (stick as a state of its own)",
-        parameters=(
-            EffectParameter(
-                "breakaway",
-                at.BREAKAWAY,
-                "N·m",
-                low=0.0,
-                high=lambda s: s.strongest,
-                deviation=lambda s: 0.02 * s.torque,
-            ),
-        ),
+        parameters=(torque_parameter("breakaway", at.BREAKAWAY, only_against=True),),
         flag=at.HAS_STICTION,
     ),
     Effect(
         "direction_dependent_friction",
         physics="τ = −|ΔT| z where ΔT z > 0: friction is ΔT higher forwards, or |ΔT| backwards where ΔT is negative",
         source="Armstrong-Hélouvry, Dupont, Canudas de Wit 1994, section 2.2",
-        parameters=(
-            EffectParameter(
-                "difference",
-                at.DIRECTION,
-                "N·m",
-                low=lambda s: -s.strongest,
-                high=lambda s: s.strongest,
-                deviation=lambda s: 0.02 * s.torque,
-            ),
-        ),
+        parameters=(torque_parameter("difference", at.DIRECTION),),
     ),
     Effect(
         "direction_dependent_viscous_friction",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from model import layout as at
-from model.effects.effect import Effect, EffectParameter, JointScale, Tone
+from model.effects.effect import Effect, EffectParameter, JointScale, Tone, torque_parameter
 
 CONTACT_RATE = 1500.0
 """Highest natural frequency (rad/s) of parts in contact. Steps of 1 ms can follow it (RK4 is stable up to 2785)."""
@@ -36,6 +36,16 @@ def _softest_contact(scale: JointScale) -> float:
     return contact_compliance(scale) + 10 * _noticeable_compliance(scale) if known else math.inf
 
 
+_DAMPING = EffectParameter(
+    "damping",
+    at.TRANSMISSION_DAMPING,
+    "N·m·s/rad",
+    null=None,
+    start=_damping,
+    low=0.0,
+    high=lambda s: 10 * _damping(s),
+    deviation=_damping,
+)
 TRANSMISSION = (
     Effect(
         "torque_ripple",
@@ -43,22 +53,8 @@ TRANSMISSION = (
         source="cogging of motor or gear, first harmonic",
         tone=Tone.OVER_POSITION,
         parameters=(
-            EffectParameter(
-                "sine",
-                at.RIPPLE_SINE,
-                "N·m",
-                low=lambda s: -s.strongest,
-                high=lambda s: s.strongest,
-                deviation=lambda s: 0.02 * s.torque,
-            ),
-            EffectParameter(
-                "cosine",
-                at.RIPPLE_COSINE,
-                "N·m",
-                low=lambda s: -s.strongest,
-                high=lambda s: s.strongest,
-                deviation=lambda s: 0.02 * s.torque,
-            ),
+            torque_parameter("sine", at.RIPPLE_SINE),
+            torque_parameter("cosine", at.RIPPLE_COSINE),
             EffectParameter(
                 "cycles", at.RIPPLE_CYCLES, "1", null=None, start=12.0, low=0.5, high=1000.0, deviation=6.0
             ),
@@ -85,16 +81,7 @@ TRANSMISSION = (
             EffectParameter(
                 "gap", at.GAP, "rad", low=0.0, high=lambda s: 0.1 * s.range, deviation=lambda s: 6 * s.resolution
             ),
-            EffectParameter(
-                "damping",
-                at.TRANSMISSION_DAMPING,
-                "N·m·s/rad",
-                null=None,
-                start=_damping,
-                low=0.0,
-                high=lambda s: 10 * _damping(s),
-                deviation=_damping,
-            ),
+            _DAMPING,
             EffectParameter(
                 "contact",
                 at.CONTACT_COMPLIANCE,
@@ -121,16 +108,7 @@ TRANSMISSION = (
                 high=lambda s: 0.1 * s.range / (s.torque / 20) if s.torque == s.strongest else math.inf,
                 deviation=lambda s: 6 * s.resolution / (0.05 * s.torque),
             ),
-            EffectParameter(
-                "damping",
-                at.TRANSMISSION_DAMPING,
-                "N·m·s/rad",
-                null=None,
-                start=_damping,
-                low=0.0,
-                high=lambda s: 10 * _damping(s),
-                deviation=_damping,
-            ),
+            _DAMPING,
         ),
         flag=at.HAS_FLEXIBILITY,
     ),

@@ -44,8 +44,7 @@ CUTOFF = 12.0
 """Default cutoff of the low-pass, Hz."""
 LEAST_LEFT = 1e-4
 """Least residual used for weights: in the first round a share of the drive's torque, in the last a share of the first.
-A record without noise leaves almost none.
-"""
+A record without noise leaves almost none."""
 LONGEST_MEMORY = 40
 """Most preceding samples that the whitening of residual torques uses: a low-passed residual is correlated."""
 
@@ -65,8 +64,7 @@ class TorqueError(FrozenRecord):
 
 class TorqueFit(FrozenRecord):
     """Result of a fit of torques. `in_sample` and `held_out` are √(Σ residual² / Σ torque²) over all joints and
-    samples.
-    """
+    samples."""
 
     model: Model
     parameters: tuple[FittedParameter, ...]
@@ -81,8 +79,7 @@ class TorqueFit(FrozenRecord):
     converged: bool
     at_limit: tuple[tuple[int, float], ...] = ()
     """Joints whose drives are at limits that the file does not state, with their share of the time. The missing torque
-    is estimated as well.
-    """
+    is estimated as well."""
     unknown_joints: tuple[int, ...] = ()
     """Those of them whose torque is not known in some trace for that reason."""
     on_the_edge: tuple[str, ...] = ()

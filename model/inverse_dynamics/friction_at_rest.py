@@ -14,8 +14,7 @@ from model.inverse_dynamics.smoothing import low_pass
 
 HOLDING_ROUNDS = 4
 """Rounds in which friction of a slow joint takes torque that remains below the cutoff. On a healthy rig, steps of a set
-point left 2.4 times the noise without any round, 1.8 after two, and 1.7 after four.
-"""
+point left 2.4 times the noise without any round, 1.8 after two, and 1.7 after four."""
 
 
 class RestingFriction(NamedTuple):

@@ -18,8 +18,7 @@ from model.machine_model.model import Model
 DIFFERENCE = 1e-3
 """Step of the finite differences, as a share of a parameter's natural size. With smaller steps, derivatives by
 parameters without influence are rounding errors (such as the mass of a link that only turns about itself). A fit
-without priors then ends where it began.
-"""
+without priors then ends where it began."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,5 @@
 """Signals of a trace on an even grid: their noise, the usable bandwidth of accelerations, and the residual torque due
-to noise.
-"""
+to noise."""
 
 from __future__ import annotations
 
@@ -29,8 +28,7 @@ QUIET_BAND = (0.3, 0.45)
 """Band, as a share of the sampling rate, in which a record is assumed to contain only noise."""
 APART = 5.0
 """Deviations of noise by which a reading must differ from the integral of a speed to count as independent of it. The
-integral of white noise walks; the detrended walk's root mean square is half of its end's deviation.
-"""
+integral of white noise walks; the detrended walk's root mean square is half of its end's deviation."""
 FEWEST = 32
 """Samples that a trace needs to estimate its noise."""
 POSTURES = 20

@@ -22,16 +22,14 @@ Rows = NDArray[np.int64]
 
 WIDER = 3.0
 """Cutoff of the motion's low-pass, as a multiple of that of the torques. It is wider so that reversals are still sharp
-when a direction-dependent torque is computed; the torque is then low-passed to the cutoff.
-"""
+when a direction-dependent torque is computed; the torque is then low-passed to the cutoff."""
 GRID = 10.0
 """Samples per period of the cutoff at which torques are computed."""
 KEPT = 3.0
 """Samples per period of the cutoff that are compared: closer ones are not independent."""
 EDGE = 2.0
 """Periods of the cutoff that are left out at both ends, where the low-pass lacks samples on one side. The influence of
-a jerk at the first sample is 0.1 N·m after one period, on an arm with noise of 0.005, and within noise after two.
-"""
+a jerk at the first sample is 0.1 N·m after one period, on an arm with noise of 0.005, and within noise after two."""
 PIECE = 0.25
 """Longest piece of a drive at an unknown limit that gets one unknown torque, in periods of the cutoff."""
 LEAST_SHAPE = 1e-3
@@ -118,16 +116,14 @@ class RecordedMotion:
     @property
     def unknown_count(self) -> Rows:
         """(n,) dimensions of a joint's compared torques that `subtract_unknown` removes; so many samples fewer are
-        known.
-        """
+        known."""
         sizes = zip(self._unknown_drives, self.moving.sum(axis=0), strict=True)
         return np.array([moving if basis is None else basis.shape[1] for basis, moving in sizes], dtype=np.int64)
 
     @cached_property
     def _unknown_drives(self) -> list[Floats | None]:
         """By joint, an orthonormal basis (moving, p) of the torques of `subtract_unknown`; None with too many
-        pieces.
-        """
+        pieces."""
         found: list[Floats | None] = []
         wide, longest = _wide(self.cutoff, self.sampled), max(1, round(PIECE / self.cutoff / self.sampled))
         for j, moving in enumerate(self.moving.T):
@@ -291,8 +287,7 @@ def recorded_motion(trace: Trace, machine: Machine, cutoff: float) -> RecordedMo
 
 def turns_round(records: Sequence[RecordedMotion], machine: Machine) -> Mask:
     """Returns joints (n,) that turn by more than a whole turn in any record; a turn brings them back to the same
-    place.
-    """
+    place."""
     revolute = np.array([machine.joint(j).kind == "revolute" for j in machine.modelled_joints])
     return revolute & np.any([np.ptp(r.position, axis=0) > 2 * np.pi for r in records], axis=0)
 

@@ -25,8 +25,7 @@ from model.machine_model.parameter import Parameter
 
 STRONGEST = 10.0
 """Largest torque of a drive, in root mean squares of the recorded one. Effects are expected to reach a few hundredths
-of the largest torque, so friction becomes a fifth of the torque in the record.
-"""
+of the largest torque, so friction becomes a fifth of the torque in the record."""
 
 
 def recorded_sizes(model: Model, motions: Sequence[RecordedMotion]) -> dict[str, Parameter]:

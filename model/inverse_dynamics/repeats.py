@@ -22,16 +22,14 @@ from model.machine_model.model import Model
 
 LEAST_OF_TORQUE = 1e-3
 """Least noise of a residual, as a share of the drive's torque: no law of a gear, magnet or scale is more exact. On a
-healthy rig with 20 bits, gears appeared to lose 0.09 % of it.
-"""
+healthy rig with 20 bits, gears appeared to lose 0.09 % of it."""
 APART = 1.0
 """Least time between two passages, s: closer samples are the same passage."""
 NEIGHBOURS = 60
 """Number of neighbours among which another passage is searched."""
 ALIKE = 0.05
 """Distance of two motions that count as the same, in standard deviations of position, speed and acceleration (root mean
-square over joints). Within that distance, a torque that follows from the motion hardly changes.
-"""
+square over joints). Within that distance, a torque that follows from the motion hardly changes."""
 FEWEST = 100
 """Number of samples that must recur for an estimate."""
 

@@ -15,8 +15,7 @@ from model.inverse_dynamics.readings import QUIET_BAND, Readings, readings_of
 
 ABOVE = 3.0
 """Least ratio of acceleration above the cutoff to that below, for a joint that vibrates. Steps of a stiff loop give
-0.6.
-"""
+0.6."""
 BEYOND_NOISE = 3.0
 """Least ratio of the same to the acceleration's noise."""
 

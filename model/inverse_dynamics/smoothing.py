@@ -60,8 +60,7 @@ def derivative(signal: Floats, period: float) -> Floats:
 @lru_cache(maxsize=64)
 def _gain(share: float, count: int) -> Floats:
     """Returns the gain of both passes at the frequencies of `count` samples, for a cutoff relative to half their
-    rate.
-    """
+    rate."""
     sections = butter(ORDER, share, output="sos")
     _, response = sosfreqz(sections, 2 * np.pi * np.arange(count // 2 + 1) / count)
     return np.asarray(np.abs(response) ** 2)

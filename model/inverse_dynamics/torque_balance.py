@@ -38,8 +38,7 @@ NOT_IN_TORQUES = {
 DIFFERENCE = 1e-6
 """Step of the finite differences, as a share of a parameter's natural size: torques are smooth or piecewise linear. A
 step of a thousandth moved reversals across a corner of the friction, at other samples for each parameter. Masses that
-cancel each other then no longer did, and a fit could not move along their direction.
-"""
+cancel each other then no longer did, and a fit could not move along their direction."""
 CONTACT_SHARE = 0.02
 """Torque through a transmission within which backlash changes sides, as a share of the torque's root mean square."""
 THRESHOLD = "amplifier_threshold"
@@ -133,8 +132,7 @@ class TorqueBalance:
 
     def told_per_torque(self, values: Mapping[str, float]) -> Floats:
         """Returns the residual (n,) per unit of torque at each joint: not 1 if the motor's parameters differ from the
-        file's.
-        """
+        file's."""
         return self._told_per_torque(_joints_of(self._vector(values), self.model))
 
     def slope(self, values: Mapping[str, float], residual: Sequence[Floats], unknown: Unknown) -> list[Floats]:
@@ -157,8 +155,7 @@ class TorqueBalance:
 
     def supplied_by_drive(self) -> list[Floats]:
         """Returns the torque of the drive alone (m, n), as recorded, of motors at standstill; residuals are given as
-        its share.
-        """
+        its share."""
         return [record.compared(record.drive * self._stated_gain) for record in self.records]
 
     def _told_per_torque(self, joints: Floats) -> Floats:
@@ -225,8 +222,7 @@ class TorqueBalance:
         self, driven: kernel.DrivenMotion, acceleration: Floats, needed: Floats, joints: Floats
     ) -> tuple[Floats, Floats]:
         """Returns the motors' torque that the motion needs − the torque applied (k, n), and the relative rise (k, n) of
-        their windings' resistance.
-        """
+        their windings' resistance."""
         flags, speed, time = self.model.flags, driven.speed, driven.time
         numbers = kernel.JointNumbers(joints, flags, self._own)
         motor, other, rise = (np.empty_like(needed) for _ in range(3))
@@ -293,8 +289,7 @@ def _before_losses(asked: Floats, contact: Floats, joints: Floats) -> Floats:
 
 def _lost_in_dead_zone(asked: Floats, speed: Floats, joints: Floats) -> Floats:
     """Returns the torque (k, n) that the amplifier's dead zone removes, with the sign of the volts that the motor
-    needs.
-    """
+    needs."""
     width = joints[:, at.DEAD_ZONE]
     if not width.any():
         return np.zeros_like(asked)

@@ -65,8 +65,7 @@ def _unit_on(joint: Joint, unit: str) -> str:
 
 def suits_drive(machine: Machine, name: str, joint: int) -> bool:
     """Whether the file describes what the effect changes: winding and magnet exist only in a DC motor driven by
-    volts.
-    """
+    volts."""
     kind = effect(name)
     of_motor = kind.file is None and kind.shared_name.family == "motor"
     return not of_motor or isinstance(machine.joint(joint).drive, DcMotor)

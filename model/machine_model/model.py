@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    Field,
-    FiniteFloat,
-    SerializerFunctionWrapHandler,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Field, FiniteFloat, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from daq.contracts.documents import shown
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine, load_machine
+from daq.contracts.service.jobs import EffectChoice
 from model import layout as at
 from model.effects.effect import EffectFile, Tone
 from model.effects.library import effect, effect_from
@@ -206,10 +201,18 @@ class Model(FrozenRecord):
             chosen.update(dict.fromkeys(matching, value))
         return wider.with_values(chosen) if chosen else wider
 
+    def with_effects(self, choices: Iterable[EffectChoice]) -> Model:
+        """Returns the model with more effects; one without joints acts on all possible ones. Raises SpecError."""
+        model = self
+        for choice in choices:
+            found = effect(choice.name)
+            every = tuple(j for j in self.machine.modelled_joints if not found.joints or j in found.joints)
+            model = model.with_effect(choice.name, () if found.whole_machine else choice.joints or every)
+        return model
+
     def without_effect(self, name: str, joints: tuple[int, ...] | None = None) -> Model:
         """Returns the model without an effect, on the given joints or anywhere. Raises SpecError if it lacks the
-        effect.
-        """
+        effect."""
         uses = [u for u in self.effects if u.name == name and (joints is None or set(u.joints) & set(joints))]
         if not uses:
             raise SpecError(

@@ -283,8 +283,7 @@ def _radius(joint: Joint) -> float:
 
 def _transmission_inertia(machine: Machine, number: int) -> float:
     """Returns the inertia of rotor and link in series (kg·m²), with the link's least inertia: its own bodies, the arm
-    folded.
-    """
+    folded."""
     joint = machine.joint(number)
     link = joint.link
     own = link.mass.value

@@ -78,8 +78,7 @@ class Parameter:
     @property
     def initial(self) -> tuple[int, int] | None:
         """Its place in an initial state (n, 2): row of the joint, column 0 for position and 1 for velocity. None for a
-        parameter of the model itself.
-        """
+        parameter of the model itself."""
         if self.kind is Kind.INITIAL_POSITION:
             return self.joints[0] - 1, 0
         if self.kind is Kind.INITIAL_VELOCITY:
@@ -100,15 +99,13 @@ class Parameter:
     @property
     def sets_torque_scale(self) -> bool:
         """Whether it is a data-sheet value that fixes the scale of all torques, which motion alone does not
-        determine.
-        """
+        determine."""
         return self.kind is Kind.DRIVE and self.part in ("torque_constant", "resistance", "gain", "gear_ratio")
 
 
 def initial_position(joint: int, trace: int | None = None) -> Parameter:
     """Returns the distance of a joint's start from its first reading, rad. `trace`: number (from 1) of its only
-    trace.
-    """
+    trace."""
     return _initial(Kind.INITIAL_POSITION, "position", "rad", joint, trace)
 
 

@@ -14,8 +14,7 @@ from model.machine_model.model import Lineage, Model
 
 LEAST_SHARE = 0.25
 """Least share of an expected deviation that remains after an earlier fit: other records are of another day, with warmer
-gears and another mounting, and the fitted model is not exact. An assumption.
-"""
+gears and another mounting, and the fitted model is not exact. An assumption."""
 
 
 class Estimate(FrozenRecord):

@@ -14,8 +14,7 @@ FAR_OFF = 4.0
 """Number of stated deviations beyond which a parameter counts as different from the file's."""
 MORE_THAN_NOISE = 0.3
 """Excess variance of a joint's error, relative to its noise, above which something is missing: a nearly right law
-leaves less. Chosen on tuning arms, none of which is used to report rates.
-"""
+leaves less. Chosen on tuning arms, none of which is used to report rates."""
 SCATTER = 4.0
 """Standard deviations of an estimated variance, within which it may exceed its noise by chance."""
 
@@ -23,8 +22,7 @@ SCATTER = 4.0
 class JointLeft(FrozenRecord):
     """Residual of a model on one joint's records, in `unit`. `rms`: root mean square of the residual; `noise`: that of
     records that the model itself makes; `there`: of the recorded torque, or of the recorded motion about its mean (None
-    if that hardly exceeds noise of the readings).
-    """
+    if that hardly exceeds noise of the readings)."""
 
     joint: int
     unit: str
@@ -45,8 +43,7 @@ class JointLeft(FrozenRecord):
 
 class FarNumber(FrozenRecord):
     """A parameter of the model at least 4 stated deviations from the machine file. `value`: of the model; `stated`,
-    `deviation`: of the file; all in `unit`.
-    """
+    `deviation`: of the file; all in `unit`."""
 
     name: str
     unit: str

@@ -30,36 +30,31 @@ NOISE_SHARE = 0.1
 """Most noise of an acceleration, as a share of its root mean square."""
 SLOWER = 3
 """Factor on the least smoothing that noise allows: flexible gears and backlash vibrate faster than a rigid arm
-moves.
-"""
+moves."""
 MOST_ROWS = 4000
 """Samples of a record that are balanced: enough for factors of two."""
 UNLIKE = 0.5
 """Share of the torque (root mean squares) that remains, above which drive and motion may not agree. Some rigs with
-hidden effects leave as much, but no other unit or column explains their records.
-"""
+hidden effects leave as much, but no other unit or column explains their records."""
 EXPLAINS = 0.25
 """Largest share of that mean square that may remain with another unit, sign or column for that to be the reason."""
 CLEAR = 5.0
 """Number of deviations at which an estimate is significant, whatever the correlation of its noise."""
 MOST_BEHIND = 1 / 8
 """Longest delay that is estimated, in widths of the smoothing. The fastest motion that passes it turns by 1 rad in that
-time; the linear estimate of a delay is then wrong by a sixth.
-"""
+time; the linear estimate of a delay is then wrong by a sixth."""
 MOST_FRICTION = 5.0
 """Largest ratio of the drive's torque to that of weight and inertia: healthy rigs have up to 4.6."""
 TURNED = 0.75
 """Least share of twice the torque of gravity in the remaining torque for gravity to count as reversed. A balance spring
-that carries the whole arm gives 0.5.
-"""
+that carries the whole arm gives 0.5."""
 LEAST_REMOVED = 0.5
 """Least share of the mean square that reversing gravity must remove."""
 LEAST_TORQUE = 0.1
 """Least torque of gravity on any joint, as a share of the drive's, from which records show its direction."""
 OUT_OF_SCALE = 100.0
 """Ratio to the bodies' torque, or its inverse, above which a drive is in another unit: mA for A gives a thousand, and
-healthy rigs 0.2 to 13.
-"""
+healthy rigs 0.2 to 13."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +74,7 @@ class Motion:
 @dataclass(frozen=True)
 class Balance:
     """Mean squares by joint (n,): remaining torque, torque of the drive, torque of the motion, and the sum for the
-    motion's two parts, weight and inertia, which may cancel.
-    """
+    motion's two parts, weight and inertia, which may cancel."""
 
     left: Floats
     given: Floats
@@ -90,8 +84,7 @@ class Balance:
     """Share of the remaining mean square that reversing gravity removes; 0 if gravity is not the reason."""
     behind: Floats
     """(n,) samples by which the drive lags the motion that it causes; 0 where that is not significant, or longer than
-    the smoothing can resolve. A drive that is held until the next sample leads by half of one.
-    """
+    the smoothing can resolve. A drive that is held until the next sample leads by half of one."""
 
     @property
     def shares(self) -> Floats:
@@ -139,8 +132,7 @@ def balance(model: Model, motion: Motion) -> Balance | None:
 @dataclass(frozen=True)
 class Factors:
     """Ratios of the drive's torque to the torque of the machine file's bodies: to all of it, to that for acceleration,
-    and to their weight; and that of the motor's braking, with friction. None if not significant.
-    """
+    and to their weight; and that of the motor's braking, with friction. None if not significant."""
 
     whole: float | None = None
     inertia: float | None = None
@@ -151,8 +143,7 @@ class Factors:
 @dataclass(frozen=True)
 class _Torques:
     """Torques (k, n) along a motion: of the drive, of the motion without and with back-EMF, of weight; the change of
-    the drive's torque per sample; speeds and positions.
-    """
+    the drive's torque per sample; speeds and positions."""
 
     given: Floats
     needed: Floats

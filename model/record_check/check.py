@@ -65,8 +65,7 @@ LOOP_SHARE = 0.125
 between rows; a period holds a drive by half of itself."""
 ON_ITS_WAY = 0.5
 """Share of its motion, weighted by the remaining distance, that a following joint makes towards its set point rather
-than away from it. Set points with another zero or sign lie behind its motion as often as ahead of it.
-"""
+than away from it. Set points with another zero or sign lie behind its motion as often as ahead of it."""
 OUT_OF_REACH = 3.0
 """Distance, in a joint's own travels, that is too long even for a joint on its way: set points in another unit."""
 
@@ -104,8 +103,7 @@ def _on_columns(trace: Trace, model: Model) -> Iterator[RecordFinding]:
 
 def repaired(trace: Trace, machine: Machine) -> Trace:
     """Returns the trace with its encoders unwrapped and spikes replaced by neighbouring values; unchanged if there are
-    none.
-    """
+    none."""
     position = trace.position
     for joint in machine.modelled_joints:
         column, found = trace.column(joint), false_readings(trace, machine, joint)
@@ -237,8 +235,7 @@ def _short(trace: Trace) -> RecordFinding:
 
 def _on_bursts(trace: Trace) -> Iterator[RecordFinding]:
     """Finds time stamps of arrival, which shift each reading by up to a burst; other findings from times would
-    follow.
-    """
+    follow."""
     found = find_bursts(trace.time)
     if found is not None:
         yield RecordFinding(
@@ -424,8 +421,7 @@ def _on_units(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
 
 def _approach(position: Floats, way: Floats) -> float:
     """Returns how much of a motion is towards the set point rather than away, from −1 to 1. way: (k,) remaining
-    distance.
-    """
+    distance."""
     work = way[:-1] * np.diff(position)
     whole = float(np.abs(work).sum())
     return float(work.sum()) / whole if whole > 0.0 else 0.0

@@ -39,8 +39,7 @@ BEHIND = 0.25
 """Lag of a drive behind its motion, in samples, that is reported: half of one follows from how it is computed."""
 LEADS = 1.5
 """Lead of a position over its set point, in samples, at which they count as exchanged: no joint moves before its set
-point.
-"""
+point."""
 FOLLOWS = 0.3
 """Least correlation of set point − position with the speed for a lead to be estimated."""
 
@@ -142,8 +141,7 @@ class _Witnesses:
 
     def _drives_motion(self, joint: int, motion: Motion | None) -> bool:
         """Whether the drive causes the motion as recorded. Its sign is then right, and set point and position are
-        exchanged.
-        """
+        exchanged."""
         found = None if motion is None else balance(self.model, motion)
         if found is None:
             return self._leads(joint)

@@ -18,8 +18,7 @@ from model.drives.controller import INTEGRAL_SHARE
 
 HOLDS = 0.1
 """Largest remaining share of the drive's variation (root mean squares) with which a law holds. Rounding and lost
-samples leave less, and no other law comes so near.
-"""
+samples leave less, and no other law comes so near."""
 BETTER = 0.2
 """Largest remainder with other columns, as a share of that with the recorded ones, for them to be accepted."""
 AT_LIMIT = 0.98

@@ -24,8 +24,7 @@ ISOLATED = 7
 """Intervals of a running median, which a spike of up to three samples does not move."""
 KINK = 2.0
 """Largest peak of a speed in one interval, relative to the largest change from one interval to the next. A torque that
-reverses in the middle of it gives half of that.
-"""
+reverses in the middle of it gives half of that."""
 LEAST_COUNTS = 4.0
 """Least false step, in steps of the sensor: rounding alone makes two."""
 EARLY_OR_LATE = 1.0
@@ -48,8 +47,7 @@ MOST_OFF_GRID = 0.05
 """Share of bursts that may deviate more: stamps of a busy computer."""
 BRIDGED = (10.0, 0.05)
 """Longest gap that is interpolated: so many intervals, and so many seconds more; the joint's motion goes on as
-before.
-"""
+before."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,5 @@
 """Base parameters in a report of a fit: the combinations that determine torques, and the records' information on
-each.
-"""
+each."""
 
 from __future__ import annotations
 

@@ -39,8 +39,7 @@ _INKS |= {"axes.edgecolor": QUIET, "grid.color": GRID}
 
 def drawn(draw: Callable[[Figure], None], height: float, width: float = WIDTH) -> str:
     """Returns SVG of a figure of that size (inches) that `draw` fills. Its colours are variables of the page's
-    style.
-    """
+    style."""
     from daq.contracts.notebook_figure import NotebookFigure
 
     with _style():

@@ -11,18 +11,7 @@ import numpy as np
 from model.blocks import Cell, Picture, Section, Table, numbers
 from model.comparison.agreement import JointAgreement, ModelAgreement
 from model.comparison.compare import TraceSignals
-from model.reports.figures import (
-    COLOURS,
-    INK,
-    MODEL_COLOURS,
-    QUIET,
-    as_label,
-    band,
-    baseline,
-    drawn,
-    panels,
-    thinned,
-)
+from model.reports.figures import COLOURS, INK, MODEL_COLOURS, QUIET, as_label, band, baseline, drawn, panels, thinned
 from model.reports.page import trace_names
 from model.units import shown_unit, with_unit
 

@@ -17,8 +17,7 @@ def decimals(size: float, digits: int) -> int:
 
 def column(values: Sequence[float], digits: int = 3) -> list[str]:
     """Formats numbers of one unit with the same decimals: so many digits of the smallest, or one less if the largest
-    then has more digits than that.
-    """
+    then has more digits than that."""
     sizes = [abs(v) for v in values if v]
     least, largest = (decimals(f(sizes, default=0.0), digits) for f in (min, max))
     places = min(least, max(largest + 1, least - 1))
@@ -27,8 +26,7 @@ def column(values: Sequence[float], digits: int = 3) -> list[str]:
 
 def estimate(value: float, low: float | None, high: float | None, digits: int = 2) -> tuple[str, str | None]:
     """Formats a value and its interval, with so many digits of the interval's half width; no interval if there is
-    none.
-    """
+    none."""
     if low is None or high is None:
         return fixed(value, decimals(value, 3)), None
     places = decimals((high - low) / 2.0, digits)

@@ -28,7 +28,7 @@ def saved_report(data: Diagnosis, names: Mapping[str, str], sections: Iterable[S
     """Returns the file as text.
 
     Args:
-        data: the answer with its data for plots, `server.jobs.results.DiagnosisData`.
+        data: the answer with its data for plots, `DiagnosisData`.
         names: names of the traces by ID, if known.
         sections: of plug-ins (`daq.plugins.report_sections`).
 

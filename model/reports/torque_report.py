@@ -32,8 +32,7 @@ def torque_report(
     files: Mapping[str, str] | None = None,
 ) -> Report:
     """Returns the page; `curves` are those of the fitted model on the traces to draw, `base` its base parameters on
-    those that were fitted to, `files` the names of the traces' files by number, where they are known.
-    """
+    those that were fitted to, `files` the names of the traces' files by number, where they are known."""
     files = files or {}
     machine = found.model.machine
     sections = (

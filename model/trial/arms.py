@@ -70,8 +70,7 @@ def sample_arms(seeds: Sequence[int], count: int) -> list[int]:
 
 def drawn_arms(commit: str, cases: dict[str, int], loads: Sequence[str] = LOAD_CYCLE) -> list[int]:
     """Returns seeds drawn from the hash of a commit: the n-th of a kind from SHA-256 of `commit kind n`, its load in
-    turn.
-    """
+    turn."""
     found = []
     for kind, count in cases.items():
         for index in range(count):

@@ -152,8 +152,7 @@ def _case(truth: Truth, seen: Detectability) -> dict[str, Any]:
 
 def named_effects(answer: Diagnosis) -> tuple[str, ...]:
     """Returns effects of the adopted steps that gave one name; a group of one effect at several joints counts as a
-    name.
-    """
+    name."""
     found = [step.effect for step in answer.steps if step.adopted and step.effect is not None and _one_name(step)]
     return tuple(dict.fromkeys(found))
 
@@ -192,8 +191,7 @@ def excess_removed(answer: Diagnosis) -> float | None:
 
 def excess_removed_whole(answer: Diagnosis) -> float | None:
     """Returns the same share from the given model to the resulting one, so that fitted tolerance parameters count
-    too.
-    """
+    too."""
     return share_removed(answer.rmse_holdout)
 
 

@@ -127,8 +127,7 @@ def _variation(given: _Equations, solution: _Solution, k: int, known: dict[str, 
 
 def _alone(given: _Equations, k: int) -> tuple[float, float]:
     """Returns the shares of the residual's energy, without noise, that one parameter explains: if constant, and if
-    varying.
-    """
+    varying."""
     noise = given.smoothed.noise
     r, j = given.residual / noise, given.jacobian[:, :, k] / noise
     energy = float((r**2).sum()) - float(given.smoothed.usable.sum())

@@ -72,8 +72,7 @@ class JointResidual(FrozenRecord):
 
 class TimeDomain(FrozenRecord):
     """Result of the time-domain form for one model and one trace. `smoothing` is the kernel's standard deviation in
-    s.
-    """
+    s."""
 
     model: str
     trace: str

@@ -49,10 +49,31 @@ def caller_of(connection: HTTPConnection) -> Caller | None:
     return found
 
 
+_BEARER = {"WWW-Authenticate": "Bearer"}
+
+
 def token_needed() -> ProblemError:
     """Returns a 401 for an anonymous caller."""
     advice = "sign in on the page, or send the header Authorization: Bearer TOKEN; `daq token add` makes one"
-    return ProblemError(401, "token-needed", "this service needs a token", advice, (), {"WWW-Authenticate": "Bearer"})
+    return ProblemError(401, "token-needed", "this service needs a token", advice, (), _BEARER)
+
+
+def token_unknown() -> ProblemError:
+    """Returns a 401 for a token that belongs to nobody."""
+    line = "this token is not known, or was revoked"
+    return ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name", (), _BEARER)
+
+
+def unknown_name(host: str) -> ProblemError:
+    """Returns a 403 for a request to another name than the service's."""
+    line = f"this service is not called {host!r:.100}"
+    return ProblemError(403, "unknown-name", line, "use its address, or add the name to server.names")
+
+
+def other_origin(origin: str | None) -> ProblemError:
+    """Returns a 403 for a request of another page."""
+    line = f"a page of another origin ({origin!r:.100}) may not do this"
+    return ProblemError(403, "other-origin", line, "use the page that this service serves")
 
 
 def require_viewer(connection: HTTPConnection) -> Caller:

@@ -25,7 +25,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
 from server import logs
-from server.access.caller import LOCAL, Caller, token_needed
+from server.access.caller import LOCAL, Caller, other_origin, token_needed, token_unknown, unknown_name
 from server.access.cookies import says_where_it_is_from, session_cookie, session_of
 from server.access.headers import secure
 from server.access.limits import LARGEST_BODY, MOST_FIELDS, MOST_OF_A_PROGRAM, Buckets, counted
@@ -266,11 +266,9 @@ class Gate:
         headers = Headers(scope=scope)
         changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
         if not is_known_name(headers.get("host", ""), self.names, loopback_only=self.open_on_loopback):
-            line = f"this service is not called {headers.get('host', '')!r:.100}"
-            raise ProblemError(403, "unknown-name", line, "use its address, or add the name to server.names")
+            raise unknown_name(headers.get("host", ""))
         if is_from_elsewhere(headers, self.names, changes_something=changes):
-            line = f"a page of another origin ({headers.get('origin')!r:.100}) may not do this"
-            raise ProblemError(403, "other-origin", line, "use the page that this service serves")
+            raise other_origin(headers.get("origin"))
         caller = await self._caller(scope, headers)
         if not _is_post(scope, STOP):
             self._count(caller, scope)
@@ -286,8 +284,7 @@ class Gate:
         if token and kind.lower() == "bearer":
             caller = await self._known(scope, token.strip())
             if caller is None or caller.expires is not None:  # a session's secret is valid only as a cookie
-                line = "this token is not known, or was revoked"
-                raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name", (), _BEARER)
+                raise token_unknown()
             return caller
         if scope["type"] == "websocket":
             ticket = parse_qs(scope["query_string"].decode("latin-1")).get("ticket")
@@ -374,6 +371,3 @@ def _led(location: str, host: str, prefix: str) -> str:
 
 def _is_post(scope: Scope, address: re.Pattern[str]) -> bool:
     return scope.get("method") == "POST" and address.fullmatch(scope["path"]) is not None
-
-
-_BEARER = {"WWW-Authenticate": "Bearer"}

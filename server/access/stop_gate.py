@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from server.access.caller import LOCAL, Caller
+from server.access.caller import LOCAL, Caller, other_origin, token_needed, token_unknown, unknown_name
 from server.access.cookies import says_where_it_is_from, session_cookie, session_of
 from server.access.origin import is_known_name, is_this_computers_user, name_of, place_of
-from server.problems import ProblemError
 
 
 class TokensCannotBeReadError(Exception):
@@ -43,11 +42,9 @@ class StopGate:
         """Returns the caller. Raises a 401 or 403, and TokensCannotBeReadError."""
         host = headers.get("host", "")
         if not is_known_name(host, self.names, loopback_only=self.open_on_loopback):
-            line = f"this service is not called {host!r:.100}"
-            raise ProblemError(403, "unknown-name", line, "use its address, or add the name to server.names")
+            raise unknown_name(host)
         if not self.is_from_here(headers):
-            line = f"a page of another origin ({headers.get('origin')!r:.100}) may not do this"
-            raise ProblemError(403, "other-origin", line, "use the page that this service serves")
+            raise other_origin(headers.get("origin"))
         kind, _, token = headers.get("authorization", "").partition(" ")
         if not token or kind.lower() != "bearer":
             local = self.open_on_loopback and is_this_computers_user(headers)
@@ -61,12 +58,10 @@ class StopGate:
                 return caller
             if local:
                 return LOCAL
-            advice = "sign in on the page, or send the header Authorization: Bearer TOKEN; `daq token add` makes one"
-            raise ProblemError(401, "token-needed", "this service needs a token", advice)
+            raise token_needed()
         caller = self._known(token.strip())
         if caller is None:
-            line = "this token is not known, or was revoked"
-            raise ProblemError(401, "token-unknown", line, "`daq token ls` lists tokens by name")
+            raise token_unknown()
         return caller
 
     def _of_session(self, headers: Mapping[str, str]) -> Caller | None:

@@ -18,6 +18,7 @@ from daq.contracts.service.experiments import (
     ExperimentState,
     MotionPreview,
 )
+from daq.trajectories.length import least_length, points_of
 from server.access.caller import Caller
 from server.api.dependencies import (
     CursorOf,
@@ -36,7 +37,7 @@ from server.bounded.messages import WorkOutMotion
 from server.bounded.motion import preview_of
 from server.bounded.workers import ExhaustedError, Workers
 from server.catalogue.room import require_room
-from server.experiments.schedule import LONGEST, least_length, points_of
+from server.experiments.schedule import LONGEST
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS, ProblemError
 from server.robot_services import RobotServices

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
-from daq.contracts.service.fleet import (
-    FleetRobot,
-    FleetStatus,
-)
+from daq.contracts.frozen import like
+from daq.contracts.service.fleet import FleetRobot, FleetStatus
 from daq.contracts.service.robot import FleetStopResult
 from server.api.dependencies import ClockDep, Robots, Viewer
 from server.problems import PROBLEMS
@@ -43,19 +41,11 @@ async def stop_fleet(robots: Robots, caller: Viewer) -> FleetStopResult:
 def _at_a_glance(rig: RobotServices) -> FleetRobot:
     status = rig.status()
     running = rig.queue.running
-    return FleetRobot(
-        robot=status.robot,
-        machine=status.machine,
+    return like(
+        FleetRobot,
+        status,
         simulated=None if status.identity is None else status.identity.simulated,
-        connection=status.connection,
-        connection_problem=status.connection_problem,
-        arm=status.arm,
-        cause=status.cause,
-        activity=status.activity,
-        limp=status.limp,
         sample_age=None if status.sample is None else status.sample.age,
         progress=None if running is None else running.progress,
         unattended=rig.unattended,
-        control=status.control,
-        queue=status.queue,
     )

@@ -1,7 +1,4 @@
-"""Routes of jobs (fits, validations, comparisons and diagnoses in the background) and of the models they make.
-
-`known_effects` lists the effects of the library for clients.
-"""
+"""Routes of jobs (fits, validations, comparisons and diagnoses in the background) and of the models they make."""
 
 from __future__ import annotations
 
@@ -41,30 +38,10 @@ from server.api.dependencies import (
     Viewer,
 )
 from server.api.upload import store_model
-from server.jobs.service import REPORT, RESULT
+from server.jobs.mailbox import REPORT, RESULT
 from server.live.waiting import Wait, when_ended
 from server.problems import PROBLEMS
 from server.routes import Router
-
-
-def known_effects() -> tuple[KnownEffect, ...]:
-    """Returns the effects in the order of the shared list, which groups them by family."""
-    from model.effects.library import library
-    from model.effects.names import effect_name
-
-    return tuple(
-        KnownEffect(
-            name=one.name,
-            called=effect_name(one.name),
-            family=one.shared_name.family,
-            title=one.shared_name.line,
-            physics=one.physics,
-            joints=one.joints,
-            whole_machine=one.whole_machine,
-        )
-        for one in library().values()
-    )
-
 
 router = Router(prefix="/robots/{robot}", responses=PROBLEMS)
 REPORT_POLICY = (
@@ -209,6 +186,8 @@ def get_lineage(rig: RobotDep, jobs: JobRows, models: ModelRows, _: Viewer, _tur
 @router.get("/effects", tags=["models"])
 def list_effects(rig: RobotDep, _: Viewer) -> tuple[KnownEffect, ...]:
     """Lists the effects that a fit may add and a diagnosis considers, grouped by family."""
+    from model.effects.known import known_effects
+
     del rig
     return known_effects()
 

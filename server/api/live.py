@@ -6,12 +6,7 @@ from fastapi import WebSocket
 
 from daq.contracts.service.live import LiveFrame, Ticket
 from server.access.caller import require_viewer
-from server.api.dependencies import (
-    RobotDep,
-    TicketsDep,
-    Viewer,
-    services_of,
-)
+from server.api.dependencies import RobotDep, TicketsDep, Viewer, services_of
 from server.api.stream import stream
 from server.problems import PROBLEMS, ProblemError
 from server.routes import Router

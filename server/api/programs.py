@@ -8,14 +8,7 @@ from fastapi import Path, Query, Response
 
 from daq.contracts.service.teaching import ProgramEntry, TeachingStatus
 from daq.teaching.program import NAME, Program
-from server.api.dependencies import (
-    Arrived,
-    LeaseHeader,
-    Operator,
-    Programs,
-    RobotDep,
-    Viewer,
-)
+from server.api.dependencies import Arrived, LeaseHeader, Operator, Programs, RobotDep, Viewer
 from server.problems import PROBLEMS
 from server.routes import Router
 from server.store.programs import StoredProgram

@@ -7,17 +7,7 @@ from daq.contracts.service.base import Page
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.robot import Done, ResetRequest, RobotStatus, RobotSummary, StopResult
 from daq.owner.messages import Reset
-from server.api.dependencies import (
-    Arrived,
-    CursorOf,
-    Events,
-    LeaseHeader,
-    Limit,
-    Operator,
-    RobotDep,
-    Robots,
-    Viewer,
-)
+from server.api.dependencies import Arrived, CursorOf, Events, LeaseHeader, Limit, Operator, RobotDep, Robots, Viewer
 from server.problems import PROBLEMS
 from server.robot.orders import answer_of
 from server.routes import Router

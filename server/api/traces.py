@@ -16,6 +16,7 @@ from daq.contracts.labels import Outcome, Source
 from daq.contracts.service.base import Moment, Page
 from daq.contracts.service.jobs import EffectName
 from daq.contracts.service.traces import CatalogueEntry, TraceChange, TraceDetails, TraceSignals
+from daq.contracts.thinning import thinned
 from daq.traces.csv_table import export_csv
 from daq.traces.reader import read_trace
 from daq.traces.summary import joint_figures
@@ -33,7 +34,6 @@ from server.api.dependencies import (
     let_others_ask,
 )
 from server.api.upload import store_upload
-from server.catalogue.thinning import thinned
 from server.problems import PROBLEMS, TITLES
 from server.routes import Router
 from server.store.traces import TraceSearch

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from daq.contracts.frozen import like
 from daq.contracts.service.experiments import MotionMark, MotionPreview, MotionViolation
 from daq.safety import Violation, check_plan
 from daq.trajectories.planner import plan, start_angles
@@ -32,11 +33,4 @@ def preview_of(order: WorkOutMotion) -> MotionPreview:
 def _as_json(violation: Violation) -> MotionViolation:
     """Converts a violation for JSON, which has no infinity: such a number becomes None."""
     value, limit = (number if math.isfinite(number) else None for number in (violation.value, violation.limit))
-    return MotionViolation(
-        rule=violation.rule,
-        joint=violation.joint,
-        time=violation.time,
-        value=value,
-        limit=limit,
-        message=violation.message,
-    )
+    return like(MotionViolation, violation, value=value, limit=limit)

@@ -69,16 +69,6 @@ class Workers:
         for worker in idle:
             worker.kill()
 
-    def idle_processes(self) -> tuple[int, ...]:
-        """Returns the PIDs of the processes that wait for an order."""
-        with self._lock:
-            return tuple(worker.number for worker in self._idle)
-
-    def busy_processes(self) -> tuple[int, ...]:
-        """Returns the PIDs of the processes that carry out an order."""
-        with self._lock:
-            return tuple(worker.number for worker in self._busy)
-
     def _taken(self) -> _Worker:
         with self._lock:
             if self._closed:
@@ -107,11 +97,6 @@ class _Worker:
         self._process = Child("server.bounded", complaints=subprocess.DEVNULL, environment=os.environ | ONE_THREAD)
         self._allowance = start_within
         self._process.send(limits)
-
-    @property
-    def number(self) -> int:
-        """The process ID."""
-        return self._process.pid
 
     @property
     def lives(self) -> bool:

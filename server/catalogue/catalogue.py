@@ -24,7 +24,7 @@ from daq.traces.salvage import salvage_folder
 from daq.traces.summary import joints_moved
 from server.problems import ProblemError, conflict, not_found
 from server.store.experiments import ExperimentStore
-from server.store.traces import NewTrace, TraceStore
+from server.store.traces import TraceStore
 
 UPLOAD = ".upload-"
 """Prefix of the name of a folder for an upload."""
@@ -258,31 +258,15 @@ class Catalogue:
 
     def _insert(self, path: Path, summary: TraceSummary) -> bool:
         assert summary.trace_id is not None
-        assert summary.created is not None
         moved = summary.moved
         if moved is None:  # no experiment says it; samples that cannot be read say so when the trace is opened
             with suppress(TraceError):
                 moved = joints_moved(read_trace(path, self.limits))
         try:
             self._traces.insert(
-                NewTrace(
-                    id=summary.trace_id,
-                    robot=self._robot,
-                    file=path.name,
-                    created=summary.created,
-                    source=summary.source or "imported",
-                    kind=summary.kind,
-                    name=summary.name,
-                    joints=summary.joints,
-                    moved=moved or (),
-                    outcome=summary.outcome,
-                    samples=summary.samples,
-                    duration=summary.duration,
-                    size=summary.size,
-                    operator=summary.operator,
-                    experiment=self._experiments.of_trace(summary.trace_id),
-                    notes=summary.notes,
-                ),
+                self._robot,
+                summary.model_copy(update={"path": path, "moved": moved}),
+                self._experiments.of_trace(summary.trace_id),
                 lambda file: (self.folder / file).is_file() or self._traces.is_archived(summary.trace_id or ""),
             )
         except ProblemError as error:

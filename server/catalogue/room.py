@@ -12,42 +12,30 @@ from daq.traces.room import RESERVE
 from server.problems import ProblemError
 
 
-class _Usage(NamedTuple):
-    """Sizes in bytes."""
-
-    total: int
-    used: int
-    free: int
-
-
-def free_room(folder: Path) -> int:
-    """Returns the free space for traces (bytes). Raises a 503 if the folder does not exist."""
-    return _usage(folder).free
-
-
-def _usage(folder: Path) -> _Usage:
-    """Raises a 503 if the folder does not exist: its disk may not be mounted."""
-    try:
-        return _Usage(*shutil.disk_usage(folder))
-    except OSError as error:
-        line = f"the folder of traces, {folder}: {error.strerror}"
-        raise ProblemError(503, "traces-away", line, "mount its disk, then try again") from error
-
-
 class Room(NamedTuple):
-    """Space on the disks of several folders (bytes): the smallest free space, and the total size."""
+    """Space on disks (bytes): of several disks, the smallest free space and the total size."""
 
     free: int
     size: int
 
 
+def room_in(folder: Path) -> Room:
+    """Returns the space on a folder's disk. Raises a 503 if the folder does not exist: its disk may not be mounted."""
+    try:
+        size, _used, free = shutil.disk_usage(folder)
+    except OSError as error:
+        line = f"the folder of traces, {folder}: {error.strerror}"
+        raise ProblemError(503, "traces-away", line, "mount its disk, then try again") from error
+    return Room(free, size)
+
+
 def room_of(folders: Iterable[Path]) -> Room:
     """Returns the space for traces, without folders that do not exist; 0 if none exists."""
-    usages = []
+    rooms = []
     for folder, *_same in by_disk(folders):
         with suppress(ProblemError):  # `storage_warnings` reports it
-            usages.append(_usage(folder))
-    return Room(min((one.free for one in usages), default=0), sum(one.total for one in usages))
+            rooms.append(room_in(folder))
+    return Room(min((one.free for one in rooms), default=0), sum(one.size for one in rooms))
 
 
 def by_disk(
@@ -65,12 +53,13 @@ def by_disk(
 
 
 def disk_warnings(folder: Path, warn_at: float) -> list[str]:
-    """Returns a line if more than this share of the disk is used, before experiments are refused for lack of space."""
+    """Returns a line if more than this share of the disk is used, before experiments are refused for lack of space; or
+    if the folder does not exist."""
     try:
-        room = shutil.disk_usage(folder)
-    except OSError:  # reported elsewhere
-        return []
-    used = 1 - room.free / max(1, room.total)
+        room = room_in(folder)
+    except ProblemError as problem:
+        return [f"{problem.detail}; mount its disk"]
+    used = 1 - room.free / max(1, room.size)
     if used < warn_at:
         return []
     line = f"the disk of the traces is {used:.0%} full: {room.free / 1e6:.0f} MB are free; no experiment is taken below"
@@ -83,7 +72,7 @@ def storage_warnings(folders: Mapping[str, Path], warn_at: float) -> list[str]:
     found = []
     for same in by_disk(folders.values()):
         names = [name for name, folder in folders.items() if folder in same]
-        found += [of_robots(names, line, among=len(folders)) for line in _warnings_of(same[0], warn_at)]
+        found += [of_robots(names, line, among=len(folders)) for line in disk_warnings(same[0], warn_at)]
     return found
 
 
@@ -92,17 +81,9 @@ def of_robots(names: Sequence[str], line: str, *, among: int) -> str:
     return line if among == 1 else f"{', '.join(names)}: {line}"
 
 
-def _warnings_of(folder: Path, warn_at: float) -> list[str]:
-    try:
-        free_room(folder)
-    except ProblemError as problem:
-        return [f"{problem.detail}; mount its disk"]
-    return disk_warnings(folder, warn_at)
-
-
 def require_room(folder: Path) -> None:
     """Raises a 507 if too little space is free, and a 503 if the folder does not exist."""
-    free = free_room(folder)
+    free = room_in(folder).free
     if free < RESERVE:
         line = f"{free / 1e6:.0f} MB are free for traces, {RESERVE / 1e6:.0f} MB stay free"
         raise ProblemError(507, "no-room", line, "free some space on the disk of the traces")

@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.frozen import like
 from daq.contracts.machine import Machine
 from daq.contracts.service.jobs import MACHINE, EffectInModel, ModelDetails, ModelParameter
 from daq.contracts.whole_file import replacing
 from server.clock import Clock
-from server.store.models import ModelStore, NewModel
+from server.store.models import ModelStore
+from server.store.tables import ModelRow
 
 if TYPE_CHECKING:
     from model.machine_model.model import EffectUse, Model
@@ -46,7 +48,7 @@ class Models:
         `robots`: the model's traces must belong to these; None: to any. Raises a 422 otherwise, SpecError if another
         model has its ID.
         """
-        new = NewModel(
+        new = ModelRow(
             id=made.identity,
             robot=self._robot,
             name=name[:64],
@@ -55,18 +57,17 @@ class Models:
             created_by=by,
             parent=made.parent,
             job=job,
-            traces=made.traces,
         )
 
         def write() -> None:
-            path = self.folder / new.file
+            path = self.folder / f"{made.identity}.json"
             if _is_stored(path, made):
                 return
             self.folder.mkdir(parents=True, exist_ok=True)
             with replacing(path) as part:
                 part.write_text(made.text, "utf-8")
 
-        return self.store.insert(new, write, robots)
+        return self.store.insert(new, made.traces, write, robots)
 
     def path_of(self, identity: str) -> Path:
         """Returns a model's file. Raises a 404."""
@@ -131,15 +132,7 @@ def _parameters(model: Model) -> tuple[ModelParameter, ...]:
     from model.machine_model.parameter_words import words_of
 
     return tuple(
-        ModelParameter(
-            name=one.name,
-            words=words_of(one),
-            unit=one.unit,
-            value=one.value,
-            low=_finite(one.low),
-            high=_finite(one.high),
-            deviation=one.deviation,
-        )
+        like(ModelParameter, one, words=words_of(one), low=_finite(one.low), high=_finite(one.high))
         for one in model.parameters
     )
 

@@ -22,9 +22,9 @@ from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
 from server.experiments.states import Event
 from server.jobs.lanes import LANES, Lane, lane_of, with_what_it_waits_for
-from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox, Reported
+from server.jobs.mailbox import MODEL, REQUEST, Mailbox, Reported
 from server.jobs.models import Models
-from server.jobs.shared_workers import SharedWorkers, worker_processes
+from server.jobs.shared_workers import SharedWorkers
 from server.jobs.work import Ended, Task, carry_out
 from server.problems import ProblemError, conflict, not_found
 from server.store.jobs import JobStore, models_of, traces_of
@@ -40,7 +40,7 @@ log = logging.getLogger("server.jobs")
 @dataclass(frozen=True)
 class JobContext:
     """Stores, services and callbacks of the jobs of one robot. `changed` is called with every changed job, and must not
-    block. `at_once`: number of workers of the long lane."""
+    block. `workers` are shared by the robots of a service."""
 
     robot: str
     machine: Machine
@@ -50,10 +50,7 @@ class JobContext:
     models: Models
     clock: Clock
     changed: Callable[[Job], None]
-    at_once: int
-    make_executor: Callable[[int], Workers] = worker_processes
-    workers: SharedWorkers | None = None
-    """Workers shared by the robots of a service; None for separate workers."""
+    workers: SharedWorkers
 
 
 @dataclass(frozen=True)
@@ -73,7 +70,7 @@ class JobService:
         self._context = context
         self._wake = threading.Event()
         self._closing = False
-        self._workers = context.workers or SharedWorkers(context.at_once, context.make_executor)
+        self._workers = context.workers
         self._running: dict[str, tuple[Job, Future[Ended]]] = {}
         self._fetched: dict[str, _Fetched] = {}
         """Waiting jobs whose traces are being fetched from the archive."""
@@ -138,8 +135,8 @@ class JobService:
         shutil.rmtree(self._folder(identity), ignore_errors=True)
 
     def result_file(self, identity: str, name: str, advice: str = "run it again") -> Path:
-        """Returns the file of a job's result (`RESULT`) or report (`REPORT`). Raises a 404 with `advice`, and a 409 if
-        the job is not done."""
+        """Returns the file of a job's result or report, by its name (`server.jobs.mailbox`). Raises a 404 with
+        `advice`, and a 409 if the job is not done."""
         job = self._context.jobs.get(self._context.robot, identity)
         if job.state != "done":
             label = job_label(job.request.kind, job.submitted)
@@ -170,8 +167,7 @@ class JobService:
             return job.model_copy(update={"progress_text": _words_of(fetched.transfer)})
         if job.state != "running":
             return job
-        reported = self._reported(job.id)
-        reported = reported or Reported(0.0, "starting")
+        reported = self._reported(job.id) or Reported(0.0, "starting")
         told = {"progress": reported.fraction, "progress_text": reported.text, "leading": reported.leading}
         return job.model_copy(update=told)
 
@@ -184,8 +180,6 @@ class JobService:
         for identity in list(self._running):
             with contextlib.suppress(OSError):
                 Mailbox(self._folder(identity)).cancel()
-        if self._context.workers is None:
-            self._workers.abandon()
 
     def _folder(self, identity: str) -> Path:
         return self._context.folder / identity
@@ -289,15 +283,11 @@ class JobService:
                 executor = self._given_to[identity] = self._workers.executor(lane)
                 return executor.submit(carry_out, self._folder(identity))
             except BrokenExecutor:
-                self._give_up(identity, lane)
+                self._workers.give_up(lane, self._given_to.get(identity))
             except Exception as error:
                 log.exception("job %s: no worker takes it", identity)
                 return _failed(error)
         return _failed(BrokenExecutor())
-
-    def _give_up(self, identity: str, lane: Lane) -> None:
-        """Closes the executor with which a job was lost."""
-        self._workers.give_up(lane, self._given_to.get(identity))
 
     def _collect(self) -> bool:
         """Records the end of finished jobs. If one cannot be written, the others are not delayed. Returns whether any
@@ -325,7 +315,7 @@ class JobService:
         try:
             ended = future.result()
         except BrokenExecutor:
-            self._give_up(identity, lane)
+            self._workers.give_up(lane, self._given_to.get(identity))
             event, reason = Event.LOST, "its worker process ended: it was killed, or ran out of memory"
         except Exception as error:
             log.exception("job %s", identity)
@@ -389,6 +379,3 @@ def _words_of(fetched: Transfer) -> str:
 
 def _fault(error: Exception) -> str:
     return f"program fault: {type(error).__name__}: {error}"
-
-
-__all__ = ["REPORT", "RESULT", "JobContext", "JobService", "worker_processes"]

@@ -15,8 +15,7 @@ from daq.contracts.service.jobs import MACHINE, CompareRequest, DiagnoseRequest,
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.reader import read_trace
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
-from server.jobs.options import options_of, with_effects
-from server.jobs.results import of_comparison, of_fit, of_validation
+from server.jobs.options import options_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -99,12 +98,13 @@ class _Worker:
         from model.fitting.options import FitOptions
         from model.machine_model.parameter_words import words_by_name
         from model.reports.fit_report import fit_report
+        from model.reports.overlays import overlays
+        from model.reports.result_data import FitData, of_fit
         from model.simulation.prepared import Options
-        from server.jobs.overlays import overlays
-        from server.jobs.results import FitData, FitJobResult
+        from server.jobs.results import FitJobResult
 
         traces, held = self._traces(request.traces), self._traces(request.held_out)
-        begin, options = with_effects(self._model(request.model), request.effects), options_of(request, FitOptions)
+        begin, options = self._model(request.model).with_effects(request.effects), options_of(request, FitOptions)
         found = fit(begin, traces, options, lambda f, text: self._tell(0, FIT_SHARE, f, text), self.mailbox)
         comparison = self._compared(
             [("before", begin), ("fitted", found.model)],
@@ -127,14 +127,15 @@ class _Worker:
     def validate(self, request: ValidateRequest) -> Ended:
         """Computes the same as `daq validate`."""
         from model.machine_model.parameter_words import words_by_name
+        from model.reports.overlays import thinned_variation
+        from model.reports.result_data import ValidationData, of_validation
         from model.reports.validation_report import validation_report
         from model.simulation.prepared import Options
         from model.validation.conventions import in_convention
         from model.validation.fidelity import validate_by_distortion
         from model.validation.names import names_to_validate
         from model.validation.time_domain import vary_in_time
-        from server.jobs.overlays import thinned_variation
-        from server.jobs.results import ValidationData, ValidationJobResult
+        from server.jobs.results import ValidationJobResult
 
         traces, model = self._traces(request.traces), self._model(request.model)
         names = names_to_validate(model, request.parameters)
@@ -169,8 +170,9 @@ class _Worker:
         from model.comparison.difference import differences
         from model.machine_model.parameter_words import words_by_name
         from model.reports.comparison_report import comparison_report
-        from server.jobs.overlays import overlays
-        from server.jobs.results import ComparisonData, ComparisonJobResult
+        from model.reports.overlays import overlays
+        from model.reports.result_data import ComparisonData, of_comparison
+        from server.jobs.results import ComparisonJobResult
 
         models = [self._model(number) for number in request.models]
         traces = self._traces(request.traces)
@@ -194,8 +196,8 @@ class _Worker:
         from model.discrepancy.explanation.answer_words import headline
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
+        from model.reports.diagnosis_data import leading, told
         from model.reports.saved_report import saved_report
-        from server.jobs.diagnosis_data import leading, told
         from server.jobs.next_experiment import experiment_chooser
         from server.jobs.results import DiagnosisJobResult
 

@@ -8,6 +8,7 @@ from collections import deque
 import numpy as np
 
 from daq.contracts.service.live import HistoryMessage, RecordEventMessage
+from daq.contracts.thinning import extremes, moments, stretches
 from daq.contracts.trace import Floats
 from daq.owner.messages import LiveSample
 
@@ -55,8 +56,9 @@ class History:
             order = order[self._time[order] >= begin]
             tick, time, values = self._tick[order], self._time[order], self._values[:, order]
             events = tuple(event for event in self._events if event.host_time >= begin)
-        if len(time) > points:
-            tick, time, values = _thinned(tick, time, values, points)
+        if (first := stretches(len(time), points)) is not None:
+            tick, time = moments(tick, first), moments(time, first)
+            values = np.stack([extremes(signal, first) for signal in values])
         columns = {name: _rows(values[number]) for number, name in enumerate(SIGNALS)}
         return HistoryMessage(
             joints=tuple(range(1, self._joints + 1)),
@@ -71,15 +73,3 @@ def _rows(values: Floats) -> tuple[tuple[float | None, ...], ...]:
     """Converts (n, j) to j rows, and NaN to None."""
     rounded = np.round(values.T, DIGITS)
     return tuple(tuple(None if value != value else value for value in row) for row in rounded.tolist())  # noqa: PLR0124
-
-
-def _thinned(
-    tick: np.ndarray[tuple[int], np.dtype[np.int64]], time: Floats, values: Floats, points: int
-) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], Floats, Floats]:
-    first = np.linspace(0, len(time), points // 2 + 1).astype(int)[:-1]
-    last = np.append(first[1:], len(time)) - 1
-    low, high = np.fmin.reduceat(values, first, axis=1), np.fmax.reduceat(values, first, axis=1)
-    falling = values[:, first] > values[:, last]
-    pairs = np.stack([np.where(falling, high, low), np.where(falling, low, high)], axis=2)
-    both = np.stack([first, last], axis=1).ravel()
-    return tick[both], time[both], pairs.reshape(len(SIGNALS), len(both), -1)

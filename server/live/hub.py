@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from pydantic import BaseModel
 
+from daq.contracts.frozen import like
 from daq.contracts.service.live import (
     LinkMessage,
     ProgressMessage,
@@ -136,15 +137,7 @@ class Hub:
                 self._deliver("samples", encoded_sample(report), report.tick)
             case EventHappened():
                 event = report.event
-                message = RecordEventMessage(
-                    kind=event.kind,
-                    message=event.message,
-                    tick=event.tick,
-                    joint=event.joint,
-                    host_time=now,
-                    time=event.time,
-                    experiment=self._experiment(),
-                )
+                message = like(RecordEventMessage, event, host_time=now, experiment=self._experiment())
                 self.history.add_event(message)
                 self.publish("events", message)
             case Progress():
@@ -222,21 +215,9 @@ class Hub:
 
 
 def _parts(status: RobotStatus, now: float) -> list[tuple[Topic, BaseModel]]:
-    robot = RobotMessage(
-        connection=status.connection,
-        connection_problem=status.connection_problem,
-        identity=status.identity,
-        arm=status.arm,
-        cause=status.cause,
-        stop=status.stop,
-        activity=status.activity,
-        experiment=status.experiment,
-        limp=status.limp,
-        control=status.control,
-    )
     age = status.link.age or 0.0
     link = LinkMessage(state=status.link.state, counters=status.link.counters, host_time=now - age)
-    return [("robot", robot), ("link", link), ("queue", QueueMessage(status=status.queue))]
+    return [("robot", like(RobotMessage, status)), ("link", link), ("queue", QueueMessage(status=status.queue))]
 
 
 def _comparable(encoded: str, message: BaseModel) -> str:

@@ -64,7 +64,8 @@ class QueueService:
         self._consented_connection: int | None = None
         """Number of the connection for which a person consented to moving a real arm."""
         self._attendance = Attendance(context.clock)
-        self._running: Running | None = None
+        self.running: Running | None = None
+        """The experiment that runs now."""
         self._waiting_for = ""
         self.notices = Notices(context.clock.monotonic)
         """Reasons to pause the queue that no operator has acknowledged. Call `wake` after adding one."""
@@ -82,11 +83,6 @@ class QueueService:
     def start(self) -> None:
         """Starts the worker thread, which runs experiments."""
         self._worker.start()
-
-    @property
-    def running(self) -> Running | None:
-        """The experiment that runs now."""
-        return self._running
 
     def submit(self, request: ExperimentRequest, by: str, key: str | None) -> tuple[Experiment, bool]:
         """Queues an experiment and returns it with True; or returns the experiment made earlier with this key, with
@@ -107,7 +103,7 @@ class QueueService:
         """Cancels an experiment; stops the arm if it runs. Raises a 404, and a 409 for an ended experiment."""
         name = self._context.robot.name
         with self._lock:
-            running = self._running
+            running = self.running
             if running is not None and running.id == identity:
                 running.cancelled_by = by
                 if running.answer is not None:
@@ -151,20 +147,17 @@ class QueueService:
         self.wake()
 
     def on_report(self, report: Report) -> None:
-        """Handles a report of the robot's owner."""
+        """Handles a report of the robot's owner: a stop, a fault or a lost link pauses the queue. Must not block."""
         if isinstance(report, Progress):
-            self.progressed(report.fraction, report.text)
+            if (running := self.running) is not None:
+                running.progress, running.text = report.fraction, report.text
         elif isinstance(report, ArmReport):
-            self.on_arm_report(report)
+            self.notices.arm_reported(report)
+            self.wake()
         elif isinstance(report, Opened):
             self.connection_made()
         elif isinstance(report, EventHappened):
             self.wake()
-
-    def on_arm_report(self, arm: ArmReport) -> None:
-        """Handles a report of the arm: a stop, a fault or a lost link pauses the queue. Must not block."""
-        self.notices.arm_reported(arm)
-        self.wake()
 
     def stop_asked(self, name: str) -> None:
         """Pauses the queue, whether or not the stop reaches an arm. Must not block."""
@@ -195,18 +188,12 @@ class QueueService:
         """Wakes the worker thread after a change that may let the next experiment begin."""
         self._changed.set()  # nothing else, since callers must not wait for a disk
 
-    def progressed(self, fraction: float, text: str) -> None:
-        """Records the progress of the running experiment."""
-        running = self._running
-        if running is not None:
-            running.progress, running.text = fraction, text
-
     def with_progress(self, experiment: Experiment) -> Experiment:
         """Returns `experiment` for clients: while it runs, with its progress; while it waits, with its content on this
         machine and the approval that it needs."""
         if experiment.state == "queued":
             return experiment.model_copy(update=self._reviewed(experiment, experiment.owner))
-        running = self._running
+        running = self.running
         if running is None or running.id != experiment.id or experiment.state != "running":
             return experiment
         return experiment.model_copy(update={"progress": running.progress, "progress_text": running.text})
@@ -226,7 +213,7 @@ class QueueService:
 
     def status(self) -> QueueStatus:
         """Returns the status now. Waits neither for a disk nor for the lock, since the event loop calls this."""
-        running, waiting_for, state, left = self._running, self._waiting_for, self._state, self._attendance.left
+        running, waiting_for, state, left = self.running, self._waiting_for, self._state, self._attendance.left
         if not state.paused and (reason := self.notices.reason):  # the queue counts as paused from now on
             state = QueueState(True, reason, self._context.clock.utc())
         attended = self._context.clock.utc() + timedelta(seconds=left) if left and self._needs_attendance() else None
@@ -361,11 +348,11 @@ class QueueService:
                 self.wake()
                 return None
             # Set before it stops waiting, so that the queue never looks empty.
-            self._running = Running(next_experiment.id, reviewed=review is not None)
+            self.running = Running(next_experiment.id, reviewed=review is not None)
             try:
                 return context.experiments.begin(name, next_experiment.id, context.clock.utc(), review)
             except BaseException as error:
-                self._running = None
+                self.running = None
                 context.control.give_back_for_queue()
                 # its approval was withdrawn just now, or is for another content
                 if isinstance(error, NotApprovedError):
@@ -420,7 +407,7 @@ class QueueService:
             context.robot.experiment = None
             context.control.give_back_for_queue()
         with self._lock:
-            ending = self._with_stop_reason(ending, self._running)
+            ending = self._with_stop_reason(ending, self.running)
             state = advance("running", ending.event)
             reason = _joined(ending.reason, "its trace is not in the catalogue yet" if ending.left_out else "")
             why = f"{_ended_as(experiment, state)} ({reason}): look at the arm, then resume the queue"
@@ -433,7 +420,7 @@ class QueueService:
                 log.exception("experiment %s: its end as %s is not written yet", experiment.id, state)
                 paused = self._pause(why) or paused
             finally:
-                self._running = None
+                self.running = None
         if paused:
             context.record_event("queue", f"paused: {why}")
             context.paused(why)
@@ -476,7 +463,7 @@ class QueueService:
         """Runs an experiment, and returns how it ended. Raises any error that prevents or loses it."""
         context = self._context
         with self._lock:
-            running = self._running
+            running = self.running
             assert running is not None
             if running.cancelled_by is not None:
                 return Ending(Event.STOPPED, "cancelled before it moved")
@@ -509,7 +496,7 @@ class QueueService:
             except TimeoutError:
                 self._runs.watch_clock()
                 if self._needs_attendance() and not self._attendance.left:
-                    running = self._running
+                    running = self.running
                     if running is not None and running.cancelled_by is None:
                         running.cancelled_by = "the service: no operator confirmed to be present"
                         self._context.robot.send(HaltRun())

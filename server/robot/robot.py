@@ -30,15 +30,7 @@ from daq.owner.messages import (
 )
 from daq.owner.start import start_owner
 from daq.owner.stop_socket import StopAnswer
-from daq.transport import (
-    PortBusyError,
-    SerialPort,
-    Terminal,
-    TransportError,
-    parse_port_url,
-    require_same,
-    terminal_at,
-)
+from daq.transport import PortBusyError, SerialPort, Terminal, TransportError, parse_port_url, require_same, terminal_at
 from server.clock import Clock
 from server.stopping.arm import Reach
 
@@ -100,9 +92,12 @@ class Robot:
         self._owner: OwnerProcess | None = None
         self._opened: Future[RobotIdentity] | None = None
         self._identity: RobotIdentity | None = None
-        self._problem = ""
-        self._arm: Seen | None = None
-        self._sample: Seen | None = None
+        self.problem = ""
+        """Why it is not connected."""
+        self.arm_seen: Seen | None = None
+        """The newest report of the arm's state."""
+        self.sample: Seen | None = None
+        """The newest sample."""
         self._terminal: Terminal | None = None
         """The pseudo-terminal at which it was reached, if it is a mock's."""
 
@@ -122,24 +117,9 @@ class Robot:
         return self._identity
 
     @property
-    def problem(self) -> str:
-        """Why it is not connected."""
-        return self._problem
-
-    @property
     def arm(self) -> ArmReport | None:
         """The newest report of the arm's state."""
-        return self._arm.report if self._arm else None
-
-    @property
-    def arm_seen(self) -> Seen | None:
-        """The newest report of the arm's state, with its time."""
-        return self._arm
-
-    @property
-    def sample(self) -> Seen | None:
-        """The newest sample, with its time."""
-        return self._sample
+        return self.arm_seen.report if self.arm_seen else None
 
     @property
     def connection(self) -> ConnectionState:
@@ -148,12 +128,6 @@ class Robot:
         if identity is None:
             return "disconnected" if owner is None else "connecting"
         return "lost" if arm is not None and arm.link == "lost" else "connected"
-
-    @property
-    def owner_pid(self) -> int | None:
-        """PID of the process that owns the port; None if there is none."""
-        owner = self._owner
-        return None if owner is None else owner.pid
 
     def connect(self, *, anew: bool = False, wanted: Callable[[], bool] = lambda: True) -> RobotIdentity:
         """Connects, or waits for a connection under way. Moves nothing. Raises ReachError, SpecError.
@@ -179,7 +153,9 @@ class Robot:
 
     def reach(self) -> Reach:
         """Returns how the robot can be reached for a stop."""
-        return Reach(self.name, self.place.url, self.owner_pid, self._terminal, self._stop_by_pipe)
+        owner = self._owner
+        process = None if owner is None else owner.pid
+        return Reach(self.name, self.place.url, process, self._terminal, self._stop_by_pipe)
 
     def require_same_place(self) -> None:
         """Raises ReachError if another program now has the port's number: nothing may be sent there."""
@@ -188,8 +164,8 @@ class Robot:
             try:
                 require_same(port.device, self._terminal)
             except TransportError as error:
-                self._problem = str(error)
-                raise ReachError(self._problem) from error
+                self.problem = str(error)
+                raise ReachError(self.problem) from error
 
     def disconnect(self, patience: float = 4.0) -> bool:
         """Frees the port, after a stop of running work. Returns whether this is done within `patience` s."""
@@ -216,7 +192,7 @@ class Robot:
         if arm is not None and arm.arm not in ("stopped", "fault"):
             told = {"arm": "stopped", "cause": "a stop that the board has confirmed", "stop": None}
             stopped = arm.model_copy(update=told)
-            self._arm = Seen(stopped, self.clock.monotonic())
+            self.arm_seen = Seen(stopped, self.clock.monotonic())
 
     def _stop_by_pipe(self) -> StopAnswer | None:
         owner = self._owner
@@ -224,7 +200,7 @@ class Robot:
 
     def _begin(self) -> None:
         place = self.place
-        self._problem = ""
+        self.problem = ""
         self._opened = Future()
         opening = Open(
             url=place.url,
@@ -240,16 +216,16 @@ class Robot:
             self._owner = self._start_owner(opening, self._on_report, self._on_end)
             _notify_each(self.reached, self.reach())
         except OSError as error:  # no memory or file descriptor is left for another process
-            self._problem = f"the robot's process cannot be started: {error.strerror or error}"
-            raise ReachError(self._problem) from error
+            self.problem = f"the robot's process cannot be started: {error.strerror or error}"
+            raise ReachError(self.problem) from error
 
     def _on_report(self, report: Report) -> None:
         seen = Seen(report, self.clock.monotonic())
         match report:
             case LiveSample():
-                self._sample = seen
+                self.sample = seen
             case ArmReport():
-                self._arm = seen
+                self.arm_seen = seen
             case Opened():
                 self._set_opened(report)
             case CannotOpen():
@@ -270,7 +246,7 @@ class Robot:
 
     def _cannot_open(self, report: CannotOpen) -> None:
         with self._lock:
-            self._problem = report.problem
+            self.problem = report.problem
             if self._opened is not None and not self._opened.done():
                 error = PortBusyError(report.problem) if report.busy else ReachError(report.problem)
                 self._opened.set_exception(error)
@@ -278,11 +254,11 @@ class Robot:
     def _on_end(self, why: str) -> None:
         with self._lock:
             was = self._identity is not None
-            self._owner = self._identity = self._arm = self._sample = None
-            if was and not self._problem:
-                self._problem = f"the connection has ended ({why})"
+            self._owner = self._identity = self.arm_seen = self.sample = None
+            if was and not self.problem:
+                self.problem = f"the connection has ended ({why})"
             if self._opened is not None and not self._opened.done():
-                self._opened.set_exception(ReachError(self._problem or f"the robot's process ended: {why}"))
+                self._opened.set_exception(ReachError(self.problem or f"the robot's process ended: {why}"))
         _notify_each(self.reached, self.reach())
         _notify_each(self.disconnected, why)
 

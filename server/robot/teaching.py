@@ -14,17 +14,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.joint_text import speed_unit
 from daq.contracts.service.robot import Activity
 from daq.contracts.service.teaching import TaughtPath, TeachingLine, TeachingStatus
-from daq.owner.messages import (
-    Answer,
-    Finish,
-    HaltRun,
-    JogBegin,
-    JogDrive,
-    LeadBegin,
-    Report,
-    RunProgram,
-    TeachingText,
-)
+from daq.owner.messages import Answer, Finish, HaltRun, JogBegin, JogDrive, LeadBegin, Report, RunProgram, TeachingText
 from daq.teaching.jog import DEAD_MAN, top_speed
 from daq.teaching.lead import PATIENCE
 from daq.teaching.program import Program

@@ -7,20 +7,22 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 
-from sqlalchemy import func, or_, select, tuple_
+from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session
 
 from daq.contracts.experiment import ExperimentSpec
+from daq.contracts.frozen import like
 from daq.contracts.labels import Outcome
 from daq.contracts.service.base import Page
 from daq.contracts.service.experiments import Experiment, ExperimentOrder, ExperimentRequest, ExperimentState
 from daq.traces.naming import new_trace_id
 from server.experiments.review import Given, Review, digest_of
 from server.experiments.states import Event, IllegalEventError, Waiting, advance, after_restart
-from server.problems import conflict, not_found
+from server.problems import conflict
 from server.store.engine import Store
 from server.store.labels import experiment_label
-from server.store.pages import Cursor, KeptPages, newest_first, page_of
+from server.store.pages import Cursor, KeptPages, latest_first, newest_first, page_of
+from server.store.rows import row_of
 from server.store.submitted import approval_of, approve, given_to, made_before, new_columns, require_approvable, void
 from server.store.submitted import digest_of as digest_of_request
 from server.store.tables import ExperimentRow
@@ -91,7 +93,7 @@ class ExperimentStore:
     def get(self, robot: str, identity: str) -> Experiment:
         """Returns an experiment. Raises a 404."""
         with self._store.reading() as session:
-            return as_experiment(_row(session, robot, identity))
+            return as_experiment(row_of(session, ExperimentRow, robot, identity))
 
     def page(
         self,
@@ -104,32 +106,21 @@ class ExperimentStore:
     ) -> Page[Experiment]:
         """Returns a page of the list, the last submitted first; with the order `ended` only ended experiments, the last
         ended first."""
-        asked = (robot, tuple(states), schedule, cursor, limit, order)
-        return self._pages.page(asked, lambda: self._read_page(robot, states, schedule, cursor, limit, order))
-
-    def _read_page(
-        self,
-        robot: str,
-        states: Sequence[ExperimentState],
-        schedule: str | None,
-        cursor: str | None,
-        limit: int,
-        order: ExperimentOrder,
-    ) -> Page[Experiment]:
         query = select(ExperimentRow).where(ExperimentRow.robot == robot)
         if states:
             query = query.where(ExperimentRow.state.in_(states))
         if schedule is not None:
             query = query.where(ExperimentRow.schedule == schedule)
-        if order == "submitted":
-            return newest_first(self._store, query, ExperimentRow.sequence, cursor, limit, as_experiment)
-        query = query.where(ExperimentRow.ended.is_not(None))
-        if cursor is not None:
-            place = Cursor.parse(cursor)
-            query = query.where(tuple_(ExperimentRow.ended, ExperimentRow.id) < tuple_(place.moment, place.identity))
-        query = query.order_by(ExperimentRow.ended.desc(), ExperimentRow.id.desc()).limit(limit + 1)
-        with self._store.reading() as session:
-            return page_of(list(session.scalars(query)), limit, as_experiment, _place_by_end)
+
+        def read() -> Page[Experiment]:
+            if order == "submitted":
+                return newest_first(self._store, query, ExperimentRow.sequence, cursor, limit, as_experiment)
+            ended = query.where(ExperimentRow.ended.is_not(None))
+            ended = latest_first(ended, ExperimentRow.ended, ExperimentRow.id, cursor).limit(limit + 1)
+            with self._store.reading() as session:
+                return page_of(list(session.scalars(ended)), limit, as_experiment, _place_by_end)
+
+        return self._pages.page((robot, tuple(states), schedule, cursor, limit, order), read)
 
     def due(self, robot: str, now: datetime, *, approved: bool = False) -> list[Waiting]:
         """Returns the first queued and due experiment, if any; with `approved`, the first approved one. Reads one row,
@@ -175,7 +166,7 @@ class ExperimentStore:
         """Marks an experiment as running. Raises IllegalEventError if it was cancelled meanwhile, and NotApprovedError
         if the review does not permit its present content."""
         with self._changing(robot) as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, ExperimentRow, robot, identity)
             if review is not None and not _may_begin(row, review):
                 raise NotApprovedError
             row.state = advance(_state(row), Event.TAKEN)
@@ -188,7 +179,7 @@ class ExperimentStore:
     ) -> Experiment:
         """Marks an experiment as ended by `event`. Raises IllegalEventError."""
         with self._changing(robot) as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, ExperimentRow, robot, identity)
             row.state = advance(_state(row), event)
             row.ended, row.reason = now, reason
             row.outcome = outcome or row.outcome  # its trace may have been found before its end was reported
@@ -310,24 +301,12 @@ def as_experiment(row: ExperimentRow) -> Experiment:
     the robot's machine."""
     has_trace = row.outcome is not None or row.state == "running"
     spec = ExperimentSpec.model_validate(row.spec)
-    return Experiment(
-        id=row.id,
-        robot=row.robot,
+    return like(
+        Experiment,
+        row,
         spec=spec,
-        state=_state(row),
-        priority=row.priority,
-        at=row.at,
-        schedule=row.schedule,
-        submitted=row.submitted,
-        submitted_by=row.submitted_by,
-        owner=row.owner,
-        changed_by=row.changed_by,
         content=digest_of(spec, row.at) if row.state == "queued" else "",
         approval=approval_of(row),
-        started=row.started,
-        ended=row.ended,
-        outcome=row.outcome,
-        reason=row.reason,
         trace=row.trace if has_trace else None,
     )
 
@@ -345,7 +324,7 @@ def _may_begin(row: ExperimentRow, review: Review) -> bool:
 
 
 def _queued(session: Session, robot: str, identity: str) -> ExperimentRow:
-    row = _row(session, robot, identity)
+    row = row_of(session, ExperimentRow, robot, identity)
     if row.state != "queued":
         line = f"{experiment_label(row)} is {row.state}"
         raise conflict("experiment-state", line, "only an experiment that is queued can be changed or approved")
@@ -364,10 +343,3 @@ def _count_waiting(session: Session, robot: str) -> int:
 
 def _state(row: ExperimentRow) -> ExperimentState:
     return row.state  # type: ignore[return-value]
-
-
-def _row(session: Session, robot: str, identity: str) -> ExperimentRow:
-    row = session.scalar(select(ExperimentRow).filter_by(robot=robot, id=identity))
-    if row is None:
-        raise not_found(f"experiment {identity!r}", "GET …/experiments lists those there are")
-    return row

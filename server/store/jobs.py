@@ -7,9 +7,8 @@ from datetime import datetime
 
 from pydantic import TypeAdapter
 from sqlalchemy import ColumnElement, String, cast, or_, select
-from sqlalchemy.orm import Session
 
-from daq.contracts.frozen import WHEN_USED
+from daq.contracts.frozen import WHEN_USED, like
 from daq.contracts.service.base import Page
 from daq.contracts.service.jobs import (
     CompareRequest,
@@ -26,6 +25,7 @@ from server.problems import conflict, not_found
 from server.store.engine import Store
 from server.store.labels import job_label
 from server.store.pages import newest_first
+from server.store.rows import row_of
 from server.store.submitted import digest_of, made_before, new_columns
 from server.store.tables import JobRow, TraceRow, TraceUseRow, spaced
 
@@ -95,7 +95,7 @@ class JobStore:
     def get(self, robot: str, identity: str) -> Job:
         """Returns a job. Raises a 404."""
         with self._store.reading() as session:
-            return as_job(_row(session, robot, identity))
+            return as_job(row_of(session, JobRow, robot, identity))
 
     def page(
         self,
@@ -141,7 +141,7 @@ class JobStore:
     ) -> Job:
         """Changes a job's state by an event. Raises a 409 if its state does not allow the event."""
         with self._store.writing() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, JobRow, robot, identity)
             try:
                 row.state = advance(row.state, event)  # type: ignore[arg-type]
             except IllegalEventError as error:
@@ -165,7 +165,7 @@ class JobStore:
     def remove(self, robot: str, identity: str) -> None:
         """Deletes an ended job, so that it no longer uses its traces. Raises a 404, 409."""
         with self._store.writing() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, JobRow, robot, identity)
             if row.state in ("queued", "running"):
                 line = f"{job_label(row.kind, row.submitted)} is {row.state}"
                 raise conflict("job-state", line, "cancel it first")
@@ -176,21 +176,7 @@ class JobStore:
 
 def as_job(row: JobRow) -> Job:
     """Converts a row for clients."""
-    return Job(
-        id=row.id,
-        robot=row.robot,
-        request=_REQUEST.validate_python(row.request),
-        state=row.state,
-        submitted=row.submitted,
-        submitted_by=row.submitted_by,
-        started=row.started,
-        ended=row.ended,
-        reason=row.reason,
-        failure=row.failure,
-        headline=row.headline,
-        model=row.model,
-        has_report=row.state == "done",
-    )
+    return like(Job, row, has_report=row.state == "done")
 
 
 def _concerns(model: str) -> ColumnElement[bool]:
@@ -200,10 +186,3 @@ def _concerns(model: str) -> ColumnElement[bool]:
         JobRow.request["model"].as_string() == model,
         cast(JobRow.request["models"], String).contains(f'"{model}"', autoescape=True),
     )
-
-
-def _row(session: Session, robot: str, identity: str) -> JobRow:
-    row = session.scalar(select(JobRow).filter_by(robot=robot, id=identity))
-    if row is None:
-        raise not_found(f"job {identity!r}", "GET …/jobs lists those there are")
-    return row

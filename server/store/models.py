@@ -2,39 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from collections.abc import Callable, Collection, Iterable, Sequence
 
-from sqlalchemy import select, tuple_
+from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from daq.contracts.documents import shown
+from daq.contracts.frozen import like
 from daq.contracts.service.base import Page
 from daq.contracts.service.jobs import ModelChange, ModelEntry
-from server.problems import ProblemError, conflict, not_found
+from server.problems import ProblemError, conflict
 from server.store.engine import Store
-from server.store.pages import Cursor, page_of
+from server.store.pages import Cursor, latest_first, page_of
+from server.store.rows import row_of
 from server.store.tables import ModelRow, TraceRow, TraceUseRow
 
 MOST_ANCESTORS = 100
 AT_ONCE = 500
 """Number of traces per query; SQLite allows 32 766 values in one."""
-
-
-@dataclass(frozen=True)
-class NewModel:
-    """The columns of a new row, and the traces to which the model was fitted."""
-
-    id: str
-    robot: str
-    name: str
-    file: str
-    created: datetime
-    created_by: str
-    parent: str | None
-    job: str | None
-    traces: tuple[str, ...]
 
 
 class ModelStore:
@@ -43,10 +28,17 @@ class ModelStore:
     def __init__(self, store: Store) -> None:
         self._store = store
 
-    def insert(self, new: NewModel, also: Callable[[], None], robots: Collection[str] | None = None) -> bool:
+    def insert(
+        self,
+        new: ModelRow,
+        traces: Iterable[str],
+        also: Callable[[], None] = lambda: None,
+        robots: Collection[str] | None = None,
+    ) -> bool:
         """Adds a model; returns False if the robot has it already. Equal models have equal IDs.
 
         Args:
+            traces: those to which the model was fitted.
             also: stores the file. Called last before the transaction is written: if it raises, there is no row.
             robots: the model's traces must belong to these; None for a model made by the service itself. Raises a 422
                 otherwise.
@@ -54,11 +46,10 @@ class ModelStore:
         with self._store.writing() as session:
             if session.get(ModelRow, (new.id, new.robot)) is not None:
                 return False
-            traces = tuple(dict.fromkeys(new.traces))
+            traces = tuple(dict.fromkeys(traces))
             if robots is not None:
                 _require_traces(session, traces, robots)
-            fields = {name: value for name, value in vars(new).items() if name != "traces"}
-            session.add(ModelRow(**fields, notes=""))
+            session.add(new)
             for trace in traces:
                 session.merge(TraceUseRow(trace=trace, used_by=f"model {new.id}"))
             session.flush()
@@ -68,18 +59,18 @@ class ModelStore:
     def get(self, robot: str, identity: str) -> ModelEntry:
         """Returns a model's entry. Raises a 404."""
         with self._store.reading() as session:
-            return _entry(session, _row(session, robot, identity))
+            return _entry(session, row_of(session, ModelRow, robot, identity))
 
     def file_of(self, robot: str, identity: str) -> str:
         """Returns the name of a model's file. Raises a 404."""
         with self._store.reading() as session:
-            return _row(session, robot, identity).file
+            return row_of(session, ModelRow, robot, identity).file
 
     def ancestors(self, robot: str, identity: str) -> tuple[ModelEntry, ...]:
         """Returns the ancestors of a model, the nearest first, as far as they are in the database."""
         found: list[ModelEntry] = []
         with self._store.reading() as session:
-            row: ModelRow | None = _row(session, robot, identity)
+            row: ModelRow | None = row_of(session, ModelRow, robot, identity)
             while row is not None and row.parent is not None and len(found) < MOST_ANCESTORS:
                 row = session.get(ModelRow, (row.parent, robot))
                 if row is not None and row.id not in {one.id for one in found}:
@@ -88,20 +79,15 @@ class ModelStore:
 
     def newest(self, robot: str, most: int) -> tuple[ModelEntry, ...]:
         """Returns up to `most` models, newest first."""
-        query = select(ModelRow).filter_by(robot=robot).order_by(ModelRow.created.desc(), ModelRow.id.desc())
+        query = latest_first(select(ModelRow).filter_by(robot=robot), ModelRow.created, ModelRow.id, None)
         with self._store.reading() as session:
             return tuple(_entry(session, row) for row in session.scalars(query.limit(most)))
 
     def page(self, robot: str, cursor: str | None, limit: int) -> Page[ModelEntry]:
         """Returns a page of the list, newest first."""
-        query = select(ModelRow).where(ModelRow.robot == robot)
-        if cursor is not None:
-            place = Cursor.parse(cursor)
-            moment = datetime.fromtimestamp(place.number, UTC)
-            query = query.where(tuple_(ModelRow.created, ModelRow.id) < tuple_(moment, place.identity))
-        query = query.order_by(ModelRow.created.desc(), ModelRow.id.desc()).limit(limit + 1)
+        query = latest_first(select(ModelRow).where(ModelRow.robot == robot), ModelRow.created, ModelRow.id, cursor)
         with self._store.reading() as session:
-            rows = list(session.scalars(query))
+            rows = list(session.scalars(query.limit(limit + 1)))
             return page_of(
                 rows, limit, lambda row: _entry(session, row), lambda row: Cursor(row.created.timestamp(), row.id)
             )
@@ -109,7 +95,7 @@ class ModelStore:
     def change(self, robot: str, identity: str, change: ModelChange) -> ModelEntry:
         """Changes the name or the notes. Raises a 404."""
         with self._store.writing() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, ModelRow, robot, identity)
             row.name = row.name if change.name is None else change.name
             row.notes = row.notes if change.notes is None else change.notes
             session.flush()
@@ -122,7 +108,7 @@ class ModelStore:
         robot has the model too, and needs the file.
         """
         with self._store.writing() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, ModelRow, robot, identity)
             child = session.scalar(select(ModelRow.name).filter_by(robot=robot, parent=identity))
             if child is not None:
                 raise conflict("model-in-use", f"model {child!r} was made from {row.name!r}", "delete that one first")
@@ -148,21 +134,4 @@ def _require_traces(session: Session, traces: Sequence[str], robots: Collection[
 
 def _entry(session: Session, row: ModelRow) -> ModelEntry:
     traces = session.scalars(select(TraceUseRow.trace).filter_by(used_by=f"model {row.id}"))
-    return ModelEntry(
-        id=row.id,
-        robot=row.robot,
-        name=row.name,
-        created=row.created,
-        created_by=row.created_by,
-        parent=row.parent,
-        job=row.job,
-        traces=tuple(sorted(traces)),
-        notes=row.notes,
-    )
-
-
-def _row(session: Session, robot: str, identity: str) -> ModelRow:
-    row = session.get(ModelRow, (identity, robot))
-    if row is None:
-        raise not_found(f"model {identity!r}", "GET …/models lists those there are")
-    return row
+    return like(ModelEntry, row, traces=tuple(sorted(traces)))

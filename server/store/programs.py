@@ -5,13 +5,15 @@ from __future__ import annotations
 from datetime import datetime
 
 from sqlalchemy import func, select
-from sqlalchemy.orm import Session, defer
+from sqlalchemy.orm import defer
 
+from daq.contracts.frozen import like
 from daq.contracts.service.base import Wire
 from daq.contracts.service.teaching import ProgramEntry
 from daq.teaching.program import Program
-from server.problems import conflict, not_found
+from server.problems import conflict
 from server.store.engine import Store
+from server.store.rows import row_of
 from server.store.tables import ProgramRow
 
 MOST_PROGRAMS = 1000
@@ -37,13 +39,13 @@ class ProgramStore:
         query = select(ProgramRow).options(defer(ProgramRow.program)).filter_by(robot=robot)
         query = query.order_by(ProgramRow.changed.desc(), ProgramRow.name)
         with self._store.reading() as session:
-            return tuple(_entry(row) for row in session.scalars(query))
+            return tuple(like(ProgramEntry, row) for row in session.scalars(query))
 
     def get(self, robot: str, name: str) -> StoredProgram:
         """Returns a program. Raises a 404."""
         with self._store.reading() as session:
-            row = _row(session, robot, name)
-            return StoredProgram(entry=_entry(row), program=Program.model_validate(row.program))
+            row = row_of(session, ProgramRow, robot, name, "name")
+            return StoredProgram(entry=like(ProgramEntry, row), program=Program.model_validate(row.program))
 
     def put(
         self, robot: str, name: str, program: Program, revision: int | None, now: datetime, by: str
@@ -59,7 +61,7 @@ class ProgramStore:
         with self._store.writing() as session:
             there = session.get(ProgramRow, (robot, program.name))
             if there is not None and there.program == content:
-                return _entry(there)
+                return like(ProgramEntry, there)
             if revision is None:
                 if there is not None:
                     raise _taken(program.name)
@@ -69,7 +71,7 @@ class ProgramStore:
                 row = ProgramRow(robot=robot, revision=0)
                 session.add(row)
             else:
-                row = _row(session, robot, name)
+                row = row_of(session, ProgramRow, robot, name, "name")
                 if program.name != name and there is not None:
                     raise _taken(program.name)
                 if row.revision != revision:
@@ -79,31 +81,13 @@ class ProgramStore:
             row.instructions = len(program.instructions)
             row.changed, row.changed_by = now, by
             session.flush()
-            return _entry(row)
+            return like(ProgramEntry, row)
 
     def remove(self, robot: str, name: str) -> None:
         """Deletes a program permanently. Raises a 404."""
         with self._store.writing() as session:
-            session.delete(_row(session, robot, name))
+            session.delete(row_of(session, ProgramRow, robot, name, "name"))
 
 
 def _taken(name: str) -> Exception:
     return conflict("program-exists", f"there is a program {name!r} already", "choose another name, or delete that one")
-
-
-def _entry(row: ProgramRow) -> ProgramEntry:
-    return ProgramEntry(
-        name=row.name,
-        robot=row.robot,
-        revision=row.revision,
-        instructions=row.instructions,
-        changed=row.changed,
-        changed_by=row.changed_by,
-    )
-
-
-def _row(session: Session, robot: str, name: str) -> ProgramRow:
-    row = session.get(ProgramRow, (robot, name))
-    if row is None:
-        raise not_found(f"program {name!r}", "GET …/programs lists those there are")
-    return row

@@ -7,44 +7,23 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Protocol
 
-from sqlalchemy import Select, delete, or_, select, update
+from sqlalchemy import Select, delete, select, update
 from sqlalchemy.orm import Session
 
+from daq.contracts.frozen import like
 from daq.contracts.labels import Outcome, Source
 from daq.contracts.service.base import Page
 from daq.contracts.service.traces import CatalogueEntry, TraceChange
-from server.problems import conflict, not_found
+from daq.traces.catalogue import TraceSummary
+from server.problems import conflict
 from server.store.engine import Store
 from server.store.labels import label_of_row, trace_label, user_label
-from server.store.pages import Cursor, KeptPages, page_of
+from server.store.pages import Cursor, KeptPages, latest_first, page_of
+from server.store.rows import row_of
 from server.store.tables import JobRow, TraceRow, TraceTagRow, TraceUseRow, spaced
 
-
-@dataclass(frozen=True)
-class NewTrace:
-    """The columns of a new row."""
-
-    id: str
-    robot: str
-    file: str
-    created: datetime
-    source: str
-    kind: str | None
-    name: str | None
-    joints: tuple[int, ...]
-    moved: tuple[int, ...]
-    outcome: Outcome | None
-    samples: int | None
-    duration: float | None
-    size: int
-    operator: str | None
-    experiment: str | None
-    notes: str
-
-    @property
-    def label(self) -> str:
-        """Name of the trace in messages."""
-        return trace_label(self.name, self.kind, self.file, self.created)
+_OF_SUMMARY = ("created", "kind", "name", "outcome", "samples", "duration", "size", "operator")
+"""Columns that are fields of a summary."""
 
 
 @dataclass(frozen=True)
@@ -85,21 +64,36 @@ class TraceStore:
         """None if there is no archive."""
         self._pages: KeptPages[CatalogueEntry] = KeptPages(store)
 
-    def insert(self, new: NewTrace, file_exists: Callable[[str], bool] = lambda _file: True) -> None:
-        """Adds a trace. If its row exists and the row's file is gone, the row gets the new file, and keeps its tags and
-        notes. Raises a 409 if the row already refers to another existing file."""
-        columns = {**new.__dict__, "joints": list(new.joints), "moved": spaced(new.moved), "missing": False}
+    def insert(
+        self,
+        robot: str,
+        new: TraceSummary,
+        experiment: str | None = None,
+        file_exists: Callable[[str], bool] = lambda _file: True,
+    ) -> None:
+        """Adds a finished trace. If its row exists and the row's file is gone, the row gets the new file, and keeps its
+        tags and notes. Raises a 409 if the row already refers to another existing file."""
+        assert new.created is not None
+        columns = {name: getattr(new, name) for name in _OF_SUMMARY} | {
+            "file": new.path.name,
+            "source": new.source or "imported",
+            "joints": list(new.joints),
+            "moved": spaced(new.moved or ()),
+            "missing": False,
+        }
         with self._store.writing() as session:
-            row = session.get(TraceRow, new.id)
+            row = session.get(TraceRow, new.trace_id)
             tags: tuple[str, ...] = ()
             if row is None:
-                row = TraceRow(**columns, searched="")
-            elif row.robot == new.robot and (row.file == new.file or not file_exists(row.file)):
+                own = {"id": new.trace_id, "robot": robot, "experiment": experiment, "notes": new.notes}
+                row = TraceRow(**own, **columns, searched="")
+            elif row.robot == robot and (row.file == new.path.name or not file_exists(row.file)):
                 tags = _tags(session, [row.id]).get(row.id, ())
-                for name in columns.keys() - {"notes", "experiment"}:
-                    setattr(row, name, columns[name])
+                for name, value in columns.items():
+                    setattr(row, name, value)
             else:
-                line = f"{new.label} is in the catalogue already, as {row.file}"
+                label = trace_label(new.name, new.kind, new.path.name, new.created)
+                line = f"{label} is in the catalogue already, as {row.file}"
                 raise conflict("trace-exists", line, "it is the same trace: nothing needs to be done")
             session.add(row)
             row.searched = _searched(row, tags)
@@ -122,7 +116,7 @@ class TraceStore:
     def file_of(self, robot: str, identity: str) -> str:
         """Returns the name of a trace's file. Raises a 404."""
         with self._store.reading() as session:
-            return _row(session, robot, identity).file
+            return row_of(session, TraceRow, robot, identity).file
 
     def files_of(self, robot: str, identities: Iterable[str]) -> dict[str, str]:
         """Returns the names of the files of traces, those that are in the table."""
@@ -133,7 +127,7 @@ class TraceStore:
     def get(self, robot: str, identity: str) -> CatalogueEntry:
         """Returns a trace's entry. Raises a 404."""
         with self._store.reading() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, TraceRow, robot, identity)
             return self._entry(session, row, _tags(session, [row.id]).get(row.id, ()))
 
     def is_archived(self, identity: str) -> bool:
@@ -153,12 +147,11 @@ class TraceStore:
         return self._pages.page(asked, lambda: self._read_page(robot, search, cursor, limit))
 
     def _read_page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
-        place = None if cursor is None else Cursor.parse(cursor)
         # PostgreSQL rejects NUL in text; nothing can match
         if any("\0" in one for one in (search.text, search.tag, search.kind) if one):
             return Page(items=())
         with self._store.reading() as session:
-            rows = list(session.scalars(_query(robot, search, place).limit(limit + 1)))
+            rows = list(session.scalars(_query(robot, search, cursor).limit(limit + 1)))
             tags = _tags(session, [row.id for row in rows])
             archived = self._archived(session, [row.id for row in rows])
         return page_of(
@@ -171,7 +164,7 @@ class TraceStore:
     def change(self, robot: str, identity: str, change: TraceChange) -> CatalogueEntry:
         """Changes tags or notes. Raises a 404."""
         with self._store.writing() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, TraceRow, robot, identity)
             if change.notes is not None:
                 row.notes = change.notes
             if change.tags is not None:
@@ -190,7 +183,7 @@ class TraceStore:
         without a file can be deleted later; a file without a row would be added again without its tags.
         """
         with self._store.writing() as session:
-            row = _row(session, robot, identity)
+            row = row_of(session, TraceRow, robot, identity)
             users = list(session.scalars(select(TraceUseRow.used_by).filter_by(trace=identity).limit(5)))
             if users:
                 line = f"{label_of_row(row)} is used by {', '.join(user_label(session, user) for user in users)}"
@@ -208,13 +201,6 @@ class TraceStore:
         return _entry(row, tags, archived=bool(self._archived(session, [row.id])))
 
 
-def _row(session: Session, robot: str, identity: str) -> TraceRow:
-    row = session.get(TraceRow, identity)
-    if row is None or row.robot != robot:
-        raise not_found(f"trace {identity!r}", "GET …/traces lists those there are")
-    return row
-
-
 def _tags(session: Session, identities: list[str]) -> dict[str, tuple[str, ...]]:
     found: dict[str, tuple[str, ...]] = {}
     query = select(TraceTagRow).where(TraceTagRow.trace.in_(identities)).order_by(TraceTagRow.tag)
@@ -223,7 +209,7 @@ def _tags(session: Session, identities: list[str]) -> dict[str, tuple[str, ...]]
     return found
 
 
-def _query(robot: str, search: TraceSearch, place: Cursor | None) -> Select[TraceRow]:
+def _query(robot: str, search: TraceSearch, cursor: str | None) -> Select[TraceRow]:
     """The traces of a robot that match a search, after a place in the list, newest first.
 
     The query stops once a page is full. A text that matches nothing scans all rows.
@@ -252,11 +238,7 @@ def _query(robot: str, search: TraceSearch, place: Cursor | None) -> Select[Trac
         query = query.where(TraceRow.created >= search.since)
     if search.until is not None:
         query = query.where(TraceRow.created < search.until)
-    if place is not None:
-        # The first condition lets the database use the index; the second breaks ties of the time.
-        query = query.where(TraceRow.created <= place.moment)
-        query = query.where(or_(TraceRow.created < place.moment, TraceRow.id < place.identity))
-    return query.order_by(TraceRow.created.desc(), TraceRow.id.desc())
+    return latest_first(query, TraceRow.created, TraceRow.id, cursor)
 
 
 def _searched(row: TraceRow, tags: Iterable[str]) -> str:
@@ -265,9 +247,12 @@ def _searched(row: TraceRow, tags: Iterable[str]) -> str:
 
 
 def _entry(row: TraceRow, tags: tuple[str, ...], *, archived: bool) -> CatalogueEntry:
-    own = CatalogueEntry.model_fields.keys() - {"tags", "joints", "moved", "missing", "archived", "local"}
-    return CatalogueEntry.model_validate(
-        {name: getattr(row, name) for name in own}
-        | {"tags": tags, "joints": tuple(row.joints), "moved": tuple(map(int, row.moved.split()))}
-        | {"missing": row.missing and not archived, "archived": archived, "local": not row.missing}
+    return like(
+        CatalogueEntry,
+        row,
+        tags=tags,
+        moved=tuple(map(int, row.moved.split())),
+        missing=row.missing and not archived,
+        archived=archived,
+        local=not row.missing,
     )

@@ -15,6 +15,7 @@ from datetime import datetime
 from sqlalchemy import select
 from sqlalchemy.exc import DatabaseError, IntegrityError, SQLAlchemyError
 
+from daq.contracts.frozen import like
 from daq.contracts.service.base import Page
 from daq.contracts.service.events import ServiceEvent
 from server.database_errors import is_value, one_line
@@ -23,17 +24,27 @@ from server.store.pages import newest_first
 from server.store.tables import EventRow
 
 
+@dataclass(frozen=True)
+class NewEvent:
+    """An event of a robot, and who caused it."""
+
+    robot: str
+    kind: str
+    text: str
+    at: datetime
+    actor: str | None = None
+    experiment: str | None = None
+
+
 class EventStore:
     """Events of all robots."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
 
-    def add(
-        self, robot: str, kind: str, text: str, at: datetime, actor: str | None = None, experiment: str | None = None
-    ) -> ServiceEvent:
+    def add(self, new: NewEvent) -> ServiceEvent:
         """Records an event."""
-        row = EventRow(robot=robot, at=at, kind=kind, text=text, actor=actor, experiment=experiment)
+        row = EventRow(**vars(new))
         with self._store.writing() as session:
             session.add(row)
             session.flush()
@@ -48,9 +59,7 @@ class EventStore:
 
 
 def _event(row: EventRow) -> ServiceEvent:
-    return ServiceEvent(
-        number=row.sequence, at=row.at, kind=row.kind, text=row.text, actor=row.actor, experiment=row.experiment
-    )
+    return like(ServiceEvent, row, number=row.sequence)
 
 
 MOST_WAITING = 10_000
@@ -58,16 +67,6 @@ MOST_WAITING = 10_000
 AGAIN_AFTER = 1.0
 """Time (s) after which a failed write is tried again."""
 log = logging.getLogger("server")
-
-
-@dataclass(frozen=True)
-class _Waiting:
-    robot: str
-    kind: str
-    text: str
-    at: datetime
-    actor: str | None
-    experiment: str | None
 
 
 class WaitingEvents:
@@ -79,7 +78,7 @@ class WaitingEvents:
         self._store = store
         self._written = written
         self._again_after = again_after
-        self._events: deque[_Waiting] = deque()
+        self._events: deque[NewEvent] = deque()
         self._changed = threading.Condition()
         """Held only briefly."""
         self._writing = threading.Lock()
@@ -88,15 +87,13 @@ class WaitingEvents:
         """Writes the waiting events; meanwhile no other thread tries, and waits for the database."""
         self._closing = False
 
-    def add(
-        self, robot: str, kind: str, text: str, at: datetime, actor: str | None = None, experiment: str | None = None
-    ) -> None:
+    def add(self, event: NewEvent) -> None:
         """Writes an event, after the waiting ones. Never raises. Waits for the database only while no other event is
         known to wait in vain."""
-        event = _Waiting(robot, kind, text, at, actor, experiment)
         with self._changed:
             if len(self._events) >= MOST_WAITING:
-                log.error("%s: %s: %s: only here: too many events wait for the database", robot, kind, text)
+                line = "%s: %s: %s: only here: too many events wait for the database"
+                log.error(line, event.robot, event.kind, event.text)
                 return
             self._events.append(event)
             if self._thread is not None:
@@ -138,7 +135,7 @@ class WaitingEvents:
         while self._events:
             event = self._events[0]
             try:
-                made = self._store.add(event.robot, event.kind, event.text, event.at, event.actor, event.experiment)
+                made = self._store.add(event)
             except Exception as error:
                 if _may_pass(error):
                     if self._thread is None:  # once

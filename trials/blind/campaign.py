@@ -1,6 +1,5 @@
 """Runs the trial, case by case: detectability, recording, diagnosis, scoring. Each stage runs once, and its result is
-kept.
-"""
+kept."""
 
 from __future__ import annotations
 
@@ -185,8 +184,7 @@ class Campaign:
 
     def _diagnose(self, seed: int) -> dict[str, Any]:
         """Diagnoses a case; returns its last answer, sealed: its file and hash are written before the truth is
-        revealed.
-        """
+        revealed."""
         recorded, case = self._row("record", seed), self.folder.name_of(seed)
         traces = [self.folder.path / "traces" / recorded["trace"]]
         row: dict[str, Any] = {"seed": seed, "case": case}

@@ -13,8 +13,7 @@ from daq.contracts.machine import Machine
 
 def trial_experiment(name: str) -> ExperimentSpec:
     """Returns `diagnostic`: the preset of 55 s. `ramp`: the source's ramp there and back, 8 s. `held-out`: the
-    preset.
-    """
+    preset."""
     from daq.trajectories.presets import preset
 
     return _ramp_step() if name == "ramp" else preset(name).spec

@@ -52,8 +52,7 @@ REGISTERED = (
     "server/jobs/next_experiment.py",
 )
 """Parts of the source tree that determine the outcome. A test follows the imports of every stage and finds them all
-here.
-"""
+here."""
 LIBRARIES = ("numpy", "scipy", "numba", "mujoco")
 """Libraries whose numerical results determine the outcome."""
 _SUFFIXES = (".py", ".toml", ".json", ".csv")

@@ -25,8 +25,7 @@ ACCELERATION = 12.0
 """rad/s² that every motor can give its joint in addition to its weight."""
 HEADROOM = 4.0
 """Volts of a current loop's amplifier, relative to those of its largest torque at rest. A loop without enough volts
-gives less than is recorded, and no file of these rigs states that.
-"""
+gives less than is recorded, and no file of these rigs states that."""
 WORST = 2.2
 """Truncation of drawn deviations, in their sizes."""
 BOARD_PERIOD_DELAY = 0.3
@@ -159,8 +158,7 @@ def _friction(joint: Records, draw: Generator, kind: Kind, strongest: float, ine
 
 def _gains(joint: Records, draw: Generator, kind: Kind, period: float, supply: float, inertia: float) -> None:
     """Places poles of the joint alone, at its largest inertia; limits gains so that a count of the sensor has little
-    effect.
-    """
+    effect."""
     p = joint[0]
     total = inertia + p["rotor"]
     if kind.drive == CURRENT:

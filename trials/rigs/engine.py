@@ -121,8 +121,7 @@ def _across(axis: Floats, j: int, gravity: Floats) -> float:
 @compiled
 def _within_volts(command: float, speed: float, p: Any) -> float:
     """Returns the part of a current loop's command (N·m of the motor) that its volts allow; back-EMF helps when it
-    brakes.
-    """
+    brakes."""
     back = p.back_emf * p.gear * speed
     share = p.nominal_constant / p.resistance
     return min(max(command, share * (-p.supply - back)), share * (p.supply - back))
@@ -131,8 +130,7 @@ def _within_volts(command: float, speed: float, p: Any) -> float:
 @compiled
 def _motor_torque(volts: float, current: float, speed: float, rise: float, p: Any, step: float) -> Any:
     """Returns the current (A) after a step and the torque (N·m) at the joint; `volts` is the command of a current loop
-    in N·m.
-    """
+    in N·m."""
     if p.current_rate > 0.0:
         wished = _within_volts(volts, speed, p) / p.nominal_constant
         current = wished + (current - wished) * math.exp(-p.current_rate * step)

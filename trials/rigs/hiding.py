@@ -44,8 +44,7 @@ OTHER_NAMES: dict[str, dict[int, tuple[str, tuple[str, ...]]]] = {
 
 EVENLY_PRESSED = 3
 """If the axes of all joints up to this one keep their angle to gravity in every posture, a weight presses evenly there,
-and friction under it is Coulomb friction.
-"""
+and friction under it is Coulomb friction."""
 NAMED_BY_LAW = {"direction_dependent_gear_loss": ("gear_loss", 1)}
 """Laws of an effect that have a name of their own in the library."""
 

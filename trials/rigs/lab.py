@@ -1,6 +1,5 @@
 """Writes what a lab would have of a rig: records as CSV, and a machine file as it would write it. Neither contains the
-truth.
-"""
+truth."""
 
 from __future__ import annotations
 

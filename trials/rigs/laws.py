@@ -74,8 +74,7 @@ def loss_level(transmitted: float, speed: float, p: Any) -> float:
 @compiled
 def sliding_level(angle: float, speed: float, load: float, transmitted: float, p: Any) -> float:
     """Returns dry friction of a sliding joint, N·m; `load` is the multiplier of load-dependent friction, times its
-    arm.
-    """
+    arm."""
     level = p.coulomb + load + loss_level(transmitted, speed, p)
     if p.direction * speed > 0.0:
         level += abs(p.direction)
@@ -132,8 +131,7 @@ def outside_torque(time: float, angle: float, p: Any) -> float:
 @compiled
 def transmitted_torque(give: float, rate: float, p: Any) -> float:
     """Returns the torque of a flexible gear with deflection `give` (motor − joint, rad); none inside its gap; contacts
-    only press.
-    """
+    only press."""
     half = 0.5 * p.gap
     depth = give - half if give > half else (give + half if give < -half else 0.0)
     if depth == 0.0 and p.gap > 0.0:

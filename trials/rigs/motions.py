@@ -21,8 +21,7 @@ def set_points(
     name: str, draw: Generator, centre: Floats, reach: Floats, speed: float, duration: float, period: float
 ) -> Floats:
     """Returns (k, n) rad around `centre` within ± `reach`, at most about `speed` rad/s; every joint has a motion of its
-    own.
-    """
+    own."""
     time = np.arange(round(duration / period)) * period
     columns = []
     for middle, half in zip(centre, reach, strict=True):

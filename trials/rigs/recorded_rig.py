@@ -85,8 +85,7 @@ def hidden_rig(kind_name: str, seed: int, case: str | None = None, effect: str |
 
 def _hidden(rig: Rig, motion: Motion, name: str, joint: int | None, draw: Generator) -> Rig:
     """Returns the rig with an effect at a joint, drawn until its loop is stable; flexible gears become stiffer each
-    time.
-    """
+    time."""
     for attempt in range(ATTEMPTS):
         law, size = drawn(rig, motion, name, joint, draw)
         if "rate" in size:

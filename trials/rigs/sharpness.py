@@ -44,8 +44,7 @@ STEP = 2e-4
 """s, about, of the simulations here."""
 DECIDES = 1e5
 """d′ by linear tolerances above which they are not refitted: no tolerance brings it below 5. It is large, because a
-sticking joint is very nonlinear: friction that the file may state has reached 4 399 by linear tolerances.
-"""
+sticking joint is very nonlinear: friction that the file may state has reached 4 399 by linear tolerances."""
 NOT_TOLD = 4.9
 """d′ at which a refit of tolerances ends, since the record does not distinguish."""
 REFITTED = 40
@@ -56,8 +55,7 @@ FARTHEST = 3.0
 """Largest initial deviations of a refit."""
 TELLS = 5.0
 """d′ at which record and file distinguish. One value that is wrong by as many deviations costs as much, so none is
-moved farther.
-"""
+moved farther."""
 DIFFERENCE = 0.05
 """Step of differences in a refit, deviations."""
 LEAST_FALL = 1e-3
@@ -240,8 +238,7 @@ class _Comparison:
 
     def _as_true(self, made: Rig, tolerance: Tolerance) -> float:
         """Returns the deviations by which a parameter of the rival is moved to equal that of the true arm with its
-        effect.
-        """
+        effect."""
         field, j = ("torque_constant" if tolerance.name == "magnet" else tolerance.name), tolerance.joint
         if j is None:
             return 0.0
@@ -349,8 +346,7 @@ def _of_link(link: Link, field: str) -> float:
 
 def _noise(rig: Rig) -> Floats:
     """Returns noise of a reading (rad, by joint): white, of rounding, and coloured at its density at low
-    frequencies.
-    """
+    frequencies."""
     pole = math.exp(-2 * math.pi * COLOURED_CORNER * float(rig.loop["period"][0]))
     slow = rig.kind.coloured**2 * (1 + pole) / (1 - pole)
     return np.asarray(rig.joints["count"] * math.sqrt(rig.kind.noise**2 + 1 / 12 + slow))

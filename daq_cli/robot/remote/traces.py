@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from daq.contracts.errors import TraceError
+from daq.contracts.frozen import like
 from daq.contracts.service.archive import Transfer
 from daq.contracts.service.traces import CatalogueEntry
 from daq.traces.catalogue import TraceSummary
@@ -53,22 +54,12 @@ def transfer_words(transfer: Transfer) -> str:
 
 def summary(entry: CatalogueEntry) -> TraceSummary:
     """Converts an entry of the service's catalogue to the form of `daq traces ls`."""
-    return TraceSummary(
+    return like(
+        TraceSummary,
+        entry,
         path=Path(entry.file),
         state="unreadable" if entry.missing else "finished",
         problem="its file is gone" if entry.missing else None,
-        size=entry.size,
         trace_id=entry.id,
-        created=entry.created,
-        source=entry.source,
-        robot=entry.robot,
-        kind=entry.kind,
-        name=entry.name,
-        joints=entry.joints,
         moved=entry.moved or None,
-        outcome=entry.outcome,
-        samples=entry.samples,
-        duration=entry.duration,
-        operator=entry.operator,
-        notes=entry.notes,
     )

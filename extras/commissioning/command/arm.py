@@ -31,8 +31,7 @@ FEWEST_CONSTANTS = 4
 """Least number of constant bytes that is evidence."""
 OTHERS = 0.2
 """Share of constant bytes that may have changed on the same controller: a slow counter may have stood still while the
-map was found. On another controller most differ.
-"""
+map was found. On another controller most differ."""
 ALLOWED_COUNTS = 12
 """Largest difference (ADC counts) between error + position and the set point: a joint may move between two bytes."""
 CRYSTALS = 1e-3
@@ -201,8 +200,7 @@ def begin_anew(folder: Path) -> Record:
 
 def _compared(bench: Bench, kept: Identity) -> tuple[Identity, str, bool]:
     """Returns the identity that remains; why the arm is another one, empty if it may be the same; and whether its
-    registers are elsewhere, so that no earlier result is valid.
-    """
+    registers are elsewhere, so that no earlier result is valid."""
     from extras.commissioning.memory.procedure import is_alive
     from extras.commissioning.person.memory_page import open_page
     from extras.commissioning.person.safe_release import typical

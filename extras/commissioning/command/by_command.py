@@ -31,8 +31,7 @@ WITHIN_TOLERANCES = "yes, within its tolerances"
 
 def end_freeze(bench: Bench) -> None:
     """Ends an active stop with the person's consent; nothing moves by that. Raises NotCommissionedError if it is to
-    stay.
-    """
+    stay."""
     with connected(bench) as controller:
         status = controller.status()
         if StatusFlag.FROZEN not in status.flags:
@@ -81,8 +80,7 @@ def period(bench: Bench) -> dict[str, Any]:
 
 def gain(bench: Bench) -> dict[str, Any]:
     """Measures volts per radian of each joint, by `daq calibrate gain`; writes the common part into the machine
-    file.
-    """
+    file."""
     from daq.calibration import gain_experiment, gains_from_trace
     from daq.calibration.gain import GainEstimate, common_gain
     from daq.contracts.quantity import Quantity
@@ -198,9 +196,9 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     from model.discrepancy.explanation.answer_words import headline
     from model.discrepancy.options import DiagnosisOptions
     from model.discrepancy.workflow import diagnose
+    from model.reports.diagnosis_data import told
     from model.reports.page import write_page
     from model.reports.saved_report import saved_report
-    from server.jobs.diagnosis_data import told
     from server.jobs.next_experiment import experiment_chooser
 
     bench.operator.show(

@@ -113,8 +113,7 @@ def potentiometers(bench: Bench) -> dict[str, Any]:
 
 def _sensor(bench: Bench, page: LinkPage, memory_map: MemoryMap, joint: int) -> Potentiometer:
     """Measures the sensor of one joint. Unusable postures are asked for again, `ATTEMPTS` times in all. Raises
-    SpecError.
-    """
+    SpecError."""
     from extras.commissioning.potentiometer import calibrate_potentiometer
 
     for attempt in range(1, ATTEMPTS + 1):
@@ -213,8 +212,7 @@ def _reading_at(bench: Bench, page: LinkPage, memory_map: MemoryMap, task: Task)
 
 def emergency_stop(bench: Bench) -> dict[str, Any]:
     """Tests whether the emergency stop cuts the drives' power: a joint then stays off its set point, whatever its
-    power.
-    """
+    power."""
     from extras.commissioning.person.memory_page import open_page
 
     memory_map, joint = bench.memory_map(), bench.joints[0]

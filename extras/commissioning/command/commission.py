@@ -142,8 +142,7 @@ def _require_sensible(folder: Path, only: str | None, left_out: set[str], becaus
 
 def _with_port(call: Invocation, folder: Path, *, find_port: bool, baud: int | None) -> Invocation:
     """Returns the invocation with the port that is found, given, configured, or in the folder's daq.toml. Raises
-    SpecError.
-    """
+    SpecError."""
     if find_port:
         if call.port_option is not None:
             raise SpecError("--find-port and --port: give one of them")
@@ -165,8 +164,7 @@ def _with_port(call: Invocation, folder: Path, *, find_port: bool, baud: int | N
 
 def _require_memory_map(path: Path) -> None:
     """Requires a valid memory map to leave out the search, before anything is recorded. Raises SpecError,
-    MemoryMapError.
-    """
+    MemoryMapError."""
     if not path.exists():
         raise SpecError(f"--skip memory: {path} does not exist, and nothing may rely on an assumed memory map")
     load_memory_map(path)

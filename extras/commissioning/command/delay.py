@@ -111,8 +111,7 @@ def _held(robot: str, url: str, memory_map: MemoryMap, consent: Consent) -> Iter
 @contextmanager
 def stopped_by_ctrl_z() -> Iterator[None]:
     """Handles Ctrl-Z like Ctrl-C. A Python handler lets the guardian's wake-up pipe see it; a process that the terminal
-    has suspended could not react to a stop.
-    """
+    has suspended could not react to a stop."""
     before = signal.signal(signal.SIGTSTP, lambda _number, _frame: None)
     try:
         yield
@@ -129,8 +128,7 @@ WIDEST_S = 0.006
 @dataclass(frozen=True)
 class Effect:
     """One set point and its effect: bounds (s) of the time when it was written, and of that when the first result with
-    it was stored.
-    """
+    it was stored."""
 
     written: tuple[float, float]
     stored: tuple[float, float]

@@ -65,8 +65,7 @@ def line(bench: Bench) -> dict[str, Any]:
 
 def memory(bench: Bench) -> dict[str, Any]:
     """Finds the memory map, by `daq memory find`. An earlier one, its findings and its record stay if this search ends
-    early.
-    """
+    early."""
     from extras.commissioning.memory_command import (
         adopt,
         findings_text,

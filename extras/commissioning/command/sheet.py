@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
 FROM = ("found", "assumed", "by hand")
 """Origin of an address: evidence at the arm, a place that agrees with all readings, or a person who has entered (or
-changed) it.
-"""
+changed) it."""
 
 
 def address_blocks(findings: dict[str, Any], path: Path) -> list[Block]:

@@ -1,6 +1,5 @@
 """The steps of a commissioning, in order: what each does, what to watch, how to stop, and which steps must precede
-it.
-"""
+it."""
 
 from __future__ import annotations
 

@@ -13,8 +13,7 @@ WHOLE_TURN = 150
 """Least spread of a low byte while its joint is moved by hand: 300 counts take it through all 256 values."""
 AT_REST = 64
 """Largest spread of a joint's bytes while another joint is moved: a quarter of a low byte, 4 degrees of a major
-axis.
-"""
+axis."""
 
 
 def spread(pages: Pages) -> NDArray[np.int64]:

@@ -81,8 +81,7 @@ Verdict = Literal["found", "contradicts", "assumed", "unknown"]
 """found:       the evidence leaves no other byte
 contradicts: found, but not where the source documents it
 assumed:     a place that agrees with all readings, as others do
-unknown:     no place, or several
-"""
+unknown:     no place, or several"""
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,7 @@ from firmware_protocol.units import ADC_COUNTS, POSTURE_UNITS
 
 AT_REST = 150
 """Number of readings of a memory at rest. In that time a counter of every period runs on by more than a joint at rest
-may move.
-"""
+may move."""
 AFTER_POWER_UP = 30
 """Number of readings after switching on."""
 ALIVE_VALUES = 5
@@ -86,8 +85,7 @@ class Operator(Protocol):
 
     def begin(self, task: Task) -> bool:
         """Asks for an action; returns when the person begins, or has done one that takes no time. False: it cannot be
-        done.
-        """
+        done."""
 
     def finished(self) -> bool:
         """Whether the person has finished the action."""

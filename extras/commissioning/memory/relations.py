@@ -33,8 +33,7 @@ WIDEST = 80.0
 MOSTLY = 0.75
 """Least share of readings that are not torn: during a fast movement many positions have their high byte from the period
 before or after. Between two readings a joint may move by half a turn of its low byte, 128 counts: at 50 readings per
-second by 6000 counts/s, its whole range in 0.7 s.
-"""
+second by 6000 counts/s, its whole range in 0.7 s."""
 GAP = 3.5
 """Longest time between two readings, in control periods, over which a movement is followed: half a turn of a low byte
 at 1800 counts/s."""
@@ -44,12 +43,10 @@ NOISE = 2.5
 """Largest difference (ADC counts) between two readings of a joint at rest, from noise and rounding."""
 SAME_PERIOD = 0.4
 """Largest delay, in control periods, of values that belong to the same period; a copy of the last one has a delay
-of 1.
-"""
+of 1."""
 SETTLED = 60
 """Largest error (ADC counts) of an arm that its drives hold, or whose set points are the posture at power-up: 4 degrees
-of a major axis, by which its load may pull it down.
-"""
+of a major axis, by which its load may pull it down."""
 LEAST_INSIDE = 12
 """Least number of different errors, inside the limits of a register, for a judgement."""
 STILL = 20.0
@@ -138,8 +135,7 @@ class JointStages:
 
     def pace(self, rate: Numbers) -> Numbers:
         """Returns the largest absolute rate (counts/s) near each reading; it determines by how much readings may
-        differ.
-        """
+        differ."""
         padded = np.pad(np.abs(rate), 2 * _APART, mode="edge")
         return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4 * _APART + 1).max(axis=1))
 

@@ -92,8 +92,7 @@ class LinkPage:
 
     def release_freeze(self, may: Callable[[], bool]) -> bool:
         """Releases an active stop, if `may()` allows it; returns whether none is active. Writes nothing to the
-        memory.
-        """
+        memory."""
         status = self.link.request(ReadStatus(), Status)
         if not status.status & StatusFlag.FROZEN:
             return True

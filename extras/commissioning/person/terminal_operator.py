@@ -69,8 +69,7 @@ def words(task: Task) -> str:
 
 class Lines:
     """Reads lines of standard input without Python's buffer, so that `select` reports correctly whether one has
-    arrived.
-    """
+    arrived."""
 
     def __init__(self, descriptor: int | None = None) -> None:
         self._descriptor = descriptor

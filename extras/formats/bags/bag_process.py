@@ -55,8 +55,7 @@ def import_bag_apart(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, cho
 
 def memory_of(limits: TraceLimits) -> int:
     """Returns the memory (bytes) for a bag: one whole file, and as much for its content as all chunks of a file may
-    have.
-    """
+    have."""
     return SPARE + limits.file_bytes + limits.total_bytes
 
 

@@ -368,8 +368,7 @@ def _hold_to_its_own_metadata(
     file: Path, database: sqlite3.Connection, found: Contents, before: Mapping[str, int]
 ) -> None:
     """Notes content that a database's own metadata announce and it lacks. Some releases of ROS leave that table
-    empty.
-    """
+    empty."""
     row = database.execute("SELECT metadata FROM metadata ORDER BY id DESC LIMIT 1").fetchone()
     if row is None or found.ended:
         return

@@ -17,8 +17,7 @@ from extras.formats.tables.flat import columns_of
 
 def message_columns(origin: str, found: Contents, topic: str) -> Columns:
     """Returns the columns of a topic's messages, and `log_time`, in s since 1970. Raises TraceError,
-    MissingExtraError.
-    """
+    MissingExtraError."""
     messages = found.messages[topic]
     decode: Callable[[bytes], Any] = json.loads
     if found.encoding(topic) == "protobuf":

@@ -16,16 +16,13 @@ from model.arrays import Floats
 
 PARALLEL = 1e-10
 """Angle (rad) below which two axes count as parallel: rounding it away matters less than a physics engine's own
-error.
-"""
+error."""
 FARTHEST = 100.0
 """Longest offset (m) along a joint's axis. Nearly parallel axes have a distant common normal, and moments about so
-distant an origin lose digits: at 100 m, four of sixteen.
-"""
+distant an origin lose digits: at 100 m, four of sixteen."""
 ROUNDED = 1e-4
 """Angle (rad) up to which axes with so distant a normal count as parallel: about the error of π written with four
-decimals.
-"""
+decimals."""
 _NOTHING = 1e-11
 """Lengths (m) below this result from π's last digits in a file, and are written as 0."""
 _NO_ANGLE = 1e-14

@@ -306,8 +306,7 @@ def to_mjcf(
     model: Annotated[str, typer.Argument(help=MODEL_HELP)], output: OutputFile = None, json: JsonOption = False
 ) -> None:
     """Write a machine, or a fitted model with its values, as MJCF for MuJoCo. Prints the parts that MJCF cannot
-    hold.
-    """
+    hold."""
     from extras.formats.robot_files.mjcf_writer import mjcf_text
 
     _write(read_model(model), mjcf_text, output, "mjcf", json)

@@ -34,8 +34,7 @@ from model.arrays import Floats
 
 EXPECTED_FRICTION = 0.1
 """Expected size of friction that the URDF does not state, as a share of the joint's largest torque: typical of geared
-arms, and wide enough for a fit to find another.
-"""
+arms, and wide enough for a fit to find another."""
 
 
 class JointParts(NamedTuple):
@@ -193,8 +192,7 @@ def _friction(joint: DescribedJoint, torque: float, source: str) -> Friction:
 
 def _torque(arm: SerialArm, index: int, gravity: Floats) -> float:
     """Returns a joint's largest torque (force): its limit, or what holds the rest of the arm against gravity; else
-    1.
-    """
+    1."""
     own = arm.joints[index]
     if own.joint.effort is not None:
         return own.joint.effort

@@ -183,8 +183,7 @@ def _preload(actuators: Xml.Element, link: OutgoingLink) -> None:
 
 def _heavy_enough(link: OutgoingLink) -> tuple[float, Floats]:
     """Returns mass and inertia that MuJoCo accepts: a thin rod's are increased by 1e-10 of themselves. Raises
-    SpecError.
-    """
+    SpecError."""
     inertia = 0.5 * (link.inertia + link.inertia.T)
     least, middle, most = np.linalg.eigvalsh(inertia)
     floor = max(LEAST_MOMENT * float(most), SMALLEST_MOMENT)

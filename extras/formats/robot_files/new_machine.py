@@ -126,8 +126,7 @@ def with_gains_of_record(machine: Machine, trace: Trace) -> Machine:
 
 def _shown_gains(machine: Machine, trace: Trace) -> Iterator[tuple[int, tuple[float, float | None]]]:
     """Yields by joint the estimated torque per unit of drive, with friction fitted too, and the explained share of the
-    variance.
-    """
+    variance."""
     from extras.formats.robot_files.uncertain_numbers import CUTOFF
     from model.inverse_dynamics.recorded_motion import recorded_motion
     from model.inverse_dynamics.torque_balance import TorqueBalance

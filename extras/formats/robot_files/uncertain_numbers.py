@@ -1,6 +1,5 @@
 """Finds the most important values of a machine file: how much does the deviation of each change the torques of a
-motion?
-"""
+motion?"""
 
 from __future__ import annotations
 

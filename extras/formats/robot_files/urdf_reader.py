@@ -1,6 +1,5 @@
 """Reads a URDF. MuJoCo's reader parses frames and inertias; its compiler, which merges, balances and rounds them, is
-not run.
-"""
+not run."""
 
 from __future__ import annotations
 

@@ -30,8 +30,7 @@ MOST_TURNS = 4
 """Turns of a joint with limits beyond which they are doubted: cables through a joint allow two or three."""
 DENSEST = 9 * 22_600.0
 """Largest mass (kg) by the cube of half the sum of its moments' radius (m³): a ball of osmium, the densest matter (22
-600 kg/m³), has m/r³ = 4π/3 ρ and a radius of 0.775 r; every other shape has less.
-"""
+600 kg/m³), has m/r³ = 4π/3 ρ and a radius of 0.775 r; every other shape has less."""
 XACRO = "is xacro that was not expanded; make a URDF of it first: `xacro FILE > robot.urdf`"
 
 NO_LIMIT = 1e9

@@ -18,8 +18,7 @@ MOST = 10_000
 
 def columns_of(found: Any) -> Columns:
     """Returns the columns of a tree of mappings, objects with fields, lists and arrays. Parts without numbers are left
-    out.
-    """
+    out."""
     columns: Columns = {}
     _add(columns, "", _plain(found))
     return columns

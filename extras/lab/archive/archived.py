@@ -64,8 +64,7 @@ class ArchivedStore:
 
     def add(self, made: Archived) -> None:
         """Records a trace that the archive now has. If the trace was deleted meanwhile, its object is queued for
-        deletion.
-        """
+        deletion."""
         with self._store.writing() as session:
             is_gone = session.get(TraceRow, made.trace) is None
             session.merge(ArchivedRow(**made.__dict__, deleting=is_gone))

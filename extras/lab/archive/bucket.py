@@ -104,8 +104,7 @@ Progress = Callable[[int], None]
 
 class ArchiveError(DaqError):
     """The store did not carry out a request. Another attempt may succeed: it is unreachable, slow, or answers
-    errors.
-    """
+    errors."""
 
     exit_code = exit_codes.NOT_REACHED
 
@@ -128,8 +127,7 @@ class Content:
 
 class Bucket:
     """Accesses objects by their names. Safe to use from any thread; each call waits for the store, up to `timeout` s
-    per piece.
-    """
+    per piece."""
 
     def __init__(self, settings: ArchiveSettings, credentials: Credentials) -> None:
         from obstore.store import S3Store

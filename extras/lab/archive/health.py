@@ -15,8 +15,7 @@ from server.clock import Clock
 
 IN_A_ROW = 2
 """Consecutive failures after which a step of a round ends: one object may be at fault, but an unreachable store would
-cost a time limit for each of hundreds.
-"""
+cost a time limit for each of hundreds."""
 
 
 class Attempts:

@@ -37,16 +37,14 @@ ROUND = 600.0
 """Time (s) between two looks for traces to send and copies to drop, in addition to those that are reported."""
 SENT_A_ROUND = 200
 """Most traces that are sent before copies are dropped: at first use years of traces may wait, and the disk may be
-full.
-"""
+full."""
 CHECKED_LATELY = timedelta(hours=1)
 """Time for which an object that was read back is not read again before the local copy is deleted."""
 RETRY_AFTER = 2
 """Time (s) after which a client may ask again for a trace that is being fetched."""
 HEARD_WITHIN = 60.0
 """Time (s) for which a failed fetch answers the next request. A waiting client asks every RETRY_AFTER; a later request
-starts a new attempt.
-"""
+starts a new attempt."""
 MB = 1_000_000
 log = logging.getLogger("server.archive")
 
@@ -124,8 +122,7 @@ class ArchiveService:
 
     def send_and_drop(self, trace: str, *, drop: bool) -> None:
         """Sends a trace on a user's request; with `drop`, the local copy is deleted afterwards. Raises a 404 for a
-        missing trace.
-        """
+        missing trace."""
         self._context.catalogue.place_of(trace)
         if self._context.archived.get(trace) is None:
             self._sending.add(trace)
@@ -230,8 +227,7 @@ class ArchiveService:
 
     def _loop(self, step: Callable[[], bool], wake: threading.Event) -> None:
         """Calls `step` until it has nothing to do, then waits for `wake`; after a failure, pauses as `health`
-        states.
-        """
+        states."""
         while not self._closing.is_set():
             wake.clear()
             pause = ROUND
@@ -361,8 +357,7 @@ class ArchiveService:
 
     def _require_still_there(self, found: Archived, now: datetime) -> None:
         """Raises DamagedError unless the archive still has the same object; reads it back if the last time was long
-        ago.
-        """
+        ago."""
         if now - found.checked > CHECKED_LATELY:
             self._require_same(found.object, Content(found.size, found.sha256))
             self._context.archived.note(found.trace, checked=now)
@@ -407,8 +402,7 @@ class ArchiveService:
 
     def _fetch_one(self, wanted: Archived) -> None:
         """Fetches a trace into the folder, compared with the file that was sent. Raises ArchiveError, ProblemError,
-        OSError.
-        """
+        OSError."""
         context = self._context
         folder = context.catalogue.folder
         free = shutil.disk_usage(folder).free
@@ -428,8 +422,7 @@ class ArchiveService:
 
     def _read_into(self, part: Path, wanted: Archived) -> bool:
         """Fetches an object into a file, and returns whether it is the one that was sent. Raises ArchiveError,
-        OSError.
-        """
+        OSError."""
         with part.open("wb") as stream:
 
             def take(piece: bytes) -> None:
@@ -487,8 +480,7 @@ class ArchiveService:
 
     def _drop(self, local: Local) -> bool:
         """Deletes a local copy, after the archive has proved that it has the same. Returns False if the copy stays for
-        any reason.
-        """
+        any reason."""
         path = self._context.catalogue.folder / local.file
         try:
             is_dropped = self._dropped(local)

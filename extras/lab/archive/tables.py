@@ -18,8 +18,7 @@ class ArchiveTable(DeclarativeBase):
 
 class ArchivedRow(ArchiveTable):
     """A trace that the archive has, verified by reading it back. The row stays until the object is deleted, also if the
-    trace is deleted before that.
-    """
+    trace is deleted before that."""
 
     __tablename__ = "archived_traces"
     __table_args__ = (Index("archived_traces_by_robot", "robot", "deleting"),)

@@ -109,8 +109,7 @@ _NOT_SENT = f"UPDATE notifications SET {_GIVEN_UP} WHERE state = 'waiting'"
 
 def forget_what_may_have_ended(database: Path, now: datetime) -> None:
     """Ends sessions, approvals of waiting experiments, and waiting notifications: they may have been ended after the
-    backup. Raises SpecError.
-    """
+    backup. Raises SpecError."""
     words = {"now": now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")}
     try:
         with closing(sqlite3.connect(database)) as connection, connection:
@@ -122,8 +121,7 @@ def forget_what_may_have_ended(database: Path, now: datetime) -> None:
 
 def note_dropped(source: Path, target: Path, packed: Container[str]) -> None:
     """Notes in the copy `target` which local traces without a file in `packed` the archive has by now, according to
-    `source`. Raises SpecError.
-    """
+    `source`. Raises SpecError."""
     try:
         with closing(sqlite3.connect(target, timeout=BUSY_TIMEOUT_MS / 1e3)) as connection:
             if not _has_table(connection, "archived_traces"):
@@ -161,8 +159,7 @@ def head_of_audit(database: Path) -> str:
 
 def note_restored(database: Path, at: datetime, command: str, archive: str, detail: str) -> None:
     """Notes the restore in a database's audit log; a database without its tables stays unchanged. Raises
-    SpecError.
-    """
+    SpecError."""
     with closing(sqlite3.connect(database)) as connection:
         if not _has_table(connection, "audit"):
             return

@@ -31,8 +31,7 @@ def is_trace(name: str) -> bool:
 @dataclass(frozen=True)
 class Places:
     """Paths of one configuration's files. `database` is the database's file; `traces` are the folders by the name of
-    each robot.
-    """
+    each robot."""
 
     database: Path
     traces: dict[str, Path]

@@ -43,8 +43,7 @@ CHECK_SHARE, WRITE_SHARE = 0.4, 0.98
 @dataclass(frozen=True)
 class Restored:
     """Result of a restore: the folders into which existing files were moved, and `removed`: objects of the backup's
-    database that this program does not make, such as triggers.
-    """
+    database that this program does not make, such as triggers."""
 
     manifest: Manifest
     put_aside: tuple[Path, ...]
@@ -151,8 +150,7 @@ class _Staged:
 
     def note_in_audit_log(self, manifest: Manifest) -> None:
         """Notes in the restored audit log which log it replaces: rows that the backup lacks are in the database that
-        was moved aside.
-        """
+        was moved aside."""
         ended = head_of_audit(self._places.database)
         detail = f"a backup of {manifest.created:%Y-%m-%d %H:%M:%S %Z} takes the place of a log that ended with {ended}"
         command = f"daq restore {self._archive.name}"

@@ -20,7 +20,7 @@ from daq.contracts.documents import parse_json, read_text
 from daq.contracts.errors import ReachError, SpecError
 from daq.contracts.extras import is_installed
 from daq.contracts.file_lock import take_lock
-from daq.contracts.frozen import FrozenRecord
+from daq.contracts.frozen import FrozenRecord, like
 from daq.contracts.whole_file import replacing
 from extras.lab.batches.columns import Columns
 from extras.lab.batches.program import program_here
@@ -111,14 +111,7 @@ class BatchFolder:
 
     def add(self, answer: Answer, about: Columns) -> Row:
         """Saves the answer about a trace to disk: the whole answer before its row. Raises SpecError."""
-        row = Row(
-            key=answer.key,
-            problem=answer.problem,
-            seconds=answer.seconds,
-            worker=answer.worker,
-            about=about,
-            columns=answer.columns,
-        )
+        row = like(Row, answer, about=about)
         try:
             if answer.text:
                 _write(self.answer_file(answer.key), answer.text + "\n")

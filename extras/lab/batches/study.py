@@ -20,7 +20,7 @@ from daq.contracts.service.jobs import DiagnoseStudy, FitStudy, ValidateStudy
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.reader import read_trace
 from extras.lab.batches.columns import Columns, of_diagnosis, of_fit, of_simulation, of_validation
-from server.jobs.options import options_of, with_effects
+from server.jobs.options import options_of
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace
@@ -136,7 +136,7 @@ def _fitted(study: FitStudy, model: Model, trace: Trace) -> tuple[Columns, str]:
     from model.fitting.fit import fit
     from model.fitting.options import FitOptions
 
-    found = fit(with_effects(model, study.effects), [trace], options_of(study, FitOptions))
+    found = fit(model.with_effects(study.effects), [trace], options_of(study, FitOptions))
     return of_fit(found), found.model_dump_json()
 
 

@@ -38,8 +38,7 @@ def problem_of(error: Exception) -> str:
 @dataclass(frozen=True)
 class Message:
     """A message in the outbox. `payload`: the signed and posted text, JSON; `id`: the same at each attempt, so that a
-    receiver recognises repeated messages.
-    """
+    receiver recognises repeated messages."""
 
     id: str
     payload: str

@@ -86,8 +86,7 @@ class Mail:
 
     def _written(self, message: Message) -> EmailMessage:
         """Returns the e-mail. Headers contain only text of this program and printable characters, to prevent header
-        injection.
-        """
+        injection."""
         told = Notification.model_validate(json.loads(message.payload)["data"])
         mail = EmailMessage()
         mail["From"], mail["To"] = self._smtp.sender, self._to

@@ -13,6 +13,7 @@ from datetime import datetime, timedelta
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from daq.contracts.frozen import like
 from daq.contracts.service.notifications import DestinationStatus, Notification, NotificationStatus
 from extras.lab.notifications.delivery import DeliveryError, Message, problem_of
 from extras.lab.notifications.destinations import Destination
@@ -133,8 +134,7 @@ class Notifier:
 
     def warnings(self) -> list[str]:
         """Returns problems that need a person, one line each: unreachable destinations, and messages that were given
-        up.
-        """
+        up."""
         found = []
         for key, count in self._counts.items():
             if count.problem:
@@ -150,19 +150,9 @@ class Notifier:
 
     def _status_of(self, one: Destination, waiting: Mapping[str, int]) -> DestinationStatus:
         count, left = self._counts[one.key], waiting.get(one.key, 0)
-        return DestinationStatus(
-            name=one.name,
-            channel=one.channel,
-            host=one.host,
-            about=one.about,
-            waiting=left,
-            sent=count.sent,
-            failed=count.failed,
-            given_up=count.given_up,
-            last_sent=count.last_sent,
-            problem=count.problem,
-            next_attempt=self._outbox.next_attempt(one.key) if left else None,
-        )
+        about = {name: getattr(one, name) for name in ("name", "channel", "host", "about")}
+        following = self._outbox.next_attempt(one.key) if left else None
+        return like(DestinationStatus, count, **about, waiting=left, next_attempt=following)
 
     # ---- the thread that accepts notifications
 

@@ -121,8 +121,7 @@ class NotificationSettings(Section):
     """The mail server; needed for e-mail."""
     private_hosts: tuple[Host, ...] = ()
     """Hosts of webhooks that may have private addresses (10.…, 192.168.…, this computer), and plain `http`. All others
-    must be public, and are rejected if their name resolves to a private address.
-    """
+    must be public, and are rejected if their name resolves to a private address."""
     attempts: Annotated[int, Field(ge=1, le=12)] = 10
     """Number of attempts after which a message is given up: 10 take two days."""
 

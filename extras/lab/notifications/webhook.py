@@ -41,8 +41,7 @@ METADATA = tuple(
     map(ip_network, ("169.254.0.0/16", "100.100.100.200", "168.63.129.16", "fd00:ec2::/32", "fd20:ce::254"))
 )
 """Addresses at which clouds give a computer its own keys: Amazon, Google, Azure, Oracle and OpenStack (link-local, and
-their own of version 6), Alibaba, Azure's agent.
-"""
+their own of version 6), Alibaba, Azure's agent."""
 GLOBAL_UNICAST = IPv6Network("2000::/3")
 """The block of assigned IPv6 addresses (RFC 4291, and IANA's registry of the address space)."""
 ENDS_WITH_IPV4 = tuple(map(IPv6Network, ("::/96", "::ffff:0:0/96", "::ffff:0:0:0/96", "64:ff9b::/96")))

@@ -18,8 +18,7 @@ Claim = Annotated[str, Field(min_length=1, max_length=200)]
 
 class OidcSettings(Section):
     """Section `[oidc]`. Without an issuer, people use tokens. The provider sends people back to /api/v1/login/callback
-    below `server.address`.
-    """
+    below `server.address`."""
 
     SHOWN = frozenset(["issuer", "client_id", "label", "scopes", "name_claim", "role_claim", "roles", "hours"])
 

@@ -24,7 +24,7 @@ from daq.contracts.service.jobs import Job, JobState
 from daq.owner.messages import LiveSample, Report
 from daq.traces.room import RESERVE
 from server.api.dependencies import ServicesDep, Viewer
-from server.catalogue.room import free_room
+from server.catalogue.room import room_in
 from server.database_errors import DamagedError
 from server.jobs.lanes import LANES, lane_of
 from server.parts import Part
@@ -172,7 +172,7 @@ class StateMetrics(Collector):
         folders = {f"traces/{rig.robot.name}" if len(rigs) > 1 else "traces": rig.catalogue.folder for rig in rigs}
         for name, folder in (*folders.items(), ("service", self._services.folder)):
             with suppress(ProblemError):  # no metric for a missing folder
-                free.add_metric((name,), free_room(folder.absolute()))
+                free.add_metric((name,), room_in(folder.absolute()).free)
         yield free
         warnings = "Number of warnings about disk and archive, which GET /api/v1/system describes."
         yield GaugeMetricFamily("daq_storage_warnings", warnings, value=len(self._services.warnings()))

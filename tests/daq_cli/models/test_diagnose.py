@@ -15,7 +15,7 @@ from model.discrepancy.grounds import Note
 from model.discrepancy.options import DiagnosisOptions
 from model.fitting.unknowns import Unknown
 from model.machine_model.parameter import Kind, Parameter
-from server.jobs.diagnosis_data import diagnosis_data
+from model.reports.diagnosis_data import diagnosis_data
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.models.conftest import write_csv
 from tests.model.discrepancy import steps
@@ -158,7 +158,7 @@ def test_json_is_the_answer_and_files_are_written(
         return answer
 
     monkeypatch.setattr("model.discrepancy.workflow.diagnose", imagined)
-    monkeypatch.setattr("server.jobs.diagnosis_data.told", lambda found, *_: diagnosis_data(found, None))
+    monkeypatch.setattr("model.reports.diagnosis_data.told", lambda found, *_: diagnosis_data(found, None))
     first, second = write_csv(tmp_path / "first.csv"), write_csv(tmp_path / "second.csv")
     files = {"--out": tmp_path / "new.json", "--report": tmp_path / "page.html", "--next": tmp_path / "asked.json"}
     options = ("--effects", "backlash,coulomb", "--joints", 1, "--most", 2, "--json", *sum(files.items(), ()))

@@ -13,6 +13,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec, Trajectory
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ENDS
+from daq.trajectories.length import least_length, points_of
 from daq.trajectories.planner import plan, start_angles
 from server.experiments.schedule import (
     LONGEST,
@@ -22,8 +23,6 @@ from server.experiments.schedule import (
     in_words,
     is_due,
     last,
-    least_length,
-    points_of,
     times,
     together,
     zone_here,

@@ -79,7 +79,7 @@ class Bench:
         traces = folder / "traces"
         traces.mkdir()
         self.catalogue = Catalogue(traces, "ma2000", self.traces, ExperimentStore(self.store))
-        self.traces.insert(new_trace(1))
+        self.traces.insert("ma2000", new_trace(1))
         (traces / "1.mcap").touch()
         models = Models(folder / "models", "ma2000", MACHINE, ModelStore(self.store), self.clock)
         self.models: Any = Meanwhile(models)
@@ -98,9 +98,7 @@ class Bench:
                 models=self.models,
                 clock=self.clock,
                 changed=self._hear,
-                at_once=1,
-                make_executor=self._make_executor,
-                workers=workers,
+                workers=workers or SharedWorkers(1, self._make_executor),
             )
         )
 
@@ -291,14 +289,14 @@ def test_a_job_looks_at_its_traces_twice_a_second_however_often_one_is_fetched(b
 
 def test_many_traces_are_looked_up_together(bench: Bench) -> None:
     archive = HandArchive(bench)
-    names = [new_trace(number) for number in range(2, 40)]
-    for new in names:
-        bench.traces.insert(new)
-        archive.has.add(new.id)
+    names = [f"{number:012x}" for number in range(2, 40)]
+    for number in range(2, 40):
+        bench.traces.insert("ma2000", new_trace(number))
+    archive.has.update(names)
     asked: list[str] = []
     listen(bench.store.engine, "before_cursor_execute", lambda *told: asked.append(told[2]))
-    assert bench.catalogue.bring([new.id for new in names], 0.0) is not None
-    assert archive.asked == [new.id for new in names]
+    assert bench.catalogue.bring(names, 0.0) is not None
+    assert archive.asked == names
     assert len([line for line in asked if line.startswith("SELECT")]) == 1
 
 

@@ -94,22 +94,22 @@ def test_an_operator_who_left_holds_the_queue_though_nothing_waits_and_they_come
 
 
 def test_a_link_that_is_lost(bench: Bench) -> None:
-    bench.queue.on_arm_report(LOST)
-    bench.queue.on_arm_report(CALM)  # before the queue's thread has looked
+    bench.queue.on_report(LOST)
+    bench.queue.on_report(CALM)  # before the queue's thread has looked
     _is_held(bench, f"the link to the robot was lost: {LOOK}")
 
 
 def test_a_link_that_comes_back_after_somebody_has_resumed_the_queue(bench: Bench) -> None:
     bench.robot.arm = LOST
-    bench.queue.on_arm_report(LOST)
+    bench.queue.on_report(LOST)
     bench.queue.resume("anna", moves_real_arm=True)
     bench.robot.arm = CALM
-    bench.queue.on_arm_report(CALM)
+    bench.queue.on_report(CALM)
     _is_held(bench, f"the link to the robot came back: {LOOK}")
 
 
 def test_a_link_that_comes_back_is_noticed_by_whoever_decides_by_it(bench: Bench) -> None:
-    bench.queue.on_arm_report(LOST)
+    bench.queue.on_report(LOST)
     bench.queue.resume("anna", moves_real_arm=True)
     bench.submit()
     bench.queue.start()  # the arm's newest report is there, and nobody has been told of it yet
@@ -198,7 +198,7 @@ def test_a_service_that_begins_with_work_waiting_lets_nobody_begin_it_but_a_pers
 @pytest.mark.parametrize(
     "happens",
     [
-        lambda queue: queue.on_arm_report(LOST),
+        lambda queue: queue.on_report(LOST),
         lambda queue: queue.stop_asked("anna"),
         lambda queue: queue.control_lapsed("anna"),
         lambda queue: queue.connection_ended("exit code 0"),

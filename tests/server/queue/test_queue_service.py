@@ -245,8 +245,8 @@ def test_a_pause_lets_the_one_that_runs_go_on_where_an_operator_must_be_there(be
 @pytest.mark.parametrize("state", ["stopped", "fault"])
 def test_a_stop_holds_the_queue_though_nothing_waits_and_whatever_is_reset_meanwhile(bench: Bench, state: str) -> None:
     stopped = CALM.model_copy(update={"arm": state, "cause": "somebody"})
-    bench.queue.on_arm_report(stopped)
-    bench.queue.on_arm_report(CALM)  # reset, before the queue's thread has looked
+    bench.queue.on_report(stopped)
+    bench.queue.on_report(CALM)  # reset, before the queue's thread has looked
     bench.queue.start()
     had = {"stopped": "was stopped", "fault": "had a fault"}[state]
     line = f"the arm {had}: look at it, then resume the queue"
@@ -260,7 +260,7 @@ def test_a_stop_holds_the_queue_though_nothing_waits_and_whatever_is_reset_meanw
 
 def test_a_stop_is_remembered_by_whoever_wants_to_resume_too_early(bench: Bench) -> None:
     bench.robot.arm = CALM.model_copy(update={"arm": "stopped", "cause": "somebody"})
-    bench.queue.on_arm_report(bench.robot.arm)
+    bench.queue.on_report(bench.robot.arm)
     with pytest.raises(ProblemError, match="the arm is stopped: somebody"):
         bench.queue.resume("anna", moves_real_arm=False)
     bench.robot.arm = CALM

@@ -3,7 +3,7 @@
 import pytest
 
 from daq.contracts.service.experiments import ExperimentRequest
-from daq.owner.messages import Answer, HaltRun
+from daq.owner.messages import Answer, HaltRun, Progress
 from server.experiments.states import Event
 from server.problems import ProblemError
 from server.queue.context import ATTENDANCE
@@ -24,7 +24,7 @@ def _running(bench: Bench) -> str:
 
 
 def test_what_runs_shows_itself_and_its_progress_only_while_it_runs(bench: Bench) -> None:
-    bench.queue.progressed(0.5, "nothing runs yet")
+    bench.queue.on_report(Progress(fraction=0.5, text="nothing runs yet"))
     waiting = bench.submit()
     assert bench.queue.with_progress(waiting) == waiting
     bench.queue.cancel(waiting.id, "anna")
@@ -32,7 +32,7 @@ def test_what_runs_shows_itself_and_its_progress_only_while_it_runs(bench: Bench
     identity = _running(bench)
     assert bench.robot.experiment == identity
     waiting = bench.submit()
-    bench.queue.progressed(0.25, "moving")
+    bench.queue.on_report(Progress(fraction=0.25, text="moving"))
     shown = bench.queue.with_progress(bench.experiments.get("ma2000", identity))
     assert (shown.progress, shown.progress_text) == (0.25, "moving")
     assert bench.queue.with_progress(waiting) == waiting

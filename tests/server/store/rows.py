@@ -1,29 +1,27 @@
 """Rows that tests of several rooms put into the database."""
 
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
 
-from server.store.traces import NewTrace
+from daq.traces.catalogue import TraceSummary
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
 
 
-def new_trace(number: int, **changes: object) -> NewTrace:
-    fields: dict[str, object] = {
-        "id": f"{number:012x}",
-        "robot": "ma2000",
-        "file": f"{number}.mcap",
+def new_trace(number: int, **changes: Any) -> TraceSummary:
+    fields: dict[str, Any] = {
+        "trace_id": f"{number:012x}",
+        "path": Path(f"{number}.mcap"),
+        "state": "finished",
         "created": NOW + timedelta(seconds=number),
         "source": "mock",
         "kind": "ramp",
-        "name": None,
         "joints": (1, 2, 3),
         "moved": (1, 2, 3),
         "outcome": "complete",
         "samples": 10,
         "duration": 0.2,
         "size": 1000,
-        "operator": None,
-        "experiment": None,
-        "notes": "",
     }
-    return NewTrace(**(fields | changes))  # type: ignore[arg-type]
+    return TraceSummary(**(fields | changes))

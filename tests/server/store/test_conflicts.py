@@ -1,7 +1,7 @@
 """What a refusal says: people know experiments, traces, jobs and models by their names and times, not by numbers."""
 
-from dataclasses import replace
 from datetime import UTC, datetime
+from pathlib import Path
 
 import pytest
 
@@ -13,47 +13,50 @@ from server.problems import ProblemError
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
-from server.store.models import ModelStore, NewModel
+from server.store.labels import trace_label
+from server.store.models import ModelStore
+from server.store.tables import ModelRow
 from server.store.traces import TraceStore
 from tests.server.store.rows import new_trace
 
 ROBOT = "ma2000"
 NOW = datetime(2026, 10, 5, 14, 3, tzinfo=UTC)
+NUMBER = f"{0:012x}"
 TRACE = new_trace(0, created=NOW, name="loose belt")
 
 
 @pytest.fixture
 def store(sqlite_store: Store) -> Store:
     """A new database with one trace."""
-    TraceStore(sqlite_store).insert(TRACE)
+    TraceStore(sqlite_store).insert(ROBOT, TRACE)
     return sqlite_store
 
 
 def test_a_trace_in_use_names_itself_and_its_users(store: Store) -> None:
-    JobStore(store).submit(ROBOT, CompareRequest(traces=(TRACE.id,), models=("machine",)), NOW, "anna", None)
-    model = NewModel("9d2f4b6c8e10", ROBOT, "rig b", "m.json", NOW, "anna", None, None, (TRACE.id,))
-    ModelStore(store).insert(model, lambda: None)
+    JobStore(store).submit(ROBOT, CompareRequest(traces=(NUMBER,), models=("machine",)), NOW, "anna", None)
+    model = ModelRow(id="9d2f4b6c8e10", robot=ROBOT, name="rig b", file="m.json", created=NOW, created_by="anna")
+    ModelStore(store).insert(model, [NUMBER])
     with pytest.raises(ProblemError) as refused:
-        TraceStore(store).remove(ROBOT, TRACE.id)
+        TraceStore(store).remove(ROBOT, NUMBER)
     users = "the comparison of 2026-10-05 14:03 UTC, model 'rig b'"
     assert str(refused.value) == f"trace 'loose belt' of 2026-10-05 14:03 UTC is used by {users}"
 
 
 def test_a_trace_that_exists_already_is_named_with_its_file(store: Store) -> None:
     with pytest.raises(ProblemError) as refused:
-        TraceStore(store).insert(replace(TRACE, file="other.mcap"))
+        TraceStore(store).insert(ROBOT, TRACE.model_copy(update={"path": Path("other.mcap")}))
     label = "trace 'loose belt' of 2026-10-05 14:03 UTC"
-    assert str(refused.value) == f"{label} is in the catalogue already, as {TRACE.file}"
+    assert str(refused.value) == f"{label} is in the catalogue already, as {TRACE.path}"
 
 
 def test_a_trace_without_a_name_is_named_by_its_kind_or_its_file() -> None:
-    assert replace(TRACE, name=None, kind="slow_ramp").label.startswith("trace 'slow ramp' of")
-    assert replace(TRACE, name=None, kind=None, file="a_b.mcap").label.startswith("trace 'a_b.mcap' of")
+    assert trace_label(None, "slow_ramp", "a_b.mcap", NOW).startswith("trace 'slow ramp' of")
+    assert trace_label(None, None, "a_b.mcap", NOW).startswith("trace 'a_b.mcap' of")
 
 
 def test_a_job_that_has_not_ended_is_named_by_its_kind_and_time(store: Store) -> None:
     jobs = JobStore(store)
-    made, _ = jobs.submit(ROBOT, CompareRequest(traces=(TRACE.id,), models=("machine",)), NOW, "anna", None)
+    made, _ = jobs.submit(ROBOT, CompareRequest(traces=(NUMBER,), models=("machine",)), NOW, "anna", None)
     with pytest.raises(ProblemError) as refused:
         jobs.remove(ROBOT, made.id)
     assert str(refused.value) == "the comparison of 2026-10-05 14:03 UTC is queued"

@@ -21,8 +21,9 @@ from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
 from server.store.lock import sqlite_file
-from server.store.models import ModelStore, NewModel
+from server.store.models import ModelStore
 from server.store.pages import Cursor
+from server.store.tables import ModelRow
 from server.store.traces import TraceSearch, TraceStore
 from tests.server.store.rows import NOW, new_trace
 
@@ -124,7 +125,7 @@ def test_what_ended_last_comes_first_whenever_it_was_submitted(store: Store) -> 
 def test_a_page_that_many_ask_for_is_read_once_until_something_is_written(store: Store) -> None:
     experiments, traces, sent = ExperimentStore(store), TraceStore(store), []
     experiments.submit("ma2000", ExperimentRequest(), NOW, "anna")
-    traces.insert(new_trace(1))
+    traces.insert("ma2000", new_trace(1))
     event.listen(store.engine, "before_cursor_execute", lambda *told: sent.append(told[2]))
 
     def listed() -> tuple[int, int, int]:
@@ -135,7 +136,7 @@ def test_a_page_that_many_ask_for_is_read_once_until_something_is_written(store:
     assert listed()[:2] == (1, 1)
     assert listed() == (1, 1, 0)
     experiments.submit("ma2000", ExperimentRequest(), NOW, "bert")
-    traces.remove("ma2000", new_trace(1).id)
+    traces.remove("ma2000", f"{1:012x}")
     assert listed()[:2] == (2, 0)
 
 
@@ -162,9 +163,9 @@ def test_a_cursor_of_somebodys_own_making_is_refused(text_: str) -> None:
 
 def test_search_finds_what_it_is_asked_for_and_takes_nothing_as_a_pattern(store: Store) -> None:
     traces = TraceStore(store)
-    traces.insert(new_trace(1, notes="Loose BELT at 100%"))
-    traces.insert(new_trace(2, name="belt_test", kind="sine"))
-    traces.insert(new_trace(3, outcome="fault"))
+    traces.insert("ma2000", new_trace(1, notes="Loose BELT at 100%"))
+    traces.insert("ma2000", new_trace(2, name="belt_test", kind="sine"))
+    traces.insert("ma2000", new_trace(3, outcome="fault"))
     traces.change("ma2000", f"{3:012x}", TraceChange(tags=("wear", "wear", "week 2")))
     assert traces.get("ma2000", f"{3:012x}").tags == ("wear", "week 2")
     for searched, numbers in (
@@ -189,8 +190,8 @@ def test_search_finds_what_it_is_asked_for_and_takes_nothing_as_a_pattern(store:
 
 def test_traces_are_found_by_joints_that_moved_and_by_what_the_newest_diagnosis_named(store: Store) -> None:
     traces, jobs = TraceStore(store), JobStore(store)
-    traces.insert(new_trace(1, moved=(1, 12)))
-    traces.insert(new_trace(2, moved=(2,)))
+    traces.insert("ma2000", new_trace(1, moved=(1, 12)))
+    traces.insert("ma2000", new_trace(2, moved=(2,)))
     assert (_found(traces, joint=1), _found(traces, joint=2), _found(traces, joint=3)) == ([1], [2], [])
     assert traces.get("ma2000", f"{1:012x}").moved == (1, 12)
     request = DiagnoseRequest(traces=(f"{1:012x}",), held_out=(f"{2:012x}",))
@@ -206,7 +207,7 @@ def test_traces_are_found_by_joints_that_moved_and_by_what_the_newest_diagnosis_
 
 def test_a_file_that_is_gone_is_marked_and_comes_back(store: Store) -> None:
     traces = TraceStore(store)
-    traces.insert(new_trace(1))
+    traces.insert("ma2000", new_trace(1))
     traces.mark_missing("ma2000", ["1.mcap"], missing=True)
     assert traces.get("ma2000", f"{1:012x}").missing
     traces.mark_missing("ma2000", ["1.mcap"], missing=False)
@@ -219,14 +220,14 @@ def test_a_spec_and_long_notes_come_back_as_they_were_given(store: Store) -> Non
     made, _ = experiments.submit("ma2000", ExperimentRequest(spec=spec), NOW, "anna")
     assert experiments.get("ma2000", made.id).spec == spec
     notes = "".join(chr(33 + number * 7919 % 90) for number in range(20_000))  # no two parts are alike: nothing to pack
-    traces.insert(new_trace(1, notes=notes))
+    traces.insert("ma2000", new_trace(1, notes=notes))
     assert traces.get("ma2000", f"{1:012x}").notes == notes
 
 
 def test_the_search_follows_every_change_of_a_text(store: Store) -> None:
     traces = TraceStore(store)
-    traces.insert(new_trace(1, notes="brass bush"))
-    traces.insert(new_trace(2, notes="brass ring"))
+    traces.insert("ma2000", new_trace(1, notes="brass bush"))
+    traces.insert("ma2000", new_trace(2, notes="brass ring"))
     assert _found(traces, text="brass") == [2, 1]
     traces.change("ma2000", f"{1:012x}", TraceChange(notes="steel bush"))
     assert (_found(traces, text="brass"), _found(traces, text="steel")) == ([2], [1])
@@ -237,7 +238,7 @@ def test_the_search_follows_every_change_of_a_text(store: Store) -> None:
 def test_texts_are_found_in_the_order_of_the_list_page_by_page(store: Store) -> None:
     traces = TraceStore(store)
     for number in range(8):
-        traces.insert(new_trace(number, notes="rare" if number in {2, 5} else "often"))
+        traces.insert("ma2000", new_trace(number, notes="rare" if number in {2, 5} else "often"))
     seen, cursor = [], None
     while cursor is not None or not seen:
         page = traces.page("ma2000", TraceSearch(text="often"), cursor, 2)
@@ -249,11 +250,9 @@ def test_texts_are_found_in_the_order_of_the_list_page_by_page(store: Store) -> 
 
 def test_the_same_model_belongs_to_each_robot_and_its_file_to_the_last(store: Store) -> None:
     models = ModelStore(store)
-    left, right = (
-        NewModel("m1", robot, f"of {robot}", "m1.json", NOW, "anna", None, None, ("000000000001",))
-        for robot in ("left", "right")
-    )
-    assert [models.insert(one, lambda: None) for one in (left, right, right)] == [True, True, False]
+    for robot, new in (("left", True), ("right", True), ("right", False)):
+        row = ModelRow(id="m1", robot=robot, name=f"of {robot}", file="m1.json", created=NOW, created_by="anna")
+        assert models.insert(row, ["000000000001"]) is new
     assert (models.get("left", "m1").name, models.get("right", "m1").name) == ("of left", "of right")
     deleted: list[str] = []
     models.remove("left", "m1", deleted.append)
@@ -265,8 +264,8 @@ def test_the_same_model_belongs_to_each_robot_and_its_file_to_the_last(store: St
 
 def test_files_of_one_robot_are_not_missing_in_the_folder_of_another(store: Store) -> None:
     traces = TraceStore(store)
-    traces.insert(new_trace(1, robot="left"))
-    traces.insert(new_trace(2, robot="right"))
+    traces.insert("left", new_trace(1))
+    traces.insert("right", new_trace(2))
     assert traces.files("left") == {"1.mcap"}
     traces.mark_missing("left", {"1.mcap", "2.mcap"}, missing=True)
     assert traces.get("left", f"{1:012x}").missing

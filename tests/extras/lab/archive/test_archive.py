@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from server.problems import ProblemError
-from server.store.models import ModelStore, NewModel
+from server.store.models import ModelStore
+from server.store.tables import ModelRow
 from tests.extras.lab.archive.bench import ROBOT, Bench
 from tests.extras.lab.archive.store import ACCESS, SECRET, Fault, FaultyStore, ObjectStore
 
@@ -42,7 +43,8 @@ def bench(store: ObjectStore, proxy: FaultyStore, make: Make) -> Bench:
 def _model_of(bench: Bench, trace: str) -> ModelStore:
     models = ModelStore(bench.store)
     now = bench.clock.utc()
-    models.insert(NewModel("a" * 12, ROBOT, "rig b", "a.json", now, "anna", None, None, (trace,)), lambda: None)
+    row = ModelRow(id="a" * 12, robot=ROBOT, name="rig b", file="a.json", created=now, created_by="anna")
+    models.insert(row, [trace])
     return models
 
 

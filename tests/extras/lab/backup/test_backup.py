@@ -64,7 +64,7 @@ def add_trace(store: Store, places: Places, number: str, robot: str = "ma2000") 
     part = folder / f"{number}.mcap.part"
     part.write_bytes(f"trace {number} ".encode() * 1000)
     part.replace(folder / f"{number}.mcap")
-    TraceStore(store).insert(new_trace(1, id=number, robot=robot, file=f"{number}.mcap", created=NOW))
+    TraceStore(store).insert(robot, new_trace(1, trace_id=number, path=Path(f"{number}.mcap"), created=NOW))
 
 
 def filled(folder: Path) -> Places:

@@ -78,7 +78,7 @@ def test_the_service_keeps_everything_in_it_and_refuses_what_it_cannot_hold(
 ) -> None:
     address = postgresql.database(template="made1")
     with closing(Store(address)) as store:
-        TraceStore(store).insert(new_trace(1))
+        TraceStore(store).insert("ma2000", new_trace(1))
     with service_inside(tmp_path, SystemClock(), monkeypatch, address) as api:
         assert api.post("/queue/pause", json={}).status_code == 200
         made = api.post("/experiments", json={}).json()

@@ -5,11 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from model.discrepancy.controller.evidence import (
-    check_controller,
-    settled_by_records,
-    with_used_set_points,
-)
+from model.discrepancy.controller.evidence import check_controller, settled_by_records, with_used_set_points
 from model.discrepancy.controller.sampled import with_errors
 from model.discrepancy.engine.fitting import evaluate
 from model.discrepancy.options import DiagnosisOptions

@@ -126,7 +126,7 @@ def test_friction_at_a_place_is_not_within_noise(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="the rig's ripple has a harmonic, which the law has not: what is left goes with it")
+@pytest.mark.xfail(strict=True, reason="the rig's ripple has a harmonic, which the law has not")
 def test_a_ripple_of_which_the_others_show_less_than_a_wave_keeps_its_name(tmp_path: Path) -> None:
     found = diagnosed_rig(tmp_path, "planar-current-via", 8874690243275, "single")
     assert [(s.effect, s.joints) for s in found.steps if s.adopted] == [("torque_ripple", (2,))], found.summary

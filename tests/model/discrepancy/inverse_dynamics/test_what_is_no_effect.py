@@ -1,6 +1,5 @@
 """What a lab's own rig shows and no effect is: the ends of a record, the motion's own frequencies, friction that fades
-at no recorded speed, sizes at their bounds; and what is said of records that do not suit their file.
-"""
+at no recorded speed, sizes at their bounds; and what is said of records that do not suit their file."""
 
 from dataclasses import replace
 from itertools import cycle

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from server.catalogue.thinning import extremes, moments, stretches
-from server.jobs.results import Overlay, Row
+from daq.contracts.thinning import extremes, moments, stretches
+from model.reports.result_data import Overlay, Row
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from daq.contracts.trace import Floats, Trace
 
+Number = TypeVar("Number", bound=np.generic)
 SIGNALS = ("position", "set_point", "error", "drive")
 
 
@@ -44,14 +46,16 @@ def stretches(samples: int, points: int) -> NDArray[np.int64] | None:
     return np.linspace(0, samples, max(1, points // 2) + 1).astype(np.int64)[:-1]
 
 
-def moments(time: Floats, first: NDArray[np.int64]) -> Floats:
+def moments(time: NDArray[Number], first: NDArray[np.int64]) -> NDArray[Number]:
     """Returns (2 · intervals,): the first and the last time of every interval."""
     return np.stack([time[first], time[_last(len(time), first)]], axis=1).ravel()
 
 
 def extremes(signal: Floats, first: NDArray[np.int64]) -> Floats:
-    """Returns (2 · intervals, j): minimum and maximum of every interval; the maximum first if the signal falls."""
-    low, high = np.minimum.reduceat(signal, first), np.maximum.reduceat(signal, first)
+    """Returns (2 · intervals, j): minimum and maximum of every interval; the maximum first if the signal falls. NaN
+    counts only where a whole interval is NaN."""
+    least, most = (np.fmin, np.fmax) if np.isnan(signal).any() else (np.minimum, np.maximum)  # these are much quicker
+    low, high = least.reduceat(signal, first), most.reduceat(signal, first)
     falling = signal[first] > signal[_last(len(signal), first)]
     pairs = np.stack([np.where(falling, high, low), np.where(falling, low, high)], axis=1)
     return pairs.reshape(-1, signal.shape[1])

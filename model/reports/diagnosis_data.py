@@ -23,10 +23,10 @@ from model.fitting.records import noise_floor, records_of
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.parameter_words import words_by_name
 from model.record_check.check import as_used
+from model.reports.overlays import overlays
+from model.reports.result_data import DiagnosisData, DiagnosisStep, GivenWhere, TriedEffect
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
-from server.jobs.overlays import overlays
-from server.jobs.results import DiagnosisData, DiagnosisStep, GivenWhere, TriedEffect
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
