@@ -61,9 +61,11 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
             if version != "editable":
                 raise
             self.app.display_warning(f"the dashboard's page was not built: {error}")
-        if version != "editable" and (SITE / "index.html").is_file():
+        if version == "editable" or self.target_name != "wheel":  # the source has them in their own places
+            return
+        if (SITE / "index.html").is_file():
             build_data["force_include"][str(SITE)] = "ma2000/docs_site"
-        elif version != "editable":
+        else:
             build_data["force_include"] |= {str(ROOT / name): f"ma2000/documents/{name}" for name in _documents()}
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast, dataclass_transform
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from daq.contracts.errors import SpecError
 from firmware_protocol.invalid import first_invalid
@@ -48,6 +48,8 @@ else:
     _OfPydantic = type(FrozenRecord)
 
 
+# Type checkers without pydantic's plug-in read the arguments of a record only where its own metaclass says this.
+@dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
 class _OneLine(_OfPydantic):
     """Turns a ValidationError of a direct call into a one-line SpecError. Data that are read or sent are still
     validated by their readers."""
