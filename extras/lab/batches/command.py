@@ -327,8 +327,13 @@ def diagnose(
 
     names = candidate_effects(effects, effect_file)
     chosen = None if joints is None else tuple(parse_joints(joints))
-    compared = None if method is None else method.value
-    study = DiagnoseStudy(effects=names, joints=chosen, most_steps=most, method=compared, despite_doubts=despite_doubts)
+    study = DiagnoseStudy(
+        effects=names,
+        joints=chosen,
+        most_steps=most,
+        method=None if method is None else method.value,
+        despite_doubts=despite_doubts,
+    )
     _run(context, Asked(traces, out, executor, model, effect_file or (), json), study)
 
 

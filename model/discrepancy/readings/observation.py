@@ -268,7 +268,9 @@ def observe(
     stated = tuple(p.name for p in model.parameters if p.deviation is not None and p.deviation > 0 and p.null is None)
     effects = tuple(p.name for p in model.parameters if p.effect is not None and p.deviation is not None)
     known = load_posterior(model, (*(t.record.trace_id for t in traces), *held_out))
-    priors = {name: Prior(expected=model.parameter(name).value, deviation=d) for name, d in known.items()}
+    priors: dict[str, Prior | None] = {
+        name: Prior(expected=model.parameter(name).value, deviation=d) for name, d in known.items()
+    }
     chosen = tuple(dict.fromkeys((*stated, *effects)))
     problem: SimulatedProblem = fit_problem(
         model, traces, FitOptions(parameters=chosen, bend_terms=BEND_TERMS, priors=priors)
