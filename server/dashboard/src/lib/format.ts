@@ -43,22 +43,15 @@ export function duration(seconds: number | null | undefined): string {
 }
 
 const TIME = new Intl.DateTimeFormat('en-GB', { hour: '2-digit', minute: '2-digit', second: '2-digit' });
-const DAY_AND_TIME = new Intl.DateTimeFormat('en-GB', {
+const MINUTE = {
   day: '2-digit',
   month: 'short',
   year: 'numeric',
   hour: '2-digit',
   minute: '2-digit',
-});
-
-const DAY_AND_SECOND = new Intl.DateTimeFormat('en-GB', {
-  day: '2-digit',
-  month: 'short',
-  year: 'numeric',
-  hour: '2-digit',
-  minute: '2-digit',
-  second: '2-digit',
-});
+} as const;
+const DAY_AND_TIME = new Intl.DateTimeFormat('en-GB', MINUTE);
+const DAY_AND_SECOND = new Intl.DateTimeFormat('en-GB', { ...MINUTE, second: '2-digit' });
 
 /** The time of day of an ISO moment, in this computer's time zone. */
 export function timeOfDay(moment: string): string {

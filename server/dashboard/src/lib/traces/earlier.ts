@@ -66,9 +66,7 @@ export function besideEarlier(
     }),
   );
   if (told.length > 0) return `Against ${runs} of this experiment: ${told.join('; ')}.`;
-  return earlier.length < FEWEST
-    ? `Error and drive are those of ${runs} of this experiment.`
-    : `As in ${runs} of this experiment: error and drive are within their range.`;
+  return `As in ${runs} of this experiment: error and drive are within their range.`;
 }
 
 function valueOf(figures: Figures, joint: number, key: 'largest_error' | 'largest_drive'): number[] {
