@@ -13,6 +13,9 @@ from daq.contracts.frozen import FrozenRecord
 from daq.contracts.refused import refused_words
 from model.machine_model.model import MODEL_FORMAT, Model
 
+LARGEST_KEPT = 1 << 20
+"""Largest size (bytes) of a stored model. The service reads it whenever a client opens it; the MA2000's has 30 kB."""
+
 
 class ModelFile(FrozenRecord):
     """Stored data of a model: its ID, its file's text, and its parent model and traces."""
@@ -58,6 +61,27 @@ def model_of(data: Any, called: str) -> Model:
         return Model.model_validate(data)
     except ValidationError as error:
         raise SpecError(f"model {called}: {refused_words(error, Model, 'model')}") from error
+
+
+def foreign_model(path: Path, called: str) -> ModelFile:
+    """Returns the model in a file of unknown origin. Raises SpecError, also for a large model, or one with user-defined
+    effects, which are programs."""
+    try:
+        data = parse_json(read_text(path, called), called)
+        _require_no_program(data)
+        made = file_of(model_of(data, called))
+    except SpecError as error:
+        raise SpecError(str(error).removeprefix("model ").removeprefix(f"{called}: ")) from error
+    if (size := len(made.text.encode())) > LARGEST_KEPT:
+        raise SpecError(f"its model has {size >> 10} kB; allowed are {LARGEST_KEPT >> 10} kB")
+    return made
+
+
+def _require_no_program(data: Any) -> None:
+    model = data.get("model", data) if isinstance(data, dict) else None
+    effects = model.get("effects") if isinstance(model, dict) else None
+    if isinstance(effects, list) and any(isinstance(use, dict) and use.get("file") for use in effects):
+        raise SpecError("effects: some are programs of a user, which a service does not run; use the command line")
 
 
 def _text(model: Model) -> str:

@@ -18,6 +18,7 @@ from daq.contracts.service.experiments import (
     ExperimentState,
     MotionPreview,
 )
+from daq.safety.preview import preview_of
 from daq.trajectories.length import least_length, points_of
 from server.access.caller import Caller
 from server.api.dependencies import (
@@ -34,7 +35,6 @@ from server.api.dependencies import (
 )
 from server.api.presets import with_preset
 from server.bounded.messages import WorkOutMotion
-from server.bounded.motion import preview_of
 from server.bounded.workers import ExhaustedError, Workers
 from server.catalogue.room import require_room
 from server.experiments.schedule import LONGEST
@@ -195,7 +195,7 @@ def _preview(motions: Workers, rig: RobotServices, spec: ExperimentSpec, most_sh
         raise ProblemError(422, "beyond-limits", line, "make a schedule of shorter experiments")
     order = WorkOutMotion(spec=spec, machine=rig.robot.machine, most_shown=most_shown)
     if length <= SHORT and spec.repeats == 1 and points_of(spec) <= FEW_POINTS:
-        return preview_of(order)
+        return preview_of(spec, rig.robot.machine, most_shown)
     try:
         answer = motions.ask(order)
     except ExhaustedError as error:

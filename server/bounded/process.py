@@ -1,7 +1,4 @@
-"""Main program of a process with limited memory and time.
-
-`read_model` reads an uploaded file as a model.
-"""
+"""Main program of a process with limited memory and time."""
 
 from __future__ import annotations
 
@@ -13,41 +10,15 @@ import threading
 import traceback
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
-from daq.contracts.documents import parse_json, read_text
-from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.errors import DaqError
 from daq.contracts.service.experiments import MotionPreview
-from model.machine_model.model_file import ModelFile, file_of, model_of
+from daq.safety.preview import preview_of
+from model.machine_model.model_file import ModelFile, foreign_model
 from server.bounded.messages import ORDER, Answer, Limits, Order, ReadModel, ReadUpload, UploadedTrace
-from server.bounded.motion import preview_of
 from server.bounded.upload import read_upload
 from server.problems import NO_ROOM
 from server.steady import weigh_session
-
-LARGEST_KEPT = 1 << 20
-"""Largest size (bytes) of a stored model. The service reads it whenever a client opens it; the MA2000's has 30 kB."""
-
-
-def read_model(order: ReadModel) -> ModelFile:
-    """Reads the model in a file. Raises SpecError, also for a model with user-defined effects, which are programs."""
-    try:
-        data = parse_json(read_text(order.path, "upload"), "upload")
-        _require_no_program(data)
-        made = file_of(model_of(data, "upload"))
-    except SpecError as error:
-        raise SpecError(str(error).removeprefix("model ").removeprefix("upload: ")) from error
-    if (size := len(made.text.encode())) > LARGEST_KEPT:
-        raise SpecError(f"its model has {size >> 10} kB; allowed are {LARGEST_KEPT >> 10} kB")
-    return made
-
-
-def _require_no_program(data: Any) -> None:
-    model = data.get("model", data) if isinstance(data, dict) else None
-    effects = model.get("effects") if isinstance(model, dict) else None
-    if isinstance(effects, list) and any(isinstance(use, dict) and use.get("file") for use in effects):
-        raise SpecError("effects: some are programs of a user, which a service does not run; use the command line")
-
 
 NICENESS, SESSION_NICENESS = 10, 5
 """Nice values of the process, and of its session: a client waits for the answer, but the service has priority."""
@@ -100,9 +71,9 @@ def _carry_out(order: Order) -> UploadedTrace | ModelFile | MotionPreview:
         case ReadUpload():
             return read_upload(order)
         case ReadModel():
-            return read_model(order)
+            return foreign_model(order.path, "upload")
         case _:
-            return preview_of(order)
+            return preview_of(order.spec, order.machine, order.most_shown)
 
 
 def _is_of_the_disk(error: BaseException | None) -> bool:

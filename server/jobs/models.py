@@ -8,16 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq.contracts.errors import DaqError, SpecError
-from daq.contracts.frozen import like
 from daq.contracts.machine import Machine
-from daq.contracts.service.jobs import MACHINE, EffectInModel, ModelDetails, ModelParameter
+from daq.contracts.service.jobs import MACHINE, ModelDetails, ModelParameter
 from daq.contracts.whole_file import replacing
 from server.clock import Clock
 from server.store.models import ModelStore
 from server.store.tables import ModelRow
 
 if TYPE_CHECKING:
-    from model.machine_model.model import EffectUse, Model
+    from model.machine_model.model import Model
     from model.machine_model.model_file import ModelFile
 
 
@@ -79,14 +78,15 @@ class Models:
 
     def details(self, identity: str) -> ModelDetails:
         """Returns a model's effects, parameters and ancestors. Raises a 404."""
+        from model.machine_model.listed import effects_of, parameters_of
         from model.machine_model.model_file import load_model
 
         entry = self.store.get(self._robot, identity)
         model = load_model(self.path_of(identity))
         return ModelDetails(
             entry=entry,
-            effects=tuple(map(_effect, model.effects)),
-            parameters=_parameters(model),
+            effects=effects_of(model),
+            parameters=parameters_of(model),
             ancestors=self.store.ancestors(self._robot, identity),
         )
 
@@ -96,7 +96,9 @@ class Models:
 
     def machine_parameters(self) -> tuple[ModelParameter, ...]:
         """Returns the parameters of the model that the machine file describes."""
-        return _parameters(self._base())
+        from model.machine_model.listed import parameters_of
+
+        return parameters_of(self._base())
 
     def _base(self) -> Model:
         from model.machine_model.model import base_model
@@ -120,22 +122,3 @@ def _is_stored(path: Path, made: ModelFile) -> bool:
     if there.identity == made.identity and there.text != made.text:
         raise SpecError(f"model {made.identity}: another model has this ID; change any of its values")
     return there.identity == made.identity
-
-
-def _effect(use: EffectUse) -> EffectInModel:
-    from model.effects.names import placed
-
-    return EffectInModel(name=use.name, joints=use.joints, called=placed(use.name, use.joints))
-
-
-def _parameters(model: Model) -> tuple[ModelParameter, ...]:
-    from model.machine_model.parameter_words import words_of
-
-    return tuple(
-        like(ModelParameter, one, words=words_of(one), low=_finite(one.low), high=_finite(one.high))
-        for one in model.parameters
-    )
-
-
-def _finite(value: float | None) -> float | None:
-    return None if value is None or abs(value) == float("inf") else value

@@ -12,10 +12,10 @@ from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 from daq.contracts.progress import CancelledError
 from daq.contracts.service.jobs import MACHINE, CompareRequest, DiagnoseRequest, FitRequest, JobRequest, ValidateRequest
+from daq.contracts.service.study_options import options_of
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.reader import read_trace
 from server.jobs.mailbox import MODEL, REPORT, REQUEST, RESULT, Mailbox
-from server.jobs.options import options_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -17,10 +17,10 @@ from daq.contracts.frozen import FrozenRecord
 from daq.contracts.machine import Machine
 from daq.contracts.service.base import Wire
 from daq.contracts.service.jobs import DiagnoseStudy, FitStudy, ValidateStudy
+from daq.contracts.service.study_options import options_of
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces.reader import read_trace
 from extras.lab.batches.columns import Columns, of_diagnosis, of_fit, of_simulation, of_validation
-from server.jobs.options import options_of
 
 if TYPE_CHECKING:
     from daq.contracts.trace import Trace

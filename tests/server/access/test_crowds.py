@@ -15,12 +15,12 @@ from uvicorn.server import ServerState
 from daq.contracts.experiment import ExperimentSpec, Sine
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import MotionPreview
+from daq.safety.preview import preview_of
 from server.access import lanes as of_lanes
 from server.access.connections import MOST_HEADERS, Connection
 from server.access.gate import AT_ONCE, Turn, Turns
 from server.access.lanes import MOST_WAITING, Lanes
 from server.bounded.messages import Limits, WorkOutMotion
-from server.bounded.motion import preview_of
 from server.bounded.workers import Workers
 from server.problems import ProblemError
 from server.steady import RESERVED, most_connections
@@ -204,7 +204,7 @@ def test_a_long_motion_is_the_same_wherever_it_is_worked_out() -> None:
     with closing(Workers(Limits(memory=1 << 30, seconds=60.0), 1)) as workers:
         answer = workers.ask(order)
         wrong = workers.ask(order.model_copy(update={"spec": spec.model_copy(update={"repeats": 1000})}))
-    assert MotionPreview.model_validate(answer.data) == preview_of(order)
+    assert MotionPreview.model_validate(answer.data) == preview_of(order.spec, order.machine, order.most_shown)
     assert "longer than" in wrong.problem or "allowed" in wrong.problem
 
 

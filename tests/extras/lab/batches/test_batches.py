@@ -11,6 +11,7 @@ from pyarrow import parquet
 from daq.contracts.errors import ReachError, SpecError
 from daq.contracts.progress import CancelledError
 from daq.contracts.service.jobs import DiagnoseRequest, DiagnoseStudy, FitRequest
+from daq.contracts.service.study_options import options_of
 from daq.executors import Workers
 from daq.traces.catalogue import list_traces
 from daq.traces.query import TraceQuery
@@ -24,7 +25,6 @@ from model.fitting.options import FitOptions
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
-from server.jobs.options import options_of
 from tests.daq.executors.by_hand import WorkersByHand
 from tests.extras.lab.batches.traces import MACHINE, folder_of_traces, number
 

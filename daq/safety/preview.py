@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 
+from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.frozen import like
+from daq.contracts.machine import Machine
 from daq.contracts.service.experiments import MotionMark, MotionPreview, MotionViolation
-from daq.safety import Violation, check_plan
+from daq.safety.check_plan import check_plan
+from daq.safety.violation import Violation
 from daq.trajectories.planner import plan, start_angles
-from server.bounded.messages import WorkOutMotion
 
 
-def preview_of(order: WorkOutMotion) -> MotionPreview:
+def preview_of(spec: ExperimentSpec, machine: Machine, most_shown: int) -> MotionPreview:
     """Plans the motion. If it has more than `most_shown` set points, the preview contains every second, third, … one.
     Raises SpecError."""
-    machine = order.machine
-    motion = plan(order.spec, machine, start_angles(order.spec, machine))
+    motion = plan(spec, machine, start_angles(spec, machine))
     violations = check_plan(motion, machine, machine.limits)
-    every = max(1, math.ceil(len(motion) / order.most_shown))
+    every = max(1, math.ceil(len(motion) / most_shown))
     return MotionPreview(
         time=tuple(index * motion.period for index in range(0, len(motion), every)),
         set_points=tuple(map(tuple, motion.angles[::every].tolist())),

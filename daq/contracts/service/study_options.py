@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
+
+from pydantic import BaseModel
 
 from daq.contracts.service.jobs import DiagnoseStudy, FitStudy
 
-if TYPE_CHECKING:
-    from model.discrepancy.options import DiagnosisOptions
-    from model.fitting.options import FitOptions
-
-Chosen = TypeVar("Chosen", "FitOptions", "DiagnosisOptions")
+Chosen = TypeVar("Chosen", bound=BaseModel)
 
 
 def options_of(study: FitStudy | DiagnoseStudy, kind: type[Chosen]) -> Chosen:
