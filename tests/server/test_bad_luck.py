@@ -107,12 +107,15 @@ def _ends_while_somebody_waits(service: Service, waiting: str) -> None:
 
 def _without_the_worker(service: Service, trace: str) -> None:
     fit = service.robot.post("/jobs", json=LONG_FIT | {"traces": [trace]}).json()
-    compare = {"kind": "compare", "traces": [trace], "models": ["machine"]}
-    following = service.robot.post("/jobs", json=compare).json()
     progress = service.folder / "service" / "jobs" / fit["id"] / PROGRESS
     while not progress.exists():
         assert service.robot.get(f"/jobs/{fit['id']}", params={"wait": 0.1}).json()["state"] in ("queued", "running")
-    os.kill(json.loads(progress.read_text())["process"], signal.SIGKILL)
+    workers = _children(service.process.pid, b"spawn_main")
+    compare = {"kind": "compare", "traces": [trace], "models": ["machine"]}
+    following = service.robot.post("/jobs", json=compare).json()
+    assert workers
+    for worker in workers:
+        os.kill(worker, signal.SIGKILL)
     ended = service.end_of(fit["id"], "jobs")
     told = "its worker process ended: it was killed, or ran out of memory"
     assert (ended["state"], ended["reason"]) == ("interrupted", told)
@@ -229,12 +232,15 @@ def test_a_disk_that_fills_up_ends_the_run_and_keeps_what_was_written(service: S
 
 def _owner_of(service: int) -> int:
     """The process that owns the port."""
+    (owner,) = _children(service, b"server.owner")
+    return owner
+
+
+def _children(service: int, word: bytes) -> list[int]:
+    """The processes of a service whose command has this word."""
     threads = Path(f"/proc/{service}/task").iterdir()
     children = [int(child) for thread in threads for child in (thread / "children").read_text().split()]
-    for child in children:
-        if b"server.owner" in Path(f"/proc/{child}/cmdline").read_bytes():
-            return child
-    raise AssertionError("no process owns the port")
+    return [child for child in children if word in Path(f"/proc/{child}/cmdline").read_bytes()]
 
 
 # ---- a day of a lab, over REST and the live stream, with a restart in its middle

@@ -249,7 +249,8 @@ class ReadingCase(Case):
         own = [k for k, u in enumerate(now.unknowns) if u.kind is not Kind.INITIAL_POSITION]
         numbers = [now.unknowns[k] for k in own]
         held, scale = replace(self.held_out, own=()).of_model(now.model), np.array([u.scale for u in numbers])
-        rows, left = held.slopes(now.values, numbers), held.samples.flat(self.held(now))
+        values = {u.name: now.values[u.name] for u in numbers}  # start postures are of other records
+        rows, left = held.slopes(values, numbers), held.samples.flat(self.held(now))
         if not (np.isfinite(rows).all() and np.isfinite(left).all()):
             return self.held_squares(now)
         J, r = held.weighted(rows, held.floor, now.memory) * scale[:, None], held.weighted(left, held.floor, now.memory)
