@@ -101,7 +101,7 @@ def test_ctrl_c_takes_back_what_waits_and_stops_nobody_else(service: Service, tm
 
 
 def test_a_paused_queue_is_told_and_nothing_is_left_lying_in_it(daq: Daq, service: Service) -> None:
-    assert daq("queue", "pause").out.startswith("paused: by local")
+    assert daq("queue", "pause").out.startswith("paused: local paused it")
     said = daq(*RAMP)
     assert said.code == 4
     assert "nothing was queued" in said.err
