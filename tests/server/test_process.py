@@ -38,7 +38,7 @@ def test_the_web_server_and_the_owner_of_the_port_load_no_compiler_no_physics_en
 PROGRAM = """
 import logging, sys, threading, warnings
 from server import logs
-from server.jobs.service import worker_processes
+from server.jobs.shared_workers import worker_processes
 
 if __name__ == "__main__":
     logs.begin()
