@@ -37,12 +37,12 @@ def test_friction_that_a_file_may_be_wrong_about_is_not_seen(sound: Rig, ratio: 
 
 
 @pytest.mark.slow
-def test_a_shifted_centre_and_a_heavier_link_are_one_to_an_axis(sound: Rig) -> None:
+def test_a_shifted_centre_and_a_heavier_link_are_nearly_one_to_an_axis(sound: Rig) -> None:
     rig = hide(sound, "centre_of_mass", 1, 0, {"shift": 0.2 * sound.bodies.links[0].a})
     none, _, mass, friction = sharpness(rig, ("link_mass", "viscous_friction"))
     assert none.d_prime > 20.0
-    assert mass.d_prime < 5.0
-    assert 5.0 < friction.d_prime <= none.d_prime
+    assert mass.d_prime < 0.01 * friction.d_prime  # gravity's torque is the same, inertia is not quite
+    assert friction.d_prime <= none.d_prime
 
 
 @pytest.mark.slow
