@@ -29,7 +29,7 @@ WORDS = {
     "design": "ma2000",
     "diagnose": "{trace}",
     "fit": "{trace} --out fitted.json",
-    "follow": "show {trace}",
+    "follow": "run ramp --model ma2000 --dry-run",
     "hide": "",
     "profile": "ma2000 {trace} --parameter load.mass",
     "sensitivity": "ma2000 {trace}",
