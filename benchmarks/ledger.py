@@ -28,6 +28,8 @@ from pathlib import Path
 import httpx
 import mujoco
 import numpy as np
+import zstandard
+from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
 from benchmarks.figures import Figure, show
@@ -72,7 +74,7 @@ def total(values):
     return values.sum()
 total(numpy.zeros(3))
 """
-"""What no simulation with compiled code can start faster than."""
+"""The least program that calls code which numba has compiled before."""
 FITTED = (
     *(f"joint{joint}.motor.{name}" for joint in (1, 2, 3) for name in ("back_emf_constant", "rotor_inertia")),
     *(f"joint{joint}.viscous_friction.coefficient" for joint in (1, 2, 3)),
@@ -94,8 +96,13 @@ class Entry:
 
     @property
     def ratio(self) -> float:
-        """How many times its floor."""
+        """How many times its floor or rival."""
         return self.took / self.floor
+
+    @property
+    def column(self) -> str:
+        """Its column in `ledger.csv`: a ratio to something else is another figure."""
+        return f"{self.name} : {self.beside}"
 
 
 def least(act: Callable[[], object], times: int) -> float:
@@ -147,7 +154,6 @@ def starts(times: int) -> Iterator[Entry]:
             "a ramp in lock-step, with its start",
             command.format(["--port", "mock://?lock_step=1", "run", "ramp", "--json"]),
         ),
-        ("daq stop, until it is sent", "from daq_cli.app import early_stop; early_stop.ask()"),
         ("import ma2000", "import ma2000"),
         ("an owner's imports", "import daq.owner.process"),
         ("the stop listener's imports", "import server.stopping.process"),
@@ -187,7 +193,7 @@ def simulated(times: int) -> Iterator[Entry]:
         fresh = of_program("-c", first.format(str(path)), times=times)
         cached = Path(path.parent, "cached.py")
         cached.write_text(CACHED, "utf-8")
-        compiler = of_program(str(cached), times=times)
+        compiler = of_program(str(cached), times=1 + times)  # the first compiles
     yield Entry("lock-step, a period with its trace", min(periods), ENGINE, engine, PERIOD_US * 1e-6 / 40 / engine)
     yield Entry("lock-step, the mock alone", alone, ENGINE, engine, PERIOD_US * 1e-6 / 150 / engine)
     yield Entry("a first simulation", fresh, "numba's first call of a cached function", compiler)
@@ -250,16 +256,17 @@ def read(times: int) -> Iterator[Entry]:
                         recording.flush()
                 recording.finish("complete", {})
 
-        def undecoded() -> None:
-            with path.open("rb") as stream:
-                for _ in StreamReader(stream).records:
-                    pass
+        def inflated() -> None:
+            for chunk in chunks:
+                zlib.crc32(zstandard.decompress(chunk.data, chunk.uncompressed_size))
 
         recorded, first = least(record_all, 1), least(lambda: read_trace(path), 1)
         again = least(lambda: read_trace(path), 3 * times)
-        rival, checked = least(undecoded, 1), least(lambda: zlib.crc32(path.read_bytes()), 3 * times)
-    yield Entry("an hour of trace, recorded", recorded, "mcap reads it undecoded", rival)
-    yield Entry("an hour of trace, first opened", first, "mcap reads it undecoded", rival, 0.2 / rival)
+        with path.open("rb") as stream:
+            chunks = [one for one in StreamReader(stream, emit_chunks=True).records if isinstance(one, Chunk)]
+        floor, checked = least(inflated, 3), least(lambda: zlib.crc32(path.read_bytes()), 3 * times)
+    yield Entry("an hour of trace, recorded", recorded, "zstd and checksums read it", floor)
+    yield Entry("an hour of trace, first opened", first, "zstd and checksums read it", floor, 0.2 / floor)
     yield Entry("an hour of trace, opened again", again, "its checksum", checked, 0.02 / checked)
 
 
@@ -273,9 +280,9 @@ def kept() -> list[dict[str, str]]:
 
 def keep(entries: list[Entry], lines: list[dict[str, str]]) -> None:
     """Writes the recorded lines with one more for the present commit; figures that there are no more go."""
-    asked = ("git", "rev-parse", "--short", "HEAD")
-    commit = subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
-    line = {"commit": commit, **{entry.name: f"{entry.ratio:.3g}" for entry in entries}}
+    asked = ("git", "describe", "--always", "--dirty", "--exclude=*")
+    commit = subprocess.run(asked, cwd=KEPT.parent, capture_output=True, text=True, check=True).stdout.strip()
+    line = {"commit": commit, **{entry.column: f"{entry.ratio:.3g}" for entry in entries}}
     with KEPT.open("w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, list(line), extrasaction="ignore", restval="", lineterminator="\n")
         table.writeheader()
@@ -284,14 +291,16 @@ def keep(entries: list[Entry], lines: list[dict[str, str]]) -> None:
 
 def compared(entry: Entry, lines: list[dict[str, str]]) -> Figure:
     """A figure beside what was recorded of it."""
-    before = [float(line[entry.name]) for line in lines[-COMPARED:] if line.get(entry.name)]
+    before = [float(line[entry.column]) for line in lines[-COMPARED:] if line.get(entry.column)]
     usual = statistics.median(before) if before else None
     worse = usual is not None and entry.ratio > WORSE * usual
     past = ", ".join(f"{value:g}" for value in before)
     missed = entry.target is not None and entry.ratio > entry.target
     target = "" if entry.target is None else f"≤ {entry.target:.3g}"
     beside = f"{entry.took * 1e3:.3g} ms : {entry.beside} {entry.floor * 1e3:.3g} ms"
-    return Figure(entry.name, f"{entry.ratio:.3g}", target, not (worse or missed), f"{beside}   before: {past}")
+    told = f"{beside}   {'WORSE than ' if worse else ''}before: {past}"
+    met = None if entry.target is None and not worse else not (worse or missed)
+    return Figure(entry.name, f"{entry.ratio:.3g}", target, met, told)
 
 
 def main() -> int:

@@ -22,14 +22,15 @@ from daq.traces.scan import Scan
 
 ONE_CHUNK_A_FLUSH = 1 << 40
 """Chunk size (bytes) that is never reached: chunks end only at `flush`, never within a row."""
-
-
 PACKED = 1 << 16
 """Size (bytes) at which records of the index are compressed."""
 
 
 class ChunkIndexes:
-    """What a writer keeps of each chunk until the end, as compressed records; as objects they take 3 MB an hour."""
+    """What a writer keeps of each chunk until the end, as compressed records; as objects they take 3 MB an hour.
+
+    To the writer it is a list of one index, itself, which writes all of them, once.
+    """
 
     def __init__(self) -> None:
         self._records = RecordBuilder()
@@ -54,7 +55,7 @@ class ChunkIndexes:
 def open_mcap(stream: IO[bytes], profile: str = layout.PROFILE) -> Writer:
     """Opens the MCAP writer of all traces: zstd, one chunk per flush, checksums over chunks and the data section."""
     writer = Writer(stream, chunk_size=ONE_CHUNK_A_FLUSH, compression=CompressionType.ZSTD, enable_data_crcs=True)
-    writer._Writer__chunk_indices = ChunkIndexes()  # type: ignore[attr-defined]  # no public way keeps them small
+    writer._Writer__chunk_indices = ChunkIndexes()  # type: ignore[attr-defined]  # no public way, so pinned to mcap 1.6
     writer.start(profile, software())
     return writer
 

@@ -242,8 +242,11 @@ class ReadingCase(Case):
         return fitted, signal_errors(self, before, after, floor_held)
 
     def _held_beyond_numbers(self, now: Fit) -> Floats:
-        """(n,) mean squares that held-out records leave where the numbers may still follow them, as far as the fitted
-        records leave their values open: a short record fits some of them to its noise."""
+        """(n,) mean squares that held-out records leave beyond what is expected of numbers that the fitted records tell
+        only to their deviations: rᵀ S⁻¹ r with the covariance S of noise and numbers, in variances of the noise.
+
+        A short record fits some numbers to its noise, and they are wrong elsewhere.
+        """
         assert self.held_out is not None
         clear = projection(now.with_slopes())
         own = [k for k, u in enumerate(now.unknowns) if u.kind is not Kind.INITIAL_POSITION]
@@ -255,8 +258,8 @@ class ReadingCase(Case):
             return self.held_squares(now)
         J, r = held.weighted(rows, held.floor, now.memory) * scale[:, None], held.weighted(left, held.floor, now.memory)
         step = np.linalg.solve(inverse(clear.inverse[np.ix_(own, own)]) + J @ J.T, J @ r)
-        left = left - (step * scale) @ rows
-        return np.array([np.mean(left[c] ** 2) for c in held.samples.columns])
+        products = left * (left - (step * scale) @ rows)  # S⁻¹ r is what is left where the numbers follow (Woodbury)
+        return np.array([max(np.mean(products[c]), 0.0) for c in held.samples.columns])
 
     @cached_property
     def _counts(self) -> tuple[int, int]:
