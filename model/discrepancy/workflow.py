@@ -22,6 +22,7 @@ from model.machine_model.model import Model
 from model.record_check.check import as_used, check_records, require_computable
 from model.record_check.finding import RecordFinding, doubts_in
 from model.record_check.pieces import in_pieces
+from model.simulation.inputs import inputs_of
 
 
 def choose_method(model: Model, traces: Sequence[Trace], options: DiagnosisOptions, *, designs: bool) -> Method:
@@ -55,11 +56,14 @@ def choose_method(model: Model, traces: Sequence[Trace], options: DiagnosisOptio
 
 
 def _accelerations_are_known(model: Model, traces: Sequence[Trace]) -> bool:
-    """Whether the traces hold drives, and accelerations beyond the noise of their readings. A record that torques
-    cannot use, as one with a gap or one of half a second, may still be simulated."""
+    """Whether the traces hold the drives of all control periods, and accelerations beyond the noise of their readings.
+    What a drive was in between is unknown. A record that torques cannot use, as one with a gap or one of half a second,
+    may still be simulated."""
     if any(trace.drive is None for trace in traces):
         return False
     try:
+        if not all(inputs_of(trace, model.machine).drive_of_every_period for trace in traces):
+            return False
         recorded_motions(traces, model.machine, choose_cutoff(traces, model.machine))
     except (SpecError, TraceError):
         return False

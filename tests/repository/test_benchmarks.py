@@ -19,10 +19,13 @@ def test_a_benchmark_that_a_signal_ended_has_met_no_target(ended: int, code: int
     assert listing.main(["ledger"], lambda command, **_: subprocess.CompletedProcess(command, ended)) == code
 
 
-@pytest.mark.parametrize(("took", "met"), [(2.1, True), (2.3, False)])
-def test_a_figure_that_has_become_a_tenth_worse_is_named(took: float, met: bool) -> None:
-    lines = [{"commit": "", "a figure": text} for text in ("9", "2", "", "2", "2")]
-    assert compared(Entry("a figure", took, "its floor", 1.0), lines).met is met
+@pytest.mark.parametrize(("took", "met"), [(2.1, None), (2.3, False)])
+def test_a_figure_that_has_become_a_tenth_worse_is_named(took: float, met: bool | None) -> None:
+    entry = Entry("a figure", took, "its floor", 1.0)
+    lines = [{"commit": "", entry.column: text} for text in ("9", "2", "", "2", "2")]
+    found = compared(entry, lines)
+    assert (found.met, "WORSE than" in found.beside) == (met, met is False)
+    assert compared(entry, [{"commit": "", "a figure : something else": "1"}]).met is None, "another ratio"
 
 
 def test_the_stop_that_is_measured_knows_no_caller_s_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
