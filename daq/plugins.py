@@ -110,6 +110,8 @@ class Plugin:
     panels: Mapping[str, str] = field(default_factory=dict)
     """Panels for the Live page, by title: paths of ES modules that a route at the root serves. The default export
     gets an HTML element and `{machine, sample}` (`PluginPanel.svelte`), draws, and may return what ends it."""
+    pages: tuple[str, ...] = ()
+    """Parts of the service's own page that need its routes: those of Experiments, `layouts`, `hide`."""
 
 
 @cache

@@ -6,4 +6,5 @@ from daq.plugins import Plugin
 PLUGIN = Plugin(
     migrations={"macros": "extras.console.versions"},
     routes=("extras.console.routes:router",),
+    pages=("macros", "plan", "console"),
 )

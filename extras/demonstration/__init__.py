@@ -16,4 +16,5 @@ PLUGIN = Plugin(
     ),
     parts=("extras.demonstration.part:Demonstrations",),
     routes=("extras.demonstration.routes:router",),
+    pages=("hide",),
 )

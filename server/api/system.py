@@ -95,6 +95,7 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
         unattended=any(rig.unattended for rig in services.robots()),
         stop_port=services.stop_port,
         panels={title: path for plugin in plugins() for title, path in plugin.panels.items()},
+        pages=tuple(page for plugin in plugins() for page in plugin.pages),
     )
 
 

@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-OURS = ("daq.contracts", "daq.traces", "daq.config", "model", "daq_cli", "ma2000", "extras.formats")
+EXTRAS = ("extras.formats",) if (ROOT / "extras").exists() else ()
+OURS = ("daq.contracts", "daq.traces", "daq.config", "model", "daq_cli", "ma2000", *EXTRAS)
 """Packages that read, fit and diagnose, or lead there."""
 FOREIGN = (
     "asyncio concurrent.futures.process httpx jinja2 matplotlib.backends.backend_agg mcap.writer multiprocessing.pool "

@@ -90,3 +90,5 @@ class SystemStatus(Wire):
     """Port of the stop listener, which answers even if the service is too busy."""
     panels: dict[str, str] = {}
     """Panels of plug-ins for the Live page, by title: paths of modules."""
+    pages: tuple[str, ...] = ()
+    """Parts of the page whose routes plug-ins have."""

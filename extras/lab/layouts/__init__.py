@@ -5,4 +5,5 @@ from daq.plugins import Plugin
 PLUGIN = Plugin(
     migrations={"layouts": "extras.lab.layouts.versions"},
     routes=("extras.lab.layouts.routes:router",),
+    pages=("layouts",),
 )

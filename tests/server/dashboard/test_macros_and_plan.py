@@ -6,10 +6,14 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from playwright.sync_api import expect
 
+from tests.repository.tracked import ROOT
 from tests.server.dashboard.browser import Dashboard
 from tests.server.dashboard.faults import faults_of
 
-pytestmark = pytest.mark.browser
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not (ROOT / "extras").exists(), reason="the desk is an extra"),
+]
 
 
 def test_a_line_is_completed_tried_without_sending_it_and_run(dashboard: Dashboard) -> None:

@@ -6637,6 +6637,11 @@ export interface components {
             panels?: {
                 [key: string]: string;
             };
+            /**
+             * Pages
+             * @default []
+             */
+            pages?: string[];
         };
         /**
          * TaughtPath

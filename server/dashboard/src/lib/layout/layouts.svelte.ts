@@ -5,9 +5,9 @@
 
 import { LayoutError, layoutOf, STANDARD, written, type Layout, type LayoutPanel } from './layout';
 
-/** Keeps a person's layouts at the service, which may have no place for them. */
+/** Keeps a person's layouts at the service. */
 export interface Keeper {
-  /** What was kept; null where the service keeps none, or none was kept. */
+  /** What was kept; null where none was. */
   get(): Promise<string | null>;
   put(text: string): Promise<void>;
 }
@@ -29,13 +29,19 @@ class Layouts {
   /** What this browser and the service have. */
   private text = '';
 
-  /** Shows the layouts of this person. What is kept and no layout any more is left out, and said. */
-  follow(person: string, keeper: Keeper): void {
+  /**
+   * Shows the layouts of this person. What is kept and no layout any more is left out, and said.
+   *
+   * `keeper`: null where the service keeps none, or has not said yet that it does.
+   */
+  follow(person: string, keeper: Keeper | null): void {
     const key = `ma2000-layouts:${person}`;
-    if (key === this.key) return;
+    if (key === this.key && keeper === this.keeper) return;
+    const isOther = key !== this.key;
     this.key = key;
     this.keeper = keeper;
-    this.take(localStorage.getItem(key) ?? '');
+    if (isOther) this.take(localStorage.getItem(key) ?? '');
+    if (keeper === null) return;
     if (localStorage.getItem(this.untold) !== null) {
       // The page was left, or there was no connection, before the service was told.
       void this.tell();
@@ -114,9 +120,10 @@ class Layouts {
 
   private async tell(): Promise<void> {
     this.timer = null;
+    if (this.keeper === null) return;
     const [text, untold] = [this.text, this.untold];
     try {
-      await this.keeper?.put(text);
+      await this.keeper.put(text);
       if (text === this.text) localStorage.removeItem(untold);
     } catch (error) {
       this.problem = `${(error as Error).message}.`;

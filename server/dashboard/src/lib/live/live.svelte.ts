@@ -108,6 +108,8 @@ class Live {
 
   /** Panels of plug-ins: where the module of each title is. */
   panels = $state.raw<Readonly<Record<string, string>>>({});
+  /** Parts of the page whose routes the service has from plug-ins; none before it has said so. */
+  pages = $state.raw<ReadonlySet<string>>(new Set());
 
   readonly clock = new ServiceClock();
   recording: Recording | null = null;
@@ -190,6 +192,7 @@ class Live {
       const known = await system;
       stop.port = known.stop_port;
       this.panels = known.panels;
+      this.pages = new Set(known.pages);
       // Of several arms some may: to say to be there does no harm then.
       this.isUnattended = known.unattended && !isFleet();
     } catch {
