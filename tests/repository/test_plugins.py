@@ -120,6 +120,8 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
             (tree / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(path, tree / name, follow_symlinks=False)
     shutil.copytree(ROOT / PAGE, tree / PAGE)
+    modules = Path("server", "dashboard", "node_modules")
+    (tree / modules).symlink_to(ROOT / modules)  # the gallery is built with them
     wheel = build(tree.parent / "built", tree).wheel
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", tree / ".venv"], check=True, timeout=60)
     (site,) = (tree / ".venv" / "lib").glob("python*/site-packages")
