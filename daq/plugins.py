@@ -111,7 +111,7 @@ class Plugin:
     """Panels for the Live page, by title: paths of ES modules that a route at the root serves. The default export
     gets an HTML element and `{machine, sample}` (`PluginPanel.svelte`), draws, and may return what ends it."""
     pages: tuple[str, ...] = ()
-    """Parts of the service's own page that need its routes: those of Experiments, `layouts`, `hide`."""
+    """Parts of the service's own page that need its routes: those of Experiments, `layouts`, `camera`, `hide`."""
 
 
 @cache

@@ -6,4 +6,5 @@ PLUGIN = Plugin(
     settings={"camera": "extras.camera.settings:CameraSettings"},
     parts=("extras.camera.part:Cameras",),
     routes=("extras.camera.routes:router",),
+    pages=("camera",),
 )
