@@ -176,7 +176,7 @@ def _has_own_names(separator: str, header: list[str]) -> bool:
 def _noted(trace: Trace, said: list[str]) -> Trace:
     """Returns the trace with more notes. If the file lacks data, the outcome is not `complete`."""
     record = trace.record
-    update: dict[str, Any] = {"notes": " ".join([record.notes, *said]).strip()}
+    update: dict[str, Any] = {"notes": " ".join(filter(None, (record.notes, *said)))}
     if any(line.startswith(INCOMPLETE) for line in said) and record.outcome in (None, "complete"):
         update["outcome"] = "interrupted"
     return replace(trace, record=record.model_copy(update=update))

@@ -55,6 +55,11 @@ def test_a_trace_comes_back_from_csv_to_the_bit(tmp_path_factory: pytest.TempPat
         assert getattr(back.record, name) == getattr(about, name), name
 
 
+def test_notes_keep_their_blanks(tmp_path: Path) -> None:
+    trace = read_trace(write(tmp_path / "a.mcap", 3, notes=" \n\u00a0"))
+    assert import_csv(export_csv(trace, tmp_path / "a.csv")).record.notes == " \n\u00a0"
+
+
 def test_a_file_has_the_same_identity_wherever_it_lies_and_another_when_it_says_something_else(tmp_path: Path) -> None:
     trace = read_trace(write(tmp_path / "a.mcap", 3))
     (tmp_path / "far").mkdir()
