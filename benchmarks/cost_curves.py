@@ -1,10 +1,9 @@
 """How time and memory of run, fit, validate, diagnose and serve grow: docs/images/cost-curves.svg.
 
     python -m benchmarks cost_curves               measure, print and draw (20 minutes)
-    python -m benchmarks cost_curves --points 3    the same with three points a curve
 
-Every point is a process of its own that has the code: processor time, and the most memory. A curve's exponent is the
-slope of its logarithms over its upper half.
+Every point is a process of its own that has the code and the records: processor time, and the most memory that it takes
+besides. A curve's exponent is the slope of its logarithms over its upper half.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from __future__ import annotations
 import argparse
 import math
 import multiprocessing
+import os
 import resource
 import statistics
 import sys
@@ -29,6 +29,7 @@ import ma2000
 from benchmarks.service_clients import clients
 from benchmarks.service_load import ProcessorTime
 from benchmarks.service_process import ROBOT, started_service, sway
+from benchmarks.waits import resident
 from daq.contracts.trace import Trace
 from model.machine_model.model import base_model
 from model.simulation.prepared import Options
@@ -37,8 +38,7 @@ from model.simulation.simulate import simulate, simulate_many
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "cost-curves.svg"
 ARMS = {1: "pendulum", 3: "ma2000", 6: "ur10e", 7: "panda"}
 """A machine for each number of joints."""
-WATCHED = 20.0
-"""Time (s) for which a service is measured."""
+WATCHED = 20.0  # s for which a service is measured
 FITTED = ("joint2.motor.back_emf_constant", "joint2.viscous_friction.coefficient", "load.mass")
 Cost = tuple[float, float]
 """Processor time (s) and memory (bytes)."""
@@ -78,10 +78,10 @@ def studied(study: str, joints: int, traces: list[Trace]) -> None:
 
 def measure(pipe: Connection, study: str, joints: int, traces: list[Trace]) -> None:
     """Sends what a study costs in this process."""
-    begun = time.process_time()
+    begun, had = time.process_time(), resident(os.getpid())
     studied(study, joints, traces)
     took = time.process_time() - begun
-    pipe.send((took, 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
+    pipe.send((took, 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - had))
 
 
 def cost(study: str, joints: int, files: list[Path]) -> Cost:
@@ -112,19 +112,19 @@ def watched(watchers: int) -> Cost:
             spent = ProcessorTime({"service": [service.process.pid]})
             time.sleep(WATCHED)
             share = spent.shares()["service"]
-            status = Path(f"/proc/{service.process.pid}/status").read_text("utf-8")
+            memory = resident(service.process.pid)
         service.ask("POST", "/stop")
-    resident = next(line for line in status.splitlines() if line.startswith("VmRSS")).split()[1]
-    return share, 1024.0 * int(resident)
+    return share, memory
 
 
 def curves(folder: Path, points: int) -> Iterator[tuple[str, str, list[tuple[float, Cost]]]]:
     """Yields against what, of what, and the points of each curve."""
     short = record(folder, 2.0)
-    lengths = {seconds: record(folder, seconds, 1) for seconds in (10.0, 20.0, 40.0, 80.0, 160.0)[:points]}
+    lengths = {10.0 * 2**k: record(folder, 10.0 * 2**k, 1) for k in range(points + 4)}
     several = [record(folder, 10.0, seed) for seed in range(2, 2 + 2 ** (points - 1))]
     for study in ("run", "fit", "validate", "diagnose"):
-        yield "s of record", study, [(s, cost(study, 0, [short, file])) for s, file in lengths.items()]
+        some = [*lengths.items()][4:] if study == "run" else [*lengths.items()][:points]  # a run takes milliseconds
+        yield "s of record", study, [(s, cost(study, 0, [short, file])) for s, file in some]
         counts = [2**k for k in range(points)]
         yield "traces of 10 s", study, [(n, cost(study, 0, [short, *several[:n]])) for n in counts]
     yield "joints", "run", [(joints, cost("run", joints, [short, short])) for joints in ARMS]
@@ -156,7 +156,6 @@ def draw(found: Iterable[tuple[str, str, list[tuple[float, Cost]]]]) -> None:
         axes[1][column].set_xlabel(against)
     axes[0][0].set_ylabel("processor time (s)")
     axes[1][0].set_ylabel("memory (MB)")
-    axes[1][0].set_yticks([100, 200, 400], ["100", "200", "400"])
     mpl.rcParams["svg.hashsalt"] = "cost curves"  # the same names in the file each time
     figure.savefig(PICTURE, metadata={"Date": None})
 

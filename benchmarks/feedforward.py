@@ -1,9 +1,6 @@
 """Tracking errors of plain set points, of those from models, and of learned ones, on arms with hidden effects.
 
-    python -m benchmarks feedforward --folder FOLDER              resumes where it was; one line of JSON an arm
-    python -m benchmarks feedforward --first 101 --arms 8 …       seeds 101 to 108
-    python -m benchmarks feedforward --friction 2 …               hidden frictions of twice the size; another FOLDER
-    python -m benchmarks feedforward --arms 1                     one arm
+    python -m benchmarks feedforward --first 101 --arms 8       seeds 101 to 108
 
 Every seed is an arm of its own: its parameters are drawn from what the machine file expects (value ± deviation), it
 carries a hidden load, and one joint has a hidden friction, of a kind and size that the seed draws. All of it is the
@@ -23,11 +20,8 @@ all three joints.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -93,13 +87,13 @@ MOTIONS = {
 """The source's ramp, sines that reverse, and a smooth motion through other postures."""
 
 
-def hidden_effects(seed: int, times: float = 1.0) -> tuple[str, ...]:
-    """Returns the mock's modifications for a seed: a friction at a joint, `times` its size, and a load."""
+def hidden_effects(seed: int) -> tuple[str, ...]:
+    """Returns the mock's modifications for a seed: a friction at a joint, and a load."""
     rng = np.random.default_rng([8, seed])
     kind = str(rng.choice(list(FRICTION)))
     joint = int(rng.integers(1, 4))
     low, high = FRICTION[kind][joint - 1]
-    size = times * low * (high / low) ** rng.random()
+    size = low * (high / low) ** rng.random()
     sign = -1 if kind == "direction_dependent_friction" and rng.random() < 0.5 else 1
     mass = rng.uniform(*PAYLOAD)
     extra = {"stribeck_friction": ",speed=0.2", "stiction": ",speed=0.02"}.get(kind, "")
@@ -107,9 +101,9 @@ def hidden_effects(seed: int, times: float = 1.0) -> tuple[str, ...]:
     return friction, f"payload:mass={mass:.3f}"
 
 
-def study(seed: int, times: float) -> dict[str, Any]:
-    """Returns errors of every method on one arm, whose hidden friction is `times` as large."""
-    effects, plant = hidden_effects(seed, times), plant_text(hidden_parameters(MACHINE, seed))
+def study(seed: int) -> dict[str, Any]:
+    """Returns errors of every method on one arm."""
+    effects, plant = hidden_effects(seed), plant_text(hidden_parameters(MACHINE, seed))
     noise = iter(range(1000 * seed, 1000 * seed + 1000))
 
     def run(specs: Sequence[ExperimentSpec]) -> list[Trace]:
@@ -153,7 +147,7 @@ def _learned(trace: Trace) -> ExperimentSpec:
 
 
 def _judged(trace: Trace) -> dict[str, Any]:
-    """Returns errors of a trace in degrees: over all joints, by joint, and the expected ones."""
+    """Returns errors of a trace in degrees: over all joints, and the expected one."""
     found = followed(trace, lambda spec: motion_of(spec, MACHINE))
     assert found is not None
     assert trace.record.spec is not None
@@ -162,28 +156,12 @@ def _judged(trace: Trace) -> dict[str, Any]:
     return {
         "rms": float(np.sqrt(np.square(missed).mean())),
         "largest": float(np.abs(missed).max()),
-        "by_joint": np.sqrt(np.square(missed).mean(axis=0)).tolist(),
         "expected": None if source is None else _together(source),
-        "missed": np.round(missed, 4).T.tolist(),
     }
 
 
 def _together(source: Feedforward) -> float:
     return float(np.degrees(np.sqrt(np.mean([error.rms**2 for error in source.expected.values()]))))
-
-
-def studied(seeds: Sequence[int], folder: Path, times: float) -> list[dict[str, Any]]:
-    """Studies every seed once; results in the folder are reused."""
-    path = folder / "arms.jsonl"
-    lines = path.read_text("utf-8").splitlines() if path.exists() else []
-    done = {entry["seed"]: entry for entry in map(json.loads, lines)}
-    for seed in seeds:
-        if seed not in done:
-            done[seed] = study(seed, times)
-            with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(done[seed]) + "\n")
-            print(_line(done[seed]), file=sys.stderr, flush=True)
-    return [done[seed] for seed in seeds]
 
 
 def _line(entry: dict[str, Any]) -> str:
@@ -243,17 +221,12 @@ def main(arguments: list[str]) -> int:
     )
     parser.add_argument("--first", type=int, default=101, help="the first seed")
     parser.add_argument("--arms", type=int, default=6, help="number of arms")
-    parser.add_argument("--folder", type=Path, help="where results are kept and reused")
-    parser.add_argument("--friction", type=float, default=1.0, help="factor of the hidden frictions' sizes")
     chosen = parser.parse_args(arguments)
-    seeds = range(chosen.first, chosen.first + chosen.arms)
-    with tempfile.TemporaryDirectory() as name:
-        folder = chosen.folder or Path(name)
-        folder.mkdir(parents=True, exist_ok=True)
-        entries = studied(seeds, folder, chosen.friction)
+    entries: list[dict[str, Any]] = []
+    for seed in range(chosen.first, chosen.first + chosen.arms):
+        entries.append(study(seed))
+        print(_line(entries[-1]), file=sys.stderr, flush=True)
     command = f"python -m benchmarks feedforward --first {chosen.first} --arms {len(entries)}"
-    if chosen.friction != 1.0:
-        command += f" --friction {chosen.friction:g}"
     return show(f"Following a motion: {len(entries)} arms, {len(MOTIONS)} motions each", command, figures(entries))
 
 

@@ -4,10 +4,9 @@
 
 Each path is a folder or a file. Each mutant (see `mutants`) is tried in a temporary copy of the tree. The tests are
 those of the folder of `tests` that mirrors the module's (`tests/daq/link` for `daq/link`; where there is none, the
-folder above), and of these the files that reach the module through imports. The quickest file runs first, and the first
-failure ends the run. Tests are left out if they are marked slow, take longer than --longest seconds, or need a
-browser, a real arm or measured traces. A mutant also counts as killed when the tests take longer than three times
-their time and 20 s (240 s for the model, which has to compile).
+folder above). The quickest file runs first, and the first failure ends the run. Tests are left out if they are marked
+slow, or need a browser, a real arm or measured traces. A mutant also counts as killed when the tests take longer than
+three times their time and 20 s (240 s for the model, which has to compile).
 
 The output is each survivor with file, line and change, and the share killed of each path. A survivor asks for a test.
 One that no test could notice is entered in equivalent_mutants.toml with the reason, and is then left out: after the
@@ -15,15 +14,11 @@ sample is drawn, so that a seed keeps its sample. The exit code is 1 where less 
 killed.
 
 --sample N    as many mutants of each path, drawn with --seed (all of them without it), whatever other paths there are
---list        print the mutants and run nothing
---kills       print each killed mutant too, with the test that failed; on a busy machine a test that waits for a
-              process or a clock may have failed without noticing the fault
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
 import os
 import re
 import shutil
@@ -34,23 +29,19 @@ import tempfile
 import time
 import tomllib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
 from itertools import count
 from pathlib import Path
 from queue import SimpleQueue
 from random import Random
 
-import grimp
-
 from benchmarks.mutants import Mutant, mutants_of
 
 ROOT = Path(__file__).parents[1]
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
-PACKAGES = ("firmware_protocol", "daq", "daq_cli", "server", "model", "mock_controller", "extras")
 TEST_FOLDERS = {
     Path("firmware_protocol", "bridge"): "firmware",
     Path("firmware_protocol"): "protocol",
@@ -78,32 +69,21 @@ class Tests:
     """The tests for the mutants of a module, and their time without a fault."""
 
     files: tuple[str, ...]
-    deselected: tuple[str, ...]
     seconds: float
 
 
-def chosen_tests(files: Iterable[str], seconds: Mapping[str, float], longest_s: float) -> Tests:
-    """Returns the tests of some files, the quickest file first, without the tests that take too long.
-
-    seconds: time of each unchanged test, by the name that selects it.
-    """
-    times, deselected = dict.fromkeys(files, 0.0), []
-    for test, taken in seconds.items():
-        file = test.partition("::")[0]
-        if file in times and taken > longest_s:
-            deselected.append(test)
-        elif file in times:
-            times[file] += taken
-    return Tests(tuple(sorted(times, key=times.__getitem__)), tuple(deselected), sum(times.values()))
+def chosen_tests(files: Iterable[str], seconds: Mapping[str, float]) -> Tests:
+    """Returns the tests of some files, the quickest file first. `seconds`: time of each file's unchanged tests."""
+    ordered = tuple(sorted(files, key=lambda file: seconds.get(file, 0.0)))
+    return Tests(ordered, sum(seconds.get(file, 0.0) for file in ordered))
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of one mutant: `killed`, `timed out` (killed as well), `survived` or `no tests`; and the failed test."""
+    """Result of one mutant: `killed`, `timed out` (killed as well), `survived` or `no tests`."""
 
     mutant: Mutant
     ending: str
-    failed: str = ""
 
     @property
     def lives(self) -> bool:
@@ -136,11 +116,6 @@ def mutants_below(path: str, root: Path = ROOT) -> list[Mutant]:
 # ---- which tests
 
 
-@cache
-def _import_graph() -> grimp.ImportGraph:
-    return grimp.build_graph(*PACKAGES, cache_dir=None)
-
-
 def mirrored_folder(file: str, root: Path = ROOT) -> Path:
     """Returns the folder of tests for a module: the same path below `tests`, or the nearest folder above that
     exists.
@@ -154,52 +129,9 @@ def mirrored_folder(file: str, root: Path = ROOT) -> Path:
     return folder
 
 
-def _imported(file: Path, root: Path) -> set[str]:
-    """Returns modules that a file of tests imports, itself or through helpers below `tests`."""
-    seen: set[Path] = set()
-    modules: set[str] = set()
-    waiting = [file]
-    while waiting:
-        current = waiting.pop()
-        if current in seen:
-            continue
-        seen.add(current)
-        for name in _import_names(current):
-            helper = root.joinpath(*name.split(".")).with_suffix(".py")
-            if not name.startswith("tests."):
-                modules.add(name)
-            elif helper.is_file():
-                waiting.append(helper)
-    return modules
-
-
-def _import_names(file: Path) -> Iterator[str]:
-    for node in ast.walk(ast.parse(file.read_bytes())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
-
-
-@cache
-def reaching(file: str, root: Path = ROOT) -> tuple[str, ...]:
-    """Returns test files of the mirrored folder that reach the module.
-
-    Preferred are those that do so within the module's own package; then any; then the whole folder, whose tests may
-    reach it through a process.
-    """
-    module = file.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
-    package = module.rpartition(".")[0]
-    known = module in _import_graph().modules  # a program beside its sources belongs to no package
-    above = (_import_graph().find_downstream_modules(module) if known else set()) | {module}
-    nearby = {other for other in above if other == package or other.startswith(f"{package}.")}
+def files_of_tests(file: str, root: Path = ROOT) -> tuple[str, ...]:
+    """Returns the files of the mirrored folder of tests."""
     files = sorted(mirrored_folder(file, root).rglob("test_*.py"))
-    imports = {test: _imported(test, root) for test in files}
-    for wanted in (nearby, above):
-        chosen = [test for test in files if imports[test] & wanted]
-        if chosen:
-            return tuple(test.relative_to(root).as_posix() for test in chosen)
     return tuple(test.relative_to(root).as_posix() for test in files)
 
 
@@ -254,7 +186,7 @@ def first_failure(lines: Iterable[str]) -> str:
 
 
 def measured(tree: Path, files: Iterable[str]) -> dict[str, float]:
-    """Returns the time (s) of each unchanged test, by the name that selects it; tests of a few ms are left out.
+    """Returns the time (s) of each file's unchanged tests.
 
     Raises MutationError if a test fails.
     """
@@ -263,7 +195,7 @@ def measured(tree: Path, files: Iterable[str]) -> dict[str, float]:
         raise MutationError(f"the tests fail without any fault (exit code {code}; {first_failure(lines)})")
     seconds: Counter[str] = Counter()
     for found in filter(None, map(_DURATION.match, lines)):
-        seconds[found[2]] += float(found[1])  # type: ignore[assignment]
+        seconds[found[2].partition("::")[0]] += float(found[1])  # type: ignore[assignment]
     return dict(seconds)
 
 
@@ -275,13 +207,12 @@ def outcome(tree: Path, mutant: Mutant, tests: Tests) -> Outcome:
     unchanged, changed_at = file.read_bytes(), file.stat().st_mtime_ns
     _write(file, mutant.applied(unchanged), next(_TIMES) * 10**9)
     try:
-        arguments = [*tests.files, *(f"--deselect={name}" for name in tests.deselected)]
         grace = COMPILING_S if mutant.file.startswith("model/") else GRACE_S
-        code, lines = run_tests(tree, arguments, 3.0 * tests.seconds + grace)
+        code, _ = run_tests(tree, tests.files, 3.0 * tests.seconds + grace)
     finally:
         _write(file, unchanged, changed_at)
     ending = {None: "timed out", 0: "survived", 5: "no tests"}.get(code, "killed")
-    return Outcome(mutant, ending, first_failure(lines))
+    return Outcome(mutant, ending)
 
 
 def _write(file: Path, content: bytes, changed_at_ns: int) -> None:
@@ -289,11 +220,8 @@ def _write(file: Path, content: bytes, changed_at_ns: int) -> None:
     os.utime(file, ns=(changed_at_ns, changed_at_ns))
 
 
-def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool) -> list[Outcome]:
-    """Tries mutants in as many copies of the tree as there may be processes, and prints each survivor at once.
-
-    With `kills` it prints each killed one as well, with the failed test.
-    """
+def run_all(mutants: list[Mutant], processes: int) -> list[Outcome]:
+    """Tries mutants in as many copies of the tree as there may be processes, and prints each survivor at once."""
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         trees: SimpleQueue[Path] = SimpleQueue()
         for number in range(processes):
@@ -304,15 +232,15 @@ def run_all(mutants: list[Mutant], processes: int, longest_s: float, kills: bool
         def attempt(mutant: Mutant) -> Outcome:
             tree = trees.get()
             try:
-                ended = outcome(tree, mutant, chosen_tests(reaching(mutant.file), seconds, longest_s))
+                ended = outcome(tree, mutant, chosen_tests(files_of_tests(mutant.file), seconds))
             finally:
                 trees.put(tree)
-            if ended.lives or kills:
-                print(f"{ended.ending}: {mutant}{f'  ({ended.failed})' if ended.failed else ''}", flush=True)
+            if ended.lives:
+                print(f"{ended.ending}: {mutant}", flush=True)
             return ended
 
         tree = trees.get()
-        seconds = measured(tree, dict.fromkeys(file for mutant in mutants for file in reaching(mutant.file)))
+        seconds = measured(tree, dict.fromkeys(file for mutant in mutants for file in files_of_tests(mutant.file)))
         trees.put(tree)
         with ThreadPoolExecutor(processes) as pool:
             return list(pool.map(attempt, mutants))
@@ -327,9 +255,6 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--sample", type=int, metavar="N")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--processes", type=int, default=1, metavar="N")
-    parser.add_argument("--longest", type=float, default=5.0, metavar="SECONDS")
-    parser.add_argument("--list", action="store_true")
-    parser.add_argument("--kills", action="store_true")
     return parser.parse_args()
 
 
@@ -346,13 +271,9 @@ def main() -> int:
             drawn = Random(options.seed).sample(mutants, options.sample) if fewer else mutants
             chosen[path] = [mutant for mutant in drawn if mutant.identity not in known]
             left_out[path] = len(drawn) - len(chosen[path])
-        if options.list:
-            for mutants in chosen.values():
-                print(*mutants, sep="\n")
-            return 0
         begun = time.monotonic()
         every = [mutant for mutants in chosen.values() for mutant in mutants]
-        ended = {each.mutant: each for each in run_all(every, options.processes, options.longest, options.kills)}
+        ended = {each.mutant: each for each in run_all(every, options.processes)}
     except MutationError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.mutants import Mutant, mutants_of
-from benchmarks.mutation import chosen_tests, equivalents, mirrored_folder, reaching
+from benchmarks.mutation import chosen_tests, equivalents, files_of_tests, mirrored_folder
 from tests.conftest import DETERMINISTIC
 from tests.order import AGAINST_THE_CLOCK
 from tests.repository.inner_run import ROOT, run_folder
@@ -163,23 +163,18 @@ def test_a_mutant_differs_in_one_place_and_every_equivalent_one_exists() -> None
     assert listed - made == set()
 
 
-def test_a_module_is_tried_by_the_tests_that_reach_it() -> None:
+def test_a_module_is_tried_by_the_tests_of_its_folder() -> None:
     assert mirrored_folder("daq/link/pending.py") == ROOT / "tests" / "daq" / "link"
     assert mirrored_folder("firmware_protocol/units.py") == ROOT / "tests" / "protocol"
     assert mirrored_folder("server/queue/order.py").is_relative_to(ROOT / "tests" / "server")
-    assert "tests/daq/link/test_transactions.py" in reaching("daq/link/pending.py")
-    assert "tests/protocol/test_memory_map.py" not in reaching("firmware_protocol/framing.py")
-    # They belong to no package, so that only a test that imports them, or the whole folder, can reach them
     assert mirrored_folder("firmware_protocol/bridge/stack.py") == ROOT / "tests" / "firmware"
-    assert reaching("firmware_protocol/bridge/stack.py") == ("tests/firmware/test_sources.py",)
-    assert "tests/firmware/bbc_micro/test_disc_image.py" in reaching("firmware_protocol/bridge/bbc_micro/disc_image.py")
+    assert "tests/daq/link/test_transactions.py" in files_of_tests("daq/link/pending.py")
     assert mirrored_folder("mock_controller/board/board.py").is_relative_to(ROOT / "tests" / "mock")
 
 
-def test_tests_that_take_too_long_are_left_out_and_the_quickest_file_comes_first() -> None:
-    seconds = {"a.py::x": 2.0, "a.py::y": 9.0, "b.py::x": 1.0, "c.py::x": 0.1}
-    chosen = chosen_tests(("a.py", "b.py"), seconds, longest_s=5.0)
-    assert (chosen.files, chosen.deselected, chosen.seconds) == (("b.py", "a.py"), ("a.py::y",), 3.0)
+def test_the_quickest_file_of_tests_comes_first() -> None:
+    chosen = chosen_tests(("a.py", "b.py"), {"a.py": 2.0, "b.py": 1.0, "c.py": 0.1})
+    assert (chosen.files, chosen.seconds) == (("b.py", "a.py"), 3.0)
 
 
 def _mutants_of_file(file: str) -> list[Mutant]:
