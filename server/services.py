@@ -33,7 +33,7 @@ from daq.contracts.service.robot import RobotStatus
 from daq.owner.messages import Answer
 from daq.plugins import named, plugins
 from daq.trajectories.set_points import control_period
-from server.access.caller import Caller
+from server.access.caller import Caller, spoken
 from server.access.lanes import Lanes
 from server.access.sessions import SessionStore
 from server.access.tickets import Tickets
@@ -330,14 +330,16 @@ class Services:
         """Handles an expired lease: the arm holds, and the queue is paused until a person resumes it."""
         rig = self._robots.get(robot.name)
         if rig is not None:
-            rig.queue.control_lapsed(holder)
+            rig.queue.control_lapsed(spoken(holder))
             rig.teaching.hold()
-        self.event_log.record(robot.name, "control", f"{holder} lost control: the arm holds its posture", actor=holder)
+        self.event_log.record(
+            robot.name, "control", f"{spoken(holder)} lost control: the arm holds its posture", actor=holder
+        )
 
     def _given_back(self, robot: Robot, holder: str) -> None:
         rig = self._robots.get(robot.name)
         if rig is not None:
-            rig.queue.control_given_back(holder)
+            rig.queue.control_given_back(spoken(holder))
 
     def _take_in(self, catalogue: Catalogue) -> None:
         try:

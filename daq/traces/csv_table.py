@@ -20,6 +20,7 @@ from daq.contracts.documents import shown
 from daq.contracts.errors import TraceError
 from daq.contracts.import_choice import Choice
 from daq.contracts.machine import load_machine, shipped_machines
+from daq.contracts.tables import is_prismatic
 from daq.contracts.trace import INCOMPLETE, Floats, Trace
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.traces import bounds, disk
@@ -27,7 +28,7 @@ from daq.traces.description import Description, read_file, toml_path, toml_text
 from daq.traces.mapping.expression import Columns, Table, listed
 from daq.traces.mapping.mapped_trace import EPOCH, INTEGRATED, integral, mapped_trace
 from daq.traces.mapping.text_table import head_of, read_text_table
-from daq.traces.mapping.units import NONE, drive_of, factor
+from daq.traces.mapping.units import NONE, drive_of, factor, known_units
 from daq.traces.naming import trace_id_of
 
 SIGNALS = ("set_point", "position", "drive", "velocity")
@@ -40,21 +41,26 @@ FILE_TIME = "The date is that of the file's last change."
 SLOWEST = 1.0
 """Time (s) between rows from which times may be in ms: a moving joint is sampled faster."""
 _COLUMN = re.compile(rf"({'|'.join(SIGNALS)})_([1-9][0-9]?)")
+_WITH_UNIT = re.compile(rf"((time|{'|'.join(SIGNALS)})(?:_[0-9]+)?) \[(.+)\]")
 
 
 def export_csv(trace: Trace, path: Path) -> Path:
-    """Writes `time` and the trace's signals to a CSV file, and a TOML file beside it. Numbers can be read back exactly.
+    """Writes `time` and the trace's signals to a CSV file, each with its unit (`position_1 [rad]`), and a TOML file
+    beside it. Numbers can be read back exactly.
 
     The same trace gives the same bytes. Raises TraceError if a file cannot be written.
     """
     path = Path(path)
-    header = ["time"]
+    header = ["time [s]"]
     columns: list[Floats] = [trace.time]
+    drive_unit = trace.drive_unit if trace.drive_unit in known_units("drive") else None
     for index, joint in enumerate(trace.joints):
+        length = "m" if is_prismatic(trace, joint) else "rad"
+        units = dict(zip(SIGNALS, (length, length, drive_unit, f"{length}/s"), strict=True))
         for name in SIGNALS:
             signal = getattr(trace, name)
             if signal is not None:
-                header.append(f"{name}_{joint}")
+                header.append(f"{name}_{joint} [{units[name]}]" if units[name] else f"{name}_{joint}")
                 columns.append(signal[:, index])
     try:
         with path.open("w", encoding="utf-8", newline="") as stream:
@@ -88,8 +94,11 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
     whole, said = _whole_rows(data)
     if choice.map or choice.where or not _has_own_names(*head_of(path, whole)):
         return _noted(mapped_trace(path, text_table(path, whole, limits), choice, description, limits), said)
+    drive_unit, *table = _read_table(path, whole, limits)
+    if description.drive_unit is None:
+        description = description.model_copy(update={"drive_unit": drive_unit})
     own = _Own(path, choice, description, trace_id_of(data, *described), said)
-    return own.trace(*_read_table(path, whole, limits))
+    return own.trace(*table)
 
 
 @dataclass(frozen=True)
@@ -170,7 +179,17 @@ def text_table(path: Path, data: bytes, limits: TraceLimits) -> Table:
 
 def _has_own_names(separator: str, header: list[str]) -> bool:
     """Whether a file has this program's column names, with commas and the time first, so that it is parsed strictly."""
-    return separator == "," and header[:1] == ["time"] and any(_COLUMN.fullmatch(name) for name in header)
+    names = [_name_and_unit(column)[0] for column in header]
+    return separator == "," and names[:1] == ["time"] and any(_COLUMN.fullmatch(name) for name in names)
+
+
+def _name_and_unit(column: str) -> tuple[str, str | None]:
+    """Returns `position_1` and `rad` of `position_1 [rad]`. A unit that traces do not have stays in the name, and such
+    a file is mapped."""
+    found = _WITH_UNIT.fullmatch(column)
+    if found is None or found[3] not in known_units(found[2]) or factor(found[2], found[3]) != 1.0:
+        return column, None
+    return found[1], found[3]
 
 
 def _noted(trace: Trace, said: list[str]) -> Trace:
@@ -213,14 +232,18 @@ def _joints(path: Path, header: list[str], description: Description) -> tuple[in
     return wanted
 
 
-def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[list[str], Floats, array[int], Decimal]:
-    """Returns the header, the numbers (rows, columns; all finite), the file row of each, and the time from which times
-    count. Raises TraceError."""
+def _read_table(path: Path, data: bytes, limits: TraceLimits) -> tuple[Any, list[str], Floats, array[int], Decimal]:
+    """Returns the drive's unit if the header has one, the header without units, the numbers (rows, columns; all
+    finite), the file row of each, and the time from which times count. Raises TraceError."""
     try:
         rows = csv.reader(io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig", newline=""))
-        header = [name.strip() for name in next(rows, [])]
+        columns = [_name_and_unit(name.strip()) for name in next(rows, [])]
+        header = [name for name, _ in columns]
         _check_header(path, header)
-        return header, *_numbers(path, header, rows, limits)
+        units = {drive_of(unit, str(path)) for name, unit in columns if unit and name.startswith("drive")}
+        if len(units) > 1:
+            raise TraceError(f"{path}: row 1: the drives have units {listed(sorted(units))}; one is allowed")
+        return next(iter(units), None), header, *_numbers(path, header, rows, limits)
     except UnicodeDecodeError as error:
         raise TraceError(f"{path}: is not text in UTF-8") from error
     except csv.Error as error:

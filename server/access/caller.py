@@ -29,6 +29,11 @@ class Caller:
     expires: datetime | None = field(default=None, compare=False)
 
     @property
+    def spoken(self) -> str:
+        """The name in a sentence."""
+        return spoken(self.name)
+
+    @property
     def may_operate(self) -> bool:
         """Whether the caller may change anything."""
         return self.role != "viewer"
@@ -41,6 +46,11 @@ class Caller:
 
 LOCAL = Caller("local", "owner")
 """A user of this computer, who reaches a service on loopback without a token and without a proxy."""
+
+
+def spoken(name: str) -> str:
+    """Returns a caller's name for a sentence."""
+    return "somebody at the service's computer" if name == LOCAL.name else name
 
 
 def caller_of(connection: HTTPConnection) -> Caller | None:

@@ -29,7 +29,7 @@ async def stop_fleet(robots: Robots, caller: Viewer) -> FleetStopResult:
     Unless the answer is `confirmed`, use the emergency stops. Only a reset of each arm ends its freeze.
     """
     for rig in robots:
-        rig.queue.stop_asked(caller.name)  # first, so that nothing begins while the stops are under way
+        rig.queue.stop_asked(caller.spoken)  # first, so that nothing begins while the stops are under way
     results = await asyncio.gather(*(rig.stop.stop() for rig in robots))
     found = {rig.robot.name: result for rig, result in zip(robots, results, strict=True)}
     for rig in robots:

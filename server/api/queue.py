@@ -49,7 +49,7 @@ def list_queue(rig: RobotDep, experiments: Experiments, _: Viewer) -> tuple[Expe
 @router.post("/queue/pause", tags=["queue"])
 def pause_queue(rig: RobotDep, caller: Operator) -> QueueStatus:
     """Pauses the queue: no further experiment begins, and a running one continues."""
-    rig.queue.pause(f"{caller.name} paused it", caller.name)
+    rig.queue.pause(f"{caller.spoken} paused it", caller.name)
     return rig.queue.status()
 
 
@@ -172,7 +172,7 @@ def take_control(
     """Gives one client control of the robot. Without heartbeats control ends: the arm holds and the queue is paused."""
     rig.require_consent(request.moves_real_arm, "is its workspace clear? then try again with moves_real_arm")
     lease = rig.control.take(caller.name, moves_real_arm=request.moves_real_arm)
-    rig.record_event("control", f"{caller.name} took control", actor=caller.name)
+    rig.record_event("control", f"{caller.spoken} took control", actor=caller.name)
     return lease
 
 
@@ -191,6 +191,6 @@ def give_control_back(rig: RobotDep, caller: Operator, lease: LeaseHeader = None
     rig.control.give_back(lease or "")
     rig.teaching.hold()
     rig.teaching.finish()
-    rig.record_event("control", f"{caller.name} gave control back", actor=caller.name)
+    rig.record_event("control", f"{caller.spoken} gave control back", actor=caller.name)
     rig.queue.wake()
     return Response(status_code=204)

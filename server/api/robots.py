@@ -64,7 +64,7 @@ async def stop_robot(rig: RobotDep, caller: Viewer) -> StopResult:
 
     Unless the answer is `confirmed`, use the emergency stop. Only a reset ends the freeze.
     """
-    rig.queue.stop_asked(caller.name)  # first, so that nothing begins while the stop is under way, or if it is lost
+    rig.queue.stop_asked(caller.spoken)  # first, so that nothing begins while the stop is under way, or if it is lost
     result = await rig.stop.stop()
     rig.record_event_later("stop", result.text, actor=caller.name)
     return result

@@ -14,6 +14,7 @@ from daq.contracts.errors import DaqError
 from daq.contracts.service.experiments import Experiment, ExperimentRequest, ExperimentState, Schedule
 from daq.contracts.service.queue import QueueStatus
 from daq.owner.messages import Answer, ArmReport, EventHappened, HaltRun, Opened, Progress, Report, RunExperiment
+from server.access.caller import spoken
 from server.database_errors import is_locked
 from server.experiments.review import Given, Review
 from server.experiments.states import Ending, Event, IllegalEventError, advance, ending_of, next_due
@@ -132,7 +133,7 @@ class QueueService:
                 self.notices.note(cause)
                 line = f"the arm {'is stopped' if arm.arm == 'stopped' else 'has a fault'}: {arm.cause}"
                 raise conflict("arm-stopped", line, "look at the arm, reset it, then resume the queue")
-            state = QueueState(False, f"resumed by {by}", self._context.clock.utc())
+            state = QueueState(False, f"resumed by {spoken(by)}", self._context.clock.utc())
             self._context.queues.set(self._context.robot.name, state)  # first: a state that is not written stays paused
             self._state, self._written = state, True
             self._consented_connection = connection if moves_real_arm else self._consented_connection

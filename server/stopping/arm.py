@@ -33,10 +33,12 @@ def stop_arm(reach: Reach) -> StopResult:
     answer = _ask(reach)
     if answer.confirmed:
         head = "stopped, confirmed by the board"
-        detail = f"set points frozen at tick {answer.tick}. {answer.text}".strip()
+        detail = f"its set points are frozen. {answer.text}".strip()
+        text = f"{head}: set points frozen at tick {answer.tick}. {answer.text}".strip()
     else:
         head = "stop sent, NOT CONFIRMED by the board" if answer.delivered else "stop NOT DELIVERED"
         detail = f"{answer.text}. Use the emergency stop."
+        text = f"{head}: {detail}"
     return StopResult(
         delivered=answer.delivered,
         confirmed=answer.confirmed,
@@ -44,7 +46,7 @@ def stop_arm(reach: Reach) -> StopResult:
         seconds=time.monotonic() - begun,
         note=answer.text,
         detail=detail,
-        text=f"{head}: {detail}",
+        text=text,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from daq.contracts.service.base import Wire
+from daq.contracts.service.robot import Done
 from extras.lab.layouts.tables import LayoutsRow
 from server.api.dependencies import ServicesDep, Viewer
 from server.problems import PROBLEMS
@@ -19,6 +20,8 @@ class KeptLayouts(Wire):
     """All layouts of one person. `text`: as the page writes them; empty if none are kept."""
 
     text: str = Field(max_length=LARGEST)
+    name: str = Field("", max_length=80)
+    """The name of the layout that is shown: the audit log has it."""
 
 
 @router.get("")
@@ -30,8 +33,8 @@ def get_layouts(services: ServicesDep, caller: Viewer) -> KeptLayouts:
 
 
 @router.put("")
-def put_layouts(kept: KeptLayouts, services: ServicesDep, caller: Viewer) -> KeptLayouts:
+def put_layouts(kept: KeptLayouts, services: ServicesDep, caller: Viewer) -> Done:
     """Keeps the caller's layouts in place of those kept before."""
     with services.store.writing() as session:
         session.merge(LayoutsRow(person=caller.name, text=kept.text))
-    return kept
+    return Done(text=kept.name)

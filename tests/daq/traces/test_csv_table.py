@@ -79,7 +79,13 @@ def test_the_same_trace_gives_the_same_bytes_and_names_only_a_machine_that_ships
     first, second = export_csv(trace, tmp_path / "b.csv"), export_csv(trace, tmp_path / "c.csv")
     assert first.read_bytes() == second.read_bytes()
     header, row, *_ = first.read_text().splitlines()
-    assert header.split(",")[:5] == ["time", "set_point_1", "position_1", "drive_1", "set_point_2"]
+    assert header.split(",")[:5] == [
+        "time [s]",
+        "set_point_1 [rad]",
+        "position_1 [rad]",
+        "drive_1 [V]",
+        "set_point_2 [rad]",
+    ]
     assert row.startswith("0.0,2.01")
     assert tomllib.loads((tmp_path / "b.toml").read_text()) == {
         "source": "mock",

@@ -101,13 +101,13 @@ def test_ctrl_c_takes_back_what_waits_and_stops_nobody_else(service: Service, tm
 
 
 def test_a_paused_queue_is_told_and_nothing_is_left_lying_in_it(daq: Daq, service: Service) -> None:
-    assert daq("queue", "pause").out.startswith("paused: local paused it")
+    assert daq("queue", "pause").out.startswith("paused: somebody at the service's computer paused it")
     said = daq(*RAMP)
     assert said.code == 4
     assert "nothing was queued" in said.err
     assert said.out == ""
     assert service.robot.get("/queue").json()["queued"] == 0
-    assert daq("queue", "resume").out.startswith("open: resumed by local")
+    assert daq("queue", "resume").out.startswith("open: resumed by somebody at the service's computer")
     assert "open" in daq("queue", "show").out
     assert daq("queue", "schedules").out.startswith("no schedules: ")
 

@@ -242,7 +242,9 @@ def test_whoever_uses_the_page_attends_what_runs_on_a_real_arm(paused: Dashboard
 
 def test_the_queue_says_that_it_waits_for_whoever_has_the_control(dashboard: Dashboard, form: Page) -> None:
     lease = dashboard.service.robot.post("/control", json={}).json()["lease"]
-    expect(form.get_by_text("local has control of the arm: the queue waits")).to_be_visible()
+    expect(
+        form.get_by_text("Somebody at the service’s computer has control of the arm: the queue waits")
+    ).to_be_visible()
     dashboard.service.robot.request("DELETE", "/control", headers={"Control-Lease": lease})
     expect(form.get_by_text("has control of the arm")).not_to_be_attached()
 

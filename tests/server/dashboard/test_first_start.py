@@ -33,7 +33,7 @@ def test_the_tour_comes_once_blocks_nothing_and_leads_to_the_demonstration(
     for _step in range(4):
         page.get_by_role("button", name="Next").focus()
         page.keyboard.press("Enter")
-    page.get_by_role("button", name="Hide something from me").click()
+    page.get_by_role("button", name="Open it").click()
     expect(page.get_by_role("heading", level=1, name="Hide something from me")).to_be_visible()
     expect(tour).to_have_count(0)
     page.goto(service.url)

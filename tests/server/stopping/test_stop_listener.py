@@ -212,7 +212,7 @@ def test_a_stop_that_is_not_delivered_holds_the_queue_at_either_door(tmp_path: P
             service.until_paused()  # first, because the connection has ended
             assert service.robot.post("/queue/resume", json={}).json()["paused"] is False
             assert httpx.post(stop, timeout=30).json()["delivered"] is False
-            assert service.until_paused()["reason"].startswith("local asked for a stop")
+            assert service.until_paused()["reason"].startswith("somebody at the service's computer asked for a stop")
 
 
 @pytest.mark.parametrize(

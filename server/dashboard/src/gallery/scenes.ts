@@ -54,7 +54,7 @@ export function begin(scene: Scene): void {
   live.robot = { ...ROBOT, ...CHANGES[scene] };
   live.queue = {
     paused: false,
-    reason: 'by local',
+    reason: 'anna paused it',
     queued: 2,
     running: null,
     waiting_for: '',

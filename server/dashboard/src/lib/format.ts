@@ -73,6 +73,11 @@ export function capital(text: string): string {
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
+/** Who a caller is, in a sentence: `local` is the service's name for those who need none. */
+export function spoken(name: string | null): string {
+  return name === null ? 'somebody' : name === 'local' ? 'somebody at the service’s computer' : name;
+}
+
 /** A one-line message of the service with a capital letter and a full stop; nothing remains nothing. */
 export function sentence(text: string): string {
   const whole = text.trim();

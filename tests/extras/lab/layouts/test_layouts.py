@@ -15,7 +15,8 @@ def test_layouts_are_kept_for_each_person(tmp_path: Path) -> None:
     ada: Any = SimpleNamespace(name="ada")
     assert get_layouts(services, ada).text == ""
     put_layouts(KeptLayouts(text="{}"), services, ada)
-    put_layouts(KeptLayouts(text='{"chosen":"Bench"}'), services, ada)
+    kept = KeptLayouts(text='{"chosen":"Bench"}', name="Bench")
+    assert put_layouts(kept, services, ada).text == "Bench"  # which the audit log has, and not all of them
     assert get_layouts(services, ada).text == '{"chosen":"Bench"}'
     assert get_layouts(services, LOCAL).text == ""
     store.close()

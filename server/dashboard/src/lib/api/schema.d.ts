@@ -4267,6 +4267,11 @@ export interface components {
         KeptLayouts: {
             /** Text */
             text: string;
+            /**
+             * Name
+             * @default
+             */
+            name?: string;
         };
         /**
          * KeptMacro
@@ -9995,7 +10000,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["KeptLayouts"];
+                    "application/json": components["schemas"]["Done"];
                 };
             };
         };

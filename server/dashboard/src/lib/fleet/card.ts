@@ -1,6 +1,7 @@
 /** One arm at a glance: what its card says. Pure; times in s. */
 
 import type { FleetRobot } from '../api/types';
+import { spoken } from '../format';
 import { ageText, STALE_AFTER } from '../live/age';
 import { queueBadge } from '../queue/words';
 import type { ArmNow } from '../stop/standing';
@@ -42,7 +43,7 @@ export function cardOf(robot: FleetRobot, since: number): Card {
     isLive,
     queue: queueBadge(queue, isConnected),
     waiting: queue.queued === 1 ? '1 waiting' : `${queue.queued} waiting`,
-    control: robot.control.holder === 'client' ? `${robot.control.name} has control` : '',
+    control: robot.control.holder === 'client' ? `${spoken(robot.control.name)} has control` : '',
     progress: queue.running === null ? null : (robot.progress ?? 0),
   };
 }

@@ -9,7 +9,7 @@ export const LAYOUT_REQUESTS: Keeper = {
   async get() {
     return (await ask(api.GET(ADDRESS))).text || null;
   },
-  async put(text) {
-    await ask(api.PUT(ADDRESS, { body: { text } }));
+  async put(text, name) {
+    await ask(api.PUT(ADDRESS, { body: { text, name } }));
   },
 };

@@ -9,7 +9,7 @@ import { LayoutError, layoutOf, STANDARD, written, type Layout, type LayoutPanel
 export interface Keeper {
   /** What was kept; null where none was. */
   get(): Promise<string | null>;
-  put(text: string): Promise<void>;
+  put(text: string, name: string): Promise<void>;
 }
 
 /** ms without a change before the service is told. */
@@ -123,7 +123,7 @@ class Layouts {
     if (this.keeper === null) return;
     const [text, untold] = [this.text, this.untold];
     try {
-      await this.keeper.put(text);
+      await this.keeper.put(text, this.chosen || STANDARD.name);
       if (text === this.text) localStorage.removeItem(untold);
     } catch (error) {
       this.problem = `${(error as Error).message}.`;

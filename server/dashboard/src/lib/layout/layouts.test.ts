@@ -33,7 +33,7 @@ it('what is saved is shown, kept here at once, and told to the service when it i
   expect(layouts.shown.name).toBe('Bench 2');
   expect(kept.get('ma2000-layouts:ada')).toContain('Bench 2');
   await vi.advanceTimersByTimeAsync(2000);
-  expect(service.put.mock.calls).toEqual([[kept.get('ma2000-layouts:ada')]]);
+  expect(service.put.mock.calls).toEqual([[kept.get('ma2000-layouts:ada'), 'Bench 2']]);
   layouts.follow('bob', keeper(null));
   expect(layouts.shown).toBe(STANDARD);
 });
@@ -65,7 +65,7 @@ it('what was changed and not told yet is told, and not lost, when the page is op
   layouts.follow('hal', service);
   await vi.advanceTimersByTimeAsync(0);
   expect(layouts.shown.name).toBe('Bench');
-  expect(service.put.mock.calls).toEqual([[text]]);
+  expect(service.put.mock.calls).toEqual([[text, 'Bench']]);
   expect(kept.has('ma2000-layouts:hal:untold')).toBe(false);
 });
 

@@ -7,6 +7,7 @@
 
 import { here, isFleet, root } from '../api/client';
 import { asProblem, type Problem } from '../api/problem';
+import { spoken } from '../format';
 import { isMissing, LiveSocket, SILENT_AFTER, type SocketState } from '../api/socket';
 import type {
   Job,
@@ -151,7 +152,7 @@ class Live {
 
   /** A name as the person at this page reads it. */
   who(name: string | null | undefined): string {
-    return name == null ? 'unknown' : name === this.me?.name ? 'you' : name;
+    return name == null ? 'unknown' : name === this.me?.name ? 'you' : spoken(name);
   }
 
   /** Time of day at the service, ms since 1970. Reactive: it grows. */

@@ -2,15 +2,15 @@ import { describe, expect, it } from 'vitest';
 import { sentence } from '../format';
 import { wordsOf } from './words';
 
-const confirmed = { kind: 'confirmed', text: 'frozen at tick 7', seconds: 0.03 } as const;
+const confirmed = { kind: 'confirmed', text: 'its set points are frozen', seconds: 0.03 } as const;
 const lost = { kind: 'not delivered', text: 'nobody answers' } as const;
 
 describe('the message about a stop', () => {
   it('is green only while it holds', () => {
     expect(wordsOf(confirmed, 'holds', 'stopped', '12:00:00')).toMatchObject({
       look: 'confirmed',
-      head: 'Stopped, confirmed by the board after 30 ms',
-      text: 'Frozen at tick 7.',
+      head: 'Stopped at 12:00:00, confirmed by the board after 30 ms',
+      text: 'Its set points are frozen.',
     });
     expect(wordsOf(confirmed, 'unknown', 'unknown', '12:00:00')).toMatchObject({
       look: 'delivered',

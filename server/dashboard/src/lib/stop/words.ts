@@ -29,7 +29,7 @@ export function wordsOf(state: StopState, standing: Standing, arm: ArmNow, time:
     const head = `Stopped at ${time}, confirmed by the board then`;
     return { look: 'delivered', sign: '▲', head, text: 'How the arm is now is not known.' };
   }
-  return { look: 'confirmed', sign: '✓', head: `Stopped, confirmed by the board ${after}`, text };
+  return { look: 'confirmed', sign: '✓', head: `Stopped at ${time}, confirmed by the board ${after}`, text };
 }
 
 function pastOf(kind: 'confirmed' | 'delivered' | 'not delivered', arm: ArmNow, time: string): StopWords {

@@ -13,7 +13,7 @@ const WORDS: Readonly<Record<string, string>> = {
   change_schedule: 'switch in the plan',
   delete_schedule: 'delete from the plan',
   upload_model: 'take in a model',
-  put_layouts: 'save the layouts of Live',
+  put_layouts: 'show or save a layout',
   put_macro_: 'save a macro',
   put_program: 'save a program',
   read_macro: 'check a macro',
