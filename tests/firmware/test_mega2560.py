@@ -1,5 +1,6 @@
 """The Mega's firmware image on a simulated board: what it does on the line, on the bus, and with a freeze."""
 
+import json
 from itertools import count
 from typing import Any
 
@@ -12,7 +13,7 @@ from mock_controller.device import build_device
 from mock_controller.options import Options
 from tests.firmware.compiled import need, need_simavr
 from tests.firmware.mega_link import MegaLink, board_on_the_bus
-from tests.protocol.dialogues import DIALOGUES
+from tests.protocol.make_vectors import FILE
 from tests.protocol.play import play
 
 pytestmark = pytest.mark.slow
@@ -85,10 +86,11 @@ class Port:
 
 
 def test_the_dialogue_of_a_bridge_that_starts_again_goes_as_written(link: MegaLink) -> None:
-    (dialogue,) = [each for each in DIALOGUES if "RESTART" in each.needs]
+    dialogues = json.loads(FILE.read_text("utf-8"))["dialogues"]
+    (dialogue,) = [each for each in dialogues if "RESTART" in each["needs"]]
     nonces = count(0x5EED0000)
     link.run_until(5 * PERIOD_US)
-    play(dialogue.steps, Port(link), lambda: next(nonces))
+    play(dialogue["steps"], Port(link), lambda: next(nonces))
 
 
 def test_a_freeze_outlasts_the_loss_of_power(host: Host, link: MegaLink) -> None:

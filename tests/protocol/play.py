@@ -110,18 +110,29 @@ def _request(step: Mapping[str, Any], names: dict[str, int], choose: Callable[[]
     if "payload" in step:
         return Frame(step["sequence"], step["host"], bytes.fromhex(step["payload"]))
     fields = {name: _filled(value, names, choose) for name, value in step["fields"].items()}
-    kind = KINDS[step["host"]]
+    return c.to_frame(step["sequence"], *message_of(step["host"], fields))
+
+
+def message_of(name: str, fields: Mapping[str, Any]) -> tuple[Message, c.Stamp]:
+    """A message and its stamp from fields as JSON has them: `as_json` undone."""
+    kind, values = KINDS[name], {field: _from_json(field, value) for field, value in fields.items()}
     stamp = c.UNSTAMPED
     if issubclass(kind, c.Request) and kind.IS_COMMAND:
-        stamp = c.Stamp(fields.pop("session"), fields.pop("number"))
-    if "data" in fields:
-        fields["data"] = bytes.fromhex(fields["data"])
-    return c.to_frame(step["sequence"], kind(**fields), stamp)
+        stamp = c.Stamp(values.pop("session"), values.pop("number"))
+    return kind(**values), stamp
+
+
+def _from_json(field: str, value: Any) -> Any:
+    if isinstance(value, list):
+        return tuple(_from_json("", item) for item in value)
+    if isinstance(value, dict):
+        return c.JointReading(**value) if "set_point" in value else c.CompactReading(**value)
+    return bytes.fromhex(value) if field == "data" else value
 
 
 def _filled(value: Any, names: dict[str, int], choose: Callable[[], int]) -> Any:
     if isinstance(value, list):
-        return tuple(_filled(item, names, choose) for item in value)
+        return [_filled(item, names, choose) for item in value]
     if not isinstance(value, str) or not (name := NAME.fullmatch(value)):
         return value
     if name[1] not in names:

@@ -18,8 +18,8 @@ from firmware_protocol.memory_map import default_memory_map
 from firmware_protocol.message import Message
 from firmware_protocol.stamp import LARGEST_NUMBER
 from firmware_protocol.units import GAIN_MAX, counts_to_posture, posture_to_counts
-from tests.protocol.make_vectors import FILE, MESSAGES
-from tests.protocol.play import as_json
+from tests.protocol.make_vectors import FILE
+from tests.protocol.play import as_json, message_of
 
 TEXT = (Path(FILE).parent / "PROTOCOL.md").read_text("utf-8")
 PERIOD_S = 0.020
@@ -156,6 +156,7 @@ def test_every_message_is_in_the_tables_with_its_opcode() -> None:
     assert replies == {(opcode, kind.__name__) for opcode, kind in c.REPLIES.items()}
 
 
+MESSAGES = [message_of(v["message"], v["fields"])[0] for v in json.loads(FILE.read_text("utf-8"))["frames"]]
 WHOLE = [m for m in MESSAGES if not isinstance(m, c.HelloReply) or m.session != c.NO_SESSION]
 
 

@@ -15,16 +15,15 @@ from mock_controller.bridge.bridge import Bridge
 from mock_controller.timeline import Timeline
 from tests.mock.host import make_device
 from tests.protocol import second_implementation as second
-from tests.protocol.dialogues import DIALOGUES, Step
-from tests.protocol.make_vectors import FILE, as_json, rendered
-from tests.protocol.play import PurePartner, play, second_bridge, second_bridge_for
+from tests.protocol.make_vectors import FILE, filled, rendered
+from tests.protocol.play import PurePartner, as_json, play, second_bridge, second_bridge_for
 from tests.protocol.second_bridge import SESSION, STALE, VALUE, CompactSecondBridge, SecondBridge, number
 
 VECTORS: dict[str, Any] = json.loads(FILE.read_text("utf-8"))
 
 
-def test_the_file_is_what_its_generator_makes_with_a_vector_for_every_message() -> None:
-    assert FILE.read_text("utf-8") == rendered(), "run: python -m tests.protocol.make_vectors"
+def test_the_file_has_a_vector_for_every_message_and_all_that_follows_from_them() -> None:
+    assert FILE.read_text("utf-8") == rendered(filled(VECTORS)), "run: python -m tests.protocol.make_vectors"
     kinds = {*c.REQUESTS.values(), *c.REPLIES.values()}
     assert {vector["message"] for vector in VECTORS["frames"]} == {kind.__name__ for kind in kinds}
     for posture, counts in VECTORS["posture_to_counts"]:
@@ -270,16 +269,17 @@ WRONG_IN_ONE_FRAME = CompactSecondBridge.__subclasses__()
 
 @pytest.mark.parametrize("kind", WRONG, ids=lambda kind: kind.__name__)
 def test_some_dialogue_finds_every_wrong_bridge(kind: type[SecondBridge]) -> None:
-    asked = [dialogue for dialogue in DIALOGUES if "COMPACT" not in dialogue.needs]
-    assert any(_goes_wrong(kind, dialogue.steps) for dialogue in asked)
+    asked = [dialogue for dialogue in VECTORS["dialogues"] if "COMPACT" not in dialogue["needs"]]
+    assert any(_goes_wrong(kind, dialogue["steps"]) for dialogue in asked)
 
 
 @pytest.mark.parametrize("kind", WRONG_IN_ONE_FRAME, ids=lambda kind: kind.__name__)
 def test_the_dialogue_of_the_turn_for_slow_lines_finds_every_one_that_is_wrong_there(kind: type[SecondBridge]) -> None:
-    assert any(_goes_wrong(kind, dialogue.steps) for dialogue in DIALOGUES if "COMPACT" in dialogue.needs)
+    asked = [dialogue for dialogue in VECTORS["dialogues"] if "COMPACT" in dialogue["needs"]]
+    assert any(_goes_wrong(kind, dialogue["steps"]) for dialogue in asked)
 
 
-def _goes_wrong(kind: type[SecondBridge], steps: Sequence[Step]) -> bool:
+def _goes_wrong(kind: type[SecondBridge], steps: Sequence[Mapping[str, Any]]) -> bool:
     nonces = iter(range(0x5EED0000, 0x5EED0100))
     try:
         play(steps, second_bridge(kind), lambda: next(nonces))
