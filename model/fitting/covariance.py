@@ -21,17 +21,19 @@ BANDWIDTH = 50
 def score_covariance(scores: Sequence[Floats], bandwidth: int = BANDWIDTH) -> Floats:
     """Returns the covariance (p, p) of the sum of scores of all runs, with Bartlett weights up to `bandwidth` samples.
 
+    Bartlett's weights are those with which samples meet in a window of `bandwidth` + 1 that slides over a run, so the
+    mean product of the sums in the window is the same in one product of matrices.
+
     Args:
         scores: one array (n, p) per run: at each sample the gradient of half the squared residual, summed over joints.
     """
-    size = scores[0].shape[1]
+    size, width = scores[0].shape[1], bandwidth + 1
     total = np.zeros((size, size))
     for run in scores:
-        total += run.T @ run
-        for lag in range(1, min(bandwidth, len(run) - 1) + 1):
-            cross = run[lag:].T @ run[:-lag]
-            total += (1.0 - lag / (bandwidth + 1)) * (cross + cross.T)
-    return 0.5 * (total + total.T)
+        sums = np.cumsum(np.concatenate([np.zeros((width, size)), run, np.zeros((bandwidth, size))]), axis=0)
+        windows = sums[width:] - sums[:-width]
+        total += windows.T @ windows / width
+    return total
 
 
 def sandwich(information: Floats, scores: Sequence[Floats], prior: Floats, bandwidth: int = BANDWIDTH) -> Floats:
