@@ -23,6 +23,7 @@ from model.machine_model.model import Model
 from model.record_check.columns import column_findings
 from model.record_check.drives import drive_findings
 from model.record_check.finding import FindingKind, RecordFinding, doubts_in
+from model.record_check.law import is_formed_as_recorded
 from model.record_check.pieces import (
     SHORTEST,
     cut_off,
@@ -403,7 +404,7 @@ def _on_units(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
         most = WILD_SHARE * max(travels[j] for j in kinds if kinds[j] == kind)
         if _approach(position, way) >= ON_ITS_WAY:
             most = OUT_OF_REACH * float(np.ptp(position))
-        if apart > most:
+        if apart > most and not is_formed_as_recorded(trace, machine, joint):
             larger = float(np.abs(trace.set_point[:, column]).max()), float(np.abs(trace.position[:, column]).max())
             unit = machine.joint(joint).units.position
             yield RecordFinding(

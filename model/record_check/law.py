@@ -90,6 +90,17 @@ def best_fit(fits: list[LawFit]) -> LawFit | None:
     return recorded if recorded.left < HOLDS else None
 
 
+def is_formed_as_recorded(trace: Trace, machine: Machine, joint: int) -> bool:
+    """Whether the controller's law gives the recorded drive, its constant too: set point and position then have one
+    unit and one zero, however far a load keeps them apart."""
+    if isinstance(machine.controller, NoController) or trace.set_point is None or trace.drive is None:
+        return False
+    column = trace.column(joint)
+    formed = formed_drive(trace, machine, joint, Reading(trace.position[:, column], trace.set_point[:, column]))
+    drive = trace.drive[:, column]
+    return formed is not None and bool(np.linalg.norm(drive - formed) < HOLDS * np.linalg.norm(drive))
+
+
 def time_matters(trace: Trace, machine: Machine, joint: int, ratio: float) -> bool:
     """Whether the law holds at the file's control period but not at `ratio` times that period.
 

@@ -71,6 +71,17 @@ def test_set_points_where_the_joint_never_goes_are_doubted(factor: float, offset
     assert ("units-differ" in kinds(rigs.slide_machine(), trace)) is doubted
 
 
+def test_a_load_may_keep_a_joint_away_from_its_set_points_where_the_drive_says_so(tmp_path: Path) -> None:
+    machine, trace = example("single_axis")(tmp_path)
+    gain = 4.0
+    controller = machine.controller.model_copy(update={"gains": ((gain, 0.0, 0.0),), "velocity_gains": None})
+    proportional = machine.model_copy(update={"controller": controller})
+    asked = 1.0 + 0.05 * trace.position
+    sagging = replace(trace, set_point=asked, position=asked - 0.3, drive=np.full_like(asked, gain * 0.3))
+    assert "units-differ" in kinds(proportional, replace(sagging, drive=None))
+    assert "units-differ" not in kinds(proportional, sagging)
+
+
 @pytest.mark.parametrize("hidden", [{}, {"coulomb": 30.0}, {"viscous": 120.0}])
 def test_friction_that_no_file_states_is_no_other_unit(hidden: dict[str, float]) -> None:
     assert kinds(rigs.slide_machine(), rigs.slide_trace(1, hidden, 8.0)) == []
