@@ -174,7 +174,8 @@ def _subject(scope: Scope, answer: dict[str, Any]) -> str | None:
 
 
 def _detail(answer: dict[str, Any]) -> str:
-    """Returns why a request was refused, an arm's answer, or the name (and times) of an experiment that was added.
+    """Returns why a request was refused, an arm's answer, the name (and times) of an experiment that was added, or the
+    kind and name of a computation.
 
     Of invalid fields it contains only the names: the problem repeats their values, and `content` has those that are no
     secrets.
@@ -184,6 +185,8 @@ def _detail(answer: dict[str, Any]) -> str:
         return line_of(f"{answer['type'].rpartition('#')[2]}: {', '.join(fields) or answer['detail']}")
     if isinstance(answer.get("text"), str):
         return line_of(answer["text"])
+    if isinstance(request := answer.get("request"), dict):
+        return line_of(", ".join(str(one) for one in (request.get("kind"), request.get("name")) if one))
     if not isinstance(spec := answer.get("spec"), dict):
         return ""
     kind = spec["trajectory"]["kind"] if isinstance(spec.get("trajectory"), dict) else ""

@@ -50,7 +50,7 @@ def test_an_experiment_from_its_submission_to_its_trace(robot: Robot, tmp_path: 
     assert len(robot.traces.signals(ended.trace, points=20).time) <= 20
     assert next(iter(robot.experiments.list("done"))).id == made.id
     table = robot.traces.download_csv(ended.trace, tmp_path / "table.csv").read_text()
-    assert table.startswith("time,")
+    assert table.startswith("time [s],")
     with pytest.raises(ServiceError) as there_already:
         robot.traces.upload(path)
     assert there_already.value.kind == "trace-exists"

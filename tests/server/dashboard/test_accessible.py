@@ -44,6 +44,13 @@ def test_the_keyboard_reaches_every_page_and_skips_what_is_repeated(dashboard: D
         expect(page.get_by_role("link", name=name, exact=True)).to_be_focused()
     page.keyboard.press("Enter")
     expect(page.get_by_role("heading", level=1, name="System")).to_be_visible()
+    page.keyboard.press("?")
+    keys = page.get_by_role("region", name="Keys")
+    expect(keys).to_contain_text("F8")
+    assert faults_of(page) == []
+    page.get_by_role("button", name="STOP").click(trial=True)  # the list blocks nothing
+    page.keyboard.press("Escape")
+    expect(keys).not_to_be_visible()
 
 
 def test_the_theme_is_the_systems_until_it_is_chosen_and_the_choice_is_kept(dashboard: Dashboard) -> None:

@@ -183,7 +183,7 @@ def test_a_trace_is_downloaded_in_both_forms_and_deleted(dashboard: Dashboard, t
     assert Path(mcap.value.path()).read_bytes() == raw
     with page.expect_download() as table:
         page.get_by_role("button", name="CSV").click()
-    assert Path(table.value.path()).read_text("utf-8").startswith("time,")
+    assert Path(table.value.path()).read_text("utf-8").startswith("time [s],")
     page.get_by_role("button", name="Delete…").click()
     page.get_by_role("button", name="Delete permanently").click()
     expect(page.get_by_text("Choose a trace")).to_be_visible()

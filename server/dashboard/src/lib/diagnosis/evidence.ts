@@ -83,10 +83,10 @@ function reasonOf(one: TriedEffect, turn: Turn, chosen: boolean): string {
 }
 
 /** What fitted and held-out traces say together. */
-function total(one: { evidence: number; evidence_held_out: number | null }): number {
+export function total(one: { evidence: number; evidence_held_out: number | null }): number {
   return one.evidence + (one.evidence_held_out ?? 0);
 }
 
-function key(one: { effect: string; joints: readonly number[] }): string {
+export function key(one: { effect: string; joints: readonly number[] }): string {
   return `${one.effect} ${one.joints.join(',')}`;
 }

@@ -3,6 +3,7 @@
 import type { DiagnosisData, DiagnosisStep, Overlay, TriedEffect } from '../api/types';
 import { driftOf, heatAt, timesNoiseAt, type Drift } from '../hidden/drift';
 import { fixed, significant } from '../format';
+import { key, total } from './evidence';
 import { shownUnit } from './overlay';
 
 export interface Told {
@@ -195,12 +196,4 @@ export function besideAnswer(scene: Scene, answered: readonly number[], moment: 
   ]
     .filter((sentence) => sentence !== '')
     .join(' ');
-}
-
-function total(one: { evidence: number; evidence_held_out: number | null }): number {
-  return one.evidence + (one.evidence_held_out ?? 0);
-}
-
-function key(one: { effect: string; joints: readonly number[] }): string {
-  return `${one.effect} ${one.joints.join(',')}`;
 }

@@ -6,6 +6,7 @@ import { JOB_REQUESTS } from '../jobs/job_requests';
 
 /** ms between two looks. */
 const LOOK_EVERY = 400;
+const SEEN = 'ma2000-hidden';
 
 export class Demonstration {
   place = $state.raw<HidingPlace | null>(null);
@@ -14,8 +15,8 @@ export class Demonstration {
   job = $state.raw<Job | null>(null);
   comparison = $state.raw<ComparisonData | null>(null);
   found = $state.raw<DiagnosisData | null>(null);
-  /** The demonstration that this page has seen begin; an older one is not shown as new. */
-  private mine = $state<string | null>(null);
+  /** The demonstration that this tab has seen, also before it was loaded anew; another's is not shown as new. */
+  private mine = $state(sessionStorage.getItem(SEEN));
   private timer: ReturnType<typeof setTimeout> | null = null;
   private closed = false;
 
@@ -40,7 +41,7 @@ export class Demonstration {
     try {
       const body = { effect, joint } as never;
       const begun = await ask(api.POST('/api/v1/robots/{robot}/hidden', { params: { path: here() }, body }));
-      this.mine = begun.id;
+      this.see(begun.id);
       await this.look();
     } catch (error) {
       this.problem = asProblem(error);
@@ -52,6 +53,11 @@ export class Demonstration {
   /** Ends the search; the demonstration then ends without an answer. Throws a Problem. */
   async cancel(job: string): Promise<void> {
     await ask(api.POST('/api/v1/robots/{robot}/jobs/{job}/cancel', { params: { path: { ...here(), job } } }));
+  }
+
+  private see(id: string): void {
+    this.mine = id;
+    sessionStorage.setItem(SEEN, id);
   }
 
   private isGoingOn(hidden: Hidden): boolean {
@@ -75,7 +81,7 @@ export class Demonstration {
 
   /** Asks for what has come since: the simulation of the machine file, the candidates, the answer. */
   private async follow(hidden: Hidden): Promise<void> {
-    if (this.mine !== hidden.id) this.mine = hidden.id;
+    if (this.mine !== hidden.id) this.see(hidden.id);
     if (hidden.comparison !== null && this.comparison === null) {
       const job = await JOB_REQUESTS.job(hidden.comparison);
       if (job.state === 'done') {
