@@ -94,11 +94,11 @@ def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
     whole, said = _whole_rows(data)
     if choice.map or choice.where or not _has_own_names(*head_of(path, whole)):
         return _noted(mapped_trace(path, text_table(path, whole, limits), choice, description, limits), said)
-    drive_unit, header, rows, numbers, begins = _read_table(path, whole, limits)
+    drive_unit, header, table, rows, begins = _read_table(path, whole, limits)
     if description.drive_unit is None:
         description = description.model_copy(update={"drive_unit": drive_unit})
     own = _Own(path, choice, description, trace_id_of(data, *described), said)
-    return own.trace(header, rows, numbers, begins)
+    return own.trace(header, table, rows, begins)
 
 
 @dataclass(frozen=True)
