@@ -107,6 +107,7 @@ def rows(rig: Rig, alteration: Alteration | None, data: Path, longest: float, ke
             cutoff = min(CUTOFF, _note(run.answer, "cutoff").get("cutoff") or CUTOFF)
             linear = reference(model, records[:first], records[first:], cutoff, offset=rig.offset).held_out
     if keep is not None and run.answer is not None:
+        keep.mkdir(parents=True, exist_ok=True)
         (keep / f"{rig.name}{'-altered' if alteration else ''}.json").write_text(json.dumps(run.answer), "utf-8")
     return [_row(title, question, run, right, linear) for question in questions]
 
@@ -200,7 +201,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for rig in chosen:
             print(least_squares(rig, options.data), flush=True)
         return 0
-    found: list[Row] = []
+    found = list[Row]()
     for rig in chosen:
         for alteration in (None,) if options.as_they_are else (None, rig.alteration):
             try:
