@@ -63,8 +63,10 @@ def test_a_pressed_stop_freezes_the_board_before_it_is_let_go(dashboard: Dashboa
     assert not dashboard.mock.ask("state")["frozen"]
     button = page.get_by_role("button", name="STOP")
     button.hover()
+    page.evaluate("navigator.vibrate = (ms) => (window.felt = ms)")
     page.mouse.down()
     expect(page.locator(CONFIRMED)).to_be_visible()
+    assert page.evaluate("window.felt") > 0
     assert dashboard.mock.ask("state")["frozen"]
     page.mouse.up()
     expect(page.locator(CONFIRMED)).to_contain_text(

@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import type { Overlay } from '../api/types';
 import { armsAt, driftOf, enlargementOf, heatAt } from './drift';
 import { runnersOf } from './race';
-import { bothNumbers } from './words';
+import { bothNumbers, guessWords } from './words';
 
 const TIME = Array.from({ length: 201 }, (_, index) => index * 0.05);
 const overlay = (before: number, after: number): Overlay =>
@@ -53,4 +53,22 @@ it('the two numbers stand in one unit, angles in degrees', () => {
   expect(bothNumbers({ ...number, unit: 'N·m', found: 0.02, low: 0.01, high: 0.03 }).range).toBe(
     '95 %: 0.0100 to 0.0300 N·m',
   );
+});
+
+it('judges a guess by effect and joint; one without a joint by the effect alone', () => {
+  const secret = { effect: 'stiction', joints: [2] };
+  const said = [
+    guessWords(secret, 'stiction', 2),
+    guessWords(secret, 'stiction', null),
+    guessWords(secret, 'stiction', 1),
+    guessWords(secret, 'backlash', 2),
+    guessWords(secret, 'backlash', null),
+  ];
+  expect(said.map((one) => one.split(',')[0])).toEqual([
+    'right',
+    'right',
+    'the effect is right',
+    'the joint is right',
+    'not this time',
+  ]);
 });

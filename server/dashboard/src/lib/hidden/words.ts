@@ -43,6 +43,17 @@ export function bothNumbers(one: HiddenNumber): { hidden: string; found: string;
   };
 }
 
+/** How a visitor's guess compares. `joint`: null where none was guessed. */
+export function guessWords(
+  secret: Pick<NonNullable<Hidden['secret']>, 'effect' | 'joints'>,
+  effect: string,
+  joint: number | null,
+): string {
+  const isJoint = joint !== null && secret.joints.includes(joint);
+  if (secret.effect !== effect) return isJoint ? 'the joint is right, the effect is not' : 'not this time';
+  return isJoint || joint === null ? 'right' : 'the effect is right, the joint is not';
+}
+
 /** What goes on now, in one line. */
 export function stageWords(hidden: Hidden | null, hasDrift: boolean): string {
   if (hidden === null) return '';
