@@ -55,20 +55,9 @@ it('the two numbers stand in one unit, angles in degrees', () => {
   );
 });
 
-it('judges a guess by effect and joint; one without a joint by the effect alone', () => {
+it('judges a guess by effect and joint', () => {
   const secret = { effect: 'stiction', joints: [2] };
-  const said = [
-    guessWords(secret, 'stiction', 2),
-    guessWords(secret, 'stiction', null),
-    guessWords(secret, 'stiction', 1),
-    guessWords(secret, 'backlash', 2),
-    guessWords(secret, 'backlash', null),
-  ];
-  expect(said.map((one) => one.split(',')[0])).toEqual([
-    'right',
-    'right',
-    'the effect is right',
-    'the joint is right',
-    'not this time',
-  ]);
+  for (const joint of [2, null]) expect(guessWords(secret, 'stiction', joint)).toBe('right');
+  expect(guessWords(secret, 'stiction', 1)).toContain('effect is right');
+  expect(guessWords(secret, 'backlash', 2)).toContain('joint is right');
 });
