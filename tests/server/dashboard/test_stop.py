@@ -105,6 +105,21 @@ def test_a_stop_reaches_the_arm_while_the_service_hangs(dashboard: Dashboard) ->
     dashboard.forgive()
 
 
+def test_on_the_screen_at_the_arm_stop_stays_where_it_is_and_nothing_releases_the_arm_there(
+    dashboard: Dashboard,
+) -> None:
+    page = dashboard.until_live()
+    dashboard.open("kiosk")
+    button = page.get_by_role("button", name="STOP")
+    before = button.bounding_box()
+    for _ in range(4):
+        page.mouse.click(before["x"] + 5, before["y"] + 5)
+    expect(page.locator(CONFIRMED)).to_be_visible()
+    assert button.bounding_box() == before
+    assert dashboard.mock.ask("state")["frozen"]
+    dashboard.forgive()
+
+
 def test_a_stop_that_nobody_answers_is_not_called_delivered_and_one_that_arrives_late_is_told(
     dashboard: Dashboard,
 ) -> None:
