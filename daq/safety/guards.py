@@ -10,6 +10,7 @@ Silence is detected by the link, which raises LinkTimeoutError once its retries 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -18,6 +19,7 @@ from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleCount, SampleRow
 from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 from firmware_protocol.commands import StatusFlag
+from firmware_protocol.units import JointCalibration
 
 
 @dataclass
@@ -48,29 +50,35 @@ class FollowingError:
         held = (row.tick - self.held_since) * self.watched.period
         longest = self.watched.limits.following_error_time
         if longest is not None and held > longest:
-            line = f"{reason.message}; it lasted {held:.2f} s, allowed are {longest:g} s"
+            why = "something blocks the joint, or its drive or sensor has failed"
+            line = f"{reason.message}. They waited {held:.2f} s, allowed are {longest:g} s: {why}"
             return Verdict(hold=True, trips=(line,), findings=findings)
         return Verdict(hold=True, findings=findings)
 
     def _outside(self, row: SampleRow, limit: int) -> Finding | None:
-        for joint, counts in zip(self.watched.joints, self.watched.counts(row.error), strict=True):
-            if abs(round(counts)) > limit:
-                line = f"joint {joint}: positional error of {counts:.0f} ADC counts, set points pause outside ±{limit}"
-                return Finding("pause", line, joint)
+        for joint, own, error in zip(self.watched.joints, self.watched.calibrations, row.error, strict=True):
+            if abs(round(error / own.rad_per_count)) > limit:
+                return _does_not_follow(joint, "set point", error, own, limit)
         return None
 
     def _ahead(self, row: SampleRow, planned: Mapping[int, int], limit: int) -> Finding | None:
         for joint, own, position in zip(self.watched.joints, self.watched.calibrations, row.position, strict=True):
             if joint not in planned:
                 continue
-            counts = (own.posture_to_rad(planned[joint]) - position) / own.rad_per_count
-            if abs(counts) > limit:
-                line = (
-                    f"joint {joint}: next set point is {counts:.0f} ADC counts from the arm, "
-                    f"it waits until the arm is within ±{limit}"
-                )
-                return Finding("pause", line, joint)
+            ahead = own.posture_to_rad(planned[joint]) - position
+            if abs(ahead / own.rad_per_count) > limit:
+                return _does_not_follow(joint, "next set point", ahead, own, limit)
         return None
+
+
+def _does_not_follow(joint: int, goal: str, away: float, own: JointCalibration, limit: int) -> Finding:
+    """Returns the pause of set points for a joint that is `away` rad from where it should be."""
+    degrees = [f"{abs(math.degrees(one)):.1f}°" for one in (away, limit * own.rad_per_count)]
+    counts = abs(away / own.rad_per_count)
+    line = (
+        f"joint {joint} is {degrees[0]} ({counts:.0f} counts) from its {goal}; set points wait while it is more than "
+    )
+    return Finding("pause", f"{line}{degrees[1]} ({limit}) away", joint)
 
 
 LONGEST_SILENCE = 0.2

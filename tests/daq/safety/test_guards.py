@@ -47,17 +47,15 @@ def test_set_points_pause_when_the_error_leaves_127_counts(error: int, held: boo
 
 def test_a_pause_is_counted_from_its_first_period_and_one_that_lasts_is_a_fault() -> None:
     guards = running()
-    assert guards.check(row(100, error=(0, -130, 0)), {}).findings == (
-        Finding("pause", "joint 2: positional error of -130 ADC counts, set points pause outside ±127", 2),
-    )
+    away = "is 8.6° (130 counts) from its set point; set points wait while it is more than 8.4° (127) away"
+    assert guards.check(row(100, error=(0, -130, 0)), {}).findings == (Finding("pause", f"joint 2 {away}", 2),)
     assert guards.check(row(103), {}).findings[-1].message == "set points continue after 0.06 s"
     guards = running()
     verdicts = [guards.check(row(tick, error=(0, 0, 130)), {}) for tick in range(27)]
     assert [bool(verdict.trips) for verdict in verdicts] == [False] * 26 + [True]
     assert all(verdict.hold for verdict in verdicts)
     (trip,) = verdicts[-1].trips
-    assert trip.startswith("joint 3: positional error of 130 ADC counts, set points pause outside ±127; ")
-    assert trip.endswith("it lasted 0.52 s, allowed are 0.5 s")
+    assert trip.startswith(f"joint 3 {away}. They waited 0.52 s, allowed are 0.5 s: something blocks the joint")
     guards = running()
     for tick in range(100):
         assert not guards.check(row(tick, error=(130 if tick % 20 else 0, 0, 0)), {}).trips
@@ -76,7 +74,7 @@ def test_set_points_keep_the_limit_s_distance_whatever_other_joints_do() -> None
     (finding,) = verdict.findings
     assert verdict.hold
     assert (finding.kind, finding.joint) == ("pause", 2)
-    assert finding.message.startswith("joint 2: next set point is 16")
+    assert finding.message.startswith("joint 2 is 10.7° (16")
     (missed,) = running().check(row(4), {}, expected={3: 510}).findings
     assert missed.message == "joint 3: tick 4 took posture 500, sent was 510"
 
@@ -120,7 +118,7 @@ def test_a_stuck_joint_ends_in_a_fault_though_its_error_never_passes_the_limit()
         trips += verdict.trips
         tick += 1
     assert posture == 530
-    assert trips[0].startswith("joint 1: next set point is 131 ADC counts from the arm")
+    assert trips[0].startswith("joint 1 is 8.6° (131 counts) from its next set point")
 
 
 def lagging_arm(rate: float) -> tuple[int, bool]:
