@@ -66,14 +66,6 @@ def test_a_controller_that_changes_its_phase_is_never_read_torn_and_followed_aga
     assert machine.whole.index(readings(snapshots[-1])) >= len(machine.whole) - 2, "as fresh as before"
 
 
-def test_a_noisy_arm_at_rest_is_followed_and_no_set_point_is_called_missed() -> None:
-    machine = Machine(noisy)
-    machine.run(3 * PERIOD_US)
-    ticks = [snapshot.tick for snapshot in sampled(machine, 80)]
-    assert ticks == list(range(ticks[0], ticks[0] + 80))
-    assert machine.ask(c.ReadStatus()).missed == 0
-
-
 def test_set_points_written_at_any_moment_are_taken_in_the_period_that_was_told() -> None:
     machine = Machine(noisy)
     machine.greet()

@@ -222,7 +222,6 @@ def test_every_example_of_the_conversation_is_what_the_code_says_by_its_rules() 
         assert reading["position"] + reading["error"] == posture_to_counts(sent[joint])
         assert said["Stopped"]["postures"][joint - 1] == counts_to_posture(reading["position"])
     block, position = bytes.fromhex(said["Block"]["data"]), default_memory_map()["position"]
-    assert position.high is not None
     for joint, reading in readings.items():
         low, high = position.low[joint - 1], position.high[joint - 1]
         start = said["ReadBlock"]["address"]
@@ -268,13 +267,6 @@ def sampled(joints: int) -> int:
 
 def commanded(joints: int) -> int:
     return on_the_line(c.WriteSetPoints(tuple((i + 1, 1) for i in range(joints))), c.SetPointsTaken(1, 0))
-
-
-def compact(joints: int) -> int:
-    moved = tuple((i + 1, 1) for i in range(joints))
-    reading = c.CompactReading(1, 1, 1)
-    reply = c.CompactSnapshot(1, 0, 1, tuple((i + 1, reading) for i in range(joints)))
-    return on_the_line(c.MoveAndSample(1, 1, moved), reply)
 
 
 def most_joints(capacity: float, bytes_of: Any) -> str:

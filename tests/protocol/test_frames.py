@@ -96,14 +96,6 @@ def test_how_the_bytes_are_cut_makes_no_difference(data: st.DataObject, line: by
     assert piecewise == whole
 
 
-@given(st.lists(st.one_of(line_noise, st.binary(min_size=100, max_size=400)), max_size=6))
-def test_any_bytes_in_any_pieces_never_raise_and_never_pile_up(pieces: list[bytes]) -> None:
-    decoder = FrameDecoder()
-    for piece in pieces:
-        decoder.feed(piece)
-        assert decoder.held <= MAX_ENCODED
-
-
 @given(line_noise, frames)
 def test_a_frame_is_found_after_any_garbage(garbage: bytes, frame: Frame) -> None:
     decoder = FrameDecoder()

@@ -3,16 +3,13 @@
 import re
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import BaseModel, Field, ValidationError, field_validator
 
 from firmware_protocol.c_header import c_header, main
 from firmware_protocol.errors import MemoryMapError, UnitsError
-from firmware_protocol.invalid import Invalid, first_invalid
 from firmware_protocol.memory_map import MemoryMap, default_memory_map, parse_memory_map
 
 SHIPPED = resources.files("firmware_protocol").joinpath("memory_map.toml").read_text("utf-8")
@@ -168,38 +165,6 @@ def test_every_value_of_a_register_survives_its_bytes(name: str) -> None:
     for value in (lowest - 1, lowest + (1 << register.bits)):
         with pytest.raises(UnitsError, match=f"value {value} .* allowed are {lowest} to"):
             register.encode(value)
-
-
-# ---- What pydantic refuses, in one line: where, what is wrong, and nothing of pydantic's own words
-
-
-class Part(BaseModel):
-    size: Annotated[float, Field(le=2.0)]
-
-
-class Whole(BaseModel):
-    parts: tuple[Part, ...]
-    name: str = ""
-
-    @field_validator("name")
-    @classmethod
-    def _no_blanks(cls, name: str) -> str:
-        if " " in name:
-            raise ValueError("a name has no blanks")
-        return name
-
-
-def refused(data: Any) -> Invalid:
-    with pytest.raises(ValidationError) as caught:
-        Whole.model_validate(data)
-    return first_invalid(caught.value)
-
-
-def test_a_wrong_value_is_told_with_place_rule_and_bounds_or_as_a_whole() -> None:
-    found = refused({"parts": [{"size": 1}, {"size": 3}], "name": "a b"})
-    assert (found.where(), found.where(first=1)) == ("parts.1.size", "parts.2.size")
-    assert (found.value, found.kind, found.bounds) == (3, "less_than_equal", {"le": 2.0})
-    assert refused(1).where("file") == "file"
 
 
 # ---- The memory map as a header of the bridge in C

@@ -9,14 +9,14 @@ import pytest
 
 from firmware_protocol import commands as c
 from firmware_protocol.errors import ProtocolError
-from firmware_protocol.framing import Frame, FrameDecoder, crc16, encode_frame, stuff, unstuff
+from firmware_protocol.framing import Frame, FrameDecoder, encode_frame, unstuff
 from firmware_protocol.units import counts_to_posture, posture_to_counts
 from mock_controller.bridge.bridge import Bridge
 from mock_controller.timeline import Timeline
 from tests.mock.host import make_device
 from tests.protocol import second_implementation as second
 from tests.protocol.make_vectors import FILE, filled, rendered
-from tests.protocol.play import PurePartner, as_json, play, second_bridge, second_bridge_for
+from tests.protocol.play import PurePartner, as_json, play, second_bridge
 from tests.protocol.second_bridge import SESSION, STALE, VALUE, CompactSecondBridge, SecondBridge, number
 
 VECTORS: dict[str, Any] = json.loads(FILE.read_text("utf-8"))
@@ -30,19 +30,6 @@ def test_the_file_has_a_vector_for_every_message_and_all_that_follows_from_them(
         assert posture_to_counts(posture) == counts == (2 * posture * 4096 + 1000) // 2000
     for counts, posture in VECTORS["counts_to_posture"]:
         assert counts_to_posture(counts) == posture == min((2 * counts * 1000 + 4096) // 8192, 999)
-
-
-@pytest.mark.parametrize("vector", VECTORS["crc"], ids=lambda v: v["data"][:20])
-def test_every_crc_is_that_of_the_vectors(vector: dict[str, str]) -> None:
-    data = bytes.fromhex(vector["data"])
-    assert f"{crc16(data):04x}" == f"{second.crc_bit_by_bit(data):04x}" == vector["crc"]
-
-
-@pytest.mark.parametrize("vector", VECTORS["cobs"], ids=lambda v: v["body"][:20])
-def test_stuffing_agrees_with_the_vectors(vector: dict[str, str]) -> None:
-    body, stuffed = bytes.fromhex(vector["body"]), bytes.fromhex(vector["stuffed"])
-    assert stuff(body) == second.stuff_byte_by_byte(body) == stuffed
-    assert unstuff(stuffed) == second.unstuff_byte_by_byte(stuffed) == body
 
 
 @pytest.mark.parametrize("encoded", VECTORS["cobs_broken"])
@@ -69,28 +56,6 @@ def test_damaged_lines_hold_no_frame(vector: dict[str, str]) -> None:
     line = bytes.fromhex(vector["line"])
     assert FrameDecoder().feed(line) == []
     assert not any(second.read_frame(piece) for piece in line.split(b"\0")[:-1] if piece)
-
-
-@pytest.mark.parametrize("vector", VECTORS["refused"], ids=lambda v: f"{v['opcode']:02x} {v['why']}")
-def test_payloads_that_must_be_refused_are_refused(vector: dict[str, Any]) -> None:
-    parse = c.parse_request if vector["direction"] == "request" else c.parse_reply
-    with pytest.raises(ProtocolError) as caught:
-        parse(Frame(0, vector["opcode"], bytes.fromhex(vector["payload"])))
-    assert c.refusal_of(caught.value).name == vector["reason"]
-
-
-@pytest.mark.parametrize("dialogue", VECTORS["dialogues"], ids=lambda d: d["rule"])
-def test_the_second_implementation_passes_the_dialogues(dialogue: dict[str, Any]) -> None:
-    """To the byte: the file says what its bridge said."""
-    bridge, steps = second_bridge_for(dialogue["needs"]), dialogue["steps"]
-    for place, step in enumerate(steps):
-        if "board" in step:
-            bridge.happens(step["board"])
-        elif "host" in step:
-            bridge.send(bytes.fromhex(step["frame"]))
-        else:
-            assert encode_frame(bridge.reply(step["sequence"])).hex() == step["frame"], (place, step)
-    assert not bridge.rest()
 
 
 @pytest.mark.parametrize("dialogue", VECTORS["dialogues"], ids=lambda d: d["rule"])

@@ -28,7 +28,6 @@ def served(*options: str) -> Iterator[str]:
     """The URL of a BBC Micro in lock-step, in a process of its own."""
     command = [sys.executable, "-m", "tests.firmware.bbc_micro.lock_step", *options]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
         try:
             yield process.stdout.readline().strip()
         finally:
@@ -43,7 +42,6 @@ def test_a_ramp_runs_at_the_rate_that_the_line_allows(tmp_path: Path, image: str
         trace = arm.trace(result := arm.run(SHORT))
     assert (result.outcome, result.missing) == ("complete", 0)
     assert trace.record.every == every
-    assert trace.tick is not None
     assert set(np.diff(trace.tick)) == {every}
     assert result.counters["missed_set_points"] == 0
 

@@ -96,7 +96,6 @@ def test_stop_freezes_the_measured_posture_and_refuses_set_points_until_release(
     stopped = host.ask(c.Stop())
     assert isinstance(stopped, c.Stopped)
     newest = host.board.snapshots.newest()
-    assert newest is not None
     assert list(stopped.postures) == [counts_to_posture(counts) for counts in newest.positions]
     assert host.board.memory.values("set_point") == list(stopped.postures)
     assert refusal(host.ask(c.WriteSetPoints(((1, 600),)))) is c.Refusal.FROZEN

@@ -65,7 +65,6 @@ def test_the_loop_without_rounding_is_the_board_s_loop_but_for_rounding() -> Non
     for tick, row in enumerate(rows):
         board.run_until(tick * 20_000 + 10_000)  # what this period took is what was written in the one before
         snapshot = board.snapshots.newest()
-        assert snapshot is not None
         seen.append(snapshot.positions)
         if tick + 1 < len(rows):
             board.write_set_points(dict(enumerate(rows[tick + 1], start=1)))

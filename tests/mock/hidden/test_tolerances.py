@@ -133,7 +133,6 @@ def test_a_bridge_with_another_map_stops_at_the_wrong_bytes_and_writes_are_count
     board.write(0xFC10, b"\x01\x02")
     assert dict(board.written) == {0xFC10: 1, 0xFC11: 1}
     shipped = default_memory_map()["position"]
-    assert shipped.high is not None
     documented = {*shipped.low[:3], *shipped.high[:3]}
     for seed in range(20):
         kept, moved = draw_memory(seed, "kept").map["position"], draw_memory(seed, "moved").map["position"]
@@ -206,8 +205,6 @@ def test_process_arguments_and_output_hold_the_seed_and_nothing_else() -> None:
         arguments = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
         environment = Path(f"/proc/{pid}/environ").read_bytes().decode(errors="replace")
         answers = json.dumps([mock.control(name) for name in ASKED])
-        assert mock._process.stdin is not None
-        assert mock._process.stdout is not None
         mock._process.stdin.close()
         mock._process.wait(10)
         left = mock._process.stdout.read().decode()

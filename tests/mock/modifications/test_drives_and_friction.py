@@ -206,17 +206,6 @@ def test_friction_under_gravity_is_a_share_of_what_the_joint_has_to_hold(payload
         )
 
 
-def test_stiction_pushes_back_like_a_spring_before_it_slips() -> None:
-    bond = effect("stiction", joint=1, breakaway=2.0, speed=0.02)
-    forces = [bond.joint_torque(0.0, 0.0, 0.001) for _ in range(400)]
-    stiffness = 2.0 / default_plant().friction.presliding
-    assert forces[0] == pytest.approx(-stiffness * 1e-6, rel=1e-2)
-    assert -2.0 < forces[-1] < -1.0
-    assert bond.joint_torque(0.0, 0.0, 1.0) == 0.0
-    bond.restart()
-    assert bond.joint_torque(0.0, 0.0, 0.0) == 0.0
-
-
 def test_stiction_holds_a_joint_until_the_breakaway_torque_and_lets_it_go_then() -> None:
     def moved(torque: float, *modifications: Any) -> float:
         """How far the waist has come while its motor's torque rose slowly to so many N·m."""

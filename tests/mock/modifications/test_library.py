@@ -219,7 +219,6 @@ def test_a_wrong_gain_scales_power_before_its_limit() -> None:
         board.write_set_points({1: posture, 3: posture})
         board.run_until(board.time_us + 30_000)
         snapshot = board.snapshots.newest()
-        assert snapshot is not None
         assert snapshot.powers[0] == (127 if limited else math.floor(1.5 * 2 * snapshot.errors[0] + 0.5))
         assert snapshot.powers[2] == min(2 * snapshot.errors[2], 127)
         assert snapshot.errors[0] > 20
@@ -232,7 +231,6 @@ def lost_ticks(board: Board, joint: int) -> list[int]:
         board.write_set_points({joint: 500 + tick // 2})
         board.run_until(tick * 20_000 - 10_000)
         snapshot = board.snapshots.newest()
-        assert snapshot is not None
         wanted = (2 * snapshot.set_points[joint - 1] * 4096 + 1000) // 2000
         if snapshot.positions[joint - 1] + snapshot.errors[joint - 1] != wanted:
             lost.append(snapshot.tick)

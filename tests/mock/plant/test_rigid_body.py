@@ -76,44 +76,6 @@ def test_hand_is_where_the_denavit_hartenberg_chain_puts_it() -> None:
     assert data.body("hand").xpos == pytest.approx(pose[:3, 3], abs=1e-12)
 
 
-def test_forearm_swings_with_the_period_of_its_pendulum() -> None:
-    """Elbow free, shoulder held pointing straight down; a small swing has the period 2π √(I / m g l)."""
-    parameters, _, _ = bare_arm()
-    joints = tuple(replace(joint, lower_stop=-4.0, upper_stop=4.0) for joint in parameters.joints)
-    model = build_model(replace(parameters, joints=joints), 5e-4)
-    model.dof_armature[:] = [1e9, 1e9, 0, 1e9, 1e9, 1e9]
-    data = mujoco.MjData(model)
-    data.qpos[:] = [0, -math.pi / 2, 0.02, 0, 0, 0]
-    body = parameters.rigid_body
-    inertia = body.m3 * body.a3**2 / 3 + body.m_load * body.a3**2 + 3 * body.wrist_inertia
-    expected = 2 * math.pi * math.sqrt(inertia / (9.81 * (body.m3 / 2 + body.m_load) * body.a3))
-    crossings = []
-    before = 0.02
-    while len(crossings) < 5:
-        mujoco.mj_step(model, data)
-        now = float(data.qpos[2])
-        if before > 0 >= now:
-            crossings.append(data.time)
-        before = now
-    assert (crossings[-1] - crossings[0]) / 4 == pytest.approx(expected, rel=2e-3)
-    assert max(abs(data.qpos[1] + math.pi / 2), abs(data.qpos[0])) < 1e-6
-
-
-def test_free_arm_without_gravity_keeps_its_kinetic_energy() -> None:
-    parameters, _, _ = bare_arm()
-    parameters = replace(parameters, rigid_body=replace(parameters.rigid_body, gravity=(0.0, 0.0, 0.0)))
-    model = build_model(parameters, 1e-4)
-    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
-    data = mujoco.MjData(model)
-    data.qpos[:] = [3, 1.0, 0.3, 0, 0, 0]
-    data.qvel[:] = [0.8, -0.5, 1.0, 0.3, 0.2, 0.4]
-    mujoco.mj_forward(model, data)
-    start = data.energy[1]
-    for _ in range(5000):
-        mujoco.mj_step(model, data)
-    assert data.energy[1] == pytest.approx(start, rel=1e-3)
-
-
 # ---- Hidden effects act at their place, and nowhere when absent
 
 LOW = (math.pi, 0.3, 0.2, 0.0, 0.0, 0.0)

@@ -31,7 +31,6 @@ class RunningMock:
         self.control_url: str | None = ready["control"]
 
     def next_line(self) -> dict[str, Any]:
-        assert self._process.stdout is not None
         line = json.loads(self._process.stdout.readline())
         assert line["ready"] is True
         return line  # type: ignore[no-any-return]
@@ -44,8 +43,6 @@ class RunningMock:
 
     def end(self) -> int:
         """Ends its standard input, as the death of its owner does; the exit code."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
         self._process.stdin.close()
         code = self._process.wait(10)
         self._process.stdout.close()

@@ -92,7 +92,6 @@ def test_snapshots_are_the_boards_own_record(bench: Bench) -> None:
     bench.host.ask(WriteSetPoints(((1, 520),)))
     bench.host.ask(Advance(90_000))
     newest = bench.host.board.snapshots.newest()
-    assert newest is not None
     snapshots = bench.say("snapshots", after=newest.tick - 2)["snapshots"]
     assert [snapshot["tick"] for snapshot in snapshots] == [newest.tick - 1, newest.tick]
     assert snapshots[-1]["time_us"] == newest.time_us

@@ -2,7 +2,8 @@
 
 import pytest
 
-from model.discrepancy.diagnosis import CLEAR_SHAPE, AgainstWhat, Candidate, RemainingShape, clear_shape, in_order
+from model.discrepancy.diagnosis import CLEAR_SHAPE, AgainstWhat, Candidate, clear_shape, in_order
+from tests.model.discrepancy.steps import shape
 
 
 def candidate(effect: str, evidence: float, *, refitted: bool) -> Candidate:
@@ -35,31 +36,13 @@ def test_fitted_candidates_come_first_each_kind_by_evidence() -> None:
 def test_a_shape_is_clear_where_it_explains_enough_in_enough_bins(
     against: AgainstWhat, torque: tuple[float | None, ...], explained: float, clear: bool
 ) -> None:
-    shape = RemainingShape(
-        joint=1,
-        against=against,
-        unit="1",
-        torque_unit="N·m",
-        centres=(0.0,) * len(torque),
-        torque=torque,
-        deviation=torque,
-        explained=explained,
-    )
-    assert (clear_shape([shape]) is not None) == clear
+    left = shape(against=against, torque=torque, explained=explained)
+    assert (clear_shape([left]) is not None) == clear
 
 
 def test_the_clear_shape_is_the_one_that_explains_most_in_any_order() -> None:
     """Torques without a controller are listed by joint."""
-    shape = RemainingShape(
-        joint=1,
-        against="speed",
-        unit="rad/s",
-        torque_unit="N·m",
-        centres=(0.0,) * 5,
-        torque=(0.1,) * 5,
-        deviation=(0.1,) * 5,
-        explained=0.4,
-    )
-    better = shape.model_copy(update={"joint": 2, "explained": 0.7})
-    assert clear_shape([shape, better]) == better
+    left = shape(explained=0.4)
+    better = shape(joint=2, explained=0.7)
+    assert clear_shape([left, better]) == better
     assert clear_shape([]) is None

@@ -1,7 +1,9 @@
 """Which of the two methods a diagnosis takes, by machine, traces and options."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,77 +32,67 @@ def slid() -> Trace:
     return rigs.slide_trace(1, {}, duration=4.0)
 
 
-def chosen(model: Model, trace: Trace, *, designs: bool = False, **options: object) -> str:
-    return choose_method(model, [trace], DiagnosisOptions.model_validate(options), designs=designs)
-
-
-@pytest.mark.slow
-def test_torques_are_balanced_where_a_sampled_controllers_drive_was_recorded() -> None:
-    assert chosen(ARM, moved()) == "inverse-dynamics"
-    assert chosen(ARM, moved(), effects=("coulomb_friction", "dead_zone")) == "inverse-dynamics"
-
-
-def test_torques_are_balanced_where_no_controller_is_described() -> None:
-    assert chosen(WITHOUT_CONTROLLER, slid()) == "inverse-dynamics"
-
-
-def test_torques_are_balanced_where_one_trace_has_no_set_points() -> None:
-    without = replace(moved(), set_point=None)
-    assert choose_method(ARM, [moved(), without], DiagnosisOptions(), designs=False) == "inverse-dynamics"
-
-
-@pytest.mark.parametrize("effects", [("stiction",), ("coulomb_friction", "lost_set_points")])
-def test_the_loop_is_simulated_for_effects_that_torques_do_not_show(effects: tuple[str, ...]) -> None:
-    assert chosen(ARM, moved(), effects=effects) == "output-error"
-
-
-def test_the_loop_is_simulated_where_an_experiment_is_to_be_designed() -> None:
-    assert chosen(ARM, moved(), designs=True) == "output-error"
-
-
-def test_the_loop_of_the_board_is_simulated() -> None:
-    record = imagined.trace(imagined.arm(), seconds=3.0)
-    assert record.drive is not None
-    assert chosen(imagined.arm(), record) == "output-error"
-
-
-def test_the_loop_is_simulated_where_a_drive_was_not_recorded() -> None:
-    without = replace(moved(), drive=None)
-    assert choose_method(ARM, [moved(), without], DiagnosisOptions(), designs=False) == "output-error"
-
-
-def test_the_loop_is_simulated_where_accelerations_are_within_the_noise_of_readings() -> None:
-    noise = np.random.default_rng(3).normal(0.0, 0.3, moved().position.shape)
-    assert chosen(ARM, replace(moved(), position=moved().position + noise)) == "output-error"
-
-
-def test_the_loop_is_simulated_where_a_record_is_too_short_for_torques() -> None:
-    """Where torques have no answer, a record that the simulation can use must not be refused."""
-    given = moved()
-    assert given.set_point is not None
-    assert given.drive is not None
-    few = slice(0, 30)
-    short = replace(
-        given,
-        time=given.time[few],
-        position=given.position[few],
-        set_point=given.set_point[few],
-        drive=given.drive[few],
+def noisy() -> Trace:
+    """The motion, with accelerations within the noise of its readings."""
+    return replace(
+        moved(), position=moved().position + np.random.default_rng(3).normal(0.0, 0.3, moved().position.shape)
     )
-    assert chosen(ARM, short) == "output-error"
 
 
-def test_a_method_that_is_asked_for_is_taken() -> None:
-    assert chosen(ARM, moved(), method="output-error") == "output-error"
-    record = imagined.trace(imagined.arm(), seconds=3.0)
-    assert chosen(imagined.arm(), record, method="inverse-dynamics") == "inverse-dynamics"
-    assert chosen(ARM, moved(), method="inverse-dynamics", designs=True) == "inverse-dynamics"
+def short() -> Trace:
+    """Too few samples for torques, which a simulation can use: it must not be refused."""
+    given, few = moved(), slice(0, 30)
+    signals = ("time", "position", "set_point", "drive")
+    return replace(given, **{name: getattr(given, name)[few] for name in signals})
+
+
+def of_the_board() -> Trace:
+    return imagined.trace(imagined.arm(), seconds=3.0)
+
+
+def without(name: str) -> Callable[[], Trace]:
+    """The motion without a signal."""
+    return lambda: replace(moved(), **{name: None})
+
+
+TORQUES, LOOP = "inverse-dynamics", "output-error"
+BOARD = imagined.arm()
+
+
+def chosen(model: Model, *traces: Callable[[], Trace], designs: bool = False, **options: object) -> str:
+    given = [trace() for trace in traces]
+    return choose_method(model, given, DiagnosisOptions.model_validate(options), designs=designs)
+
+
+@pytest.mark.parametrize(
+    ("model", "traces", "options", "method"),
+    [
+        pytest.param(ARM, [moved], {}, TORQUES, id="the drive of a sampled controller was recorded"),
+        pytest.param(ARM, [moved], {"effects": ("coulomb_friction", "dead_zone")}, TORQUES, id="effects in torques"),
+        pytest.param(WITHOUT_CONTROLLER, [slid], {}, TORQUES, id="no controller is described"),
+        pytest.param(ARM, [moved, without("set_point")], {}, TORQUES, id="one trace has no set points"),
+        pytest.param(ARM, [moved], {"effects": ("stiction",)}, LOOP, id="torques do not show it"),
+        pytest.param(ARM, [moved], {"effects": ("coulomb_friction", "lost_set_points")}, LOOP, id="nor one of two"),
+        pytest.param(ARM, [moved], {"designs": True}, LOOP, id="an experiment is to be designed"),
+        pytest.param(BOARD, [of_the_board], {}, LOOP, id="the board's drive"),
+        pytest.param(ARM, [moved, without("drive")], {}, LOOP, id="one trace has no drive"),
+        pytest.param(ARM, [noisy], {}, LOOP, id="accelerations within noise"),
+        pytest.param(ARM, [short], {}, LOOP, id="too short for torques"),
+        pytest.param(ARM, [moved], {"method": LOOP}, LOOP, id="the simulation is asked for"),
+        pytest.param(BOARD, [of_the_board], {"method": TORQUES}, TORQUES, id="torques are asked for"),
+        pytest.param(ARM, [moved], {"method": TORQUES, "designs": True}, TORQUES, id="beside an experiment"),
+    ],
+)
+def test_the_method_is_the_one_that_can_show_what_is_looked_for(
+    model: Model, traces: list[Callable[[], Trace]], options: dict[str, Any], method: str
+) -> None:
+    assert chosen(model, *traces, **options) == method
 
 
 def test_a_simulation_without_a_controller_or_set_points_is_refused() -> None:
-    for model, trace in ((WITHOUT_CONTROLLER, slid()), (ARM, replace(moved(), set_point=None))):
+    for model, trace in ((WITHOUT_CONTROLLER, slid), (ARM, without("set_point"))):
         with pytest.raises(SpecError, match="method output-error: simulates the controller, so it needs a machine"):
-            chosen(model, trace, method="output-error")
+            chosen(model, trace, method=LOOP)
 
 
 def test_a_balance_of_torques_without_drives_is_refused() -> None:

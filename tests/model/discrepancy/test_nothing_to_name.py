@@ -42,9 +42,7 @@ def test_a_sound_arm_is_called_sound(tmp_path: Path, experiment: str) -> None:
     answer = diagnosed(tmp_path, experiment=experiment)
     assert answer.verdict == "nothing-significant", answer.summary
     assert not [s for s in answer.steps if s.adopted]
-    assert answer.where is not None
     assert answer.where.joint is None
     assert answer.where.cells
     assert answer.candidates, "what was tried proves that nothing is significant"
-    assert answer.significant is not None
     assert max((c.evidence for c in answer.candidates if c.refitted), default=0.0) < answer.significant

@@ -52,7 +52,6 @@ RIGS: dict[str, Rig] = {
     "slide": lambda _: (rigs.slide_machine(), [rigs.slide_trace(s, {"coulomb": 6.0}) for s in (1, 2)]),
     "bench": lambda _: (rigs.bench_machine(), [rigs.bench_trace(s, {"dead_zone": 0.8}) for s in (1, 2)]),
     "geared": lambda _: (rigs.geared_machine(), [rigs.geared_trace(s, {"gap": 0.01}) for s in (1, 2)]),
-    "six": lambda _: (rigs.six_machine(), [rigs.six_trace(s, {"payload": 1.0}) for s in (1, 2)]),
     "outside": _outside(dead_zone=(2, 1.2)),
 }
 """Every rig of the examples and the tests that has no board. The board's drive is counts of its own."""

@@ -25,7 +25,6 @@ def in_unit(machine: Machine, factor: float) -> Machine:
 
 def recorded(trace: Trace, factor: float) -> Trace:
     """The record in that unit."""
-    assert trace.drive is not None
     return replace(trace, drive=factor * trace.drive)
 
 

@@ -70,19 +70,6 @@ def test_one_kind_of_inertia_is_enough_and_a_chain_cannot_be_changed_in_place() 
         TABLE_7_9.chain().gravity[2] = 0.0
 
 
-def test_the_load_acts_as_one_more_point_of_the_last_link() -> None:
-    chain = random_chain(5, 3)
-    lever = chain.load_position
-    points = replace(chain, load=0.0).arrays()
-    points.inertial[-1, 0] += chain.load
-    points.inertial[-1, 1:4] += chain.load * lever
-    x, y, z = lever
-    points.inertial[-1, 4:] += chain.load * np.array(
-        [y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y]
-    )
-    np.testing.assert_allclose(points.inertial, chain.arrays().inertial, atol=1e-15)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -122,24 +109,11 @@ def test_sine_and_cosine_are_right_to_the_last_digits(x: float) -> None:
     assert abs(c - math.cos(x)) <= 2.3e-16
 
 
-@given(st.floats(-100.0, 100.0), st.floats(-10.0, 10.0))
-def test_dual_sine_and_cosine_carry_the_derivative(x: float, slope: float) -> None:
-    s, c = compiled_sin_cos(complex(x, DUAL_STEP * slope))
-    assert s.imag / DUAL_STEP == pytest.approx(slope * math.cos(x), abs=1e-14)
-    assert c.imag / DUAL_STEP == pytest.approx(-slope * math.sin(x), abs=1e-14)
-
-
 @pytest.mark.parametrize("x", [0.7, 0.7 + DUAL_STEP * 1j])
 def test_interpreted_functions_agree_with_compiled_ones(x: complex) -> None:
     assert sin_cos(x) == pytest.approx(compiled_sin_cos(x), abs=1e-15)
     assert sin_cos(x) == pytest.approx((cmath.sin(x), cmath.cos(x)), abs=1e-15)
     assert reciprocal(x) == pytest.approx(compiled_reciprocal(x), abs=1e-15)
-
-
-@given(st.floats(0.01, 100.0))
-def test_dual_reciprocal_carries_the_derivative(x: float) -> None:
-    r = compiled_reciprocal(complex(x, DUAL_STEP))
-    assert r.imag / DUAL_STEP == pytest.approx(-1 / x**2, rel=1e-14)
 
 
 @numba.njit

@@ -11,7 +11,7 @@ from model.dynamics import effective_inertia, recursive, three_joint, three_join
 from model.dynamics.dual import DUAL_STEP
 from model.dynamics.effective_inertia import effective_parameters, has_closed_form
 from model.dynamics.linear_solve import solve_symmetric
-from model.dynamics.rod_arm import LENGTH_2, PUBLISHED_INERTIA, SIZE, RodArm, effective_from_rods
+from model.dynamics.rod_arm import PUBLISHED_INERTIA, SIZE, RodArm, effective_from_rods
 from model.generation.printing import source_hash, text_hash
 from model.kinematics.chain import Chain, ChainError, FloatArray, Joint
 from tests.model.dynamics.chains import OFFSET_ARM, TABLE_7_9, dual, random_chain, random_link, random_state
@@ -126,16 +126,6 @@ def central_difference(
         moved[parameter] += sign * step
         sides.append(np.asarray(accelerations(q, v, torque, effective_from_rods(moved))))
     return (sides[0] - sides[1]) / (2 * step)
-
-
-def test_real_part_of_a_dual_evaluation_is_the_real_evaluation() -> None:
-    rods = OFFSET_ARM.vector()
-    stepped = rods.astype(complex)
-    stepped[LENGTH_2] += 1j * DUAL_STEP
-    q, v, torque = random_state(4, 3)
-    real = accelerations(q, v, torque, effective_from_rods(rods))
-    twin = accelerations(q.astype(complex), v.astype(complex), torque.astype(complex), effective_from_rods(stepped))
-    np.testing.assert_allclose(np.real(twin), real, rtol=1e-13)
 
 
 def test_recursion_gives_the_same_sensitivity_to_a_mass() -> None:

@@ -12,11 +12,9 @@ from daq.contracts.effects import effect_names
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from model import layout as at
-from model.design.information import information_gain
 from model.effects.effect import Effect
 from model.effects.effect_files import load_effect_file
 from model.effects.library import library, own_effects, remove_own
-from model.fitting.options import FitOptions
 from model.inverse_dynamics.fit import fit_torques
 from model.machine_model.model import Model, base_model
 from model.machine_model.model_file import load_model, model_of, save_model
@@ -28,7 +26,6 @@ from tests.model.simulation.records import ramp_inputs, trace_of
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 SMOOTH = Options(quantise=False)
-SLIGHT = ("resistance_drift", "resistance_rise", "supply_limit", "centre_of_mass")
 ADDS_STATE_AT_NULL = {"backlash", "joint_compliance", "motor_inductance"}
 """Their state stays, at its null value, as a stiff contact, or a fast current."""
 
@@ -65,20 +62,6 @@ def test_the_library_has_every_shared_name() -> None:
 )
 def test_at_its_null_value_an_effect_changes_nothing(model: Model, inputs: RunInputs, name: str) -> None:
     assert np.array_equal(run(with_(model, name), inputs).position, run(model, inputs).position)
-
-
-@pytest.mark.parametrize("name", sorted(library()))
-def test_at_its_expected_size_an_effect_moves_arm_or_reading(model: Model, inputs: RunInputs, name: str) -> None:
-    changed = with_(model, name)
-    sizes = {
-        p.name: p.deviation * (-1 if p.name.endswith("voltage") else 1) + (p.null or 0)
-        for p in changed.parameters
-        if p.effect == name and p.null is not None and (not p.joints or 2 in p.joints) and p.deviation is not None
-    }
-    changed = changed.with_values({n: min(v, changed.parameter(n).high) for n, v in sizes.items()})
-    difference = np.abs(run(changed, inputs).reading - run(model, inputs).reading).max()
-    # the shoulder's gear hides its load; what a short record warms is slight
-    assert difference > (2e-5 if name in SLIGHT else 2e-4)
 
 
 def test_names_that_are_unknown_and_changes_that_are_impossible_are_refused(model: Model) -> None:
@@ -214,8 +197,6 @@ def test_a_fit_of_torques_finds_it(air_drag: Effect) -> None:
     del air_drag
     dragged = []
     for given in (swinging(1), swinging(5)):
-        assert given.drive is not None
-        assert given.velocity is not None
         torque = 0.02 * np.abs(given.velocity) * given.velocity
         dragged.append(dataclasses.replace(given, drive=given.drive + torque / 0.5))
     model = rod().with_effect("air_drag", (1,))
@@ -232,7 +213,6 @@ def test_a_saved_model_says_which_file_it_needs(air_drag: Effect, tmp_path: Path
     assert load_model(path).identity == model.identity
     assert model.without_effect("air_drag").identity == axis(0.0).without_effect("air_drag").identity
     remove_own("air_drag")
-    assert air_drag.file is not None
     with pytest.raises(SpecError, match=rf"name its file, air_drag.py \(SHA-256 {air_drag.file.sha256}"):
         load_model(path)
     (tmp_path / "air_drag.py").write_text(shown() + "# edited\n")
@@ -306,14 +286,3 @@ def test_effects_keep_to_their_joints_and_to_the_room_there_is(tmp_path: Path) -
     load_effect_file(written(tmp_path, many, body, "eight"))
     with pytest.raises(SpecError, match="9 parameters; a model has room for 8"):
         model.with_effect("pull", (2,)).with_effect("eight", (1,))
-
-
-def test_an_experiment_is_judged_by_what_it_tells_of_it(air_drag: Effect) -> None:
-    from daq.contracts.experiment import ExperimentSpec, Sine
-
-    del air_drag
-    spec = ExperimentSpec(trajectory=Sine(amplitude=1.0, period=1.0, cycles=2), joints=(1,))
-    gain = information_gain(
-        axis(0.02), [spec], lambda _: SWING.position, options=FitOptions(parameters=(DRAG,), sensor_bend=False)
-    )
-    assert gain.parameters[0].after < 0.5 * gain.parameters[0].before

@@ -41,7 +41,6 @@ def test_a_named_parameter_is_found_between_its_bounds_unless_it_is_held() -> No
     assert "joint2.motor.torque_constant" in names, "named, it is found though it fixes the scale of torque"
     # Its expected deviation is zero
     load = machine().load
-    assert load is not None
     model = base_model(machine().model_copy(update={"load": load.model_copy(update={"deviation": 0.0})}))
     assert model.parameter("load.mass").deviation == 0.0
     assert "load.mass" in {u.name for u in chosen_unknowns(arm(), FitOptions())}
@@ -129,7 +128,6 @@ def test_potentiometers_bend_as_far_as_their_stated_linearity_lets_expect() -> N
     assert {u.joints for u in bends} == {(1,), (2,), (3,)}
     for joint in (1, 2, 3):
         sensor = machine().joint(joint).sensor
-        assert sensor is not None
         size = 0.0025 if sensor.linearity is None else sensor.linearity.value
         first, second = [u for u in bends if u.joints == (joint,)]
         assert first.deviation == pytest.approx(0.5 * size * sensor.range.value)
@@ -148,9 +146,7 @@ def test_the_arm_may_start_off_the_posture_that_was_read_by_the_sensor_s_error()
     found = start_postures(machine(), records, bends=False)
     assert [(u.trace, u.joints) for u in found] == [(t, (j,)) for t in (0, 1) for j in (1, 2, 3)]
     sensor = machine().joint(1).sensor
-    assert sensor is not None
     assert found[0].deviation == pytest.approx(max(sensor_deviation(sensor), sensor.count))
-    assert found[0].deviation is not None
     assert (found[0].low, found[0].high) == pytest.approx((-20 * found[0].deviation, 20 * found[0].deviation))
     assert all((u.start, u.expected, u.nuisance) == (0.0, 0.0, True) for u in found)
     bent = start_postures(machine(), records, bends=True)[0].deviation

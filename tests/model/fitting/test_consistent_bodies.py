@@ -215,38 +215,10 @@ FREE = np.zeros(3, dtype=bool)
 SEVEN = arrays(float, 7, elements=st.floats(-3, 3))
 
 
-def published(seven: Floats, centre: Floats) -> Floats:
-    """J = U Uᵀ as Rucker and Wensing print U."""
-    a, d1, d2, d3, s12, s13, s23 = seven
-    rows = [
-        [np.exp(d1), s12, s13, centre[0]],
-        [0.0, np.exp(d2), s23, centre[1]],
-        [0.0, 0.0, np.exp(d3), centre[2]],
-        [0.0, 0.0, 0.0, 1.0],
-    ]
-    upper = np.exp(a) * np.array(rows)
-    return np.asarray(upper @ upper.T)
-
-
 def in_pinocchio(seven: Floats) -> pinocchio.LogCholeskyParameters:
     """The same body there, which has s23 before s13; its centre is at the origin."""
     a, d1, d2, d3, s12, s13, s23 = seven
     return pinocchio.LogCholeskyParameters(np.array([a, d1, d2, d3, s12, s23, s13, 0.0, 0.0, 0.0]))
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_mass_centre_and_moments_are_those_of_the_published_matrix(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    seven, centre = rng.normal(size=7), rng.normal(size=3)
-    pseudo = published(seven, centre)
-    mass = pseudo[3, 3]
-    assert np.exp(2 * seven[0]) == pytest.approx(mass)
-    np.testing.assert_allclose(pseudo[:3, 3] / mass, centre)
-    about_origin = np.trace(pseudo[:3, :3]) * np.eye(3) - pseudo[:3, :3]
-    about_centre = about_origin - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    found, _ = body_of(seven, FREE, np.zeros(6))
-    np.testing.assert_allclose(matrix_of(found), about_centre, atol=1e-11 * np.abs(about_origin).max())
-    np.testing.assert_allclose(log_cholesky(mass, found), seven, atol=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -1,7 +1,5 @@
 """Identifiability on Jacobians whose blind directions are known, and profile likelihoods."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -13,12 +11,12 @@ from daq.contracts.service.jobs import ParameterWords
 from model.arrays import Floats
 from model.fitting.identifiability import judged, undetermined_in_words
 from model.fitting.least_squares import Search, solve
-from model.fitting.problem import Evaluation
 from model.fitting.profile import RISE, Profile, profiled
 from model.fitting.unknowns import Unknown
 from model.fitting.whitening import Whitener, white
 from model.machine_model.parameter import Kind, Parameter
 from model.units import torque_power
+from tests.model.fitting.problems import Formula, free
 
 RANDOM = partial(np.random.default_rng, 5)
 
@@ -132,42 +130,37 @@ STUDENT_T = 2.228139
 """97.5 % quantile of Student's t with the 10 degrees of freedom that 12 velocities leave 2 parameters."""
 
 
-def parameter(name: str) -> Parameter:
-    return Parameter(name=name, kind=Kind.EFFECT, part=name, unit="1", value=1.0)
+def enzyme() -> Formula:
+    """V c/(K + c), Michaelis and Menten."""
+
+    def velocity(v: Floats) -> Floats:
+        return np.asarray(v[0] * CONCENTRATION / (v[1] + CONCENTRATION))
+
+    def slopes(v: Floats) -> Floats:
+        return np.array([velocity(v) / v[0], -velocity(v) / (v[1] + CONCENTRATION)])
+
+    return Formula(VELOCITY, velocity, slopes, (free("V", 200.0), free("K", 0.05, 0.0, 10.0)))
 
 
-@dataclass(frozen=True)
-class Curve:
-    """Some curve through points, as a problem of a fit."""
-
-    of: str
-    measured: Floats
-    unknowns: tuple[Unknown, ...]
-    floor: Floats = field(default_factory=lambda: np.ones(1))
-
-    @property
-    def runs(self) -> Sequence[Sequence[slice]]:
-        return [[slice(0, len(self.measured))]]
-
-    def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
-        if self.of == "enzyme":  # V c/(K + c), Michaelis and Menten
-            largest, half = values
-            slopes = [CONCENTRATION / (half + CONCENTRATION), -largest * CONCENTRATION / (half + CONCENTRATION) ** 2]
-            model = largest * slopes[0]
-        elif self.of in ("cliff", "unstable"):
-            over = max(0.0, values[0] - 2.0)
-            if self.of == "unstable" and over > 0.0:
-                raise SpecError("the simulation does not stay finite")
-            model = np.full(len(self.measured), 1e4 * over)
-            slopes = [np.full(len(self.measured), 1e4 if over else 0.0), np.zeros(len(self.measured))]
-        else:  # a sum of two, of which the second has nothing to show
-            slopes = [np.linspace(0, 1, len(self.measured)), np.zeros(len(self.measured))]
-            model = values[0] * slopes[0]
-        jacobian = np.array(slopes)[:, :, None] if derivatives else None
-        return [Evaluation((model - self.measured)[:, None], jacobian)]
+def line(measured: Floats, slope: Unknown) -> Formula:
+    """A straight line's slope, and a number that has nothing to show."""
+    J = np.stack([np.linspace(0, 1, len(measured)), np.zeros(len(measured))])
+    return Formula(measured, lambda v: v @ J, lambda _: J, (slope, free("nothing", 1.0, -5.0, 5.0)))
 
 
-def of(problem: Curve, index: int, size: float, noise: float, rise: float = RISE) -> Profile:
+def cliff(fails: bool) -> Formula:
+    """Flat to 2, then too steep for a straight line between two trials, or no simulation that stays finite."""
+
+    def over(v: Floats) -> Floats:
+        if fails and v[0] > 2.0:
+            raise SpecError("the simulation does not stay finite")
+        return np.full(20, 1e4 * max(0.0, v[0] - 2.0))
+
+    unknowns = (free("slope", 1.0, -5.0, 50.0), free("nothing", 1.0, -5.0, 5.0))
+    return Formula(np.zeros(20), over, lambda v: np.outer([1e4 * (v[0] > 2.0), 0.0], np.ones(20)), unknowns)
+
+
+def of(problem: Formula, index: int, size: float, noise: float, rise: float = RISE) -> Profile:
     whiteners: list[Whitener] = [white(noise)]
     begin = np.array([u.start for u in problem.unknowns])
     best = solve(problem, whiteners, begin, Never(), SEARCH)
@@ -176,7 +169,7 @@ def of(problem: Curve, index: int, size: float, noise: float, rise: float = RISE
 
 def test_the_intervals_of_the_puromycin_data_are_those_that_r_computes() -> None:
     """`confint` of R (package MASS) on `nls(rate ~ Vm * conc/(K + conc), Puromycin, subset = state == "treated")`."""
-    problem = Curve("enzyme", VELOCITY, (Unknown(parameter("V"), 200.0), Unknown(parameter("K"), 0.05, 0.0, 10.0)))
+    problem = enzyme()
     residual = solve(problem, [white(1.0)], np.array([200.0, 0.05]), Never(), SEARCH)
     noise = float(np.sqrt(2 * residual.cost / 10))
     assert residual.values == pytest.approx([212.7, 0.06412], rel=1e-3)
@@ -187,44 +180,29 @@ def test_the_intervals_of_the_puromycin_data_are_those_that_r_computes() -> None
 
 def test_a_straight_line_has_the_interval_of_its_deviation_and_a_prior_of_its_own_takes_no_part() -> None:
     measured = 3.0 * np.linspace(0, 1, 50)
-    slope = Unknown(parameter("slope"), 1.0, expected=0.0, deviation=0.01)
-    found = of(Curve("line", measured, (slope, Unknown(parameter("nothing"), 1.0, -5.0, 5.0))), 0, 0.1, 0.2)
+    found = of(line(measured, free("slope", expected=0.0, deviation=0.01)), 0, 0.1, 0.2)
     deviation = 0.2 / np.linalg.norm(np.linspace(0, 1, 50))
-    assert found.low is not None
-    assert found.high is not None
     assert (found.low - 3.0, found.high - 3.0) == pytest.approx((-1.959964 * deviation, 1.959964 * deviation), rel=2e-3)
     assert found.rises == pytest.approx([((value - 3.0) / deviation) ** 2 for value in found.values], abs=1e-6)
 
 
 def test_a_profile_ends_at_a_cliff_or_nowhere() -> None:
-    # Flat to 2, then too steep for a straight line between two trials, then no simulation that stays finite
-    slope = Unknown(parameter("slope"), 1.0, -5.0, 50.0)
-    for of_ in ("cliff", "unstable"):
-        found = of(Curve(of_, np.zeros(20), (slope, Unknown(parameter("nothing"), 1.0, -5.0, 5.0))), 0, 0.3, 0.2)
-        assert found.high == pytest.approx(2.0, abs=0.05), of_
+    for fails in (False, True):
+        found = of(cliff(fails), 0, 0.3, 0.2)
+        assert found.high == pytest.approx(2.0, abs=0.05), fails
         assert found.low is None
         assert all(np.isfinite(found.rises))
-    slope, nothing = Unknown(parameter("slope"), 1.0), Unknown(parameter("nothing"), 1.0, -5.0, 5.0)
-    found = of(Curve("line", np.linspace(0, 1, 50), (slope, nothing)), 1, 0.1, 0.2)
+    found = of(line(np.linspace(0, 1, 50), free("slope")), 1, 0.1, 0.2)
     assert (found.low, found.high, found.better) == (None, None, False)
     assert (found.values[0], found.values[-1]) == (-5.0, 5.0)
     assert found.rises == pytest.approx([0.0] * len(found.rises), abs=1e-9)
 
 
-def test_steps_outwards_double_while_the_likelihood_hardly_changes_and_progress_grows() -> None:
-    time = np.linspace(0, 1, 50)
-    deviation = 0.2 / np.linalg.norm(time)
-    slope, nothing = Unknown(parameter("slope"), 1.0), Unknown(parameter("nothing"), 1.0, -5.0, 5.0)
-    found = of(Curve("line", 3.0 * time, (slope, nothing)), 0, 0.1 * deviation, 0.2)
-    away = sorted((value - 3.0) / deviation for value in found.values if value > 3.0)
-    # 1.5 deviations raise −2 ln L by 2.25, which is more than a quarter of 3.84: the next step is as long as the last.
-    assert [*away[:4], away[-1]] == pytest.approx([0.1, 0.3, 0.7, 1.5, 2.3], rel=1e-6)
+def test_progress_of_a_profile_grows_to_one() -> None:
     told: list[float] = []
-    problem = Curve("enzyme", VELOCITY, (Unknown(parameter("V"), 200.0), Unknown(parameter("K"), 0.05, 0.0, 10.0)))
     profiled(
-        problem, [white(10.9)], np.array([212.7, 0.064]), 0, 2.0, SEARCH, progress=lambda share, _: told.append(share)
+        enzyme(), [white(10.9)], np.array([212.7, 0.064]), 0, 2.0, SEARCH, progress=lambda share, _: told.append(share)
     )
     assert told == sorted(told)
-    assert told[0] == 0.0
-    assert told[-1] == 1.0
+    assert (told[0], told[-1]) == (0.0, 1.0)
     assert sum(0.5 < share < 1.0 for share in told) > 1

@@ -21,6 +21,7 @@ from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.fitting.imagined import arm
+from tests.model.fitting.problems import Formula, free
 from tests.model.fitting.test_identifiability import unknown
 from tests.model.fitting.test_records import record_of
 
@@ -160,36 +161,23 @@ def test_a_plain_sandwich_is_done_by_hand_and_a_filter_s_memory_is_a_twentieth()
 # ---- searches
 
 
-class Rosenbrock:
+def rosenbrock(high: float = math.inf, fails_beyond: float = math.inf) -> Formula:
     """Residuals of Rosenbrock's valley, whose lowest point is (1, 1)."""
 
-    def __init__(self, high: float = math.inf, fails_beyond: float = math.inf) -> None:
-        self.high, self.fails_beyond = high, fails_beyond
-        self.tried: list[Floats] = []
-        self.runs = [[slice(0, 2)]]
-        self.floor = np.array([1e-3])
-
-    @property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        return tuple(
-            Unknown(Parameter(name=n, kind=Kind.EFFECT, part=n, unit="1", value=-0.5), -0.5, -2.0, self.high, size=0.5)
-            for n in "xy"
-        )
-
-    def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
-        self.tried.append(values.copy())
-        x, y = values
-        if x > self.fails_beyond:
+    def residual(v: Floats) -> Floats:
+        if v[0] > fails_beyond:
             raise SpecError("it does not stay finite")
-        jacobian = np.array([[-20.0 * x, -1.0], [10.0, 0.0]])[:, :, None] if derivatives else None
-        return [Evaluation(np.array([[10.0 * (y - x**2)], [1.0 - x]]), jacobian)]
+        return np.array([10.0 * (v[1] - v[0] ** 2), 1.0 - v[0]])
+
+    unknowns = tuple(free(n, -0.5, -2.0, high, size=0.5) for n in "xy")
+    return Formula(np.zeros(2), residual, lambda v: np.array([[-20.0 * v[0], -1.0], [10.0, 0.0]]), unknowns)
 
 
 START = np.array([-0.5, -0.5])
 
 
 def test_the_simplex_finds_the_lowest_point_and_says_what_it_costs() -> None:
-    problem, told = Rosenbrock(), []
+    problem, told = rosenbrock(), []
     found = climb(problem, START, Never(), 2000, 1e-9, lambda count, rms: told.append((count, rms)))
     np.testing.assert_allclose(found.values, [1.0, 1.0], atol=1e-4)
     assert found.converged
@@ -201,26 +189,26 @@ def test_the_simplex_finds_the_lowest_point_and_says_what_it_costs() -> None:
 
 
 def test_the_simplex_starts_towards_more_room_and_ends_at_its_goal() -> None:
-    problem = Rosenbrock(high=0.9)
+    problem = rosenbrock(high=0.9)
     found = climb(problem, np.array([0.5, 0.6]), Never(), 2000, 1e-9)
     np.testing.assert_allclose(problem.tried[:3], [[0.5, 0.6], [0.0, 0.6], [0.5, 0.1]])
     assert max(values.max() for values in problem.tried) <= 0.9
     np.testing.assert_allclose(found.values, [0.9, 0.81], atol=1e-3)
-    found = climb(Rosenbrock(), START, Never(), 2000, 1e-9, goal=0.5)
+    found = climb(rosenbrock(), START, Never(), 2000, 1e-9, goal=0.5)
     assert (found.converged, found.message) == (True, "the requested error is reached")
     assert found.cost <= 0.5
-    short = climb(Rosenbrock(), START, Never(), 10, 1e-9)
+    short = climb(rosenbrock(), START, Never(), 10, 1e-9)
     assert (short.converged, short.evaluations) == (False, 10)
 
 
 def test_searches_turn_back_where_the_simulation_diverges_and_say_when_they_cannot_begin() -> None:
-    assert climb(Rosenbrock(fails_beyond=0.5), START, Never(), 2000, 1e-9).values[0] <= 0.5
-    found = solve(Rosenbrock(fails_beyond=0.5), [white(1.0)], START, Never(), Search(False, 1e-9, 200))
+    assert climb(rosenbrock(fails_beyond=0.5), START, Never(), 2000, 1e-9).values[0] <= 0.5
+    found = solve(rosenbrock(fails_beyond=0.5), [white(1.0)], START, Never(), Search(False, 1e-9, 200))
     assert found.values[0] <= 0.5
     assert found.cost < 0.5 * rosen(START)
     with pytest.raises(SpecError, match="does not stay finite"):
-        solve(Rosenbrock(fails_beyond=-1.0), [white(1.0)], START, Never())
-    problem = Rosenbrock(high=0.5)
+        solve(rosenbrock(fails_beyond=-1.0), [white(1.0)], START, Never())
+    problem = rosenbrock(high=0.5)
     solve(problem, [white(1.0)], np.array([-2.0, 0.5]), Never(), Search(False, 1e-9, 1))
     np.testing.assert_allclose(problem.tried[0], [-2.0 + 0.5e-3, 0.5 - 0.5e-3])
     ten = [record_of(list(range(10)), still=0)]
@@ -233,7 +221,7 @@ def test_searches_turn_back_where_the_simulation_diverges_and_say_when_they_cann
 def test_a_search_tells_its_evaluations_and_gives_the_information_at_its_end() -> None:
     told: list[tuple[int, float]] = []
     search = Search(False, 1e-12, 200, lambda count, rms: told.append((count, rms)))
-    found = solve(Rosenbrock(), [white(2.0)], START, Never(), search)
+    found = solve(rosenbrock(), [white(2.0)], START, Never(), search)
     assert found.converged
     np.testing.assert_allclose(found.values, [1.0, 1.0], atol=1e-6)
     assert [count for count, _ in told] == list(range(1, found.evaluations + 1))
@@ -245,22 +233,11 @@ def test_a_search_tells_its_evaluations_and_gives_the_information_at_its_end() -
 
 def test_what_is_expected_pulls_as_its_deviation_says() -> None:
     """One straight unknown: the data say 3 ± 1, the prior 1 ± 0.5, so the answer is their weighted mean."""
-
-    class Straight(Rosenbrock):
-        @property
-        def unknowns(self) -> tuple[Unknown, ...]:
-            part = Parameter(name="x", kind=Kind.EFFECT, part="x", unit="1", value=0.0)
-            return (Unknown(part, 0.0, expected=1.0, deviation=0.5),)
-
-        def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
-            return [Evaluation(np.array([[values[0] - 3.0]]), np.ones((1, 1, 1)) if derivatives else None)]
-
-    problem = Straight()
-    problem.runs = [[slice(0, 1)]]
+    unknown = free("x", 0.0, expected=1.0, deviation=0.5)
+    problem = Formula(np.array([3.0]), lambda v: v, lambda _: np.ones((1, 1)), (unknown,))
     found = solve(problem, [white(1.0)], np.zeros(1), Never(), Search(False, 1e-12))
     assert found.values[0] == pytest.approx((3.0 + 4 * 1.0) / 5)
     assert found.cost == pytest.approx(0.5 * (1.6**2 + (0.4 / 0.5) ** 2))
-    assert found.information is not None
     assert found.information[0, 0] == pytest.approx(1 + 4)
 
 

@@ -67,17 +67,14 @@ def test_a_record_is_cut_where_samples_are_missing() -> None:
 
 def test_the_drive_before_the_record_is_the_mean_over_its_initial_rest_or_none() -> None:
     whole = record_of(list(range(200)))
-    assert whole.drive is not None
     (found,) = records_of([whole], machine(), "position")
     np.testing.assert_allclose(found.inputs.first_drive, whole.drive[:20].mean(axis=0))
     early = record_of(list(range(200)), still=7)
-    assert early.drive is not None
     (found,) = records_of([early], machine(), "position")
     np.testing.assert_allclose(found.inputs.first_drive, early.drive[:8].mean(axis=0))
     made = record_of(list(range(100)))
     (found,) = records_of([replace(made, drive=None)], machine(), "position")
     assert not found.inputs.first_drive.any()
-    assert made.drive is not None
     (open_loop,) = records_of([replace(made, set_point=None)], machine(), "position")
     np.testing.assert_array_equal(open_loop.inputs.first_drive, made.drive[0])
 
@@ -103,7 +100,6 @@ def test_ten_samples_are_enough_of_a_signal_that_was_recorded() -> None:
 def test_a_reading_is_as_noisy_as_its_sensor_or_its_signal_shows() -> None:
     records = records_of([record_of(list(range(200)))], machine(), "position")
     sensor = machine().joint(1).sensor
-    assert sensor is not None
     noise = 0.0 if sensor.noise is None else sensor.noise.value
     assert sensor_deviation(sensor) == pytest.approx(np.sqrt(1 / 12 + noise**2) * COUNT)
     assert noise_floor(records, machine(), "position")[0] == pytest.approx(sensor_deviation(sensor))
@@ -119,7 +115,6 @@ def test_a_reading_is_as_noisy_as_its_sensor_or_its_signal_shows() -> None:
 def joints_apart(*apart: float) -> Trace:
     """A trace in which joint 1 travels 0.7 rad and the others are held; positions are so many rad off set points."""
     made = record_of(list(range(131)), rise=0.7)
-    assert made.set_point is not None
     points = made.set_point.copy()
     points[:, 1:] = STARTS[0][1:]
     return replace(made, set_point=points, position=points + np.array(apart))
@@ -137,13 +132,11 @@ def test_positions_lie_within_half_of_the_largest_travel_of_their_set_points(apa
 def test_positions_are_held_against_set_points_of_positions_that_move() -> None:
     own = machine()
     first = own.joints[1]
-    assert first.sensor is not None
     tachometer = first.model_copy(update={"sensor": first.sensor.model_copy(update={"measures": "velocity"})})
     mixed = own.model_copy(update={"joints": (own.joints[0], tachometer, *own.joints[2:])})
     found = check_records(base_model(mixed), [joints_apart(0.0, 5.0, 0.0)])
     assert "units-differ" not in [one.kind for one in found]
     made = joints_apart(0.0, 5.0, 0.0)
-    assert made.set_point is not None
     still = replace(made, set_point=np.tile(made.set_point[0], (len(made), 1)))
     with pytest.raises(TraceError, match="no motion: no joint of made moves by 4 counts of its sensor or more"):
         records_of([still], machine(), "position")
@@ -151,7 +144,6 @@ def test_positions_are_held_against_set_points_of_positions_that_move() -> None:
 
 def test_motion_that_was_asked_for_is_needed_in_one_trace() -> None:
     made = record_of(list(range(131)))
-    assert made.set_point is not None
     sagging = replace(made, set_point=np.tile(made.set_point[0], (len(made), 1)))
     with pytest.raises(TraceError, match="no motion"):
         records_of([sagging], machine(), "position")
@@ -159,7 +151,6 @@ def test_motion_that_was_asked_for_is_needed_in_one_trace() -> None:
     with pytest.raises(TraceError, match="no motion"):
         records_of([asked], machine(), "position")
     made = record_of(list(range(131)))
-    assert made.set_point is not None
     still = np.tile(made.set_point[0], (len(made), 1))
     named = made.record.model_copy(update={"trace_id": "other"})
     second = replace(made, record=named, set_point=still, position=still)
@@ -222,7 +213,6 @@ def test_derivatives_are_those_of_the_residual_and_a_start_its_record_s(problem:
         back[k] -= step
         pairs = zip(problem.evaluate(there, False), problem.evaluate(back, False), found, strict=True)
         for t, (above, below, exact) in enumerate(pairs):
-            assert exact.jacobian is not None
             slope = (above.residual - below.residual) / (2 * step)
             np.testing.assert_allclose(exact.jacobian[k], slope, rtol=1e-3, atol=1e-4 * np.abs(slope).max() + 1e-12)
             assert exact.jacobian[k].any() == (unknown.trace in (None, t))

@@ -155,7 +155,6 @@ def test_a_hidden_friction_is_not_explained_by_numbers_that_its_fit_has_moved() 
     """Whatever the fit does with its numbers, its verdict is not that all is well."""
     rubbing = arm().with_effect("stribeck_friction", (2,), {"torque": 20.0})
     found = fit(arm(), [trace(rubbing, 0), trace(rubbing, 1)], FitOptions(rounds=1)).verdict
-    assert found is not None
     assert found.text != "The model explains the records within their noise."
     assert "`daq diagnose`" in found.text
 
@@ -172,6 +171,5 @@ def test_as_much_left_as_was_recorded_is_no_explanation() -> None:
     false[::3] = 0.0
     broken = changed(recorded, position=false)
     found = validate_by_distortion(arm(), [broken], ["link2.mass"]).verdict
-    assert found is not None
     assert not found.explains
     assert "The model explains" not in found.text

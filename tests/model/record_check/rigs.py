@@ -26,8 +26,6 @@ Made = Callable[[Path], tuple[Machine, Trace]]
 
 def _program(name: str) -> ModuleType:
     spec = spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

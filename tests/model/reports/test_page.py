@@ -89,7 +89,6 @@ def test_pooled_traces_count_by_their_samples() -> None:
         return TraceAgreement(trace="t", held_out=None, samples=samples, joints=(joint,))
 
     both = pooled([trace(9, 1.0), trace(1, 2.0)])
-    assert both is not None
     assert both[0].rmse ** 2 == pytest.approx(1.3)
     assert both[0].largest == 2.0
     assert pooled([]) is None

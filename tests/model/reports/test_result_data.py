@@ -70,7 +70,6 @@ def test_why_a_clear_dependence_is_no_finding_is_told_with_what_came_nearest() -
     within_noise = NOWHERE.model_copy(update={"joint": None})
     nothing = answer.model_copy(update={"verdict": "nothing-significant", "significant": 30.0})
     given = diagnosis_data(nothing, None, within_noise).given
-    assert given is not None
     best = max(c.evidence for c in answer.steps[0].candidates)
     assert given.not_a_finding == (
         "σ says how certain the dependence is, not how large: no joint is off by more than noise. This is not a "

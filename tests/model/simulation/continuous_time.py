@@ -279,7 +279,6 @@ class _Joint:
     @property
     def _supply(self) -> float:
         limit = self.model.machine.joint(self.number).dc_motor.supply_limit
-        assert limit is not None
         return limit.value
 
 
@@ -288,7 +287,6 @@ def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
     rows = []
     for j in (1, 2, 3):
         drive, sensor = model.machine.joint(j).dc_motor, model.machine.joint(j).sensor
-        assert sensor is not None
 
         def of(name: str, null: float = 0.0, j: int = j) -> float:
             return value.get(f"joint{j}.{name}", null)

@@ -115,14 +115,6 @@ def test_closed_form_and_recursive_runs_agree_with_every_effect(model: Model) ->
     assert np.abs(fast.position - simulate(model, inputs, Options(quantise=False)).position).max() > COUNT
 
 
-def test_steps_of_one_millisecond_follow_the_arm_as_its_machine_file_has_it(model: Model) -> None:
-    inputs = ramp_inputs(model.machine)
-    exact = simulate(model, inputs, Options(quantise=False, step=1e-3 / 16)).position
-    error = np.abs(simulate(model, inputs, Options(quantise=False)).position - exact).max()
-    assert error < 1e-3 * COUNT
-    assert np.abs(simulate(model, inputs, Options(quantise=False, step=4e-3)).position - exact).max() > 5 * error
-
-
 def test_runs_repeat_to_the_bit_and_do_not_depend_on_their_neighbours(model: Model) -> None:
     inputs = ramp_inputs(model.machine)
     once = simulate(model, inputs)

@@ -100,7 +100,6 @@ def test_the_same_arm_moves_alike_whichever_way_its_sensors_and_motors_are_conne
 
 
 def test_the_arm_in_a_mirror_moves_as_the_mirrored_arm_does(model: Model, trace: Trace) -> None:
-    assert trace.set_point is not None
     plain = simulate(model, trace, UNROUNDED)
     in_mirror = replace(trace, position=np.array(AXES) - trace.position, set_point=np.array(AXES) - trace.set_point)
     other = simulate(base_model(mirrored(model.machine)), in_mirror, UNROUNDED)
@@ -132,7 +131,6 @@ def test_records_of_an_arm_with_other_signs_fit_the_same_numbers(turns: tuple[tu
     )
     for name, value in truth.items():
         one, same = plain.parameter(name), other.parameter(name)
-        assert one.deviation is not None
         assert same.deviation == pytest.approx(one.deviation, rel=0.5)  # of few replicas
         assert same.model_value == pytest.approx(one.model_value, abs=4 * one.deviation)  # noise is turned as well
         assert same.model_value == pytest.approx(value, abs=4 * one.deviation)
@@ -145,7 +143,6 @@ def test_what_the_controller_does_with_sensors_that_count_down_is_its_law(tmp_pa
     machine = with_sensors(load_machine("ma2000"), sensors)
     with rig(tmp_path, f"seed=5&secret_sensors={seed}") as arm:
         trace = arm.trace(arm.run(LONG_RAMP, machine=machine))
-    assert trace.drive is not None
     turned_by = trace.position[-1, 0] - trace.position[0, 0]
     assert abs(turned_by) > 0.3
     assert np.sign(trace.drive[:, 0].mean()) == np.sign(turned_by), "nothing but its motor turns the waist"

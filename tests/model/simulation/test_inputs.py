@@ -74,7 +74,6 @@ def test_when_set_points_were_taken_is_believed_or_concluded() -> None:
     # right
     wanted = np.array([0.0, 0.1, 0.2, 0.3])[:, None] * np.ones(3)
     whole = trace_of([0, 4, 8, 16], wanted, None)
-    assert whole.tick is not None
     told = np.array([0, 103, 90, 114])
     record = whole.record.model_copy(update={"every": 4})
     found = inputs_of(replace(whole, record=record, tick=whole.tick + 100, taken=told), MACHINE).set_points[:, 0]

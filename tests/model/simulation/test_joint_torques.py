@@ -78,19 +78,6 @@ def test_the_current_after_a_step_is_that_of_a_speed_that_changes_evenly(h: floa
     assert found == pytest.approx(currents(0.5, 0.9, 12.0, 2.0, h)[-1], rel=1e-7)
 
 
-@pytest.mark.parametrize("h", [1e-3, 0.05])
-def test_the_current_of_the_stages_has_the_impulse_and_the_way_of_the_exact_one(h: float) -> None:
-    """∫ i dt and ∫ (h − t) i dt over a step, by the weights of RK4 with a speed that changes evenly."""
-    speeds = (0.5, 0.7, 0.7, 0.9)
-    given = (WINDING, WARM, 2.0, 12.0, 0.5)
-    stages = [joint_torques.stage_current(*given, speed, stage, h) for stage, speed in enumerate(speeds)]
-    exact = currents(0.5, 0.9, 12.0, 2.0, h, 401)
-    share = np.linspace(0.0, 1.0, 401)
-    impulse, way = (float(np.trapezoid(exact * w, share)) for w in (np.ones(401), 1.0 - share))
-    assert (stages[0] + 2 * stages[1] + 2 * stages[2] + stages[3]) / 6 == pytest.approx(impulse, rel=1e-3)
-    assert (stages[0] + stages[1] + stages[2]) / 6 == pytest.approx(way, rel=1e-3)
-
-
 def test_a_settled_current_is_what_the_back_emf_leaves_and_a_winding_that_warms_steps_of_its_own() -> None:
     assert joint_torques.steady_current(WINDING, WARM, 12.0, 0.5) == pytest.approx((12.0 - 0.04 * 50 * 0.5) / 1.8)
     weak = WINDING.copy()
@@ -238,13 +225,6 @@ def test_the_table_has_a_row_for_each_joint_and_a_column_for_each_effect(tmp_pat
     assert table[0, 0, 0] == table[2, 0, 0] != table[2, 1, 0]
     assert table[2, :, 1].tolist() == list(BEYOND_COLUMNS)
     assert own_table(base_model(ARM), np.float64).shape == (3, 0, 2)
-
-
-def test_runs_in_dual_numbers_have_a_torque_of_their_own(tmp_path: Path) -> None:
-    loaded(tmp_path, "pull", "k, speed", "k * speed", "k")
-    model = base_model(ARM).with_effect("pull", (1,))
-    assert own_table(model, np.float64)[0, 0, 0] != own_table(model, np.complex128)[0, 0, 0]
-    assert own_table(model, np.float64)[0, 0, 0] == own_table(model, np.float64)[0, 0, 0], "it is compiled once"
 
 
 def arm_with(folder: Path, arguments: str, torque: str) -> Callable[[], Model]:

@@ -275,20 +275,6 @@ def test_friction_grows_with_the_weight_across_the_axis_of_its_joint() -> None:
     np.testing.assert_allclose(levels(chain, q, joints), expected)
 
 
-def test_friction_of_the_arm_of_rods_grows_as_the_source_has_it() -> None:
-    """(7.32) to (7.34), with what gravity does along the links."""
-    numbers = [(5.0, 1.0, 0.1), (2.0, 2.0, 0.2), (1.0, 3.0, 0.3)]
-    joints = np.array([joint(at.ROD, MASS=m, A=0.3, COULOMB=c, COULOMB_ARM=a) for m, c, a in numbers])
-    chain, q = body_of(*joints, LOAD=0.5, GRAVITY_Z=-9.81), np.array([0.4, 0.9, -0.5])
-    two, three = 2.0 * 9.81 * np.sin(q[1]), 1.5 * 9.81 * np.sin(q[1] + q[2])
-    expected = [
-        1.0 + 0.1 * abs(two * np.cos(q[1]) + three * np.cos(q[1] + q[2])),
-        2.0 + 0.2 * abs(two + three * np.cos(q[2])),
-        3.0 + 0.3 * abs(three),
-    ]
-    np.testing.assert_allclose(levels(chain, q, joints, published=1), expected)
-
-
 def test_friction_in_proportion_to_gravity_torque_is_a_share_of_the_slope_of_potential_energy() -> None:
     """Three joints, one of them sliding; gravity from anywhere."""
     rng = np.random.default_rng(11)

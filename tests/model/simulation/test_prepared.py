@@ -14,7 +14,6 @@ from model.drives import controller as pid
 from model.dynamics.wide_numbers import WIDTH
 from model.machine_model.model import base_model
 from model.machine_model.parameter import initial_position
-from model.simulation.batch import seed
 from model.simulation.inputs import inputs_of
 from model.simulation.prepared import Options, Prepared, prepare
 from model.simulation.simulate import sensitivities, simulate
@@ -51,7 +50,6 @@ def test_set_points_are_whole_posture_units_or_counts_of_the_sensor() -> None:
     assert found.period == 0.02
     # A board with a finer sensor counts in its own counts
     first = MA2000.joints[0]
-    assert first.sensor is not None
     finer = first.model_copy(update={"sensor": first.sensor.model_copy(update={"bits": 14})})
     machine = MA2000.model_copy(update={"joints": (finer, *MA2000.joints[1:])})
     wanted = np.tile(START, (4, 1))
@@ -101,18 +99,6 @@ def test_without_a_controller_and_in_open_loop_nothing_controls() -> None:
     assert driven.settings[at.DRIVE_RECORDED] == 1, "the first is left as it was"
 
 
-@pytest.mark.parametrize("quantise", [True, False])
-def test_options_reach_the_record(quantise: bool) -> None:
-    noise, initial = 0.3 * np.ones((60, 3)), np.ones((3, 2))
-    found = prepared(MA2000, still(), quantise=quantise, noise=noise, initial=initial, following=0.25)
-    assert found.settings[at.QUANTISE] == quantise
-    np.testing.assert_array_equal(found.noise, noise)
-    np.testing.assert_array_equal(found.initial, initial)
-    assert found.following == 0.25
-    plain = prepared(MA2000, still())
-    assert (plain.following, plain.noise.any(), plain.settings[at.QUANTISE]) == (0.0, False, 1)
-
-
 # ---- gains
 
 
@@ -155,15 +141,6 @@ def test_a_cascade_has_gains_of_its_inner_loop_and_a_step_of_its_drive() -> None
 
 
 # ---- the grid of periods, and the start
-
-
-@pytest.mark.parametrize(("off", "whole"), [(0.049, True), (0.051, False)])
-def test_times_within_a_twentieth_of_a_period_are_those_of_periods(off: float, whole: bool) -> None:
-    made = still(4)
-    time = 0.02 * np.array([0.0, 1.0 - off, 2.0 + off, 3.0])
-    found = inputs_of(replace(made, tick=None, time=time), MA2000)
-    assert (found.rows.tolist() == [0, 1, 2, 3]) is whole
-    assert len(found) == 4
 
 
 @pytest.mark.parametrize(("angle", "allowed"), [(20.0, True), (20.001, False), (-20.001, False)])
@@ -216,19 +193,6 @@ def test_the_arm_begins_at_the_mean_of_what_it_read_at_rest(readings: list[float
 
 
 # ---- derivatives
-
-
-def test_a_parameter_is_differentiated_at_all_its_places_and_an_initial_posture_at_its_own() -> None:
-    model = base_model(MA2000)
-    vector, initial = np.zeros(len(model.vector)), np.zeros((3, 2))
-    mass = model.parameter("load.mass")
-    seed(mass, vector, initial)
-    assert np.flatnonzero(vector).tolist() == sorted(mass.slots)
-    assert not initial.any()
-    seed(initial_position(2), vector, initial)
-    assert np.flatnonzero(vector).tolist() == sorted(mass.slots)
-    assert initial[:, 0].tolist() == [0.0, 1.0, 0.0]
-    assert not initial[:, 1].any()
 
 
 @pytest.mark.parametrize("general", [False, True], ids=["closed form", "recursive"])

@@ -177,11 +177,3 @@ def test_a_drive_acts_as_much_later_as_its_delay_says(periods: float) -> None:
     begun = PERIOD * (1.0 + periods)
     np.testing.assert_allclose(found.velocity[:, 0], 1.2 * np.clip(found.time - begun, 0.0, None), atol=1e-12)
     np.testing.assert_allclose(found.position[:, 0], 0.6 * np.clip(found.time - begun, 0.0, None) ** 2, atol=1e-12)
-
-
-def test_lost_set_points_leave_a_share_of_each_step_to_the_next_period() -> None:
-    model = base_model(slide()).with_effect("lost_set_points", (1,), {"share": 0.25})
-    found = simulate(model, record(steps()), Options(quantise=False))
-    before = np.vstack([steps()[:1], steps()[:-1]])
-    wanted = steps() - 0.25 * (steps() - before)
-    np.testing.assert_allclose(found.error, wanted - found.reading, atol=1e-12)

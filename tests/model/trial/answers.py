@@ -7,7 +7,6 @@ from model.discrepancy.diagnosis import (
     Candidate,
     Diagnosis,
     FoundValue,
-    RemainingShape,
     SignalError,
     Step,
     Verdict,
@@ -15,6 +14,7 @@ from model.discrepancy.diagnosis import (
 )
 from model.machine_model.model import base_model
 from model.trial.truth import Detectability, HiddenEffect, Kind, SeenEffect, Truth
+from tests.model.discrepancy.steps import answer_of
 from tests.model.discrepancy.steps import step as plain_step
 
 MACHINE = load_machine("ma2000")
@@ -54,31 +54,8 @@ def step(
     )
 
 
-def answer(verdict: Verdict, *steps: Step, seconds: float = 5.0) -> Diagnosis:
-    return Diagnosis(
-        verdict=verdict,
-        summary="",
-        steps=steps,
-        model_before=MODEL,
-        model_after=MODEL,
-        traces=("a",),
-        seconds=seconds,
-        robot_seconds=56.0,
-    )
-
-
-def remaining(joint: int, explained: float) -> RemainingShape:
-    """A torque that is left at a joint and goes with its speed."""
-    return RemainingShape(
-        joint=joint,
-        against="speed",
-        unit="rad/s",
-        torque_unit="N·m",
-        centres=(-1.0, 1.0),
-        torque=(-2.0, 2.0),
-        deviation=(0.1, 0.1),
-        explained=explained,
-    )
+def answer(verdict: Verdict, *steps: Step) -> Diagnosis:
+    return answer_of(MODEL, *steps, verdict=verdict, seconds=5.0, robot_seconds=56.0)
 
 
 def truth(kind: Kind, *hidden: Hidden, parameters: dict[str, float] | None = None, known: bool = True) -> Truth:

@@ -5,7 +5,8 @@ import pytest
 from model.discrepancy.diagnosis import Diagnosis
 from model.trial.score import Score, score, score_of_failure
 from model.trial.truth import Truth
-from tests.model.trial.answers import MACHINE, answer, candidate, found, remaining, seen, step, truth
+from tests.model.discrepancy.steps import shape
+from tests.model.trial.answers import MACHINE, answer, candidate, found, seen, step, truth
 
 BACKLASH = truth("single", ("backlash", (2,)), parameters={"play": 0.01, "stiffness": 1.0, "damping": 1.0})
 STICTION = truth("single", ("stiction", (1,)))
@@ -97,7 +98,7 @@ def test_unknown_effect_may_say_at_which_joint_or_that_something_remains() -> No
     assert judged(STICTION, at_two).joint_right is False
     silent = answer("unknown-effect")
     assert judged(BACKLASH, silent).joint_right is False
-    shapes = tuple(remaining(joint, explained) for joint, explained in ((2, 0.8), (1, 0.2)))
+    shapes = tuple(shape(joint, explained=explained) for joint, explained in ((2, 0.8), (1, 0.2)))
     telling = silent.model_copy(update={"remaining": shapes})
     assert judged(BACKLASH, telling).joint_right
     assert judged(STICTION, telling).joint_right is False

@@ -172,7 +172,6 @@ def test_doubling_changes_do_double_the_error_and_curves_have_their_least_inside
     result = validate_by_distortion(model, [trace], DISTORTED, options=plain)
     change = result.parameter(K_B2)
     for step in (change.change_up, -change.change_down if change.change_down else None):
-        assert step is not None
         run = simulate(model.with_values({K_B2: change.value + step}), trace, plain)
         error = ((run.at_samples(run.reading) - trace.position) ** 2).mean(axis=0).sum()
         assert error == pytest.approx(2 * result.error, rel=0.01)

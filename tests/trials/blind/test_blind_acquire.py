@@ -17,6 +17,7 @@ from model.machine_model.model import base_model
 from model.machine_model.model_file import save_model
 from model.trial.arms import compose
 from tests.daq.executors.by_hand import WorkersByHand
+from tests.model.discrepancy.steps import answer_of
 from trials.blind import diagnoser
 from trials.blind.campaign import ROBOT_TIME, Campaign
 from trials.blind.experiments import trial_experiment
@@ -39,18 +40,7 @@ def asked(duration: float) -> NextExperiment:
 
 
 def answered(wanted: NextExperiment | None, verdict: Any = "ambiguous") -> Diagnosis:
-    model = base_model(MACHINE)
-    return Diagnosis(
-        verdict=verdict,
-        summary="",
-        steps=(),
-        model_before=model,
-        model_after=model,
-        traces=(),
-        next_experiment=wanted,
-        seconds=0.0,
-        robot_seconds=0.0,
-    )
+    return answer_of(base_model(MACHINE), verdict=verdict, next_experiment=wanted)
 
 
 def run(duration: float, outcome: str = "complete") -> Acquired:
@@ -105,7 +95,6 @@ def test_the_diagnoser_asks_for_an_experiment_only_where_it_may(
     assert answer().next_experiment is None
     (tmp_path / "asking.json").write_text(json.dumps({"budget": 15.0}), "utf-8")
     wanted = answer().next_experiment
-    assert wanted is not None
     assert wanted.duration <= 15.0
 
 
@@ -128,7 +117,6 @@ def test_a_trial_runs_the_experiment_that_its_diagnosis_asks_for(
     Campaign(folder, MACHINE, until="diagnose").run([SOUND], WorkersByHand(), lambda _number, line: said.append(line))
     assert [line.partition(": ")[2] for line in said] == ["done"]
     row = folder.row("diagnose", SOUND)
-    assert row is not None
     assert "failure" not in row
     assert len(row["further"]) >= 1
     assert sum(further["duration"] for further in row["further"]) <= ROBOT_TIME

@@ -1,5 +1,7 @@
 """The controller's own numbers prove a wrong gain and lost set points, and nothing else."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -16,7 +18,6 @@ from model.discrepancy.controller.evidence import (
 from tests.model.fitting import imagined
 
 SENSOR = imagined.machine().joint(1).sensor
-assert SENSOR is not None
 UNIT = SENSOR.range.value / 2**SENSOR.bits
 
 
@@ -34,10 +35,6 @@ def with_power(given: Trace, error: NDArray[np.float64], factor: float) -> Trace
     return imagined.changed(given, error=error, power_raw=power)
 
 
-def test_a_sound_controller_gives_no_finding(sound: Trace) -> None:
-    assert check_controller([sound], imagined.machine()) == ()
-
-
 @pytest.mark.parametrize("factor", [0.9, 1.05, 1.3])
 def test_a_wrong_gain_is_measured(sound: Trace, factor: float) -> None:
     assert sound.error is not None
@@ -48,22 +45,7 @@ def test_a_wrong_gain_is_measured(sound: Trace, factor: float) -> None:
         assert finding.value == pytest.approx(factor - 1, abs=0.01)
 
 
-def test_lost_set_points_are_counted(sound: Trace) -> None:
-    assert sound.set_point is not None
-    rng = np.random.default_rng(1)
-    used = sound.set_point.copy()
-    lost = rng.random(len(used)) < 0.2
-    for k in np.flatnonzero(lost):
-        used[k, 1] = used[max(k - 1, 0), 1]
-    found = check_controller([with_power(sound, used - sound.position, 1.0)], imagined.machine())
-    assert [(f.effect, f.joint) for f in found] == [("lost_set_points", 2)]
-    assert 0.05 < found[0].value < 0.4
-    restored = with_used_set_points(with_power(sound, used - sound.position, 1.0))
-    assert restored.set_point is not None
-    assert np.allclose(restored.set_point, used)
-
-
-BOTH = ("wrong_gain", "lost_set_points")
+BOTH, LOST = ("wrong_gain", "lost_set_points"), ("lost_set_points",)
 
 
 def with_gains(given: Trace, gains: tuple[int, int, int]) -> Trace:
@@ -98,37 +80,28 @@ def sampled() -> Machine:
     return imagined.machine().model_copy(update={"controller": other})
 
 
-def test_a_record_with_all_numbers_settles_gains_and_set_points(sound: Trace) -> None:
-    assert settled_by_records([sound], imagined.machine()) == BOTH
-    assert settled_by_records([sound, sound], imagined.machine()) == BOTH
-    assert settled_by_records([], imagined.machine()) == ()
+SETTLED: dict[str, tuple[Callable[[Trace], list[Trace]], tuple[str, ...]]] = {
+    "all numbers": (lambda sound: [sound], BOTH),
+    "all numbers, twice": (lambda sound: [sound, sound], BOTH),
+    "no records": (lambda _: [], ()),
+    "I acts": (lambda sound: [with_gains(sound, (2, 1, 0))], LOST),
+    "D acts": (lambda sound: [with_gains(sound, (2, 0, 3))], LOST),
+    "more than P acts in one of two": (lambda sound: [sound, with_gains(sound, (2, 1, 3))], LOST),
+    "a few samples": (lambda sound: [shortened(sound, 19)], LOST),
+    "a few samples beside many": (lambda sound: [sound, shortened(sound, 19)], BOTH),
+    "a joint at rest": (lambda sound: [at_rest(sound, 3)], LOST),
+    "a joint at rest in one of two": (lambda sound: [at_rest(sound, 3), sound], BOTH),
+    "no errors": (lambda sound: [imagined.changed(sound, error=None)], ()),
+    "no powers": (lambda sound: [imagined.changed(sound, power_raw=None)], LOST),
+    "no powers in one of two": (lambda sound: [sound, imagined.changed(sound, power_raw=None)], LOST),
+}
 
 
-@pytest.mark.parametrize("gains", [(2, 1, 0), (2, 0, 3), (2, 1, 3)])
-def test_a_gain_is_not_judged_where_more_than_p_acts(sound: Trace, gains: tuple[int, int, int]) -> None:
-    other = with_gains(sound, gains)
-    assert settled_by_records([other], imagined.machine()) == ("lost_set_points",)
-    assert settled_by_records([sound, other], imagined.machine()) == ("lost_set_points",)
-    assert check_controller([other], imagined.machine()) == ()
-
-
-def test_a_gain_is_not_judged_by_a_few_samples(sound: Trace) -> None:
-    short = shortened(sound, 19)
-    assert "wrong_gain" not in settled_by_records([short], imagined.machine())
-    assert "wrong_gain" in settled_by_records([sound, short], imagined.machine())
-
-
-def test_a_gain_is_judged_on_every_joint_or_not_at_all(sound: Trace) -> None:
-    still = at_rest(sound, 3)
-    assert settled_by_records([still], imagined.machine()) == ("lost_set_points",)
-    assert "wrong_gain" in settled_by_records([still, sound], imagined.machine())
-
-
-def test_records_without_the_controllers_numbers_settle_nothing(sound: Trace) -> None:
-    assert settled_by_records([imagined.changed(sound, error=None)], imagined.machine()) == ()
-    no_power = imagined.changed(sound, power_raw=None)
-    assert settled_by_records([no_power], imagined.machine()) == ("lost_set_points",)
-    assert settled_by_records([sound, no_power], imagined.machine()) == ("lost_set_points",)
+@pytest.mark.parametrize("shown", SETTLED)
+def test_records_settle_what_every_joint_shows_in_enough_samples(sound: Trace, shown: str) -> None:
+    records, settled = SETTLED[shown]
+    assert settled_by_records(records(sound), imagined.machine()) == settled
+    assert check_controller(records(sound), imagined.machine()) == ()
 
 
 def test_another_controller_is_not_judged(sound: Trace) -> None:
@@ -138,7 +111,6 @@ def test_another_controller_is_not_judged(sound: Trace) -> None:
 
 def test_wrong_errors_while_no_set_point_moves_do_not_settle_lost_set_points(sound: Trace) -> None:
     still = at_rest(sound, 2)
-    assert still.error is not None
     error = still.error.copy()
     error[:, 1] += 10 * UNIT
     judged = settled_by_records([with_power(still, error, 1.0)], imagined.machine())

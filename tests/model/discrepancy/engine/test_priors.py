@@ -1,13 +1,14 @@
-"""What numbers are expected to be: both constants of a motor are of one magnet."""
+"""What numbers are expected to be: both constants of a motor are of one magnet, and friction may be next to nothing."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from model.discrepancy.engine.priors import SAME_MAGNET, prior_cost, prior_rows
+from model.discrepancy.engine.priors import SAME_MAGNET, prior_cost, prior_distance, prior_rows
 from model.fitting.unknowns import Unknown
 from model.machine_model.parameter import Kind, Parameter
 
@@ -98,6 +99,22 @@ def test_the_constant_that_is_stated_more_exactly_speaks_for_both() -> None:
     assert cost(exact, 0.05, 0.05) == 0.0
 
 
+def friction(effect: str | None = "coulomb_friction", low: float = 0.0) -> Unknown:
+    """A friction of 10 that is stated to 30 %, of an effect that the library has or of none."""
+    own = constant("torque", 10.0, component="coulomb_friction").parameter
+    return Unknown(replace(own, kind=Kind.EFFECT, effect=effect), 10.0, low, 1e4, 10.0, 3.0)
+
+
+def test_friction_below_what_is_stated_counts_by_its_ratio_and_above_by_its_distance() -> None:
+    u = friction()
+    assert prior_distance(u, 16.0)[0] == pytest.approx(2.0)
+    assert prior_distance(u, 1.0)[0] == pytest.approx(-math.log(10.0) / 0.3)
+    assert cost([u], 0.0) == cost([u], 0.05) == pytest.approx((math.log(100) / 0.3) ** 2)
+    assert prior_distance(friction(effect=None), 1.0) == prior_distance(u, 1.0), "no number of a machine vanishes"
+    for other in (friction(low=-5.0), replace(u, nuisance=True)):
+        assert prior_distance(other, 1.0)[0] == pytest.approx(-3.0)
+
+
 SEVERAL = [
     constant(BACK, 0.06, joint=2),
     constant("resistance", 2.0, deviation=0.1),
@@ -105,17 +122,18 @@ SEVERAL = [
     constant(TORQUE, 0.05, joint=2),
     constant(BACK, 0.05),
     constant("rotor_inertia", 1e-4, deviation=None),
+    friction(),
 ]
 
 
-@given(shares=st.lists(st.floats(0.3, 2.5), min_size=6, max_size=6))
+@given(shares=st.lists(st.floats(0.3, 2.5), min_size=7, max_size=7))
 def test_rows_are_the_derivatives_of_the_distances_whose_squares_are_the_cost(shares: list[float]) -> None:
     at = np.array([share * u.expected for share, u in zip(shares, SEVERAL, strict=True)])
     rows, aims = prior_rows(SEVERAL, at)
-    assert rows.shape == (5, 6), "nothing is stated of the inertia"
+    assert rows.shape == (6, 7), "nothing is stated of the inertia"
     assert cost(SEVERAL, *at) == pytest.approx(float(aims @ aims), rel=1e-9, abs=1e-12)
     for k, u in enumerate(SEVERAL):
-        step = np.zeros(6)
+        step = np.zeros(7)
         step[k] = 1e-6 * u.expected
         ahead, behind = (prior_rows(SEVERAL, at + side * step)[1] for side in (1, -1))
         expected = -(ahead - behind) / (2 * step[k])

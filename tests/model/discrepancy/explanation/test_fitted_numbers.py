@@ -1,27 +1,17 @@
 """Numbers of the machine file after a fit, beside what the file states."""
 
 from daq.contracts.machine import load_machine
-from daq_cli.models.diagnosis_text import WIDTH, answer_text
 from model.discrepancy.diagnosis import Diagnosis, FoundValue
 from model.discrepancy.explanation.fitted_numbers import most_moved, stated_beside, stated_numbers
 from model.machine_model.model import Model, base_model
-from tests.model.discrepancy.steps import step
+from tests.model.discrepancy.steps import answer_of
 
 GIVEN = base_model(load_machine("examples/pan_tilt.toml"))
-MASS, ROTOR = "link1.mass", "joint1.motor.rotor_inertia"
+MASS = "link1.mass"
 
 
 def answer(after: Model, **fields: object) -> Diagnosis:
-    return Diagnosis(
-        verdict="nothing-significant",
-        summary="",
-        steps=(),
-        model_before=GIVEN,
-        model_after=after,
-        traces=("a",),
-        seconds=1.0,
-        robot_seconds=1.0,
-    ).model_copy(update=fields)
+    return answer_of(GIVEN, model_after=after).model_copy(update=fields)
 
 
 def moved(**deviations: float) -> Model:
@@ -29,7 +19,6 @@ def moved(**deviations: float) -> Model:
     values = {}
     for word, distance in deviations.items():
         p = GIVEN.parameter(word.replace("__", "."))
-        assert p.deviation is not None
         values[p.name] = p.value + distance * p.deviation
     return GIVEN.with_values(values)
 
@@ -74,18 +63,3 @@ def test_what_the_file_states_stands_beside_a_number_that_a_step_has_named() -> 
         stated_beside("spring", "joint1.spring.stiffness", FoundValue(value=1, low=None, high=None, unit="1"), stated)
         == ""
     )
-
-
-def test_a_terminal_lists_them() -> None:
-    after = moved(link1__mass=1.5)
-    mass, fitted = GIVEN.parameter(MASS), after.parameter(MASS)
-    added = FoundValue(value=0.2, low=0.1, high=0.3, unit="kg", part="added", joints=(1,))
-    taken = step("link_mass", (1,), parameters={"joint1.link_mass.added": added})
-    found = answer(after, steps=(taken,), verdict="named")
-    text = answer_text(found)
-    assert "numbers  those that the fit moved most: stated → fitted (stated deviations)" in text
-    assert f"  link1.mass  {mass.value:.4g} ± {mass.deviation:.2g} kg → {fitted.value:.4g} kg  (1.5)" in text
-    added_to = f"= 0.2 kg (95 %: 0.1 to 0.3); the file states {mass.value:.4g} ± {mass.deviation:.2g} kg"
-    assert added_to in " ".join(text.split())
-    assert max(map(len, text.splitlines())) <= WIDTH
-    assert "numbers  those" not in answer_text(answer(GIVEN))

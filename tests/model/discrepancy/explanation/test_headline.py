@@ -54,22 +54,35 @@ def test_a_group_that_no_motion_tells_apart_is_named_as_its_class(answer: Diagno
         assert "no motion" not in summary(left)
 
 
-def test_it_says_when_no_known_effect_is_left(answer: Diagnosis) -> None:
-    unknown = answer.model_copy(update={"verdict": "unknown-effect"})
-    assert headline(unknown).endswith("(7.8 to 8.2); none of the known effects explains what is left")
-    assert headline(unknown.model_copy(update={"steps": ()})) == "none of the known effects explains what is left"
+NOTHING = {"verdict": "nothing-significant"}
+TAKEN_BACK = {"adopted": False, "refusal": Refusal(kind="only-resembles", joints=(2,))}
+DOUBT = Suspicion(effect="backlash", joints=(1,), evidence=24.0, needed=30.0, seconds=20.0)
 
 
-def test_it_tells_a_sound_model_from_one_whose_effect_was_refused(answer: Diagnosis) -> None:
-    nothing = answer.model_copy(update={"verdict": "nothing-significant"})
-    assert headline(nothing) == "nothing that the held-out traces confirm"
-    gone = nothing.steps[0].model_copy(
-        update={"adopted": False, "refusal": Refusal(kind="only-resembles", joints=(2,))}
-    )
-    back = nothing.model_copy(update={"steps": (gone,)})
-    assert headline(back) == "none of the known effects, and what is left has no shape of one"
-    sound = nothing.model_copy(update={"steps": ()})
-    assert headline(sound) == "the model explains these traces within their noise and its tolerances"
+@pytest.mark.parametrize(
+    ("fields", "of_step", "said"),
+    [
+        (
+            {"verdict": "unknown-effect"},
+            {},
+            "Coulomb friction on joint 2, 8 N·m (7.8 to 8.2); none of the known effects explains what is left",
+        ),
+        ({"verdict": "unknown-effect"}, None, "none of the known effects explains what is left"),
+        (NOTHING, {}, "nothing that the held-out traces confirm"),
+        (NOTHING, TAKEN_BACK, "none of the known effects, and what is left has no shape of one"),
+        (NOTHING, None, "the model explains these traces within their noise and its tolerances"),
+        (
+            {"verdict": "suspected", "suspicion": DOUBT},
+            None,
+            "perhaps backlash on joint 1, evidence 24 of 30; 20 s more of this motion would settle it",
+        ),
+    ],
+)
+def test_an_answer_without_a_name_says_what_there_is(
+    answer: Diagnosis, fields: dict[str, object], of_step: dict[str, object] | None, said: str
+) -> None:
+    steps = () if of_step is None else (answer.steps[0].model_copy(update=of_step),)
+    assert headline(answer.model_copy(update={**fields, "steps": steps})) == said
 
 
 def test_what_is_left_and_a_number_far_from_its_file_are_told_where_nothing_is_named(answer: Diagnosis) -> None:
@@ -93,14 +106,6 @@ def test_what_is_left_and_a_number_far_from_its_file_are_told_where_nothing_is_n
     assert summary(doubted).endswith("though link1.mass comes out at 5.51 kg, where 3 is stated.")
     unknown = error.model_copy(update={"floor": 1e-9})
     assert "times its noise" not in headline(nothing.model_copy(update={"rmse_fit": (unknown,)})), "no noise is stated"
-
-
-def test_a_suspicion_says_what_more_motion_would_settle(answer: Diagnosis) -> None:
-    doubt = Suspicion(effect="backlash", joints=(1,), evidence=24.0, needed=30.0, seconds=20.0)
-    suspected = answer.model_copy(update={"verdict": "suspected", "steps": (), "suspicion": doubt})
-    assert headline(suspected) == (
-        "perhaps backlash on joint 1, evidence 24 of 30; 20 s more of this motion would settle it"
-    )
 
 
 def test_joints_that_were_not_examined_are_in_the_first_line(answer: Diagnosis) -> None:

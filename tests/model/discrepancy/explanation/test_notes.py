@@ -84,12 +84,6 @@ def test_numbers_far_from_what_is_stated_are_one_warning_the_furthest_first() ->
     assert on_stated_numbers([mass], {"link1.mass": 2.0}) == ()
 
 
-def test_traces_are_counted() -> None:
-    one, two = (note_words(Note(kind="tolerances-fitted-first", values={"traces": n})) for n in (1, 2))
-    assert "1 trace," in one
-    assert "2 traces," in two
-
-
 def test_a_note_reads_the_same_after_json() -> None:
     pairs = Note(kind="not-separable", values={"pairs": [["a", "b", 1.24]], "least": 3.0, "budget": 60.0})
     again = Note.model_validate_json(pairs.model_dump_json())

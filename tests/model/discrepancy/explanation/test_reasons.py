@@ -90,17 +90,7 @@ def test_what_the_controllers_numbers_prove_is_said_without_a_model(arm: Model, 
 
 def answer(arm: Model, **fields: object) -> Diagnosis:
     """An answer with these fields, and its sentences."""
-    bare = Diagnosis(
-        verdict="unknown-effect",
-        summary=UNWRITTEN,
-        steps=(),
-        where=NOWHERE,
-        model_before=arm,
-        model_after=arm,
-        traces=(),
-        seconds=1.0,
-        robot_seconds=1.0,
-    )
+    bare = steps.answer_of(arm, verdict="unknown-effect", summary=UNWRITTEN, where=NOWHERE)
     return with_sentences(bare.model_copy(update=fields))
 
 
@@ -140,14 +130,6 @@ def test_an_answer_with_nothing_significant_says_what_was_taken_back(arm: Model)
     )
 
 
-def test_several_reasons_and_what_is_left_are_sentences_one_after_the_other(arm: Model) -> None:
-    step = step_with("coulomb_friction", (2,), TORQUE, Reason())
-    shape = remaining("speed", 0.7, -0.5, 0.1, 0.4, 1.0, 2.5)
-    found = answer(arm, verdict="named", steps=(step, step), remaining=(shape,))
-    told = reason_text(step, arm.machine)
-    assert found.summary == f"{told} {told} Something is left that none of the known effects explains."
-
-
 def test_an_older_answer_keeps_its_text(arm: Model) -> None:
     step = step_with("stiction", (2,), {}).model_copy(update={"reason": "it sticks"})
     found = answer(arm, verdict="named", steps=(step,), notes=("one note",))
@@ -155,16 +137,7 @@ def test_an_older_answer_keeps_its_text(arm: Model) -> None:
 
 
 def remaining(against: AgainstWhat, explained: float, *torques: float | None) -> RemainingShape:
-    return RemainingShape(
-        joint=3,
-        against=against,
-        unit="1",
-        torque_unit="N·m",
-        centres=tuple(map(float, range(len(torques)))),
-        torque=torques,
-        deviation=torques,
-        explained=explained,
-    )
+    return steps.shape(3, against, explained, torques)
 
 
 def test_what_is_left_is_called_a_shape_only_where_it_is_one() -> None:
@@ -180,16 +153,6 @@ def test_what_is_left_is_called_a_shape_only_where_it_is_one() -> None:
     )
     assert what_is_left([few, faint]).endswith(
         "goes with time, explains 80 % of what is left, but rests on 2 of the 5 bins that a shape needs"
-    )
-
-
-def test_friction_at_a_place_is_told_with_the_place() -> None:
-    tight = remaining("position", 0.8, 0.01, 0.12, None, -0.06, -0.05).model_copy(
-        update={"unit": "rad", "against_motion": True}
-    )
-    assert what_is_left([tight]) == (
-        "no clear shape: the best, friction at joint 3 of −0.06 to 0.12 N·m that goes with position, most at 57.3°, "
-        "explains 80 % of what is left, but rests on 4 of the 5 bins that a shape needs"
     )
 
 

@@ -15,7 +15,6 @@ from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from model.discrepancy.diagnosis import Diagnosis
 from model.discrepancy.engine.fitting import evaluate
-from model.discrepancy.engine.holdout import share_removed
 from model.discrepancy.inverse_dynamics.case import torque_case
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.options import DiagnosisOptions, TorqueOptions
@@ -28,7 +27,6 @@ MAKERS = {
     "slide": (rigs.slide_machine, rigs.slide_trace),
     "bench": (rigs.bench_machine, rigs.bench_trace),
     "geared": (rigs.geared_machine, rigs.geared_trace),
-    "six": (rigs.six_machine, rigs.six_trace),
 }
 
 
@@ -58,10 +56,8 @@ def test_nothing_is_named_on_a_sound_rig(rig: str) -> None:
     found = diagnosed(rig, {})
     assert found.verdict == "nothing-significant", found.summary
     assert found.model_after.effects == found.model_before.effects
-    assert found.where is not None
     assert found.where.cells
     assert found.candidates
-    assert found.significant is not None
     assert max(c.evidence for c in found.candidates if c.refitted) < found.significant
     assert [e.joint for e in (*found.rmse_fit, *found.rmse_holdout)] == [1, 1]
     assert all(e.after <= e.before for e in found.rmse_fit)
@@ -86,8 +82,6 @@ def test_a_sliding_servo_axis(hidden: dict[str, float], effect: str, parameter: 
     check_found(found, effect, (1,))
     estimate = found.steps[0].parameters[f"joint1.{effect}.{parameter}"]
     assert estimate.value == pytest.approx(value, rel=0.02)
-    assert estimate.low is not None
-    assert estimate.high is not None
     assert estimate.low < estimate.value < estimate.high
 
 
@@ -125,28 +119,6 @@ def test_free_play() -> None:
     assert first(found) == ("backlash", (1,))
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(300)
-def test_a_payload_on_a_six_joint_arm() -> None:
-    """Its friction where six joints turn leaves more than ten times the noise below 3 Hz, which is told."""
-    found = diagnosed("six", {"payload": 1.0}, TorqueOptions(cutoff=3.0, most_steps=1))
-    check_found(found, "payload", (), "partly")
-    assert found.steps[0].parameters["load.payload.mass"].value == pytest.approx(1.0, rel=0.1)
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(600)
-def test_a_sound_six_joint_arm() -> None:
-    assert diagnosed("six", {}, TorqueOptions(cutoff=3.0)).verdict == "nothing-significant"
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(600)
-def test_gear_loss_on_one_of_six_joints() -> None:
-    found = diagnosed("six", {"loss_3": 0.15}, TorqueOptions(cutoff=3.0, most_steps=1))
-    check_found(found, "gear_loss", (3,))
-
-
 def test_without_held_out_traces_an_effect_must_hold_on_quarters_of_the_record() -> None:
     found = diagnose_torques(base_model(rigs.slide_machine()), [rigs.slide_trace(1, {"coulomb": 8.0})])
     assert first(found) == ("coulomb_friction", (1,))
@@ -159,7 +131,6 @@ def test_an_effect_that_explains_too_little_of_records_not_fitted_to_is_refused(
     found = diagnose_torques(base_model(rigs.slide_machine()), [rigs.slide_trace(1, {"coulomb": 8.0})], (), nearly_all)
     assert found.steps[0].effect == "coulomb_friction"
     assert not any(step.adopted for step in found.steps)
-    assert found.steps[0].refusal is not None
     assert found.steps[0].refusal.kind == "falls-too-little"
     assert found.model_after.effects == found.model_before.effects
 
@@ -174,27 +145,6 @@ def test_a_spring_is_named_beside_a_mass_that_is_not_the_files_which_is_named_to
     assert found.verdict == ("ambiguous" if named else "named")
     masses = ("link1.mass", "load.payload.mass", "joint1.link_mass.added")
     assert sum(p.value for p in found.model_after.parameters if p.name in masses) == pytest.approx(mass, rel=0.01)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("resistance", "constant"), [(2.4, 0.05), (2.3, 0.0465)])
-def test_a_motors_stated_resistance_and_torque_constant_are_tolerances(resistance: float, constant: float) -> None:
-    """Both scale every torque. Without them the rotor's inertia, stated to 5 %, would have to be 20 % off and more. Its
-    back-EMF constant is of the same magnet, and stated to 2 %."""
-    stated = rigs.bench_machine().model_dump()
-    drive = stated["joints"][0]["drive"]
-    drive["resistance"].update(deviation=0.2, low=0.1)
-    drive["torque_constant"].update(deviation=0.005, low=0.001)
-    magnet = {"constant": constant, "back_emf": constant}
-    traces = [rigs.bench_trace(seed, {"resistance": resistance, **magnet}) for seed in (1, 2)]
-    found = diagnose_torques(base_model(Machine.model_validate(stated)), traces[:1], traces[1:])
-    assert (found.verdict, found.steps) == ("nothing-significant", ()), found.summary
-    names = ("motor.resistance", "motor.torque_constant", "motor.rotor_inertia")
-    r, k, inertia = (found.model_after.parameter(f"joint1.{name}").value for name in names)
-    assert r * inertia / k == pytest.approx(resistance * rigs.BENCH["inertia"] / constant, rel=0.005)
-    assert inertia == pytest.approx(rigs.BENCH["inertia"], abs=1e-5), "within its deviation"
-    assert abs(r - 2.0) < 2 * 0.2
-    assert abs(k - 0.05) < 2 * 0.005
 
 
 def test_a_machine_file_without_deviations_leaves_its_bodies_free() -> None:
@@ -302,48 +252,37 @@ def test_a_disturbance_does_not_vanish_from_a_record_that_does_not_show_it() -> 
     assert left_of(humming(3.0), quiet)[0] > without[0] + 0.5 * 3.0**2 / 2
 
 
-def test_held_out_records_speak_for_an_effect_that_is_there_and_not_for_one_that_is_not() -> None:
-    told = {}
-    for coulomb in (6.0, 0.0):
-        traces = [rigs.slide_trace(seed, {"coulomb": coulomb}, duration=6.0) for seed in (1, 2)]
-        options = TorqueOptions(effects=("coulomb_friction",), least_evidence=-1e6, least_share=0.0)
-        found = diagnose_torques(base_model(rigs.slide_machine()), traces[:1], traces[1:], options)
-        told[coulomb] = found.steps[0].evidence_held_out if found.steps else None
-    assert told[6.0] is not None
-    assert told[6.0] > 100.0
-    assert told[0.0] is None or told[0.0] < 5.0
-
-
-def test_a_held_out_record_that_tells_nothing_of_a_joint_confirms_nothing() -> None:
-    """A drive at a limit all the time: nothing is left there, with an effect or without, since nothing is known."""
-    fitted_before, fitted_after = np.array([4.0, 1.0]), np.array([1.0, 1.0])
-    assert share_removed(fitted_before, fitted_after, np.array([0.0, 1.0]), np.array([0.0, 1.0])) == 0.0
-    assert share_removed(fitted_before, fitted_after, np.array([2.0, 1.0]), np.array([0.5, 1.0])) == pytest.approx(0.75)
-
-
 # ---- A number of the machine that is far from its file, and what stands for it.
 
 
-def of_bench(constant: float) -> Diagnosis:
-    """The motor bench with a magnet of this torque constant, N·m/A: 0.05 stated to 10 %, its back-EMF to 2 %."""
+@pytest.mark.parametrize(
+    ("resistance", "constant", "weaker"),
+    [
+        pytest.param(2.3, 0.045, 0.1, marks=pytest.mark.slow),
+        (2.3, 0.0465, None),
+        pytest.param(2.4, 0.05, None, marks=pytest.mark.slow),
+    ],
+)
+def test_a_magnet_is_weakened_from_four_deviations_of_its_better_known_constant_and_else_within_its_tolerances(
+    resistance: float, constant: float, weaker: float | None
+) -> None:
+    """0.05 N·m/A are stated to 10 %, its back-EMF to 2 %: 10 % and 7 % weaker are 4.7 and 3.4 deviations of that.
+    Resistance and constant scale every torque: without them the rotor's inertia would have to be far off."""
     stated = rigs.bench_machine().model_dump()
     drive = stated["joints"][0]["drive"]
     drive["resistance"].update(deviation=0.2, low=0.1)
     drive["torque_constant"].update(deviation=0.005, low=0.001)
-    traces = [
-        rigs.bench_trace(seed, {"resistance": 2.3, "constant": constant, "back_emf": constant}) for seed in (1, 2)
-    ]
-    return diagnose_torques(base_model(Machine.model_validate(stated)), traces[:1], traces[1:])
-
-
-@pytest.mark.parametrize(("constant", "weaker"), [pytest.param(0.045, 0.1, marks=pytest.mark.slow), (0.0465, None)])
-def test_a_magnet_is_weakened_from_four_deviations_of_its_better_known_constant(
-    constant: float, weaker: float | None
-) -> None:
-    """10 % and 7 % weaker are 4.7 and 3.4 deviations of the back-EMF constant."""
-    found = of_bench(constant)
+    hidden = {"resistance": resistance, "constant": constant, "back_emf": constant}
+    traces = [rigs.bench_trace(seed, hidden) for seed in (1, 2)]
+    found = diagnose_torques(base_model(Machine.model_validate(stated)), traces[:1], traces[1:])
     named = [s for s in found.steps if s.adopted]
     assert [s.effect for s in named] == ([] if weaker is None else ["weakened_magnet"]), found.summary
     for step in named:
         (loss,) = step.parameters.values()
         assert loss.value == pytest.approx(weaker, abs=0.01)
+    if weaker is None:
+        names = ("motor.resistance", "motor.torque_constant", "motor.rotor_inertia")
+        r, k, inertia = (found.model_after.parameter(f"joint1.{name}").value for name in names)
+        assert r * inertia / k == pytest.approx(resistance * rigs.BENCH["inertia"] / constant, rel=0.005)
+        assert inertia == pytest.approx(rigs.BENCH["inertia"], abs=1e-5), "within its deviation"
+        assert (abs(r - 2.0) < 2 * 0.2, abs(k - 0.05) < 2 * 0.005) == (True, True)

@@ -31,7 +31,6 @@ def test_what_the_model_before_lacks_is_the_friction_and_the_model_after_leaves_
     assert np.median(np.abs(before)) == pytest.approx(8.0, rel=0.15), "and a little of what else the file states"
     assert np.sqrt(np.mean(after**2)) < 0.2
     drive = TRACES[1].drive
-    assert drive is not None
     assert np.ptp(held.measured) == pytest.approx(np.ptp(drive), rel=0.1), "the recorded force, low-passed"
 
 
@@ -46,7 +45,6 @@ def test_an_answer_by_simulation_has_none(found: Diagnosis) -> None:
 
 def at_limit(trace: Trace, share: float) -> Trace:
     """The record of a drive that stands at its limit for a share of the time."""
-    assert trace.drive is not None
     limit = float(np.quantile(np.abs(trace.drive), 1 - share))
     return replace(trace, drive=np.clip(trace.drive, -limit, limit))
 

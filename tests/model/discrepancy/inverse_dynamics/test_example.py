@@ -19,8 +19,6 @@ ROOT = Path(__file__).parents[4]
 def written(folder: Path, name: str = "motor_bench_rig") -> list[Path]:
     """The records of a pretended rig."""
     spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
     rig = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(rig)
     return list(rig.write(folder))

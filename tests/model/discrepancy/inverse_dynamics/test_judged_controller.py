@@ -193,23 +193,10 @@ def test_a_diagnosis_in_torques_of_a_sound_controller_names_nothing() -> None:
 def test_a_limit_that_the_file_does_not_state_loses_no_set_points(law: str, share: float) -> None:
     """A drive in steps comes to its limit where the motion is fastest, step by step, as to the top of a motion."""
     drive = recorded(law).drive
-    assert drive is not None
     limit = RESOLUTION * float(np.round(share * np.abs(drive).max() / RESOLUTION))
     limited = recorded(law, limit=limit)
-    assert limited.drive is not None
     assert (np.abs(limited.drive) == limit).sum() > 2
     assert judged(law, limit=limit).findings == ()
-
-
-def test_set_points_are_lost_beside_a_limit_that_the_file_does_not_state() -> None:
-    """Of a cascade they are not told: what its inner loop sums up at the limit follows from set points that the limit
-    hides."""
-    drive = recorded("pid", lost=0.4).drive
-    assert drive is not None
-    limit = RESOLUTION * float(np.round(0.8 * np.abs(drive).max() / RESOLUTION))
-    (found,) = judged("pid", lost=0.4, limit=limit).findings
-    assert found.effect.value == "lost_set_points"
-    assert found.value == pytest.approx(0.4, abs=0.06)
 
 
 def stated(law: str, **controller: Any) -> Machine:

@@ -2,7 +2,6 @@
 within what their file states."""
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,7 +18,6 @@ from model.discrepancy.inverse_dynamics.resolution import MOST_UNEVEN, _is_hardl
 from model.machine_model.model import base_model
 from model.machine_model.parameter import Kind, Parameter
 from tests.model.discrepancy.inverse_dynamics import rigs
-from tests.model.discrepancy.inverse_dynamics.searches import diagnosed_rig
 
 SAMPLE = 0.002
 """s between the samples of `slide_trace`."""
@@ -27,7 +25,6 @@ SAMPLE = 0.002
 
 def acting_late(trace: Trace, samples: float) -> Trace:
     """The trace of a rig whose drive acts so many samples after it was recorded."""
-    assert trace.drive is not None
     recorded = np.interp(trace.time + samples * SAMPLE, trace.time, trace.drive[:, 0])
     return replace(trace, drive=recorded[:, None])
 
@@ -182,7 +179,6 @@ def bent(**bends: float) -> float:
     """How uneven the MA2000's first potentiometer is with these terms, as shares of its range."""
     model = base_model(load_machine("ma2000"))
     span = model.machine.joint(1).sensor
-    assert span is not None
     terms = {name: share * span.range.value for name, share in bends.items()}
     return steepest_bend(model.with_effect("potentiometer_nonlinearity", (1,), terms), 1)
 
@@ -208,23 +204,11 @@ def test_a_variance_above_the_noise_without_a_shape_is_no_unknown_effect() -> No
 
     def noisy(seed: int) -> Trace:
         trace = rigs.slide_trace(seed, {})
-        assert trace.drive is not None
         return replace(trace, drive=trace.drive + 4.0 * draw.standard_normal(trace.drive.shape))
 
     found = diagnose_torques(base_model(rigs.slide_machine()), [noisy(1)], [noisy(2)])
     assert found.rmse_fit[0].after > 1.5 * found.rmse_fit[0].floor
     assert found.remaining == ()
-    assert found.verdict == "nothing-significant", found.summary
-
-
-@pytest.mark.parametrize(
-    ("kind", "seed"), [("axis-current", 500), pytest.param("arm-current", 507, marks=pytest.mark.slow)]
-)
-@pytest.mark.timeout(300)
-def test_a_sound_rig_of_another_world_is_sound(kind: str, seed: int, tmp_path: Path) -> None:
-    """Bristles in its friction, a current loop behind its drive, positions alone: noise of accelerations was called a
-    compliance, and friction near reversals Stribeck friction."""
-    found = diagnosed_rig(tmp_path, kind, seed, "sound")
     assert found.verdict == "nothing-significant", found.summary
 
 

@@ -45,8 +45,6 @@ def test_effects_of_which_each_takes_a_third_are_named_together() -> None:
 def test_the_gap_shrinks_with_every_step() -> None:
     found = slide(("coulomb_friction", "periodic_disturbance"), coulomb=6.0, hum=8.5)
     gap = found.gap
-    assert gap is not None
-    assert gap.without is not None
     assert [s.kind for s in gap.stages] == ["given", "effect", "effect", "refitted"]
     for kind, noisier in (("fitted", 1.05), ("held_out", 1.2)):
         given, first, second, whole = (getattr(s, kind)[0] or 0.0 for s in gap.stages)
@@ -165,31 +163,13 @@ def test_friction_at_a_place_is_seen_where_it_is_and_is_unknown() -> None:
     assert shape.explained > 0.4
     place = max(zip(shape.centres, shape.torque, strict=True), key=lambda b: b[1] or 0.0)
     assert place[0] == pytest.approx(rigs.SLIDE["tight_at"], abs=0.03)
-    assert place[1] is not None
     assert place[1] > 0.5
     assert what_is_left(found.remaining).startswith("friction at joint 1 of ")
 
 
 def test_the_joint_of_the_largest_residual_is_named(rubbing: Workflow) -> None:
     where = rubbing.case.where(rubbing.found.now)
-    assert where.worst is not None
     assert (where.joint, where.worst.joint, where.largest) == (1, 1, None)
     sizes = np.sqrt(rubbing.found.now.squares)
     assert where.worst.rms == pytest.approx(sizes[0])
     assert where.worst.ratio == pytest.approx(sizes[0] / rubbing.case.noise[0])
-
-
-def test_the_joint_of_the_largest_torque_is_told_beside_the_one_farthest_above_its_noise() -> None:
-    """Of six joints, the last has three hundred times its noise and the second the largest torque."""
-    model = base_model(rigs.six_machine())
-    traces = [rigs.six_trace(1, {}, duration=6.0)]
-    records = recorded_motions(traces, model.machine, 3.0)
-    case = torque_case(model, records, (), np.array([0.1, 0.1, 0.1, 0.1, 0.1, 1e-3]), TorqueOptions())
-    flow = Workflow(case, 16.0, silent, Never())
-    residual = [np.tile([0.1, 9.0, 0.1, 0.1, 0.1, 0.3], (len(r), 1)) for r in flow.found.now.signals]
-    where = case.where(replace(flow.found.now, signals=residual))
-    assert where.worst is not None
-    assert where.largest is not None
-    assert (where.joint, where.worst.joint, where.largest.joint) == (6, 6, 2)
-    assert where.worst.ratio == pytest.approx(300.0)
-    assert where.largest.rms == pytest.approx(9.0)

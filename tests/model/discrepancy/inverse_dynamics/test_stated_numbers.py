@@ -40,7 +40,6 @@ def test_a_rotor_whose_inertia_is_far_from_what_is_stated_is_named_with_its_valu
     assert value.value == pytest.approx(0.04, rel=0.03)
     assert value.low is not None
     assert step.evidence > 10.0
-    assert step.where.worst is not None
     assert step.where.worst.ratio > 3.0, "where torques are missing with the number as the file states it"
     assert found.model_after.parameter("joint1.drive.inertia").value == pytest.approx(value.value)
     (note,) = (n for n in found.notes_data if n.kind == "stated-numbers-moved")

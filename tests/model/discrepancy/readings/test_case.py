@@ -127,7 +127,6 @@ def test_noise_that_records_show_is_reckoned_with(noise: float) -> None:
     traces = [imagined.trace(ARM, k, seconds=5.0, noise=noise) for k in (0, 1)]
     case, now = weighed_by_noise(case_of(ARM, traces[:1], traces[1:]))
     shown = case.compared.observation.noise
-    assert case.held_out is not None
     assert (shown is None) is (noise == 0.3)
     assert case.held_out.observation.noise is shown
     counts = case.compared.floor / case.compared.observation.unit
@@ -215,7 +214,6 @@ def test_a_number_far_off_begins_the_effect_that_does_the_same(number: str, off:
     far, near = (at_start(case, {number: deviations}) for deviations in (off, off / 3))
     trials = {t.joints: t for t in list_trials(far, case.compared.observation, case.options)}
     own, stated = trials.get((3,), trials.get(())), ARM.parameter(number)
-    assert own is not None
     (size,), distance = own.amplitudes, far.values[number] - stated.value
     start = case.take_back(effect, own.parameters, far)
     assert start[size] == pytest.approx(-distance / stated.value if effect == "weakened_magnet" else distance)

@@ -121,7 +121,6 @@ def standing(model: Model, *held: Model) -> tuple[ReadingCase, Fit]:
 def left_on(model: Model, *held: Model) -> list[Floats]:
     """Root mean squares (n,) of what the model leaves of every held-out record, in floors of noise."""
     case, now = standing(model, *held)
-    assert case.held_out is not None
     floor = noise_floor(case.held_out, now.values)
     runs = [r.runs[0] for r in case.held_out.observation.records]
     return [np.sqrt(np.mean(one[rows] ** 2, axis=0)) / floor for one, rows in zip(case.held(now), runs, strict=True)]

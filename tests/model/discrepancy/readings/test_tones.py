@@ -104,7 +104,6 @@ def test_a_tone_is_tried_with_the_number_of_rates_that_it_was_chosen_from() -> N
     observation = observed(2.0)
     assert tone_trial(imagined.arm(), "dead_zone", 1, {}, 0.1, 7, observation) is None
     trial = tone_trial(imagined.arm(), "periodic_disturbance", 1, {"frequency": 0.01}, 0.5, 7, observation)
-    assert trial is not None
     assert (trial.places, trial.starts[0]["joint1.periodic_disturbance.frequency"]) == (7, 0.5), "at the slowest"
 
 
@@ -112,7 +111,6 @@ def with_first(sensor: dict[str, object] | None, kind: str = "revolute") -> Mach
     """The arm with another sensor on joint 1, or with none."""
     machine = imagined.machine()
     own = machine.joint(1).sensor
-    assert own is not None
     changed = {"kind": kind, "sensor": None if sensor is None else own.model_copy(update=sensor)}
     return machine.model_copy(update={"joints": (machine.joint(1).model_copy(update=changed), *machine.joints[1:])})
 
