@@ -11,8 +11,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from daq.contracts.errors import TraceError
 from daq.contracts.machine import Machine, load_machine
@@ -346,18 +344,17 @@ def said(found: tuple[RecordFinding, ...], fault: Faulty) -> list[RecordFinding]
 
 @pytest.mark.parametrize("name", RIGS)
 @pytest.mark.parametrize("kind", FAULTS)
-@settings(max_examples=3, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 2**32 - 1))
-def test_a_fault_is_said_with_its_place(name: str, kind: str, seed: int) -> None:
+def test_a_fault_is_said_with_its_place(name: str, kind: str) -> None:
     machine, trace = rig(name)
-    fault = FAULTS[kind](trace, machine, np.random.default_rng(seed))
-    if fault is None or (name, kind) in NOT_TOLD:
-        return
-    found = check_records(base_model(machine), [fault.trace])
-    lines = [one.line for one in found]
-    assert said(found, fault), lines
-    cut = kind == "saturated" and all(one.advice.startswith("Used: ") for one in said(found, fault))
-    assert cut or kind in ONLY_NOTED or doubts_in(found), lines
+    for seed in (1, 2, 3):
+        fault = FAULTS[kind](trace, machine, np.random.default_rng(seed))
+        if fault is None or (name, kind) in NOT_TOLD:
+            return
+        found = check_records(base_model(machine), [fault.trace])
+        lines = [one.line for one in found]
+        assert said(found, fault), (seed, lines)
+        cut = kind == "saturated" and all(one.advice.startswith("Used: ") for one in said(found, fault))
+        assert cut or kind in ONLY_NOTED or doubts_in(found), (seed, lines)
 
 
 @pytest.mark.parametrize("name", RIGS)
