@@ -29,8 +29,6 @@ WITHIN = 60.0
 
 
 class Word(BaseModel):
-    """A message."""
-
     said: str
 
 

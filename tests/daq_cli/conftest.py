@@ -30,7 +30,6 @@ def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pa
 
 @pytest.fixture
 def daq(capsys: pytest.CaptureFixture[str]) -> CommandLine:
-    """The command."""
     return CommandLine(capsys)
 
 
@@ -46,5 +45,4 @@ def mock() -> Iterator[MockProcess]:
 
 @pytest.fixture
 def port(mock: MockProcess) -> str:
-    """Its URL."""
     return f"{mock.url}?lock_step=1"

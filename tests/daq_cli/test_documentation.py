@@ -4,7 +4,6 @@ import importlib
 import pkgutil
 import re
 import shlex
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,8 @@ import pytest
 import typer.main
 
 import daq
-from daq.config.settings import RobotSettings
 from daq.contracts import exit_codes
 from daq.contracts.errors import DaqError
-from daq.link.dialects import dialect_of
 from daq_cli.app.subcommands import subcommands
 from tests.daq_cli.invoke import CommandLine
 
@@ -85,12 +82,6 @@ def test_every_exit_code_is_explained() -> None:
 
 
 (SETTINGS,) = re.findall(r"```toml\n(\[robot\]\n.*?)```", YOUR_ROBOT, re.DOTALL)
-
-
-def test_the_page_s_settings_name_a_machine_and_a_dialect_that_exist() -> None:
-    settings = RobotSettings.model_validate(tomllib.loads(SETTINGS.replace("$PWD", "/home"))["robot"])
-    assert (ROOT / settings.machine).is_file()
-    assert dialect_of(str(settings.port)).scale.joints == 2
 
 
 def test_the_check_of_the_page_s_settings_speaks_of_its_dialect_and_of_no_memory_map(

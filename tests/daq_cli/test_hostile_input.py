@@ -1,7 +1,5 @@
 """Every option that takes a file or a number, given what nobody means: one line, and the exit code of wrong input."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -127,20 +125,11 @@ def test_a_number_without_meaning_is_refused_before_anything_is_reached(
     ("words", "expected"),
     [
         ("sine --period 0.03", ("sine: period", "0.03 s", "40 ms (two control periods) and more")),
-        ("sine --period 1e-300", ("sine: period", "too short")),
-        ("sine --cycles 1e-9", ("sine: cycles × period", "too short")),
         ("sine --period 3600 --cycles 1000", ("it would take 1e+03 h", "at most 4 h")),
         ("ramp --duration 0.019", ("ramp: duration", "20 ms (a control period)")),
-        ("cubic --duration 1e-300", ("cubic: duration", "too short")),
-        ("staircase --dwell 1e-9", ("staircase: dwell", "too short")),
-        ("staircase --steps 200 --dwell 3600", ("it would take", "at most 4 h")),
-        ("slow-ramp --speed 1e-300", ("it would take", "at most 4 h")),
         ("multisine --lowest 1e-300", ("lowest frequency of 1e-300 Hz", "0.001 Hz and more")),
-        ("multisine --duration 0.001", ("multisine: duration", "too short")),
         ("ramp --settle 0.001", ("settle: 0.001 s", "too short")),
-        ("ramp --hold 0.001", ("hold: 0.001 s", "too short")),
         ("ramp --amplitude 0.1", ("amplitude", "half a set point (0.135°)", "0 to record the arm at rest")),
-        ("ramp --amplitude 1e-300", ("amplitude", "half a set point")),
     ],
 )
 def test_a_motion_that_set_points_cannot_represent_is_refused(
@@ -197,14 +186,6 @@ def test_the_configuration_shown_is_a_configuration(daq: CommandLine, text: str)
     Path("again.toml").write_text(said.out)
     assert load_settings(Path("again.toml"))[0] == load_settings()[0]
     assert "# port is not set" in said.out.split("[robot]")[1].split("[")[0]
-
-
-def test_a_service_at_an_invalid_port_does_not_start() -> None:
-    command = [sys.executable, "-c", "from daq_cli import main; main()", "--port", "nonsense", "serve"]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=30)
-    assert ended.returncode == 2
-    (line,) = ended.stderr.splitlines()
-    assert "port 'nonsense': must begin with serial://, tcp:// or mock://" in line
 
 
 def test_the_configuration_is_checked_with_the_port_that_is_named(daq: CommandLine) -> None:

@@ -1,6 +1,5 @@
 """Text from outside is never markup: whatever a robot, a file or a model is called is shown as it is, at every door."""
 
-import io
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from daq.contracts.notebook_figure import drawable
-from daq.progress_bar import in_notebook
 from daq.traces.plot import html_page, picture
 from daq.traces.reader import read_trace
 from daq_cli.app.context import console, print_table, printable
@@ -95,14 +93,6 @@ def test_in_a_terminal(capsys: pytest.CaptureFixture[str], show: Callable[[str],
     said = capsys.readouterr()
     assert "\x1b" not in said.out + said.err
     assert " ".join(printable(name).split()) in " ".join((said.out + said.err).split())
-
-
-@NAMES
-def test_in_the_bar_of_a_notebook(name: str) -> None:
-    shown = io.StringIO()
-    with in_notebook(name, shown.write) as told:
-        told(0.5, name)
-    assert "<script>" not in shown.getvalue()
 
 
 @NAMES

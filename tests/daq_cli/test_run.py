@@ -50,25 +50,6 @@ def test_a_run_is_recorded_and_printed_for_people(daq: CommandLine, port: str) -
     ]
 
 
-def test_late_set_points_are_told_once(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    from daq.contracts.experiment import ExperimentSpec
-    from daq.contracts.trace import LATE_SET_POINTS, late_set_points_line
-    from daq.owner.messages import Finished
-    from daq_cli.robot.experiment import print_result
-    from daq_cli.robot.run_display import run_display
-    from tests.daq.traces.samples import write
-
-    line = late_set_points_line(3)
-    with run_display(ExperimentSpec()) as display:
-        display.event("note", 1.0, line)
-        display.event("note", 1.0, "another")
-    trace = write(tmp_path / "a.mcap", 20)
-    print_result(Finished(outcome="complete", trace=trace, samples=20, missing=0, counters={LATE_SET_POINTS: 3.0}))
-    said = capsys.readouterr()
-    assert (said.out + said.err).count(line) == 1
-    assert "note: another" in said.err
-
-
 def test_a_dry_run_connects_to_nothing_and_leaves_nothing(
     daq: CommandLine, monkeypatch: pytest.MonkeyPatch, empty_folder: Path
 ) -> None:

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
 
@@ -140,8 +139,3 @@ def test_completion_loads_no_heavy_library(words: str, offered: list[str]) -> No
     run = begun(**asked)
     assert sorted(run.stdout.split()) == offered
     assert loaded(run) & HEAVY == set()
-
-
-def test_the_version_is_that_of_the_package(daq: CommandLine) -> None:
-    said = daq("--version")
-    assert (said.code, said.out) == (0, f"daq {version('ma2000-daq')}\n")

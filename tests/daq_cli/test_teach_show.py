@@ -43,12 +43,6 @@ def test_a_program_is_shown_by_number_and_in_words(daq: CommandLine) -> None:
     ) == load_program(FILE)
 
 
-def test_control_characters_in_a_program_are_not_printed(daq: CommandLine) -> None:
-    FILE.write_text(FILE.read_text().replace('"name"', '"machine": "a\\u001b[2J", "name"', 1))
-    said = daq("teach", "show", FILE)
-    assert "\x1b" not in said.out + said.err
-
-
 @pytest.mark.parametrize(
     ("before", "after", "code", "expected"),
     [

@@ -144,15 +144,6 @@ def test_configured_limits_of_traces_hold(daq: CommandLine, tmp_path: Path) -> N
     daq("traces", "show", path).complains(2, "traces.limits.joint", "chunk_bytes")
 
 
-def test_control_characters_in_a_trace_are_not_printed(daq: CommandLine, tmp_path: Path) -> None:
-    path = write(tmp_path / "a.mcap", 3, notes="\x1b[31mred\x07", operator="\x1b]0;title\x07", robot="a\x1b[2J")
-    shown = daq("traces", "show", path)
-    assert shown.code == 0
-    assert "red" in shown.out
-    assert "\x1b" not in shown.out
-    assert "\x07" not in shown.out
-
-
 def test_control_characters_in_a_file_name_are_not_printed(daq: CommandLine, tmp_path: Path) -> None:
     path = write(tmp_path / "a\x1b[2J.mcap", 3)
     for words in (("show", path), ("export", path)):

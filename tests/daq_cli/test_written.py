@@ -17,16 +17,6 @@ from firmware_protocol.memory_map import default_memory_map
 from tests.daq_cli.invoke import CommandLine
 
 
-def test_the_old_file_stays_until_the_new_one_is_whole(empty_folder: Path) -> None:
-    path = empty_folder / "model.json"
-    path.write_text("old")
-    with replacing(path) as part:
-        part.write_text("new")
-        assert path.read_text() == "old"
-    assert path.read_text() == "new"
-    assert list(empty_folder.iterdir()) == [path]
-
-
 def test_the_old_file_stays_when_the_new_one_fails(empty_folder: Path) -> None:
     path = empty_folder / "model.json"
     path.write_text("old")

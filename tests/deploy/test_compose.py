@@ -254,7 +254,6 @@ def _lost(given: Any, again: Any, path: str) -> Iterator[str]:
 
 
 def promtool(*words: object) -> subprocess.CompletedProcess[str]:
-    """Prometheus's own checks."""
     program = shutil.which("promtool")
     if program is None:
         pytest.skip("needs promtool: apt install prometheus")

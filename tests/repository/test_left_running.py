@@ -2,10 +2,6 @@
 
 import subprocess
 import sys
-import threading
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from tests.left_running import Running
 
@@ -13,33 +9,11 @@ SLEEPER = "import time; time.sleep(60)"
 GRANDPARENT = f"import subprocess, sys; subprocess.Popen([sys.executable, '-c', {SLEEPER!r}], start_new_session=True)"
 
 
-@contextmanager
-def a_thread() -> Iterator[threading.Thread]:
-    go = threading.Event()
-    thread = threading.Thread(target=go.wait, name="forgotten", daemon=True)
-    thread.start()
-    try:
-        yield thread
-    finally:
-        go.set()
-        thread.join()
-
-
 def processes_left(before: Running) -> Running:
     """What was left, once a process is seen: on a busy machine it is listed before it has its environment."""
     while not (left := (Running.now() - before).wait(grace_s=0.01)).processes:
         pass
     return left
-
-
-def test_it_names_a_thread_that_was_left_and_waits_for_one_that_is_about_to_end() -> None:
-    before = Running.now()
-    with a_thread():
-        left = (Running.now() - before).wait(grace_s=0.01)
-    assert "'forgotten'" in str(left)
-    before = Running.now()
-    threading.Thread(target=time.sleep, args=(0.05,)).start()
-    assert not (Running.now() - before).wait()
 
 
 def test_it_names_processes_that_were_left_by_anyone_and_can_end_them() -> None:

@@ -1,7 +1,6 @@
 """The bench of real machines: its entries fit together, records are imported, and marks say what they promise."""
 
 import json
-import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,18 +10,14 @@ import numpy as np
 import pytest
 
 from benchmarks.real_machines.__main__ import rows, summary, table
-from benchmarks.real_machines.judge import judge, moved, wrong_names
+from benchmarks.real_machines.judge import judge
 from benchmarks.real_machines.records import (
-    MissingDataError,
-    add_torque,
-    content,
-    find_repository,
     read_columns,
     write_machine,
     write_record,
 )
 from benchmarks.real_machines.reference import reference
-from benchmarks.real_machines.rigs import HERE, Number, Question, Record, Torque, load_rigs
+from benchmarks.real_machines.rigs import HERE, Number, Question, Record, load_rigs
 from daq.contracts.machine import load_machine
 from ma2000 import read_trace
 
@@ -38,32 +33,6 @@ def test_every_entry_fits_its_machine_file_and_its_alteration_is_one(rig: Any, t
     assert changes != bool(altered.add)
     written = write_machine(rig.machine, altered.set, altered.remove, tmp_path / "m.toml")
     assert (load_machine(str(written)) != machine) == changes
-
-
-def _repository(folder: Path) -> str:
-    """A repository at its second commit; its first one."""
-    git = ["git", "-C", str(folder), "-c", "user.name=t", "-c", "user.email=t@example.org"]
-    folder.mkdir(parents=True)
-    subprocess.run([*git, "init", "-q"], check=True)
-    for text in ("first", "second"):
-        (folder / "log.json").write_text(text)
-        subprocess.run([*git, "add", "."], check=True)
-        subprocess.run([*git, "commit", "-qm", text], check=True)
-    done = subprocess.run([*git, "rev-parse", "HEAD~1"], check=True, capture_output=True, text=True)
-    return done.stdout.strip()
-
-
-def test_a_file_is_read_at_its_commit_of_any_repository_and_plain_as_it_is(tmp_path: Path) -> None:
-    commit = _repository(tmp_path / "rig")
-    subprocess.run(["git", "clone", "-q", "--bare", tmp_path / "rig", tmp_path / "own+bare" / "repo"], check=True)
-    (tmp_path / "own" / "plain").mkdir(parents=True)
-    (tmp_path / "own" / "plain" / "log.json").write_text("plain")
-    read = {n: content(find_repository(tmp_path, f"own/{n}"), commit, "log.json") for n in ("rig", "bare", "plain")}
-    assert read == {"rig": b"first", "bare": b"first", "plain": b"plain"}
-    with pytest.raises(MissingDataError, match=r"get github\.com/own/none"):
-        find_repository(tmp_path, "own/none")
-    with pytest.raises(MissingDataError, match=r"absent\.json"):
-        content(tmp_path / "rig", commit, "absent.json")
 
 
 def _pendulum(folder: Path, load: float, seed: int) -> None:
@@ -110,18 +79,6 @@ def test_a_record_is_renamed_and_imported_by_the_product(pendulum: Any, tmp_path
     assert linear.held_out < 0.02
 
 
-def test_of_many_records_one_is_read_and_a_torque_added_is_the_drive_s(pendulum: Any, tmp_path: Path) -> None:
-    series = [{"x": [1.0] * 100}, {"x": [2.0] * 100}]
-    (tmp_path / "bam" / "data" / "many.json").write_text(json.dumps({"data": series}))
-    rig = replace(pendulum, map={"time": "0.5*#", "position": "{part}.x"})
-    columns = read_columns(rig, Record(("many.json",), 0.0, 1.5, "data.1"), tmp_path)
-    assert np.array_equal(columns["position_1"], [2.0, 2.0, 2.0])
-    assert np.array_equal(columns["time"], [0.0, 0.5, 1.0])
-    columns = read_columns(pendulum, pendulum.fitted[0], tmp_path)
-    sprung = add_torque(columns, Torque("spring", 1, 0.3), gain=0.1)
-    assert np.allclose(sprung["drive_1"] - columns["drive_1"], 3.0 * columns["position_1"])
-
-
 def _answer(*steps: tuple[str, Sequence[str], Sequence[int], bool], verdict: str = "named", size: float = 0.2) -> Any:
     return {
         "verdict": verdict,
@@ -159,18 +116,6 @@ COULOMB = Question("friction", ("coulomb_friction",), (1, 2), "", Number(("coulo
 )
 def test_marks(answer: Any, mark: str) -> None:
     assert judge(COULOMB, answer, {"coulomb_friction", "viscous_friction"})[1] == mark
-
-
-def test_names_that_were_withdrawn_or_unasked_and_numbers_far_off_are_told() -> None:
-    answer = _answer(
-        ("coulomb_friction", (), (1, 2), False), ("spring_torque", (), (1,), True), verdict="unknown-effect"
-    )
-    assert judge(COULOMB, answer, ())[0] == "unknown (coulomb_friction withdrawn: found-one-way)"
-    assert wrong_names(answer, {"coulomb_friction"}) == ["spring_torque on 1"]
-    question = replace(COULOMB, moved=Number(("link1.mass",), 85.0, 105.0, "kg"))
-    note = {"numbers": [{"name": "link1.mass", "value": 94.6}]}
-    assert moved(question, note) == "link1.mass 94.6 kg"
-    assert [moved(COULOMB, note), moved(question, {"numbers": [{"name": "link1.mass", "value": 130.0}]})] == ["", ""]
 
 
 def test_a_rig_that_takes_too_long_or_is_refused_has_no_answer(pendulum: Any, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.mutants import Mutant, mutants_of
-from benchmarks.mutation import chosen_tests, equivalents, files_of_tests, mirrored_folder
+from benchmarks.mutation import equivalents, files_of_tests, mirrored_folder
 from tests.conftest import DETERMINISTIC
 from tests.order import AGAINST_THE_CLOCK
 from tests.repository.inner_run import ROOT, run_folder
@@ -170,11 +170,6 @@ def test_a_module_is_tried_by_the_tests_of_its_folder() -> None:
     assert mirrored_folder("firmware_protocol/bridge/stack.py") == ROOT / "tests" / "firmware"
     assert "tests/daq/link/test_transactions.py" in files_of_tests("daq/link/pending.py")
     assert mirrored_folder("mock_controller/board/board.py").is_relative_to(ROOT / "tests" / "mock")
-
-
-def test_the_quickest_file_of_tests_comes_first() -> None:
-    chosen = chosen_tests(("a.py", "b.py"), {"a.py": 2.0, "b.py": 1.0, "c.py": 0.1})
-    assert (chosen.files, chosen.seconds) == (("b.py", "a.py"), 3.0)
 
 
 def _mutants_of_file(file: str) -> list[Mutant]:

@@ -13,11 +13,9 @@ class HandClock:
     wall: datetime = datetime(2026, 1, 1, tzinfo=UTC)
 
     def utc(self) -> datetime:
-        """The wall clock."""
         return self.wall
 
     def monotonic(self) -> float:
-        """The other one."""
         return self.now
 
     def elapsed(self) -> float:
@@ -30,6 +28,5 @@ class HandClock:
         self.wall += timedelta(seconds=seconds)
 
     def turn(self, seconds: float) -> None:
-        """Both go on."""
         self.now += seconds
         self.wall += timedelta(seconds=seconds)

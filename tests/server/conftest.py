@@ -68,7 +68,6 @@ def here(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest
 
 @pytest.fixture
 def sqlite_store(tmp_path: Path) -> Iterator[Store]:
-    """A new SQLite database."""
     with closing(migrated_store(tmp_path / "service.sqlite")) as made:
         yield made
 

@@ -36,7 +36,6 @@ class WrongClock(SystemClock):
     ahead: timedelta = timedelta(0)
 
     def utc(self) -> datetime:
-        """What it shows."""
         return datetime.now(UTC) + self.ahead
 
 

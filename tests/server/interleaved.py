@@ -162,7 +162,6 @@ class Wire:
         return replies
 
     def stop(self) -> Any:
-        """As `Link.stop`."""
         return self.request(c.Stop(), c.Stopped)
 
     def _answer(self, request: c.Request) -> Any:  # noqa: PLR0911 - one for each kind of request
@@ -214,11 +213,9 @@ class WiredController(WatchedController):
         self._watch = SetPointWatch()
 
     def set_points(self, postures: Any) -> Any:
-        """One write."""
         return self.link.request(c.WriteSetPoints(tuple(postures.items())), c.SetPointsTaken)
 
     def line_rate(self, *_: object, **__: object) -> Any:
-        """Of every period."""
         return SimpleNamespace(every=1)
 
     def next_snapshot(self, *_: object, **__: object) -> Any:
@@ -235,7 +232,6 @@ class Told(Future[Answer]):
         self._world = world
 
     def result(self, timeout: float | None = None) -> Answer:
-        """As every future's."""
         until = math.inf if timeout is None else self._world.clock.now + timeout
         self._world.until(lambda: self.done() or self._world.clock.now >= until)
         if not self.done():
@@ -285,7 +281,6 @@ class Turn:
         """Nothing was locked."""
 
     def wait_for(self, so: Callable[[], bool], _timeout: float) -> bool:
-        """As a condition's."""
         self._world.until(so)
         return True
 
@@ -293,11 +288,9 @@ class Turn:
         """Whoever waits looks by itself."""
 
     def set(self) -> None:
-        """As an event's."""
         self._set = True
 
     def clear(self) -> None:
-        """As an event's."""
         self._set = False
 
     def wait(self, _timeout: float) -> None:
@@ -313,7 +306,6 @@ class Stores:
     said: list[str] = field(default_factory=list)
 
     def due(self, *_: object, **__: object) -> list[Waiting]:
-        """Those that may run."""
         return [Waiting(str(n), n, 0, None) for n in range(self.waiting)]
 
     def begin(self, _robot: str, identity: str, *_: object) -> Any:
@@ -322,11 +314,9 @@ class Stores:
         return SimpleNamespace(id=identity, spec=ExperimentSpec())
 
     def count_waiting(self, *_: object) -> int:
-        """How many."""
         return self.waiting
 
     def trace_number(self, identity: str) -> str:
-        """Of its trace."""
         return identity
 
     def __getattr__(self, _name: str) -> Callable[..., Any]:

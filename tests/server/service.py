@@ -41,7 +41,6 @@ class Service:
         return found
 
     def status(self) -> dict[str, Any]:
-        """Of the robot."""
         return self._until("/robots/ma2000", lambda _: True)
 
     def until_arm(self, state: str) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from websockets.sync.client import connect
 from benchmarks.service_process import child
 from server.logs import PlainLines
 from server.serve import FORCED
-from tests.server.hostile_files import bomb, sound_trace
+from tests.daq.traces.test_hostile_files import bomb_of_chunks
 from tests.server.service import running_service
 
 
@@ -151,7 +151,7 @@ def test_the_service_ends_in_time_whatever_it_does(tmp_path: Path) -> None:
     with running_service(tmp_path) as service:
         service.until_connected()
         where, over = urlsplit(service.url), threading.Event()
-        content = bomb(sound_trace(), 1 << 30)
+        content = bomb_of_chunks(16)
 
         def ask(method: str, path: str, **body: object) -> None:
             with contextlib.suppress(httpx.HTTPError), httpx.Client(timeout=60) as client:

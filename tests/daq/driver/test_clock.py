@@ -9,13 +9,11 @@ from hypothesis import strategies as st
 from daq.driver.clock import LockStepClock, RealClock
 from daq.driver.line_rate import (
     LARGEST_SHARE,
-    LineRate,
     bound_ms,
     bytes_of_a_compact_turn,
     bytes_of_a_snapshot,
     bytes_of_a_turn,
     line_rate,
-    reported_rates,
     stop_latency_s,
 )
 from daq.driver.tick_time import WINDOW_TICKS, TickTime
@@ -156,15 +154,6 @@ def test_bytes_are_those_of_the_frames(joints: int, moving: int) -> None:
     assert bytes_of_a_snapshot(joints, compact=True) == on_the_line(compact)
 
 
-@pytest.mark.parametrize(
-    ("baud", "joints", "plain", "compact"),
-    [(9600, 3, 6, 4), (9600, 6, 8, 5), (19200, 3, 3, 2), (19200, 6, 4, 3), (38400, 3, 2, 1), (57600, 6, 2, 1)],
-)
-def test_every_so_many_periods_there_is_a_sample(baud: int, joints: int, plain: int, compact: int) -> None:
-    assert line_rate(baud / 10, PERIOD, joints, joints).every == plain
-    assert line_rate(baud / 10, PERIOD, joints, joints, can_be_compact=True).every == compact
-
-
 @pytest.mark.parametrize("baud", [1200, 9600, 19200, 38400, 57600, 115200])
 @pytest.mark.parametrize("joints", range(1, 7))
 @pytest.mark.parametrize("compact", [False, True])
@@ -174,30 +163,11 @@ def test_no_rate_takes_more_of_the_line_than_it_may_and_no_faster_fits(baud: int
     assert rate.every == 1 or rate.share * rate.every / (rate.every - 1) > LARGEST_SHARE
 
 
-def test_rates_are_told_with_joints_share_and_stop_for_one_for_three_and_for_all() -> None:
-    words = line_rate(1920, PERIOD, 3, 3, can_be_compact=True).in_words
-    assert words == (
-        "25 samples per second of 3 joints, every 2nd control period, 74 % of the line; a stop takes up to 45 ms"
-    )
-    assert line_rate(11520, PERIOD, 1, 1).in_words.startswith("50 samples per second of 1 joint, every control period")
-    found = reported_rates(1920, PERIOD, can_be_compact=True)
-    assert [(rate.joints, rate.moving) for rate in found] == [(1, 1), (3, 3), (6, 6)]
-    assert found == tuple(line_rate(1920, PERIOD, joints, joints, can_be_compact=True) for joints in (1, 3, 6))
-    assert [rate.compact for rate in reported_rates(1920, PERIOD, can_be_compact=False)] == [False] * 3
-
-
 def test_a_stop_waits_for_the_largest_frame_and_ten_milliseconds_of_the_bridge() -> None:
     longest = on_the_line(c.WriteBlock(0xFC00, bytes(c.MAX_WRITE)), c.Stop())
     assert stop_latency_s(1920) == pytest.approx(longest / 1920 + 0.010)
     assert stop_latency_s(1e12) == pytest.approx(0.010)
     assert [bound_ms(s) for s in (0.0, 0.0449999, 0.045, 0.0450001, 0.0450021)] == [0, 45, 45, 46, 46]
-
-
-def test_every_nth_period_is_written_as_english_writes_it() -> None:
-    endings = {"st": (21,), "nd": (2, 22), "rd": (3, 23), "th": (4, 10, 11, 12, 13, 20, 24, 110, 112, 120)}
-    for ending, every in ((ending, every) for ending, numbers in endings.items() for every in numbers):
-        words = LineRate(3, 3, every, 0.5, PERIOD, 0.0).in_words
-        assert f", every {every}{ending} control period, 50 % of the line; " in words
 
 
 def test_a_turn_is_compact_only_where_set_points_need_it() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from daq.driver import Controller, ControllerRestartedError, GainsNotTakenError, ProtocolVersionError
 from daq.driver.line_rate import bytes_of_a_compact_turn, bytes_of_a_turn
-from daq.link import Link, LinkState, RequestRefusedError
+from daq.link import Link, RequestRefusedError
 from daq.transport import TransportError
 from firmware_protocol import commands as c
 from firmware_protocol.joints import JointReading
@@ -207,40 +207,6 @@ def test_a_release_that_is_refused_for_another_reason_is_not_tried_again(reason:
     assert controller.counters.refused == 1
 
 
-def test_identity_and_status_are_those_of_greeting_board_and_link() -> None:
-    simulated = c.HelloReply(2, c.Capability.SAMPLE | c.Capability.SIMULATED, 15_000, 8, 3, 0, 7)
-    own = controller_that(lambda _: None, simulated)
-    identity = own.identity
-    assert (identity.version, identity.period_s, identity.ring_depth, identity.boots) == (2, 0.015, 8, 3)
-    assert (identity.simulated, identity.restarted, own.period_s) == (True, False, 0.015)
-    assert not controller_that(lambda _: None).identity.simulated
-    status = controller_that(lambda _: c.Status(70, 5, 3, 9, 4)).status()
-    assert (status.tick, status.flags, status.boots, status.missed, status.stop) == (
-        70,
-        c.StatusFlag.FROZEN | c.StatusFlag.SET_POINT_MISSED,
-        3,
-        9,
-        4,
-    )
-    assert (status.link, status.counters.requests) == (LinkState.CONNECTED, 2)
-
-
-def test_outputs_and_gripper_are_asked_for_as_given() -> None:
-    asked: list[c.Request] = []
-    replies: dict[type[c.Request], c.Reply] = {c.WriteOutputs: c.OutputsWritten(), c.SetGripper: c.GripperSet()}
-
-    def answers(request: c.Request) -> c.Reply:
-        asked.append(request)
-        return replies.get(type(request), c.Process(1, 2, 1))
-
-    controller = controller_that(answers)
-    controller.write_outputs(0b11, 0b01)
-    controller.set_gripper(closed=True)
-    controller.set_gripper(closed=False)
-    assert asked == [c.WriteOutputs(0b11, 0b01), c.SetGripper(1), c.SetGripper(0)]
-    assert controller.process() == c.Process(1, 2, 1)
-
-
 def test_what_a_stop_s_confirmation_tells() -> None:
     confirmation = controller_that(lambda _: c.Stopped(7, (1, 2, 3, 4, 5, 6))).stop()
     assert (confirmation.sent, confirmation.acknowledged, confirmation.tick) == (True, True, 7)
@@ -308,42 +274,3 @@ def test_a_slow_line_gives_a_sample_every_so_many_periods_where_the_bridge_sees_
     assert rate.share * rate.every == pytest.approx(turn / 960.0 / 0.02)
     assert controller.line_rate((1, 2, 3)).moving == 0
     assert controller.line_rate().joints == 6
-
-
-class LockStepBoard:
-    """Its time stands still between requests; `time_us` is told to whoever asks."""
-
-    def __init__(self) -> None:
-        self.time_us = 1_000_000
-
-    def answer(self, sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
-        hello = c.HelloReply(
-            2, c.Capability.SAMPLE | c.Capability.LOCK_STEP, 20_000, 8, 3, self.time_us & 0xFFFFFFFF, 7
-        )
-        reply: c.Reply = hello
-        if isinstance(request, c.Advance):
-            self.time_us += request.microseconds
-            reply = c.Advanced(self.time_us, self.time_us // 20_000)
-        elif isinstance(request, c.Sample):
-            reply = c.Snapshot(self.time_us // 20_000, 0, ((1, JointReading(500, 2048, 0, 0)),))
-        return [(0.0, frame_of(sequence, reply))]
-
-
-def test_in_lock_step_the_clock_is_the_controller_s() -> None:
-    board = LockStepBoard()
-    link, _ = scripted_link(board.answer, lock_step=True)
-    controller = Controller(link)
-    assert controller.clock.now() == pytest.approx(1.0)
-    board.time_us = 1_600_000
-    assert controller.next_snapshot().host_time == pytest.approx(1.6), "a sample shows its period to be over"
-    board.time_us = 40_000
-    controller.hello()
-    assert controller.clock.now() == pytest.approx(0.04)
-    assert controller.next_snapshot().tick == 2
-    board = LockStepBoard()
-    link, channel = scripted_link(board.answer, lock_step=True)
-    controller = Controller(link)
-    first = controller.next_snapshot()
-    controller.next_snapshot(first.tick + 3)
-    passed = [request.microseconds for _, request in channel.asked if isinstance(request, c.Advance)]
-    assert [us for us in passed if us] == [65_000], "three periods and a quarter"

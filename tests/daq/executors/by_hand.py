@@ -55,7 +55,6 @@ class WorkersInThreads(Workers):
 
 
 def square(number: int) -> int:
-    """A job."""
     return number**2
 
 
@@ -67,5 +66,4 @@ def square_or_die(number: int) -> int:
 
 
 def process_of(_number: int) -> int:
-    """Who computes."""
     return os.getpid()

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.link import LinkLostError, LinkTimeoutError, dialects
-from daq.link.counters import COUNTED, LinkCounters, RoundTrips, Tally
+from daq.link.counters import RoundTrips, Tally
 from daq.link.dialects import dialect_of
 from daq.link.timing import RETRIES, LinkTiming
 from daq.link.turn_exchange import MarkCounter
@@ -127,8 +127,6 @@ def test_times_of_replies_and_repeats_leave_room_for_a_shared_wire_and_a_stop() 
 
 
 def test_a_trace_counts_what_happened_while_it_was_recorded() -> None:
-    assert Tally().snapshot(damaged=0) == LinkCounters()
-    assert LinkCounters().numbers() == dict.fromkeys([*COUNTED, "damaged", "round_trip_count"], 0.0)
     tally = Tally()
     tally.count("retries", 67)
     for _ in range(100):
@@ -145,19 +143,6 @@ def test_a_trace_counts_what_happened_while_it_was_recorded() -> None:
     whole = tally.snapshot(4)
     assert (whole.retries, whole.damaged, whole.round_trips.count) == (69, 4, 110)
     assert whole.round_trips.max_s == 0.05
-    numbers = LinkCounters(retries=2, round_trips=RoundTrips(3, 0.1, 0.2, 0.3, 0.4)).numbers()
-    expected = {"count": 3.0, "mean_s": 0.1, "p50_s": 0.2, "p99_s": 0.3, "max_s": 0.4}
-    assert {name: value for name, value in numbers.items() if value} == {
-        "retries": 2.0,
-        **{f"round_trip_{name}": value for name, value in expected.items()},
-    }
-    tally = Tally()
-    for name in COUNTED:
-        tally.count(name)
-    tally.count("torn", 4)
-    found = tally.snapshot(damaged=7)
-    assert {name: getattr(found, name) for name in COUNTED} == dict.fromkeys(COUNTED, 1) | {"torn": 5}
-    assert found.damaged == 7
 
 
 def trips(*seconds: float) -> RoundTrips:
@@ -179,14 +164,6 @@ def test_half_of_the_round_trips_are_no_longer_than_the_median_and_one_in_a_hund
     tally = Tally()
     tally.round_trip(3.0)
     assert tally.snapshot(damaged=0).round_trips == RoundTrips(1, 3.0, 3.0, 3.0, 3.0)
-
-
-@pytest.mark.parametrize(
-    ("seconds", "edge"), [(1e-6, 10e-6), (10e-6, 10e-6), (10.5e-6, 11e-6), (11.5e-6, 12.1e-6), (0.8, 10e-6 * 1.1**119)]
-)
-def test_a_round_trip_is_told_to_the_next_tenth_above_it(seconds: float, edge: float) -> None:
-    assert trips(seconds, 3.0).p50_s == pytest.approx(edge)
-    assert trips(seconds).p50_s == seconds, "never more than the longest of all"
 
 
 # ---- Turns in lock-step: what the idle mark ends, what a time-out costs, however bytes are cut

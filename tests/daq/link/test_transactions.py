@@ -1,7 +1,5 @@
 """What a link makes of lost, late, repeated, foreign and refused replies."""
 
-from random import Random
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -92,20 +90,6 @@ def test_a_reply_that_nobody_waits_for_is_dropped_and_counted() -> None:
     link, _ = scripted_link(answer)
     assert link.request(c.ReadStatus(), c.Status) == STATUS
     assert (link.counters.stale, link.counters.duplicates) == (2, 1)
-
-
-def test_damage_is_counted_and_costs_one_repetition() -> None:
-    damaged = iter([True])
-
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
-        frame = bytearray(frame_of(sequence, STATUS))
-        if next(damaged, False):
-            frame[5] ^= 0x10
-        return [(0.0, bytes(frame))]
-
-    link, _ = scripted_link(answer)
-    assert link.request(c.ReadStatus(), c.Status) == STATUS
-    assert (link.counters.damaged, link.counters.retries) == (1, 1)
 
 
 def test_a_refusal_says_which_request_and_why_and_is_counted_by_itself() -> None:
@@ -276,24 +260,6 @@ def test_a_greeting_is_answered_by_its_own_nonce_which_is_the_time_in_lock_step(
     assert link.counters.refused == 1
 
 
-class Chance(Random):
-    """Draws the largest number."""
-
-    def getrandbits(self, bits: int, /) -> int:
-        return (1 << bits) - 1
-
-
-def test_numbers_and_nonces_are_drawn_from_all_there_are() -> None:
-    def answer(sequence: int, request: c.Request) -> list[tuple[float, bytes]]:
-        assert isinstance(request, c.Hello)
-        return [(0.0, frame_of(sequence, c.HelloReply(2, c.Capability.SAMPLE, 20_000, 8, 1, request.nonce, 7)))]
-
-    channel = ScriptedChannel(answer)
-    link = Link(ScriptedEndpoint([channel]), now=channel.now, chance=Chance())
-    link.greet()
-    assert channel.asked == [(0xFFFF, c.Hello(2, 0xFFFFFFFF))]
-
-
 def test_a_link_is_clean_again_after_a_hundred_good_replies() -> None:
     link, _ = scripted_link(once_silent(STATUS, RETRIES + 1))
     with pytest.raises(LinkTimeoutError):
@@ -311,17 +277,6 @@ def test_a_link_is_clean_again_after_a_hundred_good_replies() -> None:
         assert link.state is LinkState.DEGRADED
         link.request(c.ReadStatus(), c.Status)
     assert link.state is LinkState.CONNECTED
-
-
-def test_a_link_says_where_it_leads() -> None:
-    link, channel = scripted_link(lambda _sequence, _request: [])
-    assert (repr(link), link.url, link.bytes_per_second) == ("Link(script://, connected)", "script://", 11520.0)
-    assert (link.lock_step, link.control) == (False, None)
-    with link:
-        assert channel.broken is None
-    assert channel.broken == "closed"
-    with pytest.raises(LinkLostError, match="script: closed"):
-        link.request(c.ReadStatus(), c.Status)
 
 
 class _Waits:

@@ -45,7 +45,6 @@ class Running:
         self.say(RunExperiment(number=1, asked=time.monotonic(), spec=spec, moves_real_arm=False).model_dump_json())
 
     def report(self) -> Report:
-        """What it says next."""
         assert self.process.stdout is not None
         return REPORT.validate_json(self.process.stdout.readline())
 
@@ -66,7 +65,6 @@ class Running:
         self.process.stdin.close()
 
     def exit_code(self) -> int:
-        """When it has ended."""
         return self.process.wait(20)
 
     def left(self) -> int:

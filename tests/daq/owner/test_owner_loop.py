@@ -198,7 +198,6 @@ class Interrupted(Bridge):
         return super().receive(frame)
 
     def hear_a_stop(self) -> None:
-        """From whomever."""
         super().receive(to_frame(0, Stop()))
 
 

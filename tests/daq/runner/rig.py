@@ -67,14 +67,12 @@ class Rig:
     def run(
         self, spec: ExperimentSpec = SHORT, *, machine: Machine | None = None, consent: Consent | None = None
     ) -> RunResult:
-        """One run."""
         machine = machine or self.machine
         requests = StopRequests(lambda: self.wants_end, lambda: self.orphaned)
         run = RunSetup(self.controller, self.control, spec, machine, machine.limits, self.folder, self.ears, requests)
         return run_experiment(run, consent or Consent())
 
     def trace(self, result: RunResult) -> Trace:
-        """What was recorded."""
         return read_trace(result.trace)
 
     def ask(self, do: str, **details: object) -> dict[str, Any]:

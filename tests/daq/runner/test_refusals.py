@@ -54,18 +54,6 @@ def test_a_real_arm_moves_only_with_the_operators_consent(arm: Rig) -> None:
     assert arm.trace(result).record.source == "real"
 
 
-def test_one_line_tells_how_many_more_there_are(arm: Rig) -> None:
-    """Joints 2 and 3 would both be too fast, and joint 1 alone."""
-    fast = Ramp(amplitude=math.radians(40), duration=0.2)
-    only_one = SHORT.model_copy(update={"trajectory": fast, "joints": (1,), "gains": {}})
-    with pytest.raises(SafetyError) as alone:
-        arm.run(only_one)
-    with pytest.raises(SafetyError) as two:
-        arm.run(only_one.model_copy(update={"joints": (1, 4)}))
-    assert "more)" not in str(alone.value)
-    assert "(and 1 more); nothing moved" in str(two.value)
-
-
 @pytest.mark.parametrize(("ms", "allowed"), [(19.81, True), (20.19, True), (19.79, False), (20.21, False)])
 def test_a_period_may_differ_from_the_machine_files_by_a_hundredth(arm: Rig, ms: float, allowed: bool) -> None:
     period = arm.machine.controller.period.model_copy(update={"value": ms * 1e-3})

@@ -68,7 +68,6 @@ class Tally:
     examples: list[str] = field(default_factory=list)
 
     def fault(self, kind: str, file: str, detail: str) -> None:
-        """Counts a fault."""
         self.faults[kind] += 1
         if self.faults[kind] <= 3:
             self.examples.append(f"{kind}: {file}: {detail[:300]}")
@@ -259,19 +258,16 @@ def cut(rng: random.Random, data: bytes) -> bytes:
 
 
 def doubled(rng: random.Random, data: bytes) -> bytes:
-    """A part twice."""
     begin, end = sorted(rng.choices(range(len(data)), k=2))
     return data[:end] + data[begin:end] + data[end:]
 
 
 def left_out(rng: random.Random, data: bytes) -> bytes:
-    """A part missing."""
     begin, end = sorted(rng.choices(range(len(data)), k=2))
     return data[:begin] + data[end:]
 
 
 def swapped(rng: random.Random, data: bytes) -> bytes:
-    """Two parts exchanged."""
     a, b, c, d = sorted(rng.choices(range(len(data)), k=4))
     return data[:a] + data[c:d] + data[b:c] + data[a:b] + data[d:]
 

@@ -144,7 +144,6 @@ class Campaign:
         self._sound = {kind.name: kind.read(kind.opened) for kind in self.kinds}
 
     def run(self, cases: Iterator[tuple[Kind, str, bytes]]) -> Tally:
-        """Reads each file."""
         for kind, way, data in cases:
             kind.damaged.write_bytes(data)
             self._case(kind, way, data)
@@ -190,6 +189,5 @@ def damaged(chosen: list[Kind], rng: random.Random) -> Iterator[tuple[Kind, str,
 
 
 def campaign(cases: int, seed: int, kinds: list[Kind]) -> Tally:
-    """So many damaged files."""
     running = Campaign(kinds)
     return running.run(itertools.islice(damaged(running.kinds, random.Random(seed)), cases))

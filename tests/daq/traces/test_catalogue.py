@@ -9,14 +9,14 @@ from mcap.writer import IndexType, Writer
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.experiment import ExperimentSpec, Sine
-from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
+from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS
 from daq.traces.catalogue import TraceSummary, find_trace, list_traces
-from daq.traces.ends import first_metadata, indexed_metadata
-from daq.traces.layout import END_METADATA, START_METADATA
+from daq.traces.ends import indexed_metadata
+from daq.traces.layout import END_METADATA
 from daq.traces.naming import trace_path
 from daq.traces.query import parse_query
 from daq.traces.salvage import salvage_folder
-from daq.traces.scan import UNREADABLE, scan
+from daq.traces.scan import UNREADABLE
 from daq.traces.writer import TraceWriter
 from tests.daq.traces.samples import CREATED, JOINTS, record, row, write
 
@@ -188,22 +188,6 @@ def test_what_is_refused(text: str, says: str) -> None:
 def path(tmp_path: Path) -> Path:
     """A finished trace."""
     return write(tmp_path / "a.mcap", notes="warm")
-
-
-def test_the_index_leads_to_both_metadata_within_limits(path: Path) -> None:
-    with path.open("rb") as stream:
-        found = indexed_metadata(stream, DEFAULT_TRACE_LIMITS)
-    assert found == scan(path.read_bytes(), "a").metadata
-    assert found.keys() == {START_METADATA, END_METADATA}
-    assert found[END_METADATA]["samples"] == "100"
-    with path.open("rb") as stream:
-        name, metadata = first_metadata(stream, DEFAULT_TRACE_LIMITS, "a")
-    assert (name, metadata) == (START_METADATA, scan(path.read_bytes(), "a").metadata[START_METADATA])
-    few = TraceLimits(metadata_bytes=100)
-    with path.open("rb") as stream, pytest.raises(ValueError, match="more than 100 bytes"):
-        indexed_metadata(stream, few)
-    with path.open("rb") as stream, pytest.raises(TraceError, match="ends or is damaged before its first metadata"):
-        first_metadata(stream, few, "a")
 
 
 def test_an_index_that_is_missing_or_changed_is_noticed(path: Path) -> None:

@@ -109,15 +109,19 @@ def test_definitions_in_chunks_count_as_records(tmp_path: Path, sound: dict[str,
     assert "there are more than 900 records (traces.limits.records)" in line
 
 
-def test_a_bomb_of_two_gibibytes_is_refused_at_once(tmp_path: Path) -> None:
-    """Fifty kB of chunks of 64 MiB, each as large as it declares: what they are together is limited."""
+def bomb_of_chunks(count: int) -> bytes:
+    """A trace of a few kB with so many chunks of 64 MiB, each as large as it declares."""
     plain = struct.pack("<BQHIQQ", Opcode.MESSAGE, 64 * A_MEGABYTE - HEAD, 1, 0, 0, 0).ljust(64 * A_MEGABYTE, b"\0")
     packed = zstandard.compress(plain)
     chunk = struct.pack("<QQQII4sQ", 0, 0, len(plain), 0, 4, b"zstd", len(packed)) + packed
     whole = foreign(ours())
     begin = first_of(whole, Opcode.METADATA)
-    data = whole[:begin] + (struct.pack("<BQ", Opcode.CHUNK, len(chunk)) + chunk) * 32 + whole[begin:]
-    line = refused(tmp_path / "a.mcap", data, TraceLimits(total_bytes=100 * A_MEGABYTE))
+    return whole[:begin] + (struct.pack("<BQ", Opcode.CHUNK, len(chunk)) + chunk) * count + whole[begin:]
+
+
+def test_a_bomb_of_two_gibibytes_is_refused_at_once(tmp_path: Path) -> None:
+    """What its chunks are together is limited."""
+    line = refused(tmp_path / "a.mcap", bomb_of_chunks(32), TraceLimits(total_bytes=100 * A_MEGABYTE))
     assert "its chunks have more than 104857600 bytes (traces.limits.total_bytes)" in line
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from daq_cli.models.diagnosis_text import WIDTH, answer_text, candidates_lines
 from daq_cli.robot.experiment import read_spec
-from model.discrepancy.diagnosis import Candidate, Diagnosis, DifferencePlace, Step, Suspicion
+from model.discrepancy.diagnosis import Candidate, Diagnosis, Step
 from model.discrepancy.explanation.answer_words import with_sentences
 from model.discrepancy.explanation.notes import on_stated_numbers
 from model.discrepancy.grounds import Note
@@ -54,14 +54,6 @@ def test_other_verdicts_are_said_as_what_they_are(answer: Diagnosis) -> None:
     assert text.startswith("NOTHING SIGNIFICANT  the model explains these traces")
 
 
-def test_a_suspicion_says_what_is_missing(answer: Diagnosis) -> None:
-    doubt = Suspicion(effect="coulomb_friction", joints=(1,), evidence=24.0, needed=30.0, seconds=20.0)
-    bare = answer.model_copy(update={"verdict": "suspected", "steps": (), "remaining": (), "suspicion": doubt})
-    said = "Coulomb friction on joint 1, evidence 24 of 30; 20 s more of this motion would settle it"
-    assert " ".join(answer_text(with_sentences(bare)).split()).startswith(f"SUSPECTED perhaps {said}")
-    assert with_sentences(bare).summary == f"Suspected: {said}."
-
-
 def test_numbers_far_from_what_is_stated_stand_right_under_the_verdict(answer: Diagnosis) -> None:
     load = Parameter(name="load.mass", kind=Kind.INERTIA, part="mass", unit="kg", value=500.0)
     mass = Unknown(load, start=500.0, expected=500.0, deviation=50.0)
@@ -71,79 +63,6 @@ def test_numbers_far_from_what_is_stated_stand_right_under_the_verdict(answer: D
     assert lines[1].startswith("WARNING  This number came out more than 4 of its stated deviations")
     assert sum("stated deviations" in line for line in lines) == 1
     assert "WARNING" not in answer_text(answer)
-
-
-def test_an_answer_without_steps_shows_what_it_rests_on(answer: Diagnosis) -> None:
-    step = answer.steps[0]
-    weak = tuple(c.model_copy(update={"evidence": c.evidence / 1000}) for c in step.candidates)
-    bare = answer.model_copy(
-        update={
-            "verdict": "nothing-significant",
-            "steps": (),
-            "remaining": (),
-            "where": step.where,
-            "candidates": weak,
-            "significant": 10.0,
-            "rmse_fit": step.rmse_fit,
-            "rmse_holdout": step.rmse_holdout,
-        }
-    )
-    text = " ".join(answer_text(bare).split())
-    assert f"where {step.where.summary}" in text
-    best = "The best of 7 candidates, Coulomb friction on joint 2, has evidence of 2; an effect is named from 10."
-    assert best in text
-    assert "gap rms error in closed loop joint 1, ° joint 2, ° joint 3, ° on traces fitted to model as given" in text
-    assert "+ Coulomb friction, joint 2" in text
-    probes = tuple(c.model_copy(update={"refitted": False}) for c in weak)
-    only_probed = answer_text(bare.model_copy(update={"candidates": probes}))
-    assert "None of the candidates promised enough to be fitted." in only_probed
-
-
-def test_an_unknown_effect_is_told_by_its_summary_once(answer: Diagnosis) -> None:
-    unknown = {"verdict": "unknown-effect", "steps": (), "where": answer.steps[0].where}
-    found = with_sentences(answer.model_copy(update=unknown))
-    text = " ".join(answer_text(found).split())
-    assert f"where {found.summary}" in text
-    assert found.where is not None
-    assert text.count(found.where.summary) == text.count("of what is left") == 1
-    assert "\nleft" not in answer_text(found)
-    refused = answer.steps[0].model_copy(update={"adopted": False})
-    after_steps = answer_text(found.model_copy(update={"steps": (refused,)}))
-    assert f"left {found.summary}" in " ".join(after_steps.split())
-
-
-def test_what_is_left_beside_a_named_effect_and_a_step_not_taken_are_said(answer: Diagnosis) -> None:
-    shape, step = answer.remaining[0], answer.steps[0]
-    assert "left     A torque at joint" in answer_text(answer)
-    unclear = answer.model_copy(update={"remaining": (shape.model_copy(update={"explained": 0.08}),)})
-    assert "left     No clear shape: the best" in answer_text(unclear)
-    refused = step.model_copy(update={"adopted": False, "rejected_because": "the held-out error rises"})
-    text = answer_text(answer.model_copy(update={"steps": (refused,)}))
-    assert "not taken into the model: the held-out error rises" in text
-
-
-def test_a_separation_is_told_once_and_only_where_there_is_one(answer: Diagnosis) -> None:
-    asked = answer.next_experiment
-    assert asked is not None
-
-    def told(**changes: object) -> str:
-        changed = answer.model_copy(update={"next_experiment": asked.model_copy(update=changes)})
-        return " ".join(answer_text(changed).split())
-
-    assert told().count("6.4 standard deviations") == 1
-    place = DifferencePlace(joint=2, phase="creep", share=0.7, other_joint=False)
-    given = told(reason="They would differ by 6.4 standard deviations.", differs_at=place)
-    assert given.count("6.4 standard deviations") == 1
-    assert "It would separate" not in told(separates=(), predicted_separation=0.0)
-
-
-@pytest.mark.parametrize(
-    ("share", "said"),
-    [(1.002, "all of the held-out variance beyond noise is gone"), (-0.05, "beyond noise has grown by 5.0 %")],
-)
-def test_no_more_than_all_of_the_variance_is_gone(answer: Diagnosis, share: float, said: str) -> None:
-    step = answer.steps[0].model_copy(update={"excess_removed_holdout": share})
-    assert said in answer_text(answer.model_copy(update={"steps": (step,)}))
 
 
 def test_json_is_the_answer_and_files_are_written(
@@ -261,16 +180,3 @@ def test_the_named_one_is_listed_wherever_it_stands() -> None:
     assert len(lines) == 8
     group = step("f0", *others).model_copy(update={"effect": None, "group": (others[0], others[6])})
     assert "f6" in candidates_lines(group)[-2]
-
-
-def test_what_an_earlier_step_has_fitted_and_refused_is_no_promise() -> None:
-    earlier = step("ripple", fitted("ripple", 90.0))
-    now = step("backlash", fitted("backlash", 50.0), probed("ripple", 9000.0))
-    assert not any("ripple" in line for line in candidates_lines(now, [earlier]))
-    assert any("ripple" in line for line in candidates_lines(now))
-
-
-def test_a_probe_that_promises_nothing_is_only_counted() -> None:
-    lines = candidates_lines(step("backlash", fitted("backlash", 50.0), probed("ripple", -2.0)))
-    assert lines[2:] == ["            and 1 more"]
-    assert candidates_lines(step("lost_set_points")) == [], "nothing was tried"

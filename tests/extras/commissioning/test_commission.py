@@ -22,7 +22,7 @@ from extras.commissioning.command.by_hand import potentiometers
 from extras.commissioning.command.measured import with_controller, with_limits, with_sensors
 from extras.commissioning.command.periods import Periods
 from extras.commissioning.command.record import Record
-from extras.commissioning.command.sheet import acceptance_sheet, addresses_of, memory_picture
+from extras.commissioning.command.sheet import acceptance_sheet, addresses_of
 from extras.commissioning.command.steps import STEPS, lacking, resting_on, step_named
 from extras.commissioning.memory.procedure import Task, is_alive, release, switched_off_and_on
 from extras.commissioning.person.memory_page import open_page
@@ -47,10 +47,6 @@ def test_the_watched_memory_shows_what_changes_and_what_changes_with_it(daq: Com
     assert changing
     assert any(one["together"] for one in changing)
     assert all(one["lowest"] <= one["value"] <= one["highest"] for one in found["bytes"])
-
-
-def test_without_a_robot_nothing_is_watched(daq: CommandLine) -> None:
-    daq("memory", "watch", "--once").complains(3, "no robot is configured")
 
 
 def test_a_byte_of_which_nothing_is_proved_is_not_written() -> None:
@@ -367,15 +363,3 @@ def test_a_controller_whose_bridge_believes_in_a_wrong_map_breaks_some(daq: Comm
     said = daq("--port", MOCK + "&secret_map=3&documented=moved", "robot", "check")
     assert said.code == 5
     assert "BROKEN  position + error is the set point" in said.out
-
-
-def test_the_picture_of_the_memory_fills_what_is_found_and_outlines_what_is_assumed() -> None:
-    found = {"register": "position", "joint": 2, "verdict": "found", "low": "FC02", "high": "FC01"}
-    assumed = {"register": "gain_p", "joint": 1, "verdict": "assumed", "low": "FC03"}
-    svg = memory_picture({"base": "FC00", "size": 32, "findings": [found, assumed]})
-    assert svg.count("<rect") == 32
-    assert svg.count('fill-opacity="0.35"') == 2
-    assert svg.count('fill-opacity="0"') == 1
-    assert ">x2<" in svg
-    assert ">x2+<" in svg
-    assert ">P1<" in svg

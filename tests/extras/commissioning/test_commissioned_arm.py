@@ -197,11 +197,6 @@ def test_an_adapter_is_compared_only_where_both_have_a_serial_number() -> None:
     assert "A2" in same_adapter(KEPT, "A2")
 
 
-def test_an_identity_is_the_same_after_it_was_written_and_read() -> None:
-    assert Identity.of_data(KEPT.as_data()) == KEPT
-    assert Identity.of_data({}) == Identity({})
-
-
 # ---- a search that finds no place for gains, outputs and gripper leaves a map without them, with which the arm goes on
 
 

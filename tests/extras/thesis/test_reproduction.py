@@ -53,13 +53,6 @@ def test_only_the_known_statements_do_not_come_out(result: Reproduction) -> None
     }
 
 
-def test_text_shows_ours_beside_the_published(result: Reproduction) -> None:
-    text = as_text(result)
-    for shown in ("0.2449", "0.2426", "9.4940e-4"[:4], "start posture", "not given", "Found on the way"):
-        assert shown in text
-    assert Reproduction.model_validate_json(result.model_dump_json()) == result
-
-
 def test_a_reproduction_without_traces_or_methods_is_refused() -> None:
     with pytest.raises(SpecError, match="at least one trace"):
         reproduce_thesis([])
@@ -69,11 +62,6 @@ def test_elements_of_the_inertia_matrix_are_those_of_the_equation_that_figure_7_
     """(7.28) takes link 3 and its load as one rod: D23 is 0.109 to 0.114 kg·m² there, and 0.101 to 0.105 exactly."""
     coupling = result.figures.analysis.element(2, 3).whole
     assert (min(coupling), max(coupling)) == pytest.approx((0.109, 0.114), abs=6e-4)
-
-
-def test_the_findings_say_that_one_ramp_does_not_determine_the_parameters(result: Reproduction, ladder: Ladder) -> None:
-    (said,) = (f for f in result.findings if "one ramp does not tell the 13 parameters" in f)
-    assert f"MLOAD {ladder.steps[-1].values['MLOAD']:.3g} for 1.25" in said
 
 
 # ---- chapter 8, as far as it can be reproduced
@@ -120,11 +108,6 @@ def test_pid_lags_on_every_joint(chapter: ControlChapter) -> None:
     assert "lag" in next(c.ours for c in chapter.checks if c.name == "PID follows with a lag")
 
 
-def test_statements_that_do_not_come_out_are_among_the_findings(chapter: ControlChapter) -> None:
-    failed = {c.name for c in chapter.checks if not c.holds}
-    assert failed == {"with the tabled back-EMF constants cases 1 and 2 are damped", "PID from 90°: joint 3 overshoots"}
-
-
 def test_the_chapter_can_be_cancelled() -> None:
     now = threading.Event()
     now.set()
@@ -160,12 +143,6 @@ def test_the_page_shows_what_the_command_prints_hill_climbing_included(ramp: Tra
     whole = as_text(reproduce_thesis([ramp])).splitlines()
     for block in blocks():
         compare(block, whole)
-
-
-def test_the_page_names_every_statement_that_is_not_borne_out(result: Reproduction) -> None:
-    shown = "\n".join(line for block in blocks() for line in block)
-    for check in result.failed:
-        assert f"NO  {check.name}" in shown
 
 
 def compare(block: list[str], output: list[str]) -> None:

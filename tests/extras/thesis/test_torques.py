@@ -12,22 +12,18 @@ from extras.thesis.driven_arm import DrivenArm, equation_of_motion
 from extras.thesis.figures import influence_tables
 from extras.thesis.tables import (
     BASIC,
-    LADDER,
     SYMBOLS,
     VISCOUS_AND_COULOMB,
-    basis_of_symbol,
     model_of,
     recomputed_fidelities,
-    unfitted,
 )
-from extras.thesis.torques import TorqueAnalysis, largest, torques_along, torques_of_run
+from extras.thesis.torques import TorqueAnalysis, largest, torques_along
 from model import layout as at
 from model.dynamics import recursive
 from model.machine_model.model import Model
 from model.simulation.bodies import rod_arm_body
 from model.simulation.chain_of_model import chain_of
 from tests.model.fitting.imagined import arm
-from tests.model.validation.synthetic import ramp_trace
 
 K = 12
 RNG = np.random.default_rng(4)
@@ -76,13 +72,6 @@ def test_a_thin_rod_about_its_own_joint_is_one_quarter_rotation(model: Model) ->
     (still,) = (torques_along(bare, np.zeros(1), *np.zeros((3, 1, 3)), "rest"),)
     own = still.element(3, 3)
     assert own.rotation[0] / (own.rotation[0] + own.translation[0]) == pytest.approx(0.25)
-
-
-def test_a_model_s_own_motion_is_analysed_under_the_name_of_its_trace(model: Model) -> None:
-    trace = ramp_trace(model)
-    run = torques_of_run(model, trace)
-    assert run.source == f"simulation of {trace.record.trace_id}"
-    assert len(run.time) == len(run.gravity[1].whole)
 
 
 # ---- control laws
@@ -170,13 +159,6 @@ def test_three_sigma_taken_literally_gives_over_forty_percent_more() -> None:
     assert all(0.42 <= f.relative_difference <= 0.46 for f in recomputed_fidelities("three_sigma"))
 
 
-def test_each_table_has_the_parameters_of_its_model() -> None:
-    assert [len(m.free) for m in LADDER] == [8, 9, 12, 13]
-    assert all(set(m.deviations) == set(m.values) for m in LADDER)
-    assert [s.name for s in SYMBOLS if basis_of_symbol(s.name) == "mass"] == ["m1", "m2", "m3", "MLOAD"]
-    assert [s.name for s in SYMBOLS if basis_of_symbol(s.name) == "length"] == ["R1", "A2", "A3"]
-
-
 def test_a_table_becomes_a_model_with_its_values() -> None:
     machine = load_machine("ma2000")
     model = model_of(VISCOUS_AND_COULOMB, machine)
@@ -194,13 +176,6 @@ def test_the_model_and_the_arm_of_chapter_8_have_the_same_bodies() -> None:
     body = rod_arm_body(model.vector[: at.SHARED].copy(), joints, model.flags.copy())
     arm = VISCOUS_AND_COULOMB.arm().vector()
     assert arm[: len(body)] == pytest.approx(body, rel=1e-9)
-
-
-def test_fits_start_where_the_source_starts() -> None:
-    start = unfitted(VISCOUS_AND_COULOMB, load_machine("ma2000"))
-    assert start.parameter("link2.length").value == 0.23
-    assert start.parameter("joint2.viscous_friction.coefficient").value == 0.0
-    assert start.parameter("joints1+2+3.load_dependent_friction.arm").value == 0.0
 
 
 def test_tables_of_chapter_5_hold_but_for_the_waist() -> None:

@@ -62,7 +62,6 @@ class Request:
             self.status = message["status"]
 
     def through(self, gate: Gate) -> "Request":
-        """Itself, answered."""
         try:
             asyncio.run(self.send_through(gate))
         except HTTPException as error:  # FastAPI's handler makes a problem of it

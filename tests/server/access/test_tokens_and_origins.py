@@ -32,13 +32,11 @@ from tests.server.service import Service, running_service
 
 @pytest.fixture
 def clock() -> HandClock:
-    """Of whoever reads tokens."""
     return HandClock()
 
 
 @pytest.fixture
 def tokens(store: Store) -> TokenStore:
-    """Those in it."""
     return TokenStore(store)
 
 

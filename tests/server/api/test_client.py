@@ -19,14 +19,12 @@ LONG = SHORT.model_copy(update={"hold": 600.0})
 
 @pytest.fixture
 def client(service: Service) -> Iterator[Client]:
-    """Of the shared service."""
     with Client(service.url) as client:
         yield client
 
 
 @pytest.fixture
 def robot(client: Client) -> Robot:
-    """The only one."""
     robot = client.robot()
     robot.connect()
     return robot
@@ -136,17 +134,6 @@ def _why_lost(control: HeldControl) -> str:
             _ = control.lease
         except ControlLostError as error:
             return str(error)
-
-
-def test_what_the_service_is_and_who_calls(client: Client, robot: Robot) -> None:
-    assert client.me().role == "owner"
-    assert client.system().stop_port == int(client.url.rpartition(":")[2]) + 1
-    assert robot.machine().name == "ma2000"
-    assert set(robot.gains().gains) == {1, 2, 3, 4, 5, 6}
-    assert len(robot.models.machine_parameters()) > 10
-    assert list(robot.jobs.list("running")) == []
-    with pytest.raises(ServiceError, match="there is no robot 'other'"):
-        client.robot("other").status()
 
 
 def test_a_service_that_does_not_answer_is_said_to_be_unreachable() -> None:

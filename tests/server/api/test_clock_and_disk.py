@@ -188,7 +188,6 @@ def test_a_look_into_the_folder_while_a_trace_is_uploaded_takes_nothing_away(
 
 
 # ---- what the service says about itself then, and to whom
-# ---- what the service says about itself then, and to whom
 
 
 STRANGER = {"X-Forwarded-For": "10.0.0.9"}

@@ -2,9 +2,7 @@
 
 import io
 
-from daq.contracts.experiment import ExperimentSpec
 from daq.traces.reader import read_trace
-from daq.trajectories.presets import PRESETS
 from tests.server.polling import reset
 from tests.server.service import Service
 
@@ -101,25 +99,6 @@ def test_a_motion_beyond_the_limits_is_refused_before_it_is_queued(service: Serv
 
 
 # ---- presets that run as they are, and the rules of a specification
-# ---- presets that run as they are, and the rules of a specification
-
-
-def test_every_preset_is_there_and_can_be_run_as_it_is(service: Service) -> None:
-    presets = service.robot.get("/presets").json()
-    assert [preset["name"] for preset in presets] == list(PRESETS)
-    for preset in presets:
-        assert ExperimentSpec.model_validate(preset["spec"]) == PRESETS[preset["name"]].spec
-        preview = service.robot.post("/experiments/preview", json={"spec": preset["spec"]})
-        assert preview.status_code == 200, preset["name"]
-        assert preview.json()["violations"] == [], preset["name"]
-
-
-def test_the_rules_of_a_specification_name_bounds_and_defaults(service: Service) -> None:
-    schema = service.robot.get("/spec-schema").json()
-    rule = {"default": 0.65, "exclusiveMinimum": 0, "maximum": 3600, "title": "Duration", "type": "number"}
-    assert schema["$defs"]["Ramp"]["properties"]["duration"] == rule
-    assert schema["properties"]["repeats"]["maximum"] == 1000
-    assert set(schema["properties"]["trajectory"]["discriminator"]["mapping"]) >= {"ramp", "sine", "sequence"}
 
 
 def test_a_preview_shows_where_a_motion_breaks_a_limit_and_queues_nothing(service: Service) -> None:

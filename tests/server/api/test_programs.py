@@ -27,13 +27,11 @@ def _program(name: str = "pick", duration: float = 1.0) -> Program:
 
 @pytest.fixture
 def clock() -> HandClock:
-    """The store's."""
     return HandClock()
 
 
 @pytest.fixture
 def programs(store: Store) -> ProgramStore:
-    """None yet."""
     return ProgramStore(store)
 
 

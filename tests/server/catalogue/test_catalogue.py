@@ -40,7 +40,6 @@ class Shelf:
     copy: Path
 
     def tags(self) -> tuple[str, ...]:
-        """The trace's."""
         return self.traces.get(ROBOT, self.number).tags
 
 

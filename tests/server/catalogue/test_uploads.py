@@ -21,19 +21,32 @@ from server.bounded.messages import Limits, ReadModel, ReadUpload
 from server.bounded.process import LONGEST_LINE, answer_order
 from server.bounded.workers import ExhaustedError, Workers
 from server.problems import ProblemError
+from tests.daq.traces.damaged_traces import originals, recording
+from tests.daq.traces.samples import record
+from tests.daq.traces.test_hostile_files import bomb, bomb_of_chunks
 from tests.daq.traces.test_salvage import FORMAT_1
-from tests.server.hostile_files import bomb, hostile_tables, hostile_traces, sound_trace, table
+from tests.daq.traces.test_scan import foreign, ours
 from tests.server.service import Service
 
 MCAP, CSV = {"Content-Type": "application/octet-stream"}, {"Content-Type": "text/csv"}
-SOUND = sound_trace()
-HOSTILE = [(name, content, MCAP) for name, content in hostile_traces(SOUND).items()] + [
-    (name, content, CSV) for name, content in hostile_tables().items()
-]
+SOUND = originals()[0].data
+TABLE = b"time,set_point_1,position_1\n"
+HOSTILE = {
+    "no joints": (foreign(ours() | {"joints": ""}), MCAP),
+    "record nested deeply": (foreign(ours() | {"record": "[" * 100_000}), MCAP),
+    "an operator of 1000 characters": (recording(record(operator="x" * 1000), close=True), MCAP),
+    "a chunk of 2⁶⁴−1 bytes inside": (bomb(2**64 - 1, 1000), MCAP),
+    "a bomb of 64 MB that says it is small": (bomb(1000, 64 << 20), MCAP),
+    "times of ±1e308": (TABLE + b"-1e308,0,0\n1e308,0,0\n", CSV),
+    "a row of 10⁶ columns": (TABLE + b"1," * 1_000_000 + b"\n", CSV),
+    "a field that does not end": (TABLE + b'0,0,"' + b"x" * 1_000_000, CSV),
+    "bytes": (bytes(range(256)) * 100, CSV),
+}
+"""Every kind of them is in tests/daq/traces; here is that the door refuses them, too."""
 LIMITS = Limits(memory=256 << 20, seconds=30.0)
 
 
-@pytest.mark.parametrize(("content", "kind"), [one[1:] for one in HOSTILE], ids=[one[0] for one in HOSTILE])
+@pytest.mark.parametrize(("content", "kind"), HOSTILE.values(), ids=HOSTILE)
 def test_a_hostile_file_is_refused_in_one_line(service: Service, content: bytes, kind: dict[str, str]) -> None:
     """Most need no new process: what is merely wrong leaves its reader as it was."""
     answer = service.robot.post("/traces", content=content, headers=kind)
@@ -74,10 +87,10 @@ def _order(folder: Path, content: bytes, name: str = "upload.mcap") -> ReadUploa
 
 def test_what_needs_too_much_memory_is_refused_and_the_next_file_is_read(workers: Workers, tmp_path: Path) -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    order = _order(tmp_path, bomb(SOUND, 1 << 30))
+    order = _order(tmp_path, bomb_of_chunks(8))
     with contextlib.suppress(ExhaustedError):  # where its end comes by the kernel
         assert workers.ask(order).problem
-    assert workers.ask(_order(tmp_path, SOUND)).data["summary"]["samples"] == 50
+    assert workers.ask(_order(tmp_path, SOUND)).data["summary"]["samples"] == 60
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000, "kB: it was inflated here"
 
 
@@ -102,7 +115,7 @@ def test_a_reader_that_is_killed_is_told_and_another_takes_its_place(workers: Wo
 
 
 def test_a_disk_without_room_is_not_the_files_fault(workers: Workers, tmp_path: Path) -> None:
-    order = _order(tmp_path, table(), "upload.csv")
+    order = _order(tmp_path, TABLE + b"0,0.1,0.1\n0.02,0.1,0.1\n", "upload.csv")
     assert not workers.ask(order).problem
     (number,) = _readers()
     resource.prlimit(number, resource.RLIMIT_FSIZE, (100, resource.RLIM_INFINITY))

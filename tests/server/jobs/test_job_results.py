@@ -1,14 +1,12 @@
 """What jobs find, as a page gets it: true to its types, and told in one line."""
 
-import json
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 from pydantic import TypeAdapter
 
 from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.thresholds import THRESHOLDS
-from model.effects.library import library
 from server.jobs.results import JobResult
 from tests.server.service import Service
 
@@ -88,21 +86,3 @@ def test_fit_validation_and_lineage(sound_service: Service, ramps: tuple[str, st
     (made,) = [one for one in lineage["models"] if one["id"] == fitted["model"]]
     assert (made["parent"], made["job"], made["traces"]) == (lineage["machine"], fitted["id"], [ramps[0]])
     assert {fitted["id"], validated["id"]} <= {one["id"] for one in lineage["jobs"]}
-
-
-def test_results_are_described_kind_by_kind(sound_service: Service) -> None:
-    described = json.loads(sound_service.client.get("/openapi.json").text)
-    (content,) = described["paths"]["/api/v1/robots/{robot}/jobs/{job}/result"]["get"]["responses"]["200"][
-        "content"
-    ].values()
-    kinds = set(content["schema"]["discriminator"]["mapping"])
-    assert kinds == {"fit", "validate", "compare", "diagnose"}
-    assert len(get_args(get_args(JobResult)[0])) == len(kinds)
-
-
-def test_the_effects_of_the_library_are_told_once_each(sound_service: Service) -> None:
-    told = sound_service.robot.get("/effects").json()
-    names = [one["name"] for one in told]
-    assert names == list(library())
-    assert all(one["title"] and one["family"] for one in told)
-    assert next(one for one in told if one["name"] == "base_tilt")["whole_machine"]

@@ -54,7 +54,6 @@ class HandExecutor(Workers):
         self._carry_out = carry_out
 
     def submit(self, _function: Any, /, *args: Any, **_named: Any) -> Future[Any]:
-        """As an executor's."""
         (folder,) = args
         self.given.append(folder.name)
         future: Future[Any] = Future()
@@ -62,7 +61,6 @@ class HandExecutor(Workers):
         return future
 
     def count(self) -> int:
-        """As an executor's."""
         return 1
 
 
@@ -120,7 +118,6 @@ class Bench:
         return self._kept(job)
 
     def state_of(self, job: Job) -> str:
-        """As the database says."""
         return self._kept(job).state
 
     def _kept(self, job: Job) -> Job:
@@ -200,7 +197,6 @@ class HandArchive:
         bench.catalogue.archive = self
 
     def among(self, _session: Session, traces: Collection[str]) -> set[str]:
-        """Has some."""
         return self.has & set(traces)
 
     def delete_later(self, _session: Session, trace: str) -> None:
@@ -225,7 +221,6 @@ class HandArchive:
         return Transfer(direction="fetch", state=state, done=1_000_000, total=4_000_000, problem=self.problem)
 
     def ends(self) -> None:
-        """The trace is there."""
         self._file.touch()
         self._bench.clock.turn(LOOK_EVERY)
         self._bench.service.look()
@@ -429,7 +424,6 @@ class HeldExecutor(HandExecutor):
         self.futures: dict[str, Future[Ended]] = {}
 
     def submit(self, _function: Any, /, *args: Any, **_named: Any) -> Future[Any]:
-        """As an executor's."""
         (folder,) = args
         self.futures[folder.name] = future = Future()
         return future

@@ -3,14 +3,12 @@ had been done here."""
 
 import json
 from collections.abc import Callable
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from daq.contracts.service.jobs import DiagnoseRequest, FitRequest, Job, WaitsBehind
-from daq_cli.models.service_jobs import standing_of
 from model.machine_model.model_file import load_model
 from server.jobs.mailbox import Mailbox
 from tests.daq_cli.invoke import CommandLine, Said
@@ -191,24 +189,3 @@ def test_diagnose_is_a_job_of_the_service(daq: Daq, service: Service, tmp_path: 
 
 
 NOW = datetime(2026, 11, 22, 18, 0, tzinfo=UTC)
-
-
-@pytest.mark.parametrize(
-    ("behind", "words"),
-    [
-        (None, "queued"),
-        (
-            WaitsBehind(job="a", request=DiagnoseRequest(traces=("a", "b")), started=None, others=0),
-            "waits behind: diagnosis of 2 traces",
-        ),
-        (
-            WaitsBehind(job="a", request=FitRequest(traces=("a",)), started=NOW - timedelta(minutes=3), others=2),
-            "waits behind: fit of 1 trace (3 min so far), 2 more",
-        ),
-    ],
-    ids=["nothing", "one that waits, too", "one that is computed"],
-)
-def test_a_job_that_waits_says_behind_what(behind: WaitsBehind | None, words: str) -> None:
-    request = FitRequest(traces=("a",))
-    more = {"request": request, "state": "queued", "submitted": NOW, "submitted_by": "anna", "waits_behind": behind}
-    assert standing_of(Job.model_validate({"id": "b", "robot": "ma2000", **more}), NOW) == words

@@ -79,13 +79,6 @@ def test_two_places_that_come_free_together_reach_two_robots() -> None:
     assert workers.take_place("long", second.wake)
 
 
-def test_lanes_do_not_wait_for_each_other() -> None:
-    workers = SharedWorkers(2)
-    robot = Robot()
-    assert [workers.take_place("long", robot.wake) for _ in range(3)] == [True, True, False]
-    assert workers.take_place("short", robot.wake)
-
-
 def test_an_executor_is_opened_once_and_given_up_once() -> None:
     opened: list[Idle] = []
 

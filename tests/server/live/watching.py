@@ -33,7 +33,6 @@ def frames(socket: ClientConnection, within: float = WATCH_AT_MOST) -> Iterator[
 
 
 def messages(socket: ClientConnection, topic: str) -> Iterator[Any]:
-    """Messages of one topic."""
     for frame in frames(socket):
         for message in frame.messages:
             if message.topic == topic:

@@ -77,7 +77,6 @@ class Asked(Future[Answer]):
         self.looks = threading.Semaphore(0)
 
     def result(self, timeout: float | None = None) -> Answer:
-        """As every future's."""
         self.looks.release()
         return super().result(timeout)
 
@@ -189,7 +188,6 @@ class Bench:
         return made
 
     def runs(self, schedule: Schedule) -> list[Experiment]:
-        """What it has submitted."""
         return list(self.experiments.page("ma2000", (), schedule.id, None, 10).items)
 
     def counted(self, schedule: Schedule) -> int:

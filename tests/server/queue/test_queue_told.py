@@ -4,14 +4,11 @@ from datetime import timedelta
 
 import pytest
 
-from daq.contracts.experiment import ExperimentSpec, SlowRamp
-from daq.contracts.service.experiments import ExperimentRequest
 from daq.contracts.service.robot import RobotIdentity
 from daq.contracts.trace import TraceEvent
 from daq.owner.messages import EventHappened, Opened, Progress
 from server.problems import ProblemError
-from server.queue.context import ATTENDANCE, Attendance
-from tests.server.clocks import HandClock
+from server.queue.context import ATTENDANCE
 from tests.server.queue.bench import CALM, REAL, SPEC, Bench, done
 
 LOOK = "look at the arm, then resume the queue"
@@ -62,15 +59,6 @@ def test_a_run_that_the_last_service_left_is_told_when_the_next_begins(bench: Be
     assert bench.begun_anew().status() == status, "the next service finds it as it was"
 
 
-def test_a_queue_with_nothing_to_do_is_open_and_the_database_knows_it(bench: Bench) -> None:
-    line = "nothing was waiting when the service started"
-    status = bench.queue.status()
-    assert (status.paused, status.reason, status.since) == (False, line, bench.clock.utc())
-    assert (status.queued, status.running, status.waiting_for, status.attended_until) == (0, None, "", None)
-    kept = bench.queues.get("ma2000")
-    assert (kept.paused, kept.reason, kept.since) == (False, line, bench.clock.utc())
-
-
 def test_the_first_reason_stays_unless_a_person_gives_another_or_resumes_the_queue(bench: Bench) -> None:
     bench.queue.pause("the first")
     begun = bench.clock.utc()
@@ -99,18 +87,6 @@ def test_the_presence_of_an_operator_is_shown_where_it_is_needed(bench: Bench) -
     assert bench.queue.status().attended_until == bench.clock.utc() + timedelta(seconds=ATTENDANCE - 20)
     bench.queue.attend()
     assert bench.queue.status().attended_until == bench.clock.utc() + timedelta(seconds=ATTENDANCE)
-
-
-def test_presence_lapses_once() -> None:
-    clock = HandClock()
-    presence = Attendance(clock)
-    assert (presence.left, presence.has_lapsed()) == (0.0, False)
-    presence.say()
-    clock.turn(ATTENDANCE - 1)
-    assert (presence.left, presence.has_lapsed()) == (1.0, False)
-    clock.turn(2)
-    assert presence.left == 0.0
-    assert [presence.has_lapsed(), presence.has_lapsed()] == [True, False]
 
 
 @pytest.mark.parametrize(
@@ -188,20 +164,6 @@ def test_an_event_of_the_robot_makes_the_queue_look_again(bench: Bench) -> None:
     bench.robot.arm = CALM
     bench.queue.on_report(EventHappened(event=TraceEvent(time=0.0, kind="note", message="the jog has ended", tick=1)))
     bench.until(lambda event: event == "experiment: failed: refused")
-
-
-@pytest.mark.parametrize(
-    ("spec", "name"),
-    [
-        (SPEC.model_copy(update={"name": "monday"}), "monday"),
-        (ExperimentSpec(trajectory=SlowRamp(), joints=(1,)), "slow ramp"),
-    ],
-)
-def test_people_know_an_experiment_by_its_name_or_its_kind(bench: Bench, spec: ExperimentSpec, name: str) -> None:
-    bench.answer = done("fault")
-    bench.queue.submit(ExperimentRequest(spec=spec), "anna", None)
-    bench.queue.start()
-    bench.until(lambda event: event == f"queue: paused: {name} failed (): {LOOK}")
 
 
 def test_the_arm_is_asked_for_what_was_submitted_under_the_word_that_was_given_which_nobody_else_takes_back(

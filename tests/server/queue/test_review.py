@@ -67,7 +67,6 @@ class WhatBegins(RuleBasedStateMachine):
         self.known: dict[str, Known] = {}
 
     def teardown(self) -> None:
-        """Nothing is left."""
         self.database.close()
         self.folder.cleanup()
 
@@ -165,7 +164,6 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx.Cli
 
 @pytest.fixture
 def people(robot: httpx.Client, tmp_path: Path) -> dict[str, Person]:
-    """Those who take part."""
     return people_at(robot, tmp_path, {"anna": "operator", "bert": "operator", "olga": "owner", "vera": "viewer"})
 
 

@@ -2,13 +2,12 @@
 
 import pytest
 
-from daq.contracts.service.experiments import ExperimentRequest
 from daq.owner.messages import Answer, HaltRun, Progress
 from server.experiments.states import Event
 from server.problems import ProblemError
 from server.queue.context import ATTENDANCE
 from tests.server.meanwhile import raising
-from tests.server.queue.bench import AT_ONCE, FULL, REAL, SPEC, TOO_LONG, Bench, done
+from tests.server.queue.bench import AT_ONCE, FULL, REAL, TOO_LONG, Bench, done
 
 STOPPED = Answer(number=1, problem="the arm has been stopped", exit_code=6)
 LOOK = "look at the arm, then resume the queue"
@@ -187,11 +186,3 @@ def test_a_service_that_ends_begins_nothing_more(bench: Bench) -> None:
     bench.submit()
     bench.queue.resume("anna", moves_real_arm=False)
     assert bench.events == ["experiment: queued", "queue: resumed"]
-
-
-def test_the_same_request_under_the_same_key_is_queued_once(bench: Bench) -> None:
-    request = ExperimentRequest(spec=SPEC)
-    one, new = bench.queue.submit(request, "anna", "key")
-    again, anew = bench.queue.submit(request, "anna", "key")
-    assert (new, anew, again.id) == (True, False, one.id)
-    assert bench.events == ["experiment: queued"]

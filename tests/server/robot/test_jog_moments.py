@@ -31,7 +31,6 @@ class Teaching:
         self.begun, self.let_go, self.second = threading.Event(), threading.Event(), threading.Event()
 
     def jog(self, _velocities: dict[int, float], said: float) -> None:
-        """A command."""
         self.said.append(said)
         if self.begun.is_set():
             self.second.set()
@@ -40,7 +39,6 @@ class Teaching:
         self.let_go.wait(WITHIN)
 
     def status(self) -> TeachingStatus:
-        """Now."""
         return TeachingStatus(activity="jog")
 
 
@@ -51,7 +49,6 @@ class Socket:
         self.says = iter(says)
 
     async def receive(self) -> dict[str, str]:
-        """A message."""
         for say in self.says:
             text = await say()
             return {"type": "websocket.receive", "text": text}

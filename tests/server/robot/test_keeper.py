@@ -32,7 +32,6 @@ class SlowOwner:
         self.made.append(self)
 
     def close(self, _patience: float) -> bool:
-        """It goes."""
         self.closed = True
         self.ended("exit code 0")
         return True

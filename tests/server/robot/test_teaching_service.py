@@ -56,7 +56,6 @@ def robot() -> Asked:
 
 @pytest.fixture
 def teaching(robot: Asked) -> TeachingService:
-    """Its teaching."""
     return TeachingService(robot, lambda _line: None)
 
 

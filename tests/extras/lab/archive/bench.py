@@ -32,7 +32,6 @@ class TurnedClock(SystemClock):
     """Time (s) by which its monotonic clock is ahead."""
 
     def utc(self) -> datetime:
-        """What it shows."""
         return datetime.now(UTC) + self.ahead
 
     def monotonic(self) -> float:

@@ -16,7 +16,6 @@ def store() -> Iterator[ObjectStore]:
 
 @pytest.fixture(scope="package")
 def shared_proxy(store: ObjectStore) -> Iterator[FaultyStore]:
-    """A proxy before it."""
     with faulty(store) as proxy:
         yield proxy
 

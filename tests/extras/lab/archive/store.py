@@ -39,7 +39,6 @@ class ObjectStore:
     made: int = 0
 
     def bucket(self) -> str:
-        """Makes a bucket."""
         self.made += 1
         name = f"traces-{self.made}"
         self.client.create_bucket(Bucket=name)
@@ -100,7 +99,6 @@ class FaultyStore:
     """Ends what stalls."""
 
     def fail(self, fault: Fault, *methods: str, times: int | None = None, only: str = "") -> None:
-        """From now on."""
         self.only = only
         self.methods = methods or ("GET", "HEAD", "PUT", "POST", "DELETE")
         self.left = times

@@ -236,18 +236,6 @@ def test_a_limit_that_cannot_be_kept_is_told(store: ObjectStore, make: Make) -> 
     assert bench.path(used).exists()
 
 
-def test_a_limit_is_told_before_it_bites(store: ObjectStore, make: Make) -> None:
-    bench = make(store.bucket(), store.url, keep_size=1)
-    bench.trace(9000)
-    bench.service.start()
-    bench.until(lambda: bench.service.status().local_bytes > 0)
-    share = bench.service.status().local_bytes / 1e6
-    assert 0 < share < 1
-    assert bench.service.warnings(share + 0.01) == []
-    (line,) = bench.service.warnings(share - 0.01)
-    assert line.endswith("of 1 MB (archive.keep_size): beyond that the oldest archived ones are dropped")
-
-
 def test_a_deleted_trace_is_deleted_in_the_archive_even_if_that_is_away(
     bench: Bench, store: ObjectStore, proxy: FaultyStore
 ) -> None:

@@ -10,7 +10,6 @@ import pytest
 from daq.config.settings import load_settings
 from daq.contracts.errors import SpecError
 from extras.lab.archive.bucket import load_credentials, object_name
-from extras.lab.archive.health import pause_after
 from extras.lab.archive.settings import ArchiveSettings
 from tests.extras.lab.archive.store import ACCESS, SECRET
 
@@ -103,10 +102,6 @@ def test_names_of_objects_need_no_escape_and_tell_contents_apart() -> None:
     assert one == "lab/a/ma2000/2026/gr_er_1-aaaaaaaaaaaaaaaa.mcap"
     assert other != one
     assert object_name("", "ma2000", "….mcap", at, "a" * 64) == "ma2000/2026/trace-aaaaaaaaaaaaaaaa.mcap"
-
-
-def test_pauses_double_up_to_a_minute() -> None:
-    assert [pause_after(failures) for failures in (1, 2, 3, 6, 7, 10_000)] == [1, 2, 4, 32, 60, 60]
 
 
 def test_without_obstore_one_line_says_what_to_install() -> None:

@@ -17,13 +17,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import select
 
-from daq.contracts.errors import ReachError, SpecError
+from daq.contracts.errors import SpecError
 from daq.contracts.experiment import ExperimentSpec
 from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import ExperimentRequest
 from daq.teaching.program import Absolute, Program
 from extras.lab.archive.archived import Archived, ArchivedStore
-from extras.lab.backup.database import copy_database, head_of_audit, revision_of
+from extras.lab.backup.database import head_of_audit, revision_of
 from extras.lab.backup.manifest import MANIFEST, verify
 from extras.lab.backup.places import DATABASE, Places, places_of
 from extras.lab.backup.restore import restore
@@ -33,7 +33,6 @@ from server.access.sessions import SessionStore
 from server.experiments.review import Given, Review
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
-from server.store.lock import sole_use
 from server.store.programs import ProgramStore
 from server.store.queues import QueueState, QueueStore
 from server.store.schema import VERSION, migrations
@@ -44,6 +43,7 @@ from tests.server.service import Service
 from tests.server.store.rows import new_trace
 
 NOW = datetime(2026, 1, 1, 12, tzinfo=UTC)
+PROGRAM = Program(name="pick", instructions=(Absolute(angles={1: 3.1}),))
 SPEC = ExperimentSpec.model_validate({"trajectory": {"kind": "pause", "duration": 0.1}, "joints": [1]})
 
 
@@ -73,6 +73,7 @@ def filled(folder: Path) -> Places:
     with closing(Store(places.url)) as store:
         store.migrate()
         ExperimentStore(store).submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
+        ProgramStore(store).put("ma2000", "pick", PROGRAM, None, NOW, "anna")
         for number in ("aaa", "bbb"):
             add_trace(store, places, number)
     (places.traces["ma2000"] / "ccc.mcap.part").write_bytes(b"is being recorded")
@@ -121,6 +122,7 @@ def test_everything_comes_back_elsewhere_as_it_was(archive: Path, tmp_path: Path
     with closing(Store(places.url)) as store:
         store.migrate()
         assert ExperimentStore(store).count_waiting("ma2000") == 1
+        assert ProgramStore(store).get("ma2000", "pick").program == PROGRAM
 
 
 @pytest.mark.parametrize("before", [None, QueueState(False, "resumed", NOW), QueueState(True, "by anna", NOW)])
@@ -385,16 +387,6 @@ def test_a_flipped_bit_or_a_cut_is_refused_or_harmless(
         assert everything(there)["traces/aaa.mcap"] == everything(tmp_path / "here")["traces/aaa.mcap"]
 
 
-def test_a_restore_waits_for_no_service_that_runs(archive: Path, tmp_path: Path) -> None:
-    places = filled(tmp_path / "there")
-    before = everything(tmp_path / "there")
-    with sole_use(places.url), pytest.raises(ReachError, match="a service uses it; end that one first"):
-        restore(archive, places, NOW, quietly, overwrite=True)
-    assert everything(tmp_path / "there") == before
-    with sole_use(places.url):
-        pass
-
-
 def test_a_disk_that_fills_up_leaves_no_half_backup_and_no_half_restore(archive: Path, tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="are free, a backup needs"):
         back_up(places_in(tmp_path / "here"), tmp_path / "second.zip", NOW, quietly, reserve=1 << 60)
@@ -455,13 +447,10 @@ def test_what_cannot_be_backed_up_or_restored_is_one_line(daq: CommandLine, tmp_
     daq("backup", str(tmp_path / "no" / "folder.zip")).complains(2, "cannot be written")
 
 
-def test_the_configured_places(tmp_path: Path) -> None:
+def test_a_database_that_is_no_file_is_not_backed_up_here() -> None:
     from daq.config.service import ServiceSettings
     from daq.config.settings import Settings
 
-    places = places_of(Settings(server=ServiceSettings(folder=tmp_path)))
-    assert places.target(DATABASE) == tmp_path / "service.sqlite"
-    assert places.target("jobs/0123456789ab/result.json") == tmp_path / "jobs" / "0123456789ab" / "result.json"
     with pytest.raises(SpecError, match="is not a file"):
         places_of(Settings(server=ServiceSettings(database="postgresql://x/y")))
 
@@ -498,14 +487,3 @@ def test_a_database_is_read_whatever_its_folder_is_called(tmp_path: Path, name: 
         store.migrate()
     assert revision_of(places.database) == max(migrations()[VERSION])
     assert head_of_audit(places.database) == "nothing"
-
-
-def test_a_copy_holds_the_taught_programs(tmp_path: Path) -> None:
-    program = Program(name="pick", instructions=(Absolute(angles={1: 3.1}),))
-    with closing(Store(f"sqlite:///{tmp_path / DATABASE}")) as store:
-        store.migrate()
-        ProgramStore(store).put("ma2000", "pick", program, None, datetime.now(UTC), "anna")
-        copy_database(tmp_path / DATABASE, tmp_path / "copy.sqlite")
-    with closing(Store(f"sqlite:///{tmp_path / 'copy.sqlite'}")) as restored:
-        restored.migrate()
-        assert ProgramStore(restored).get("ma2000", "pick").program == program

@@ -19,7 +19,6 @@ class Cluster:
 
     @property
     def url(self) -> str:
-        """As an executor's."""
         return self.address.replace("tcp://", "dask://")
 
 

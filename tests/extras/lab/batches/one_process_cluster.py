@@ -17,7 +17,6 @@ def fails(number: int) -> int:
 
 
 def main() -> None:
-    """Prints what came out."""
     with (
         LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
         ending(dask.connected("dask://", cluster.scheduler_address)) as workers,

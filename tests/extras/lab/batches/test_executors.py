@@ -42,16 +42,11 @@ def test_what_is_understood(url: str, kind: str, place: str) -> None:
     ("url", "says"),
     [
         ("", "is not an executor URL; write local://4"),
-        ("4", "is not an executor URL"),
-        ("local", "is not an executor URL"),
         ("slurm://compute", "is not an executor URL; write local://4 or dask://host:8786"),
         ("local://four", "write the number of processes"),
         ("local://0", "0 workers; 1 to 10000"),
-        ("local://4?memory=1GB", "is not an executor URL"),
         ("http://[", "Invalid IPv6 URL"),
         ("dask://host:port", "Port could not be cast"),
-        ("dask://host/path", "is not an executor URL"),
-        ("dask://somebody@host", "is not an executor URL"),
         ("dask://", "names no scheduler"),
     ],
 )

@@ -27,8 +27,6 @@ ANNA = EmailSettings(to="anna@lab.example")
 
 
 class Handler:
-    """Keeps the e-mails."""
-
     def __init__(self) -> None:
         self.taken: list[Envelope] = []
         self.answer = "250 taken"

@@ -14,7 +14,7 @@ from daq.contracts.service.notifications import Notification
 from daq.owner.messages import ArmReport
 from extras.lab.notifications.delivery import DeliveryError, Message
 from extras.lab.notifications.destinations import Destination
-from extras.lab.notifications.outbox import PAUSES, Outbox, pause_after
+from extras.lab.notifications.outbox import PAUSES, Outbox
 from extras.lab.notifications.part import Faults
 from extras.lab.notifications.service import Notifier, message_of
 from server.clock import SystemClock
@@ -66,13 +66,11 @@ class LeapingClock(SystemClock):
     ahead: timedelta = timedelta(0)
 
     def utc(self) -> datetime:
-        """What it shows."""
         return NOW + self.ahead
 
 
 @contextmanager
 def notifying(store: Store, *destinations: Destination, clock: Any = None, **options: Any) -> Iterator[Notifier]:
-    """Runs a notifier."""
     notifier = Notifier(destinations, Outbox(store), clock or LeapingClock(), **options)
     notifier.start()
     try:
@@ -209,12 +207,6 @@ def test_a_clock_that_is_set_back_by_years_delays_no_message(store: Store) -> No
     assert outbox.due("webhook lab", NOW - timedelta(days=1000)) is not None
 
 
-def test_the_last_attempt_is_two_days_after_the_first() -> None:
-    pauses = [pause_after(attempts) for attempts in range(1, 13)]
-    assert pauses == sorted(pauses)
-    assert 1.5 < sum(pauses[:9]) / 86400 < 2.5
-
-
 def test_what_lasts_is_told_at_the_second_look_and_once(sqlite_store: Store) -> None:
     receiver, there = Receiver(), {"storage": told("full")}
     with notifying(sqlite_store, to("lab", receiver), look=lambda: dict(there)) as notifier:
@@ -239,14 +231,6 @@ def test_a_fault_is_told_when_it_begins() -> None:
 
     states = ("idle", "fault", "fault", "idle", "fault")
     assert [faults.new("ma2000", report(arm), NOW) is not None for arm in states] == [False, True, False, False, True]
-
-
-def test_without_a_destination_there_is_no_thread(sqlite_store: Store) -> None:
-    before = threading.active_count()
-    with notifying(sqlite_store) as notifier:
-        notifier.tell(told())
-        assert threading.active_count() == before
-        assert notifier.status().destinations == ()
 
 
 @pytest.fixture(autouse=True)

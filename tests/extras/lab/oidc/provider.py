@@ -24,7 +24,6 @@ class Provider:
 
     @property
     def port(self) -> int:
-        """Where it listens."""
         return int(self.url.rpartition(":")[2])
 
     def person(self, subject: str, **claims: object) -> None:
@@ -38,7 +37,6 @@ class Provider:
         return answer.headers["location"]
 
     def end(self) -> None:
-        """Ends it."""
         self.process.terminate()
         self.process.wait(ENDING_WITHIN)
 

@@ -101,7 +101,6 @@ class Browser:
         return _seen(answer)
 
     def sign_in(self, provider: Provider, subject: str = "anna-1") -> str:
-        """The whole way."""
         return self.back(provider.sign_in(self.begin(), subject))
 
     def me(self) -> httpx.Response:

@@ -12,32 +12,9 @@ from extras.lab.prometheus.part import Counts
 from tests.server.service import Service
 
 NOON = datetime(2026, 3, 2, 12, 0, tzinfo=UTC)
-GAUGES = (
-    "daq_connected",
-    "daq_stopped",
-    "daq_queued",
-    "daq_queue_paused",
-    "daq_running",
-    "daq_live_clients",
-    "daq_jobs_now",
-    "daq_disk_free_bytes",
-    "daq_disk_reserve_bytes",
-    "daq_link_seconds",
-)
-COUNTERS = (
-    "daq_link",
-    "daq_samples",
-    "daq_experiments",
-    "daq_jobs",
-    "daq_stops",
-    "daq_refused_requests",
-    "daq_live_dropped",
-)
 
 
 class Scraped:
-    """One answer."""
-
     def __init__(self, text: str) -> None:
         self.families = {family.name: family for family in text_string_to_metric_families(text)}
 
@@ -62,17 +39,6 @@ def _scraped(service: Service) -> Scraped:
 def _job(state: Any, **more: Any) -> Job:
     request = CompareRequest(traces=("a",), models=("machine",))
     return Job(id="a", robot="ma2000", request=request, state=state, submitted=NOON, submitted_by="anna", **more)
-
-
-def test_counters_are_counters_and_everything_has_its_unit_in_its_name(service: Service) -> None:
-    service.until_connected()
-    families = _scraped(service).families
-    assert {name: families[name].type for name in GAUGES} == dict.fromkeys(GAUGES, "gauge")
-    assert {name: families[name].type for name in COUNTERS} == dict.fromkeys(COUNTERS, "counter")
-    for name in ("daq_http_seconds", "daq_job_seconds", "daq_sample_lateness_seconds"):
-        assert families[name].type == "histogram"
-    undescribed = [name for name, family in families.items() if name.startswith("daq_") and not family.documentation]
-    assert undescribed == []
 
 
 def test_stops_refused_tokens_and_outcomes_are_counted(service: Service) -> None:
