@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from daq.config.toml_text import toml_value
-from daq.contracts.machine import Machine, parse_machine
+from daq.contracts.machine import Machine
 from daq.contracts.machine_form import DEFAULT, DOWN
-from daq.contracts.toml_places import places_of
 from daq.contracts.written_numbers import NUMBERS, UNSTATED, number_text, read_number
 
 WIDTH = 118
@@ -23,17 +22,13 @@ ALIKE = ("drive", "friction", "sensor")
 """Parts of a joint that may be copied from another by `like`."""
 
 
-def machine_text(
-    machine: Machine, comments: Mapping[str, Sequence[str]] | None = None, drives: Mapping[int, str] | None = None
-) -> str:
+def machine_text(machine: Machine, drives: Mapping[int, str] | None = None) -> str:
     """Returns the text of a machine file. Defaults are left out; sources are comments after their numbers.
 
-    comments: whole-line comments to keep, by the part that they precede: `""` for the top, `controller`, `limits`, or
-    `joints.1` and so on. drives: names from the library by joint (from 1), written in place of drive, friction and
-    sensor; if all joints have one, the controller is that of the servos.
+    drives: names from the library by joint (from 1), written in place of drive, friction and sensor; if all joints
+    have one, the controller is that of the servos.
     """
     named = drives or {}
-    kept = {} if comments is None else comments
     data = machine.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     joints, limits = data.pop("joints"), data.pop("limits", None)
     notes = str(data.pop("notes", ""))
@@ -47,29 +42,22 @@ def machine_text(
         if data.get(name) == default:
             del data[name]
     controller = data.pop("controller", None) if set(named) != set(range(1, len(joints) + 1)) else None
-    top = kept.get("", ())
-    lines = [*top, *[""][: len(top)], *(line for key, value in data.items() for line in _entry(key, value))]
+    lines = [line for key, value in data.items() for line in _entry(key, value)]
     if notes and "\n" not in notes and len(notes) < WIDTH - len("notes = ''"):
         lines.append(f"notes = {toml_value(notes)}")
     elif notes:
         lines += ['notes = """', *(toml_value(line)[1:-1] for line in notes.split("\n"))]
         lines[-1] += '"""'
     if controller is not None:
-        lines += _after(_table("controller", controller, ""), kept.get("controller", ()))
+        lines += _table("controller", controller, "")
     if limits:
-        table = ["", "[limits]", *(line for key, value in limits.items() for line in _entry(key, value))]
-        lines += _after(table, kept.get("limits", ()))
+        lines += ["", "[limits]", *(line for key, value in limits.items() for line in _entry(key, value))]
     for k, joint in enumerate(joints):
         if k + 1 in named:
             joint |= {"drive": named[k + 1], "friction": {}, "sensor": {}}
         alike = next((one for one in joints[:k] if all(one.get(part) == joint.get(part) for part in ALIKE)), None)
-        lines += _after(["", "[[joints]]", *_joint(joint, alike)], kept.get(f"joints.{k + 1}", ()))
+        lines += ["", "[[joints]]", *_joint(joint, alike)]
     return "\n".join(lines) + "\n"
-
-
-def _after(lines: list[str], comments: Sequence[str]) -> list[str]:
-    """Returns a table's lines, with comments between the blank line before it and its heading."""
-    return [*lines[:1], *comments, *lines[1:]] if not lines[0] else [*comments, *lines]
 
 
 def _joint(joint: dict[str, Any], alike: dict[str, Any] | None) -> list[str]:
@@ -184,23 +172,3 @@ def _is_default(value: Any) -> bool:
 def _is_plain_zero(number: dict[str, Any]) -> bool:
     """Whether a number is 0 without any other property."""
     return bool(number["value"] == 0.0) and not set(number) - _NUMBER - {"assumed"}
-
-
-def tidied(text: str, origin: str) -> str:
-    """Returns a machine file in the short form; whole-line comments stay before their parts.
-
-    Raises SpecError for a file that is not a machine file.
-    """
-    machine = parse_machine(text, origin)
-    places = places_of(text)
-    parts = [(line, path) for path, line in places.lines.items() if path[:1] != ("joints",) or len(path) == 2]
-    heads = sorted((line, ".".join(str(p + 1) if isinstance(p, int) else p for p in path)) for line, path in parts)
-    comments: dict[str, list[str]] = {}
-    for line, comment in places.alone.items():
-        after = next((name for head, name in reversed(heads) if head < line), "")
-        before = next((name for head, name in heads if head > line), after)
-        own = next((name for name in (before, after) if name.startswith(("controller", "limits", "joints"))), "")
-        own = before if before.startswith("joints") and before != after else own if after else ""
-        part = own if own.startswith("joints") else own.partition(".")[0]
-        comments.setdefault(part, []).append(comment)
-    return machine_text(machine, comments)

@@ -1,4 +1,5 @@
-"""Errors shown to users. Each is one line that states what is wrong, where, and what is allowed.
+"""Errors shown to users. Each is one line that states what is wrong, where, and what is allowed; if a file has several
+mistakes, a line follows for each.
 
 `exit_code` is the exit code of the command line, from `daq.contracts.exit_codes`.
 """
@@ -8,6 +9,9 @@ from __future__ import annotations
 from typing import ClassVar
 
 from daq.contracts import exit_codes
+
+MISTAKE = "\n  "
+"""Precedes each of several mistakes of one file, so that each has a line of its own."""
 
 
 class DaqError(Exception):

@@ -18,7 +18,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import AfterValidator, BaseModel, Field, FiniteFloat, ValidationError, model_validator
 
 from daq.contracts.documents import parse_toml, read_text
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import MISTAKE, SpecError
 from daq.contracts.frozen import FrozenRecord
 from daq.contracts.limits import Limits
 from daq.contracts.machine_form import SpelledOut
@@ -506,7 +506,7 @@ def parse_machine(text: str, origin: str = "machine file") -> Machine:
     lines = sorted(((places.line(path or _named_place(words)) or 0, words) for path, words in found), key=itemgetter(0))
     said = [_within_a_line(words if not line else f"line {line}: {words}") for line, words in lines]
     raise SpecError(
-        f"{origin}: {said[0]}" if len(said) == 1 else "\n  ".join([f"{origin}: {len(said)} mistakes", *said])
+        f"{origin}: {said[0]}" if len(said) == 1 else MISTAKE.join([f"{origin}: {len(said)} mistakes", *said])
     )
 
 

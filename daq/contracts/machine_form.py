@@ -281,6 +281,11 @@ def _default(value: float, unit: str, *, assumed: bool = True) -> dict[str, Any]
     return number | {"assumed": True} if assumed else number
 
 
+def is_machine_file(data: Mapping[str, Any]) -> bool:
+    """Whether the data of a TOML file are meant as a machine: only there, joints are tables."""
+    return any(isinstance(joint, dict) for joint in _list(data.get("joints")))
+
+
 def _is_row(value: Any) -> bool:
     return isinstance(value, list) and len(value) == 3 and all(isinstance(one, int | float) for one in value)
 

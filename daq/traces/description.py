@@ -21,6 +21,7 @@ from daq.contracts.frozen import FrozenRecord
 from daq.contracts.import_choice import Choice
 from daq.contracts.labels import Outcome
 from daq.contracts.machine import Machine, load_machine, shipped_machines
+from daq.contracts.machine_form import is_machine_file
 from daq.contracts.refused import refused_words
 from daq.contracts.trace import EARLIEST, LATEST, Floats, Moment, TraceRecord
 from daq.contracts.trace_limits import TraceLimits
@@ -79,7 +80,10 @@ class Description(FrozenRecord):
     def of(cls, path: Path, data: bytes) -> Self:
         """Parses the description in a TOML file. Raises TraceError."""
         try:
-            description = cls.model_validate(parse_toml(data.decode("utf-8-sig"), str(path)))
+            stated = parse_toml(data.decode("utf-8-sig"), str(path))
+            if is_machine_file(stated):
+                raise TraceError(f"{path}: is a machine file, for --model; a TOML of a record's name describes it")
+            description = cls.model_validate(stated)
         except ValidationError as error:
             raise TraceError(f"{path}: {refused_words(error, cls, 'the file')}") from error
         except UnicodeDecodeError as error:

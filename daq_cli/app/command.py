@@ -14,7 +14,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from daq.contracts import exit_codes
-from daq.contracts.errors import DaqError, SpecError
+from daq.contracts.errors import MISTAKE, DaqError, SpecError
 from daq_cli.app.context import Invocation
 from daq_cli.app.lazy import LazyGroup
 from daq_cli.app.subcommands import subcommand
@@ -188,10 +188,12 @@ def _show_usage_error(error: Any) -> NoReturn:
 
 
 def fail(message: str, exit_code: int) -> NoReturn:
-    """Ends with one line on standard error. A long line is shortened in its middle, because its end states what is
-    allowed."""
-    line = " ".join(message.split())
-    if len(line) > LONGEST_LINE:
-        line = f"{line[: LONGEST_LINE // 2]} … {line[-LONGEST_LINE // 2 :]}"
-    print("daq: " + "".join(one if one.isprintable() else ascii(one)[1:-1] for one in line), file=sys.stderr)
+    """Ends with one line on standard error, and one for each mistake of a machine file. A long line is shortened in
+    its middle, because its end states what is allowed."""
+    for k, part in enumerate(message.split(MISTAKE)):
+        line = " ".join(part.split())
+        if len(line) > LONGEST_LINE:
+            line = f"{line[: LONGEST_LINE // 2]} … {line[-LONGEST_LINE // 2 :]}"
+        shown = "".join(one if one.isprintable() else ascii(one)[1:-1] for one in line)
+        print(f"{'  ' if k else 'daq: '}{shown}", file=sys.stderr)
     raise SystemExit(exit_code)

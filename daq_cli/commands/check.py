@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from daq_cli.app.context import JsonOption, print_json
+from daq.contracts.machine import load_machine
+from daq_cli.app.context import JsonOption, print_json, printable
 from daq_cli.models.model_input import (
     MODEL_HELP,
     TraceFolderOption,
@@ -32,15 +34,19 @@ def check(
     folder: TraceFolderOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Show the contents of traces, and check units, signs, columns, times and readings. The exit code is 2 if a record
-    is doubted."""
+    """Show the contents of traces, and check units, signs, columns, times and readings; or check machine files (.toml).
+    The exit code is 2 if a record is doubted."""
     from model.machine_model.model import base_model
     from model.record_check.check import check_records
     from model.record_check.fields import field_reports
 
     robot = robot_of(context)
+    if model is None and all(map(_is_machine, traces)):
+        _check_machines(traces, json)
+        return
+    named = None if model is None else read_model(model)
     read = read_traces(robot, folder, traces)
-    of = base_model(machine_of(read, robot, traces)) if model is None else read_model(model)
+    of = named or base_model(machine_of(read, robot, traces))
     say_what_is_lacking(of, read)
     check_made_for(of.machine, read, traces)
     found, fields = check_records(of, read), field_reports(of, read)
@@ -59,3 +65,22 @@ def check(
     else:
         print(f"no doubts about {len(read)} trace{'' if len(read) == 1 else 's'}")
     end_if_doubted(found)
+
+
+def _is_machine(name: str) -> bool:
+    from daq.contracts.documents import parse_toml, read_text
+    from daq.contracts.machine_form import is_machine_file
+
+    path = Path(name)
+    return path.suffix == ".toml" and path.is_file() and is_machine_file(parse_toml(read_text(path, name), name))
+
+
+def _check_machines(names: list[str], json: bool) -> None:
+    """Prints the joints of machine files. Raises SpecError with a line for each mistake."""
+    machines = [load_machine(name) for name in names]
+    if json:
+        print_json([{"machine": one.name, "joints": [joint.name for joint in one.joints]} for one in machines])
+        return
+    for name, one in zip(names, machines, strict=True):
+        joints = ", ".join(joint.name for joint in one.joints)
+        print(printable(f"{name}: no mistakes in machine {one.name} with joints {joints}"))

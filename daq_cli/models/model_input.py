@@ -130,9 +130,10 @@ def read_model(name: str) -> Model:
     from model.machine_model.model import base_model
     from model.machine_model.model_file import load_model
 
-    if name not in shipped_machines() and Path(name).suffix != ".toml":
-        return load_model(Path(name))
-    return base_model(load_machine(name))
+    path = Path(name)
+    if name in shipped_machines() or path.suffix == ".toml" or not (path.suffix or path.exists()):
+        return base_model(load_machine(name))
+    return load_model(path)
 
 
 def load_effects(files: Sequence[Path] | None, robot: RobotAccess | None = None) -> None:

@@ -257,13 +257,21 @@ def tidy(
         Path | None, typer.Option("--output", "-o", help="File to write (default: the file itself).")
     ] = None,
 ) -> None:
-    """Write a machine file in the short form: quantities as texts, sources as comments, defaults left out."""
-    from daq.config.machine_text import tidied
+    """Write a machine file in the short form: quantities as texts, sources as comments, defaults left out.
+
+    Parts that are short already stay as they are, and so do comments. A file with such parts alone is not written.
+    """
+    from daq.config.tidied_machine import tidied
     from daq.contracts.documents import read_text
 
-    text = tidied(read_text(file, f"machine file {file}"), str(file))
+    given = read_text(file, f"machine file {file}")
+    text = tidied(given, str(file))
     path = output or file
     check_folder(path, "--output")
+    if text == given:
+        console().print(f"{file}: nothing in it gets shorter")
+        if output is None:
+            return
     with replacing(path) as part:
         part.write_text(text, "utf-8")
     print(path)

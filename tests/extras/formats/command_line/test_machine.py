@@ -176,8 +176,20 @@ def test_a_file_is_tidied_where_it_lies_or_elsewhere(daq: CommandLine) -> None:
     before = Path("mine.toml").read_text("utf-8")
     assert daq("machine", "tidy", "mine.toml", "-o", "other.toml").out == "other.toml\n"
     assert Path("other.toml").read_text("utf-8") == before
+    said = daq("machine", "tidy", "mine.toml")
+    assert (said.out, said.err) == ("", "mine.toml: nothing in it gets shorter\n")
+    assert daq("check", "mine.toml").out == "mine.toml: no mistakes in machine pan_tilt with joints pan, tilt\n"
+    Path("mine.csv").write_text("a\n1\n", "utf-8")
+    for name in ("mine.csv", "mine.toml"):
+        daq("check", name, "--model", "ma2000").complains(2, "mine.toml: is a machine file, for --model; a TOML of")
     Path("mine.toml").write_text(before.replace("bits = 12", "bits = 99"), "utf-8")
     daq("machine", "tidy", "mine.toml").complains(2, "joints.1.sensor.bits: found 99, must be at most 32")
+    # Each of several mistakes has a line of its own, and none of it is left out
+    many = "".join(f"colour_{k} = 1\n" for k in range(30))
+    Path("mine.toml").write_text(many + before, "utf-8")
+    said = daq("check", "mine.toml")
+    assert (said.code, said.err.count("\n"), "…" in said.err) == (2, 31, False)
+    assert re.findall(r"^  line (\d+): ", said.err, re.MULTILINE) == [str(k + 1) for k in range(30)]
 
 
 def test_drives_are_listed_and_one_is_shown_with_its_numbers(daq: CommandLine) -> None:
