@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from typing import Annotated
 
@@ -35,6 +36,7 @@ def mcp(
         raise SpecError("mcp: only a service has this: `daq --server http://host:8300 mcp`, or set DAQ_SERVER")
     served = tools_of(call.server, os.environ.get(TOKEN_VARIABLE) or None, call.robot_option)
     if http is None:
+        logging.getLogger("mcp").setLevel(logging.ERROR)  # whoever started this shows standard error to people
         served.run("stdio")
     else:
         served.run("streamable-http", host="127.0.0.1", port=http, stateless_http=True)

@@ -69,11 +69,13 @@ def test_an_experiment_goes_from_preview_to_trace_and_a_job(service: Service) ->
         ("traces", {"most": 10**30}, "most"),
         ("traces", {"text": "x" * 201}, "text"),
         ("submit", {"spec": "ramp"}, "spec"),
-        ("submit", {"spec": {"joints": [1e308]}}, "joints.0"),
+        ("submit", {"spec": {"joints": [1e308]}}, "submit: spec.joints.1: "),
         ("submit", {"spec": {"trajectory": {"kind": "sine", "amplitude": 1e999}}}, "amplitude"),
         ("submit", {"spec": {"folder": "/tmp"}}, "folder"),
         ("fit", {"request": {"traces": ["a"], "name": "<script>"}}, "name"),
-        ("diagnose", {"request": {"traces": ["a"], "effects": ["__import__('os')"]}}, "effects.0"),
+        ("diagnose", {"request": {"traces": ["a"], "effects": ["__import__('os')"]}}, "request.effects.1"),
+        ("fit", {"request": {"traces": ["a"], "holdout": []}}, "request.holdout: there is no such field here"),
+        ("trace", {}, "trace: number: is missing"),
         ("approve", {"number": "1"}, "approve"),
     ],
 )
@@ -91,11 +93,16 @@ def test_hostile_arguments_get_one_clear_answer_and_change_nothing(
     assert said in words
     assert len(words) < 1000
     assert "Traceback" not in words
+    assert "pydantic" not in words
+    assert "_told" not in words
     assert service.robot.get("/experiments").json()["items"] == before
 
 
 def test_no_tool_approves_consents_or_moves_by_hand(service: Service) -> None:
     listed = asked(tools.tools_of(service.url, None), lambda client: client.list_tools())
+    fields = {tool.name: tool.input_schema.get("$defs", {}) for tool in listed.tools}
+    assert "held_out" in fields["diagnose"]["DiagnoseRequest"]["properties"]
+    assert "trajectory" in fields["submit"]["ExperimentSpec"]["properties"]
     names = {tool.name for tool in listed.tools}
     assert names == {
         *("status", "traces", "trace", "preview", "experiments", "job"),
