@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, cast, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -17,6 +17,7 @@ from daq.traces.catalogue import TraceSummary, summary_of
 from daq.traces.files import open_trace
 from daq.traces.tables import export_table
 from firmware_protocol.invalid import first_invalid
+from ma2000.given import check_argument
 
 
 def read_trace(path: Path | str, **choice: Any) -> Trace:
@@ -31,6 +32,9 @@ def read_trace(path: Path | str, **choice: Any) -> Trace:
     known = [each.name for each in fields(Choice)]
     if unknown := sorted(set(choice) - set(known)):
         raise SpecError(f"read_trace: {unknown[0]}: a choice is one of {', '.join(known)}")
+    hints = get_type_hints(Choice)
+    for name, value in choice.items():
+        check_argument(f"read_trace: {name}", value, hints[name])
     return open_trace(Path(path), choice=Choice(**choice) if choice else None)
 
 

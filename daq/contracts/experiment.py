@@ -6,7 +6,7 @@ import math
 import re
 import sys
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, Field, FiniteFloat, StrictBool, ValidationError, model_validator
 
@@ -284,6 +284,14 @@ class ExperimentSpec(PlainExperiment):
 
     feedforward: Annotated[Feedforward | None, Field(exclude_if=lambda one: one is None)] = None
 
+    @classmethod
+    def model_validate(cls, obj: Any, **options: Any) -> Self:
+        """Reads plain data. Raises a one-line SpecError that names the field and what is allowed."""
+        try:
+            return super().model_validate(obj, **options)
+        except ValidationError as error:
+            raise SpecError(_one_line(error)) from error
+
     @model_validator(mode="after")
     def _computed_path(self) -> Self:
         if self.feedforward is not None and not isinstance(self.trajectory, Path):
@@ -315,8 +323,8 @@ def parse_spec(data: object, origin: str = "experiment") -> ExperimentSpec:
     """Returns an experiment from plain data. Raises a one-line SpecError that names the field and what is allowed."""
     try:
         return ExperimentSpec.model_validate(data)
-    except ValidationError as error:
-        raise SpecError(f"{origin}: {_one_line(error)}") from error
+    except SpecError as error:
+        raise SpecError(f"{origin}: {error}") from error
 
 
 def _one_line(error: ValidationError) -> str:

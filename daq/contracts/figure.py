@@ -66,6 +66,9 @@ class _Row:
 def figure_of(trace: Recorded, joints: tuple[int, ...] | None = None, axes: Axes | None = None) -> Figure:
     """Returns the figure: one row per signal, one column per joint, marks at events; or positions on given axes."""
     if axes is not None:
+        from daq.contracts.notebook_figure import axes_of
+
+        axes = axes_of(axes)
         shown = _only(trace, joints)
         row = _rows(shown)[0]
         for column, joint in enumerate(shown.joints):

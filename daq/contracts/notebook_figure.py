@@ -6,12 +6,14 @@ import io
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font, get_font_names
 from matplotlib.text import Text
 
+from daq.contracts.errors import SpecError
+
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.backend_bases import RendererBase
 
 OTHER_SCRIPTS = (
@@ -67,5 +69,8 @@ class NotebookFigure(Figure):
 
 
 def axes_of(given: Axes | None) -> Axes:
-    """The axes to draw on: those given, or the only ones of a new figure, which a notebook shows."""
+    """The axes to draw on: those given, or the only ones of a new figure, which a notebook shows. Raises SpecError for
+    anything else."""
+    if given is not None and not isinstance(given, Axes):
+        raise SpecError(f"plot: ax: found {given!r:.80}, must be axes of matplotlib")
     return NotebookFigure(layout="constrained").subplots() if given is None else given

@@ -275,11 +275,12 @@ class Trace(WithArrays):
         count = SampleCount(every)
         return [(row, lost) for row, step in enumerate(steps.tolist()) if (lost := count.missing(step))]
 
-    def column(self, joint: int) -> int:
-        """Returns the column of joint `joint` (from 1). Raises TraceError if the trace lacks it."""
-        if joint not in self.joints:
-            raise TraceError(f"{self.called}: joint {joint} is not recorded; the joints are {self.joints}")
-        return self.joints.index(joint)
+    def column(self, joint: int | str) -> int:
+        """Returns the column of a joint: its number from 1, or its name. Raises TraceError if the trace lacks it."""
+        known: Sequence[int | str] = self.record.joint_names if isinstance(joint, str) else self.joints
+        if joint not in known:
+            raise TraceError(f"{self.called}: joint {joint} is not recorded; the joints are {tuple(known)}")
+        return known.index(joint)
 
 
 Traces = Trace | Sequence[Trace]
@@ -289,6 +290,7 @@ Traces = Trace | Sequence[Trace]
 def as_sequence(traces: Traces) -> Sequence[Trace]:
     """Wraps a single trace in a tuple. Raises SpecError for anything but traces."""
     found = (traces,) if isinstance(traces, Trace) else traces
-    if wrong := [one for one in found if not isinstance(one, Trace)]:
+    each = found if isinstance(found, Sequence) else (found,)
+    if wrong := [one for one in each if not isinstance(one, Trace)]:
         raise SpecError(f"traces: give a Trace or several, not {type(wrong[0]).__name__}; `read_trace` reads a file")
     return found

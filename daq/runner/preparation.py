@@ -111,7 +111,8 @@ def require_matching_machine(controller: Controller, machine: Machine) -> None:
     scale, joints = controller.link.scale, len(machine.joints)
     if joints != scale.joints:
         raise SafetyError(
-            f"{controller.link.url} has {scale.joints} joints, the machine file {machine.name} describes {joints}"
+            f"{controller.link.url} has {scale.joints} joints, the machine file {machine.name} describes {joints}: "
+            "name its own by `machine` under [robot] in daq.toml"
         )
     for joint in controller.joints:
         own = machine.calibration(joint)

@@ -1,5 +1,7 @@
 """A folder of traces as a data set."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -40,3 +42,37 @@ def test_a_choice_says_what_is_taken_of_a_file_of_another_program(tmp_path: Path
     assert (as_sequence(trace), as_sequence([trace, trace])) == ((trace,), [trace, trace])
     with pytest.raises(SpecError, match="read_trace: maps: a choice is one of topic, set_points, joints"):
         ma2000.read_trace(tmp_path / "log.csv", maps={})
+    with pytest.raises(SpecError, match="plot: ax: found 3, must be axes of matplotlib"):
+        trace.plot(ax=3)  # type: ignore[arg-type]
+    named = replace(trace, record=trace.record.model_copy(update={"joint_names": ("elbow",)}))
+    assert named.column("elbow") == 0
+    with pytest.raises(TraceError, match=r"joint wrist is not recorded; the joints are \('elbow',\)"):
+        named.column("wrist")
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (
+            lambda: ma2000.read_trace("x.csv", map=["a=q"]),
+            "read_trace: map: found ['a=q'], must be Mapping",
+        ),
+        (
+            lambda: ma2000.read_trace("x.csv", joints="a,b"),
+            "read_trace: joints: found 'a,b', must be tuple[str, ...]",
+        ),
+        (lambda: ma2000.read_trace("x.csv", where=3), "read_trace: where: found 3, must be str or None"),
+        (lambda: ma2000.read_trace(None), "read_trace: path: found None, must be Path or str"),
+        (lambda: ma2000.load_machine(None), "load_machine: name_or_path: found None, must be str"),
+        (lambda: ma2000.diagnose("ur10e", 5), "traces: give a Trace or several, not int"),
+        (lambda: ma2000.fit("ma2000", (), {}), "fit: options: found {}, must be FitOptions or None"),
+        (lambda: ma2000.simulate("nosuch", 3), "machine 'nosuch': no such file, and not a packaged machine"),
+        (lambda: ma2000.profile("ma2000", (), "x"), "profile: fitted: found 'ma2000', must be FitResult"),
+        (lambda: ma2000.ExperimentSpec.model_validate({"joints": "a"}), "joints: Input should be a valid"),
+    ],
+)
+def test_an_argument_of_another_kind_is_one_line(call: Callable[[], object], said: str) -> None:
+    with pytest.raises(SpecError) as refused:
+        call()
+    assert str(refused.value).startswith(said), refused.value
+    assert "\n" not in str(refused.value)

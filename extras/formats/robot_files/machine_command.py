@@ -53,7 +53,10 @@ def new(
     ] = None,
     tip: Annotated[str | None, typer.Option(help="Link at the end of the arm (default: the last joint's own).")] = None,
     gravity: Annotated[
-        str | None, typer.Option(help="x,y,z in the axes of the URDF's root, m/s² (default: the file's, or 0,0,-9.81).")
+        str | None,
+        typer.Option(
+            help="x,y,z in m/s² (default: 0,0,-9.81), in the axes of the URDF's root; without one, z is the first axis."
+        ),
     ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Machine file to write (default: its name with .toml).")
@@ -75,9 +78,9 @@ def new(
     if urdf is None:
         if name is None:
             raise SpecError("give a name, or --urdf and a file")
-        text = _described(name, drives, joints, trace)
+        text = _described(name, drives, joints, _pull(gravity), trace)
     else:
-        text = _of_urdf(urdf, joints, hold, tip, gravity, drives, name, trace)
+        text = _of_urdf(urdf, joints, hold, tip, _pull(gravity), drives, name, trace)
     machine = parse_machine(text, "new machine")
     path = output or Path(f"{machine.name}.toml")
     _check_new(path)
@@ -86,7 +89,20 @@ def new(
     _tell(load_machine(str(path)), path, trace, json)
 
 
-def _described(name: str, drives: str | None, joints: str | None, trace: Trace | None) -> str:
+def _pull(gravity: str | None) -> tuple[float, float, float] | None:
+    if gravity is None:
+        return None
+    x, y, z = parse_numbers(gravity, "--gravity", 3)
+    return x, y, z
+
+
+def _described(
+    name: str,
+    drives: str | None,
+    joints: str | None,
+    gravity: tuple[float, float, float] | None,
+    trace: Trace | None,
+) -> str:
     """Returns the text of a machine that is described by names of drives, or by answers."""
     from extras.formats.robot_files.new_machine import Described, check_drive, text_of
 
@@ -97,15 +113,15 @@ def _described(name: str, drives: str | None, joints: str | None, trace: Trace |
     elif trace is not None:
         names = list(trace.record.joint_names) or [f"joint_{joint}" for joint in trace.joints]
     else:
-        count = len(given) or int(_asked("How many joints?", "1", str.isdecimal, "a whole number"))
-        names = [f"joint_{k + 1}" for k in range(count)]
+        told = str(len(given)) if given else _asked("How many joints, or their names?", "1", bool, "pan,tilt or 2")
+        names = [f"joint_{k + 1}" for k in range(int(told))] if told.isdecimal() else _names(told)
     if len(given) not in (0, 1, len(names)):
         raise SpecError(f"--drives names {len(given)}, but there are {len(names)} joints")
     if given:
         each = given * len(names) if len(given) == 1 else given
-        return text_of(name, [Described(one, drive) for one, drive in zip(names, each, strict=True)], unit)
+        return text_of(name, [Described(one, drive) for one, drive in zip(names, each, strict=True)], unit, gravity)
     console().print("Enter accepts the value in brackets, or leaves a value unknown.")
-    return text_of(name, [_joint_told(one, last=one == names[-1]) for one in names], unit)
+    return text_of(name, [_joint_told(one, last=one == names[-1]) for one in names], unit, gravity)
 
 
 def _joint_told(name: str, *, last: bool) -> Described:
@@ -119,13 +135,15 @@ def _joint_told(name: str, *, last: bool) -> Described:
         _is_of("m"),
         "a length like 160 mm",
     )
-    crossed = not last and _asked(
+    if last:
+        return Described(name, drive, mass, length)
+    axis = _asked(
         f"{name}: is the next axis parallel or crossed? [parallel]",
         "parallel",
         ("parallel", "crossed").__contains__,
         "parallel or crossed",
     )
-    return Described(name, drive, mass, length, "crossed" if crossed == "crossed" else "parallel")
+    return Described(name, drive, mass, length, "crossed" if axis == "crossed" else "parallel")
 
 
 def _drive_told(name: str, slides: bool = False) -> str:
@@ -164,7 +182,7 @@ def _of_urdf(
     joints: str | None,
     hold: str | None,
     tip: str | None,
-    gravity: str | None,
+    pull: tuple[float, float, float] | None,
     drives: str | None,
     name: str | None,
     trace: Trace | None,
@@ -178,10 +196,6 @@ def _of_urdf(
     from extras.formats.robot_files.serial_arm import serial_arm
     from extras.formats.robot_files.urdf_reader import read_urdf
 
-    pull = None
-    if gravity is not None:
-        x, y, z = parse_numbers(gravity, "--gravity", 3)
-        pull = (x, y, z)
     given = [] if drives is None else [one.strip() for one in drives.split(",")]
     other = load_machine(given[0]) if len(given) == 1 and not _is_drive(given[0]) else None
     robot = read_urdf(urdf)

@@ -35,19 +35,29 @@ class Described:
     """A short description of a joint.
 
     drive: a name of the library, a torque per unit of the recorded drive such as `0.5 N·m/A`, or empty: not known.
-    mass: of its link. length: to the next joint's axis. axis: direction of that axis relative to this one's.
+    mass: of its link. length: to the next joint's axis. axis: direction of that axis relative to this one's;
+    None: not told, taken for parallel.
     """
 
     name: str
     drive: str = ""
     mass: str = GUESSED["mass"]
     length: str = GUESSED["length"]
-    axis: Literal["parallel", "crossed"] = "parallel"
+    axis: Literal["parallel", "crossed"] | None = None
 
 
-def text_of(name: str, joints: Sequence[Described], unit: str) -> str:
-    """Returns the machine file of described joints. unit: of the recorded drive. Raises SpecError."""
-    lines = [f'name = "{name}"']
+def text_of(
+    name: str, joints: Sequence[Described], unit: str, gravity: tuple[float, float, float] | None = None
+) -> str:
+    """Returns the machine file of described joints, whose notes say which directions were assumed.
+
+    unit: of the recorded drive. gravity: m/s², z along the first axis; None: not told. Raises SpecError.
+    """
+    notes = ["gravity acts along the first axis (--gravity 0,-9.81,0: across it)"] if gravity is None else []
+    if any(joint.axis is None for joint in joints[:-1]):
+        notes.append("axes are parallel (alpha = '90 deg' in a joint's geometry crosses the next one)")
+    lines = [f'name = "{name}"', *([] if gravity is None else [f"gravity = {list(gravity)}"])]
+    lines += [f'notes = "Assumed: {"; ".join(notes)}."'] if notes else []
     for joint in joints:
         lines += ["", "[[joints]]", f'name = "{joint.name}"']
         alpha = ', alpha = "90 deg"' if joint.axis == "crossed" else ""

@@ -79,7 +79,7 @@ def test_text_goes_to_standard_output_unless_a_file_is_named(daq: CommandLine) -
 
 
 ANSWERS = """\
-2
+pan,tilt
 robotis/xm430
 robotis/xm430-w350
 150 g ± 10 %
@@ -112,15 +112,16 @@ def test_what_is_asked_becomes_the_file() -> None:
     assert "Measure first, because their deviations change the torques most:" in done.stderr
     assert Path("pan-tilt.toml").read_text("utf-8").splitlines() == [
         'name = "pan-tilt"',
+        'notes = "Assumed: gravity acts along the first axis (--gravity 0,-9.81,0: across it)."',
         "",
         "[[joints]]",
-        'name = "joint_1"',
+        'name = "pan"',
         'geometry = { a = "40 mm", alpha = "90 deg" }',
         'link = { mass = "150 g ± 10 %" }',
         'drive = "robotis/xm430-w350"',
         "",
         "[[joints]]",
-        'name = "joint_2"',
+        'name = "tilt"',
         'geometry = { a = "160 mm" }',
         'link = { mass = "0.12 kg" }',
         'drive = { gain = "1 N·m/V ± 50 %, assumed: nothing is known of it" }',
@@ -201,8 +202,11 @@ def test_drives_are_listed_and_one_is_shown_with_its_numbers(daq: CommandLine) -
 def test_the_page_s_dynamixels_make_a_machine(daq: CommandLine) -> None:
     section = (EXAMPLE.parents[1] / "docs" / "any-arm.md").read_text("utf-8").partition("## My Dynamixels")[2]
     (command,) = re.findall(r"^daq (machine new .*)$", section.partition("## My Franka")[0], re.MULTILINE)
-    assert daq(*command.split()).code == 0
-    assert len([line for line in Path("head.toml").read_text("utf-8").splitlines() if line]) == 11
+    said = daq(*command.split())
+    assert (said.code, "axes are parallel (alpha = '90 deg' in a joint's geometry" in said.err) == (0, True)
+    assert len([line for line in Path("head.toml").read_text("utf-8").splitlines() if line]) == 12
+    assert daq(*command.replace("new head", "new across").split(), "--gravity", "0,-9.81,0").code == 0
+    assert load_machine("across.toml").gravity == (0.0, -9.81, 0.0)
     written = re.findall(r"```toml\n(.*?)```", section, re.DOTALL)[0]
     Path("own.toml").write_text(f'name = "own"\n{written}link = {{ mass = "0.15 kg", radius = "40 mm" }}\n', "utf-8")
     controller = load_machine("own.toml").controller
