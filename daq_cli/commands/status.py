@@ -25,9 +25,11 @@ def status(context: typer.Context, json: JsonOption = False) -> None:
         return
     print(printable(found.headline))
     if (one := report.sample) is not None:
+        names = {joint: f"{joint} {printable(robot.machine.joint(joint).name)}:" for joint in one.joints}
+        wide = max(map(len, names.values()), default=0)
         for joint, *angles in zip(one.joints, one.position, one.set_point, one.error, strict=True):
             position, set_point, error = (position_text(robot.machine, joint, one) for one in angles)
-            print(f"  joint {joint}: {position:>9s}   set point {set_point:>9s}   error {error:>7s}")
+            print(f"  joint {names[joint]:{wide}} {position:>9s}   set point {set_point:>9s}   error {error:>7s}")
     if line := rates_line(report.link):
         print(line)
     if (queue := report.queue) is not None:
