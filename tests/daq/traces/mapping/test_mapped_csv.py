@@ -33,7 +33,13 @@ def test_a_mapping_names_columns_units_and_joints_and_is_kept_beside_the_file(tm
     assert (trace.joints, trace.record.drive_unit, trace.record.robot) == ((1, 2), "A", "bench 2")
     remember(path, choice, trace.record.columns)
     assert open_trace(path) == trace
-    assert path.with_suffix(".toml").read_text().startswith('# bench\nrobot = "bench 2"\n')
+    toml = path.with_suffix(".toml")
+    assert toml.read_text().startswith('# bench\nrobot = "bench 2"\n')
+    by_hand = '[map]  # by hand\ntime = "stamp in ms"\n'
+    for text in (by_hand, "map = { time = 'stamp in ms' }\n", "map.time = 'stamp in ms'\n"):
+        toml.write_text(text)
+        remember(path, choice, trace.record.columns)
+        assert open_trace(path).record.columns == trace.record.columns
     again = Choice(map={"time": "stamp in s"})
     remember(path, again, open_trace(path, choice=again).record.columns)
     assert open_trace(path).time[-1] == 30.0
@@ -136,6 +142,19 @@ def test_joints_with_names_keep_them_and_some_can_be_chosen(tmp_path: Path) -> N
     np.testing.assert_array_equal(numbered.position[0], [2, 1])
     with pytest.raises(TraceError, match="--joints pan,elbow: it has lift, pan, grip"):
         open_trace(path, choice=Choice(map=mapping, joints=("pan", "elbow")))
+    stated = path.with_suffix(".toml")
+    for columns in ("t,q1,q2,q3", "time,position_1,position_2,position_3"):
+        path.write_text(f"{columns}\n0,1,2,3\n1,1,2,3\n")
+        known = Choice(map={"time": "t in s", "position": "q{} in rad"} if "q1" in columns else {})
+        stated.write_text('joint_names = ["lift", "pan", "grip"]\n')
+        assert open_trace(path, choice=known).record.joint_names == ("lift", "pan", "grip")
+        stated.write_text('joint_names = ["lift", "pan"]\n')
+        with pytest.raises(TraceError, match="joint_names = lift, pan: its joints are 3 without names"):
+            open_trace(path, choice=known)
+    path.write_text(f"{head}\n0,1,2,3\n1,1,2,3\n")
+    stated.write_text('joint_names = ["lift", "pan", "elbow"]\n')
+    with pytest.raises(TraceError, match="joint_names = lift, pan, elbow: its joints are lift, pan, grip; state a"):
+        open_trace(path, choice=Choice(map=mapping))
 
 
 def test_records_in_one_file_rows_without_a_reading_and_times_that_come_twice(tmp_path: Path) -> None:
