@@ -39,8 +39,9 @@ def check(
     from model.record_check.fields import field_reports
 
     robot = robot_of(context)
+    given = None if model is None else read_model(model)
     read = read_traces(robot, folder, traces)
-    of = base_model(machine_of(read, robot, traces)) if model is None else read_model(model)
+    of = given or base_model(machine_of(read, robot, traces))
     say_what_is_lacking(of, read)
     check_made_for(of.machine, read, traces)
     found, fields = check_records(of, read), field_reports(of, read)

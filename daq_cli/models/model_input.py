@@ -130,8 +130,9 @@ def read_model(name: str) -> Model:
     from model.machine_model.model import base_model
     from model.machine_model.model_file import load_model
 
-    if name not in shipped_machines() and Path(name).suffix != ".toml":
-        return load_model(Path(name))
+    path = Path(name)
+    if name not in shipped_machines() and (path.suffix == ".json" or (path.suffix != ".toml" and path.exists())):
+        return load_model(path)
     return base_model(load_machine(name))
 
 

@@ -62,6 +62,9 @@ def test_what_is_guessed_is_shown_and_asked_for(tmp_path: Path) -> None:
         "position": "q{} [deg] in deg",
         "drive": "tau{} [Nm] in Nm",
     }
+    named = "t,q_shoulder_joint,dq_shoulder_joint,q_wrist_1_joint,dq_wrist_1_joint,q_wrist_2_joint,dq_wrist_2_joint"
+    with pytest.raises(TraceError, match=r"--map 'position=q_\{\} in \?' --map 'velocity=dq_\{\} in \?'"):
+        open_trace(file(tmp_path / "named.csv", ["0,1,2,3,4,5,6"], named))
     speed = file(tmp_path / "bench.csv", ["0,1", "1,2"], "Time,Velo")  # words that are cut short
     with pytest.raises(TraceError, match=r"--map 'velocity=Velo in \?'"):
         open_trace(speed)
@@ -106,6 +109,8 @@ def test_expressions(tmp_path: Path, given: dict[str, str], expected: list[float
         ({"position": "q{}", "drive": "tau{}"}, "drive: its unit is not stated"),
         ({"position": "q{}", "drive": "tau0 in A"}, "drive: has no column of joint '0', which others have"),
         ({"position": "1.5 + 2"}, "'1.5 + 2' is not a column"),
+        ({"position": "q{}", "drive": "tau{} in ‰"}, "drive: '‰' is a share: of what? As of a supply: ‰ of 7.4 V"),
+        ({"position": "q{}", "drive": "tau{} in % of 12"}, "drive: '% of 12' is a share: of what?"),
     ],
 )
 def test_what_is_wrong_in_a_mapping_is_one_line(tmp_path: Path, given: dict[str, str], complaint: str) -> None:
@@ -114,6 +119,24 @@ def test_what_is_wrong_in_a_mapping_is_one_line(tmp_path: Path, given: dict[str,
         open_trace(path, choice=Choice(map={"time": "stamp in ms"} | given))
     assert complaint in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_a_drive_may_be_a_share_of_a_stated_whole(tmp_path: Path) -> None:
+    path = file(tmp_path / "servo.csv", ["0,1,500", "1,2,-250"], "t,q_1,present_load_1")
+    with pytest.raises(TraceError, match=r"of drive \(.*for a share: ‰ of 7.4 V\)"):
+        open_trace(path)
+    for unit, base, expected in (
+        ("‰ of 7.4 V", "V", 3.7),
+        ("per mille of 2.94 N·m", "N·m", 1.47),
+        ("% of 500 mA", "A", 2.5),
+    ):
+        given = {"time": "t in s", "position": "q_{} in rad", "drive": f"present_load_{{}} in {unit}"}
+        trace = open_trace(path, choice=Choice(map=given))
+        assert trace.drive is not None
+        assert (trace.record.drive_unit, trace.drive[0, 0]) == (base, pytest.approx(expected))
+        assert trace.record.columns["drive"] == given["drive"]
+    with pytest.raises(TraceError, match=r"--drive-unit ‰: write V, A, .* for a share of that"):
+        open_trace(path, choice=Choice(map=given, drive_unit="‰"))
 
 
 def test_formats_whose_makers_state_the_units_are_not_asked_about(tmp_path: Path) -> None:
