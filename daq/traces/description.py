@@ -30,6 +30,8 @@ from daq.traces.recording import software
 
 EARLY = 0.9
 """Smallest time between samples as a share of the control period, including clock jitter."""
+ALL = "all"
+"""In place of a condition: all rows, whatever the TOML says."""
 MAP = "[map]"
 """The table of a mapping, which `remember` writes at the end of the file."""
 _ANY_MAP = re.compile(r"(?m)^[ \t]*\[[ \t]*map[ \t]*\]")
@@ -96,6 +98,7 @@ class Description(FrozenRecord):
     def over(self, choice: Choice) -> Choice:
         """Returns the choice, completed by this description."""
         names = tuple(name for name in self.joints or () if isinstance(name, str)) or None
+        where = choice.where or self.where
         return replace(
             choice,
             topic=choice.topic or self.topic,
@@ -104,7 +107,7 @@ class Description(FrozenRecord):
             received=choice.received or self.times == "received",
             drive_unit=choice.drive_unit or self.drive_unit,
             map=self.map | dict(choice.map),
-            where=choice.where or self.where,
+            where=None if where == ALL else where,
         )
 
     def names_of(self, origin: str, own: Sequence[str]) -> tuple[str, ...]:

@@ -69,6 +69,7 @@ def mapped_trace(path: Path, table: Table, choice: Choice, description: Descript
     record = description.record(path, machine, "")
     update: dict[str, Any] = {"notes": " ".join([record.notes, *notes]).strip(), "joint_names": names}
     update |= {"drive_unit": found.drive_unit, "joints_chosen": choice.joints is not None, "columns": found.used}
+    update |= {"where": choice.where or ""}
     if created is not None and description.created is None:
         update["created"] = created
     record = record.model_copy(update=update)

@@ -95,7 +95,7 @@ def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
     )
     hint = _other_topics(found, topic) if trace.set_point is None else ""
     notes = f"{record.notes} From topic {topic}, joints {spoken}.{hint}".strip()
-    told = {"joint_names": names, "joints_chosen": choice.joints is not None}
+    told = {"joint_names": names, "joints_chosen": choice.joints is not None, "where": choice.where or ""}
     record = record.model_copy(update={"trace_id": identity, "notes": notes} | told)
     bounds.check_signals({name: getattr(trace, name) for name in bounds.LARGEST}, str(path))
     bounds.check_record(record, (), str(path))

@@ -188,6 +188,10 @@ def test_records_in_one_file_rows_without_a_reading_and_times_that_come_twice(tm
         open_trace(path, choice=Choice(map=mapping))
     first = open_trace(path, choice=Choice(map=mapping, where="episode=0"))
     np.testing.assert_array_equal(first.position[:, 0], [1, 2])
+    assert first.record.where == "episode=0"
+    rising = file(tmp_path / "b.csv", ["0,1,0", "1,2,0", "2,4,1", "3,5,1"], "t,q,episode")
+    remember(rising, Choice(where="episode=0"), {"time": "t in s", "position": "q in rad"})
+    assert [len(open_trace(rising, choice=Choice(where=where))) for where in (None, "all")] == [2, 4]
     assert "not a number, left out: 1, the first is data row 2" in first.record.notes
     assert "repeat the previous time, left out: 1, the first is data row 4" in first.record.notes
     with pytest.raises(TraceError, match="no row is left where time=7"):
