@@ -17,7 +17,7 @@ from model.record_check.fields import LEAST_TRAVEL
 from model.record_check.finding import RecordFinding
 from model.record_check.law import DEGREE
 from model.record_check.pieces import measures_speed
-from model.record_check.readings import noise_of
+from model.record_check.readings import ISOLATED, noise_of
 from model.record_check.words import CHECK_COLUMNS, number
 
 LIKE = 0.9
@@ -43,23 +43,17 @@ FITS = {
 
 @dataclass(frozen=True)
 class _Joint:
-    """A moving joint: ways (k,) over a window of samples, its integrated velocity (k,), all joints' (k, j), and its
-    place."""
+    """A moving joint: ways (k,) over a window of samples, its integrated velocity (k,), and all joints' (k, j)."""
 
     joint: int
     ways: Floats
     own: Floats
     every: Floats
-    place: int
 
     @property
     def factor(self) -> float:
         """Way per integrated velocity. A low pass of first order leaves it at 1."""
-        return float(self.ways @ self.own / (self.own @ self.own))
-
-    @property
-    def like(self) -> float:
-        return _cosine(self.ways, self.own)
+        return _factor(self.ways, self.own)
 
 
 def speed_findings(trace: Trace, machine: Machine) -> Iterator[RecordFinding]:
@@ -79,7 +73,7 @@ def _moving(trace: Trace, machine: Machine) -> Iterator[_Joint]:
 
     A tachometer's position is its integral.
     """
-    if trace.velocity is None:
+    if trace.velocity is None or len(trace) < 4 * ISOLATED:
         return
     steps = 0.5 * (trace.velocity[1:] + trace.velocity[:-1]) * np.diff(trace.time)[:, None]
     integrals = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
@@ -95,18 +89,18 @@ def _moving(trace: Trace, machine: Machine) -> Iterator[_Joint]:
             width *= 2
         ways, every = position[width:] - position[:-width], integrals[width:] - integrals[:-width]
         if every[:, place].any() or travel > LEAST_SHARE * largest:
-            yield _Joint(joint, ways, every[:, place], every, place)
+            yield _Joint(joint, ways, every[:, place], every)
 
 
 def _told(one: _Joint, trace: Trace) -> str:
     """Returns what is wrong with a joint's velocity, as a sentence; empty if it agrees or nothing fits."""
     if not one.own.any():
         return "the velocity is 0 throughout, although the position moves."
-    if abs(one.like) < LIKE:
-        rest = 1.0 - one.like**2
-        for place, joint in enumerate(trace.joints):
-            other = _cosine(one.ways, one.every[:, place])
-            if other > LIKE and 1.0 - other**2 < BETTER * rest:
+    like = _cosine(one.ways, one.own)
+    if abs(like) < LIKE:
+        for joint, other in zip(trace.joints, one.every.T, strict=True):
+            better = 1.0 - _cosine(one.ways, other) ** 2 < BETTER * (1.0 - like**2)
+            if better and 1 / SAME < _factor(one.ways, other) < SAME:
                 return f"the position moves as the velocity of joint {joint} says, not as its own."
         return ""
     size = abs(one.factor)
@@ -128,12 +122,17 @@ def _doubt(trace: Trace, joint: int | None, one: _Joint, says: str) -> RecordFin
         consequence="doubt",
         record=trace.called,
         joint=joint,
-        value=one.factor if one.own.any() else 0.0,
+        value=one.factor,
         allowed=1.0,
         unit="1",
         says=says if joint is not None else f"all joints: {says}",
         advice=f"{CHECK_COLUMNS} Without a velocity it is computed from positions.",
     )
+
+
+def _factor(ways: Floats, integrated: Floats) -> float:
+    size = float(integrated @ integrated)
+    return float(ways @ integrated) / size if size > 0.0 else 0.0
 
 
 def _size(signal: Floats) -> float:
