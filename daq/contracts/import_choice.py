@@ -16,7 +16,7 @@ class Choice:
     received:   whether to use the times at which messages were received instead of their own times
     drive_unit: unit of the drive; `none` leaves the drive out
     map:        in a table, the columns and their unit by signal (`daq.traces.mapping.expression`)
-    where:      in a table, the rows to import: COLUMN=VALUE or COLUMN=LOW..HIGH
+    where:      in a table, the rows to import: COLUMN=VALUE, COLUMN=LOW..HIGH or all
     as_guessed: whether to accept the columns that were guessed from their names
     numbering:  names of a machine's joints 1, 2 …, for a recording that names no machine
     """

@@ -123,6 +123,8 @@ class TraceRecord(FrozenRecord):
     """Joint names of an imported file, in the order of the columns; empty if it has none."""
     columns: Annotated[dict[str, str], Field(exclude_if=lambda columns: not columns)] = {}
     """Source columns of each signal in an imported table; empty for all other files."""
+    where: Annotated[str, Field(exclude_if=lambda where: not where)] = ""
+    """The condition that selected the rows of an imported file; empty for all rows."""
     joints_chosen: Annotated[bool, Field(exclude_if=lambda chosen: not chosen)] = False
     """Whether a person gave the order of the joints, so that names may differ from the machine's."""
     spec: ExperimentSpec | None = None

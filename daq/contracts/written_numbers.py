@@ -21,6 +21,8 @@ _WRITTEN = re.compile(
     rf"\s*(?:\[\s*(?P<low>{_NUMBER})?\s*to\s*(?P<high>{_NUMBER})?\s*\])?\s*(?:,\s*(?P<source>.*?))?\s*",
     re.DOTALL,
 )
+_COMMA = re.compile(r"(?:^|[^,]*?[\s±\[+-])[\d.]+(?:,| (?=\d{3}\b))\d")
+"""A decimal comma, or a group of thousands, in front of any source."""
 EXAMPLE = '"0.8 ± 0.08 kg" or "0.8 kg ± 10 % [0 to 2], its source"'
 _COMMON = {
     ("deg", "rad"): math.pi / 180.0,
@@ -31,6 +33,7 @@ _COMMON = {
     ("mH", "H"): 1e-3,
 }
 """Factors of common units. Files with only these load without pint, whose import takes 0.5 s."""
+SPEED_CONSTANT = "V·s/rad"
 NUMBERS = ("value", "low", "high", "deviation")
 """Fields of a number that have its unit."""
 
@@ -58,6 +61,8 @@ def read_number(written: str | float, comment: str, allowed: Sequence[str]) -> d
     """
     text = _plain_signs(written) if isinstance(written, str) else repr(float(written))
     match = _WRITTEN.fullmatch(text)
+    if _COMMA.match(text):
+        raise ValueError(f"found {written!r:.80}: write decimals with a point, thousands without a sign: 0.8, 1200")
     if match is None:
         raise ValueError(f"found {written!r:.80}, must be a number like {EXAMPLE}")
     found: dict[str, Any] = {"value": float(match["value"])}
@@ -93,7 +98,10 @@ def converted(number: Mapping[str, Any], allowed: Sequence[str]) -> dict[str, An
         if found is not None:
             factor, inverse = found
             return _inverted(number, one, factor) if inverse else _scaled(number, one, factor)
-    raise ValueError(f"unit is {number['unit']!r}, must be {' or '.join(map(repr, allowed))}, or one that converts")
+    speed = _factor(unit, SPEED_CONSTANT) if "N·m/A" in allowed else None
+    hint = "" if speed is None else ": it is a speed constant, written as back_emf_constant, or its reciprocal in N·m/A"
+    units = " or ".join(map(repr, allowed))
+    raise ValueError(f"unit is {number['unit']!r}, must be {units}, or one that converts{hint}")
 
 
 def _scaled(number: Mapping[str, Any], unit: str, factor: float) -> dict[str, Any]:

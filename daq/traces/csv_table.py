@@ -143,9 +143,9 @@ class _Own:
         names, unit = self.choice.joints, self.choice.drive_unit
         if names is not None and len(names) != len(joints):
             raise TraceError(f"{self.path}: --joints {','.join(names)}: it has {len(joints)} joints without names")
-        update: dict[str, Any] = {} if names is None else {"joint_names": names, "joints_chosen": True}
-        if names is None and len(self.description.joint_names) in (len(joints), 0):
-            update = {"joint_names": self.description.joint_names}
+        update: dict[str, Any] = {"joint_names": names, "joints_chosen": True}
+        if names is None:
+            update = {"joint_names": self.description.names_of(str(self.path), tuple(map(str, joints)))}
         if unit == NONE:
             signals.pop("drive", None)
         elif unit is not None:

@@ -6,7 +6,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -31,8 +31,11 @@ from daq.traces.recording import software
 
 EARLY = 0.9
 """Smallest time between samples as a share of the control period, including clock jitter."""
+ALL = "all"
+"""In place of a condition: all rows, whatever the TOML says."""
 MAP = "[map]"
 """The table of a mapping, which `remember` writes at the end of the file."""
+_ANY_MAP = re.compile(r"(?m)^[ \t]*\[[ \t]*map[ \t]*\]")
 
 
 class Description(FrozenRecord):
@@ -40,7 +43,7 @@ class Description(FrozenRecord):
 
     machine:   name of a packaged machine, or a path relative to the TOML's folder
     joints:    joint numbers of a CSV file with this program's names, otherwise names; None for all joints
-    joint_names: of a CSV file with this program's names, in the order of its joints
+    joint_names: of joints that have only numbers in the file, in its order
     time_unit: of a CSV file with this program's names; None for s
     topic, set_points, times: of a bag, as in `Choice`
     where, map: of a table with other column names, as in `Choice`
@@ -99,6 +102,7 @@ class Description(FrozenRecord):
     def over(self, choice: Choice) -> Choice:
         """Returns the choice, completed by this description."""
         names = tuple(name for name in self.joints or () if isinstance(name, str)) or None
+        where = choice.where or self.where
         return replace(
             choice,
             topic=choice.topic or self.topic,
@@ -107,8 +111,22 @@ class Description(FrozenRecord):
             received=choice.received or self.times == "received",
             drive_unit=choice.drive_unit or self.drive_unit,
             map=self.map | dict(choice.map),
-            where=choice.where or self.where,
+            where=None if where == ALL else where,
         )
+
+    def names_of(self, origin: str, own: Sequence[str]) -> tuple[str, ...]:
+        """Returns the names of a file's joints: its own, or for numbers those stated here; empty if there are none.
+
+        own: the names or numbers in the file, in its order. Raises TraceError if the stated names are not of these.
+        """
+        stated, numbered = self.joint_names, all(name.isdecimal() for name in own)
+        one_each = len(set(stated)) == len(stated) == len(own) and (numbered or set(stated) == set(own))
+        if stated and not one_each:
+            has = f"{len(own)} without names" if numbered else ", ".join(own)
+            raise TraceError(
+                f"{origin}: joint_names = {', '.join(stated)}: its joints are {has}; state a name for each"
+            )
+        return stated if numbered else tuple(own)
 
     def load_machine(self, path: Path) -> Machine | None:
         """Returns the machine that the description of the file `path` names; None if it names none. Raises
@@ -187,13 +205,15 @@ def remember(path: Path, choice: Choice, used: Mapping[str, str]) -> Path:
     values |= {"times": "received" if choice.received else None}
     values |= {} if used or choice.drive_unit is None else {"drive_unit": drive_of(choice.drive_unit, str(path))}
     lines = {key: f"{key} = {toml_text(value)}\n" for key, value in values.items() if value is not None}
-    before = text.partition(f"\n{MAP}\n")[0] if f"\n{MAP}\n" in f"\n{text}" else text
-    for key in lines:
+    before = _ANY_MAP.split(text)[0]
+    for key in (*lines, r"map(?:\.\w+)?"):
         before = re.sub(rf"(?m)^{key}\s*=.*\n?", "", before)
     mapped = "".join(f"{toml_text(key)} = {toml_text(value)}\n" for key, value in used.items())
     whole = "".join(lines.values()) + before.strip("\n") + ("\n" if before.strip() else "")
+    whole += f"\n{MAP}\n{mapped}" if mapped else ""
+    Description.of(toml, whole.encode())  # what it cannot read again is not written
     try:
-        toml.write_text(whole + (f"\n{MAP}\n{mapped}" if mapped else ""), encoding="utf-8")
+        toml.write_text(whole, encoding="utf-8")
     except OSError as error:
         raise TraceError(f"{toml}: cannot be written: {disk.reason(error)}") from error
     return toml

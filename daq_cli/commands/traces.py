@@ -199,7 +199,9 @@ def import_(
             "May be repeated; it is kept in the .toml.",
         ),
     ] = None,
-    where: Annotated[str | None, typer.Option(help="The rows to take: episode_index=3, or time=2..10 (s).")] = None,
+    where: Annotated[
+        str | None, typer.Option(help="The rows to take: episode_index=3, time=2..10 (s), or all.")
+    ] = None,
     as_guessed: Annotated[bool, typer.Option("--as-guessed", help="Take columns as their names let guess.")] = False,
     topic: Annotated[str | None, typer.Option(help="Of a bag: the topic of the joints.")] = None,
     set_points: Annotated[str | None, typer.Option(help="Of a bag: the topic of the set points.")] = None,
@@ -229,7 +231,8 @@ def import_(
         from daq.traces.description import remember
 
         kept = remember(file, choice, made.columns)
-        typer.echo(printable(f"kept in {kept}: the file is read so from now on"), err=True)
+        again = "" if choice.where is None else "; --where all reads all rows again"
+        typer.echo(printable(f"kept in {kept}: the file is read so from now on{again}"), err=True)
 
 
 def _mapping(texts: list[str]) -> dict[str, str]:

@@ -297,10 +297,11 @@ WAYS: dict[str, Callable[[Motion, list[int]], Motion]] = {
     "thousands": _scaled("drive", 1e3),
     "drive-sign": _scaled("drive", -1.0),
     "milliseconds": _slower(1e-3),
+    "seconds": _slower(1e3),
     "position-drive": _exchanged,
 }
 """Changes of a record, or its machine file, that may make its balance hold."""
-OF_ALL = frozenset(["milliseconds"])
+OF_ALL = frozenset(["milliseconds", "seconds"])
 """Those that concern the whole record."""
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from daq.contracts.errors import TraceError
 from daq.contracts.joint_matching import matched
-from daq.contracts.machine import Machine, NoController
+from daq.contracts.machine import DcMotor, Machine, NoController
 from daq.contracts.quantity import Quantity
 from daq.contracts.trace import Trace
 from model.arrays import Floats
@@ -46,6 +46,7 @@ from model.record_check.readings import (
     sort_jumps,
     unwrapped,
 )
+from model.record_check.speeds import speed_findings
 from model.record_check.words import at_times, number, times_of
 
 FEWEST = 3
@@ -55,6 +56,8 @@ ON_EARTH = (9.76, 9.84)
 Loop = Literal["closed", "open"]
 WITHIN_NOISE = 3.0
 """Multiple of its noise within which a model still explains a record: spikes that leave less need no note."""
+OTHER_MAGNET = 5.0
+"""Ratio of a motor's constants that no magnet has: at stall, data sheets of geared servos give down to 0.36."""
 MOST_KEPT = 100
 """Times in a finding: a page does not need more."""
 WILD_SHARE = 0.5
@@ -96,7 +99,8 @@ def check_records(model: Model, traces: Sequence[Trace], *, torques: bool | None
 
 
 def _on_columns(trace: Trace, model: Model) -> Iterator[RecordFinding]:
-    columns = column_findings(trace, model)
+    speeds = list(speed_findings(trace, model.machine))
+    columns = speeds or column_findings(trace, model)
     yield from columns
     if not doubts_in(columns):
         yield from drive_findings(trace, model)
@@ -199,6 +203,21 @@ def _on_machine(machine: Machine, traces: Sequence[Trace]) -> Iterator[RecordFin
             advice="State it in m/s², along the axes of the base.",
         )
     for joint in machine.modelled_joints:
+        drive = machine.joint(joint).drive
+        back_emf = drive.back_emf_constant.value if isinstance(drive, DcMotor) else 0.0
+        ratio = drive.torque_constant.value / back_emf if isinstance(drive, DcMotor) and back_emf else 1.0
+        if not 1 / OTHER_MAGNET < ratio < OTHER_MAGNET:
+            yield RecordFinding(
+                kind="motor-constants",
+                consequence="doubt",
+                joint=joint,
+                value=ratio,
+                allowed=1.0,
+                unit="1",
+                says=f"the machine file's torque_constant is {number(ratio)} times its back_emf_constant. In N·m/A and "
+                "V·s/rad, one magnet gives both the same number.",
+                advice="Check their units, and on which side of the gear they are.",
+            )
         if not machine.joint(joint).count and all(joint in trace.joints for trace in traces):
             sizes = [noise_of(trace.position[:, trace.column(joint)]) for trace in traces if len(trace) > 2]
             unit = machine.joint(joint).units.position

@@ -337,6 +337,11 @@ _WAY_WORDS: dict[str, tuple[FindingKind, str, str]] = {
         "Check the sign of the drive, the direction of positions, and `gear_ratio`.",
     ),
     "milliseconds": ("time-scale", "drive and motion agree if times are in ms.", "Convert times to s."),
+    "seconds": (
+        "time-scale",
+        "drive and motion agree if times are a thousand times as long.",
+        "Were times in s read as ms?",
+    ),
     "position-drive": (
         "columns-swapped",
         "drive and motion agree if position and drive are exchanged.",

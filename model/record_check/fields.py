@@ -102,6 +102,7 @@ class _Record:
         gaps = find_gaps(self._trace.time)
         there = f"{len(self._trace)} rows in {number(float(np.sum(steps)))} s, usually {number(usual)} s apart"
         there += f", {times_of(len(gaps), 'gap')}" if gaps else ""
+        there += f", only where {where}" if (where := self._trace.record.where) else ""
         if high - low > UNEVEN * usual:
             means = "Uneven times blur speeds and accelerations: stamp at the device."
             return self._of("time", None, f"{there} ({number(float(low))} to {number(float(high))} s)", means, "known")

@@ -20,6 +20,7 @@ FindingKind = Literal[
     "gravity-magnitude",
     "gravity-reversed",
     "jump",
+    "motor-constants",
     "no-sensor",
     "position-unit",
     "saturated",
@@ -28,6 +29,7 @@ FindingKind = Literal[
     "stuck",
     "time-scale",
     "units-differ",
+    "velocity-differs",
     "wraps",
 ]
 

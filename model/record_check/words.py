@@ -23,4 +23,4 @@ def times_of(count: int, what: str) -> str:
 
 def number(value: float) -> str:
     """Formats a measured value for a sentence."""
-    return f"{value:.3g}"
+    return f"{float(f'{value:.3g}'):g}"

@@ -59,7 +59,7 @@ def mapped_trace(path: Path, table: Table, choice: Choice, description: Descript
         notes.append(INTEGRATED)
     machine = description.load_machine(path)
     known = choice.numbering if machine is None else tuple(joint.name for joint in machine.joints)
-    names, taken = _chosen(table, found, choice.joints)
+    names, taken = _chosen(table, found, description.names_of(table.origin, found.tokens), choice.joints)
     if names:
         kept = taken_names(table.origin, names, machine, known, chosen=choice.joints is not None)
         taken = [column for column, name in zip(taken, names, strict=True) if name in kept]
@@ -69,6 +69,7 @@ def mapped_trace(path: Path, table: Table, choice: Choice, description: Descript
     record = description.record(path, machine, "")
     update: dict[str, Any] = {"notes": " ".join([record.notes, *notes]).strip(), "joint_names": names}
     update |= {"drive_unit": found.drive_unit, "joints_chosen": choice.joints is not None, "columns": found.used}
+    update |= {"where": choice.where or ""}
     if created is not None and description.created is None:
         update["created"] = created
     record = record.model_copy(update=update)
@@ -142,12 +143,18 @@ def selected_rows(table: Table, time: Floats, where: str) -> Rows:
     return np.asarray((values >= low) & (values < high) if dots else values == low)
 
 
-def _chosen(table: Table, found: Signals, wanted: tuple[str, ...] | None) -> tuple[tuple[str, ...], list[int]]:
-    """Returns the names of the imported joints (empty if they have only numbers), and their columns."""
-    tokens, every = found.tokens, list(range(len(found.tokens)))
-    numbered = all(token.isdecimal() for token in tokens)
+def _chosen(
+    table: Table, found: Signals, names: tuple[str, ...], wanted: tuple[str, ...] | None
+) -> tuple[tuple[str, ...], list[int]]:
+    """Returns the names of the imported joints (empty if they have only numbers), and their columns.
+
+    names: of all joints, or empty. wanted: those to import, or other names for all.
+    """
+    every = list(range(len(found.tokens)))
     if wanted is None:
-        return (() if numbered else tokens), every
+        return names, every
+    tokens = names if set(wanted) <= set(names) else found.tokens
+    numbered = all(token.isdecimal() for token in tokens)
     if set(wanted) <= set(tokens):
         taken = [tokens.index(name) for name in wanted]
         return (() if numbered else wanted), taken

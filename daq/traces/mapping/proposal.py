@@ -75,7 +75,18 @@ WORDS: dict[str, tuple[str, ...]] = {
     "position": ("position", "pos", "q", "theta", "angle", "present_position", "qpos", "q_present", "joint_position"),
     "set_point": ("set_point", "setpoint", "goal_position", "target_position", "target", "command", "q_d", "goal"),
     "velocity": ("velocity", "vel", "speed", "dq", "qd", "qvel", "omega", "present_velocity", "rpm", "joint_velocity"),
-    "drive": ("torque", "tau", "effort", "current", "voltage", "present_current", "joint_torque", "iq", "force"),
+    "drive": (
+        "torque",
+        "tau",
+        "effort",
+        "current",
+        "voltage",
+        "present_current",
+        "present_load",
+        "joint_torque",
+        "iq",
+        "force",
+    ),
 }
 """Usual column names of a signal, alone or with a joint's name or number."""
 LEAST_LETTERS = 4
@@ -162,6 +173,8 @@ def _question(table: Table, guess: Proposal, entries: Mapping[str, Said], units:
 
 
 def _range(key: str, guess: Proposal) -> str:
+    if key.startswith("drive"):
+        return "; for a share: ‰ of 7.4 V"
     return (
         "; for -100 to 100: range of CALIBRATION.json, range of MACHINE"
         if "lerobot" in guess.format and key in ("position", "set_point")
@@ -187,17 +200,20 @@ def _guess(table: Table, signal: str) -> str | None:
                 return bare[name]
         if signal == "time":
             continue
+        patterns: dict[str, int] = {}
         for name in table.columns:
             pattern = re.sub(r"\d+", "{}", name)
             words = re.findall(r"[^\W\d_]+", _bare(signal, pattern))
             if pattern.count("{}") == 1 and {word, f"{word}s"} & {*words[:1], *words[-1:], "_".join(words)}:
-                return pattern
+                patterns[pattern] = len(tokens_in(pattern, table.columns))
         for pattern in [form.replace("@", word) for form in _FORMS]:
             tokens = tokens_in(pattern, list(bare))
             if len(tokens) > 1:
                 name = bare[pattern.replace("{}", tokens[0])]
                 at = name.lower().find(tokens[0])
-                return f"{name[:at]}{{}}{name[at + len(tokens[0]) :]}"
+                patterns.setdefault(f"{name[:at]}{{}}{name[at + len(tokens[0]) :]}", len(tokens))
+        if patterns:
+            return max(patterns, key=lambda pattern: patterns[pattern])  # the one that leaves no joint out
     return None
 
 

@@ -14,14 +14,14 @@ from daq.contracts.errors import TraceError
 from daq.contracts.trace import Floats
 from daq.traces.mapping.expression import Table
 from daq.traces.mapping.ranges import RANGE_OF, Range, ranges_of
-from daq.traces.mapping.units import DRIVES, NONE, factor, known_units, unit_in
+from daq.traces.mapping.units import NONE, OF_WHAT, SHARES, drive_scale, factor, known_units, unit_in
 
 BY_JOINT = ("position", "set_point", "velocity", "drive")
 """Signals of each joint. The position may be left out if there is a velocity."""
 SIGNALS = ("time", *BY_JOINT)
 KEY = re.compile(rf"time|({'|'.join(BY_JOINT)})(?:_([1-9][0-9]?))?")
 """Keys of a mapping: a signal of all joints, or of one joint by its number."""
-_IN = re.compile(r"(?:(.*?)\s+)?in\s+(range of .+|\S+)", re.DOTALL)
+_IN = re.compile(r"(?:(.*?)\s+)?in\s+((?:range|%|‰|per mille) of .+|per mille|\S+)", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,12 @@ def said(key: str, text: str, origin: str) -> Said:
     if found is None:
         return Said(text.strip(), None)
     signal, unit = match[1] or "time", found[2]
-    if unit in known_units(signal) or (signal == "drive" and unit == NONE):
+    if unit in known_units(signal) or (signal == "drive" and (unit == NONE or drive_scale(unit) is not None)):
         return Said((found[1] or "").strip(), unit)
     if unit.startswith(RANGE_OF) and signal in ("position", "set_point"):
         return Said((found[1] or "").strip(), unit)
+    if signal == "drive" and unit.startswith(tuple(SHARES)):
+        raise TraceError(f"{origin}: {key}: {shown(unit)} is {OF_WHAT}")
     raise TraceError(f"{origin}: {key}: unit {shown(unit)} is unknown; write {', '.join(known_units(signal))}")
 
 
@@ -108,7 +110,8 @@ def _of_joints(table: Table, signal: str, items: Mapping[str, Said], beside: Pat
     units = {token: _unit(table, signal, entry) for token, entry in items.items()}
     scales = {token: _range(unit, token, beside) or (factor(signal, unit), 0.0) for token, unit in units.items()}
     values = [scales[token][0] * table.value(entry.expression) + scales[token][1] for token, entry in items.items()]
-    bases = sorted({DRIVES[unit][0] if signal == "drive" else known_units(signal)[0] for unit in units.values()})
+    known = [drive_scale(unit) if signal == "drive" else None for unit in units.values()]
+    bases = sorted({known_units(signal)[0] if scale is None else scale[0] for scale in known})
     if len(bases) > 1:
         raise TraceError(f"{table.origin}: drive: units {' and '.join(bases)} differ; one is needed")
     return values, bases[0]

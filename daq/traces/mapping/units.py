@@ -36,6 +36,10 @@ DRIVES: dict[str, tuple[str, float]] = {
 """Units of a drive: the corresponding unit of a trace, and the factor to it."""
 NONE = "none"
 """Used in place of a drive's unit: the drive is left out."""
+SHARES = {"%": 1e-2, "‰": 1e-3, "per mille": 1e-3}
+"""Shares of a whole that the user states: a servo's load may be of its supply, its current or its torque."""
+OF_WHAT = "a share: of what? As of a supply: ‰ of 7.4 V"
+_SHARE = re.compile(rf"({'|'.join(SHARES)})(?: of ([0-9.]+) ?(\S+))?")
 _AT_END = re.compile(r".*[\[(_ ]([^\[\](_ )]+)[\])]?")
 
 
@@ -44,8 +48,22 @@ def drive_of(unit: str, origin: str) -> str:
     TraceError."""
     typed = {name: base for name, (base, size) in DRIVES.items() if size == 1.0} | {NONE: NONE}
     if unit not in typed:
-        raise TraceError(f"{origin}: --drive-unit {unit}: write {', '.join(dict.fromkeys(typed.values()))}")
+        units = ", ".join(dict.fromkeys(typed.values()))
+        hint = "" if _SHARE.fullmatch(unit) is None else ", or --map 'drive=COLUMN{} in ‰ of 7.4 V' for a share of that"
+        raise TraceError(f"{origin}: --drive-unit {unit}: write {units}{hint}")
     return typed[unit]
+
+
+def drive_scale(unit: str) -> tuple[str, float] | None:
+    """Returns the unit of a trace and the factor to it; None for an unknown unit, or a share of nothing that is
+    stated."""
+    share = _SHARE.fullmatch(unit)
+    if share is None:
+        return DRIVES.get(unit)
+    if share[3] not in DRIVES or not share[2].replace(".", "", 1).isdecimal():
+        return None
+    base, size = DRIVES[share[3]]
+    return base, SHARES[share[1]] * float(share[2]) * size
 
 
 def known_units(signal: str) -> tuple[str, ...]:
@@ -55,7 +73,11 @@ def known_units(signal: str) -> tuple[str, ...]:
 
 def factor(signal: str, unit: str) -> float:
     """Returns the factor from a unit to the unit of a trace."""
-    return DRIVES[unit][1] if signal == "drive" else UNITS[signal][unit]
+    if signal != "drive":
+        return UNITS[signal][unit]
+    scale = drive_scale(unit)
+    assert scale is not None
+    return scale[1]
 
 
 def unit_in(signal: str, name: str) -> str | None:

@@ -35,7 +35,8 @@ def check_files(path: Path, limits: TraceLimits) -> None:
     if path.is_dir() and not (path / METADATA).exists():
         inside = sorted(one.name for one in path.iterdir() if one.suffix in STORAGES)
         rather = f"; name the file in it, {path / inside[0]}" if inside else ""
-        raise TraceError(f"{path}: is a folder without {METADATA}, as an interrupted recording leaves it{rather}")
+        reason = ", as an interrupted recording leaves it" if inside else " of a bag, or meta/info.json of lerobot"
+        raise TraceError(f"{path}: is a folder without {METADATA}{reason}{rather}")
     if not is_bag(path, first_bytes(path)):
         wanted = f"a folder with {METADATA}, or a file {', '.join(STORAGES)}"
         raise TraceError(f"{path}: {f'is no bag: that is {wanted}' if path.exists() else 'there is no such bag'}")

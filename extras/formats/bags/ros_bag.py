@@ -78,6 +78,8 @@ def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
     states = _read(path, found, topic)
     asked = None if choice.set_points is None else _read(path, found, _topic(path, found, choice.set_points))
     names = _names(origin, states, choice.joints, limits)
+    if choice.joints is None:
+        description.names_of(origin, names)
     known = choice.numbering if machine is None else tuple(joint.name for joint in machine.joints)
     names = taken_names(origin, names, machine, known, chosen=choice.joints is not None)
     table = _Table(origin, names, states, found.missing)
@@ -93,7 +95,7 @@ def import_bag(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: C
     )
     hint = _other_topics(found, topic) if trace.set_point is None else ""
     notes = f"{record.notes} From topic {topic}, joints {spoken}.{hint}".strip()
-    told = {"joint_names": names, "joints_chosen": choice.joints is not None}
+    told = {"joint_names": names, "joints_chosen": choice.joints is not None, "where": choice.where or ""}
     record = record.model_copy(update={"trace_id": identity, "notes": notes} | told)
     bounds.check_signals({name: getattr(trace, name) for name in bounds.LARGEST}, str(path))
     bounds.check_record(record, (), str(path))

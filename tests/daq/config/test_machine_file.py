@@ -205,6 +205,15 @@ def test_what_is_no_such_quantity_is_refused(written: str, allowed: tuple[str, .
         read_number(written, "", allowed)
 
 
+@pytest.mark.parametrize(
+    "written", ["0,8 kg", "1.200,5 kg", "0.8 ± 0,08 kg, scales", "0.8 kg [0,5 to 1]", "1 200 kg", "330 rpm/V"]
+)
+def test_how_a_data_sheet_writes_it_is_told(written: str) -> None:
+    told = "written as back_emf_constant" if "rpm" in written else "write decimals with a point"
+    with pytest.raises(ValueError, match=told):
+        read_number(written, "", ("N·m/A",) if "rpm" in written else ("kg",))
+
+
 def test_what_a_file_leaves_out_is_zero_or_the_usual_and_the_comment_is_the_source() -> None:
     machine = parse_machine(SHORT)
     joint, motor = machine.joint(1), machine.joint(1).dc_motor

@@ -172,12 +172,12 @@ def bursts(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
 
 def milliseconds(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
     """Times in ms."""
-    return Faulty(replace(trace, time=1e3 * trace.time), ("time-scale", "drive-scale"))
+    return Faulty(replace(trace, time=1e3 * trace.time), ("time-scale", "drive-scale", "velocity-differs"))
 
 
 def slow_times(trace: Trace, machine: Machine, draw: Generator) -> Faulty:
     """Times twice as long."""
-    return Faulty(replace(trace, time=2.0 * trace.time), ("time-scale",))
+    return Faulty(replace(trace, time=2.0 * trace.time), ("time-scale", "velocity-differs"))
 
 
 def slipped(trace: Trace, machine: Machine, draw: Generator) -> Faulty | None:

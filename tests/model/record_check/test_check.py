@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from daq.contracts.errors import TraceError
 from daq.contracts.machine import Machine, load_machine
@@ -18,6 +19,7 @@ from daq.contracts.trace import Trace
 from daq.traces.csv_table import import_csv
 from daq_cli.models.diagnosis_text import answer_text
 from mock_controller.hidden.sizes import LATER_SIZES, SHARED_SIZES, SizeRange, draw_values
+from model.arrays import Floats
 from model.discrepancy.explanation.answer_words import headline
 from model.discrepancy.inverse_dynamics.diagnose import diagnose_torques
 from model.discrepancy.options import DiagnosisOptions
@@ -30,6 +32,7 @@ from model.machine_model.model import base_model
 from model.record_check.check import as_used, check_records, repaired
 from model.record_check.finding import RecordFinding, doubts_in
 from model.record_check.readings import find_bounds, find_dead, find_jumps
+from model.record_check.speeds import speed_findings
 from tests.model.discrepancy.inverse_dynamics import rigs
 from tests.model.record_check.faults import FAULTS, Faulty
 from tests.model.record_check.rigs import RIGS, ROOT, example, mock, world
@@ -236,6 +239,7 @@ UNIT_FAULTS: dict[str, tuple[Callable[[Trace], Trace], str, str]] = {
     "slower": (lambda t: replace(t, time=1.5 * t.time), "time-scale", "1.5 times"),
     "slow": (lambda t: replace(t, time=3.0 * t.time), "time-scale", "3 times"),
     "milliseconds": (lambda t: replace(t, time=1e3 * t.time), "time-scale", "ms"),
+    "seconds": (lambda t: replace(t, time=1e-3 * t.time), "time-scale", "s"),
 }
 
 
@@ -247,6 +251,41 @@ def test_a_scale_is_said_of_what_has_it(fault: str, tmp_path: Path) -> None:
         found = check_records(base_model(machine), [changed(trace)])
         (one,) = [one for one in found if one.kind != "no-sensor"]
         assert (one.kind, words in one.line) == (kind, True), one.line
+
+
+VELOCITIES: dict[str, tuple[Callable[[Floats], Floats], int | None, str]] = {
+    "still": (lambda v: v * [0.0, 1.0], 1, "the velocity is 0 throughout, although the position moves"),
+    "sign": (lambda v: v * [1.0, -1.0], 2, "the velocity has the wrong sign"),
+    "rpm": (
+        lambda v: v * [1.0, 9.549],
+        2,
+        "moves 0.105 times as far as the velocity says, as if velocities were in rpm",
+    ),
+    "degrees": (np.degrees, None, "moves 0.0175 times as far as the velocity says"),
+    "milliseconds": (lambda v: v / 1e3, None, "moves 1000 times as far as the velocity says, as if times in s"),
+    "exchanged": (lambda v: v[:, ::-1], 1, "the position moves as the velocity of joint 2 says, not as its own"),
+}
+
+
+@pytest.mark.parametrize("fault", VELOCITIES)
+def test_a_velocity_that_its_position_contradicts_is_doubted(fault: str) -> None:
+    changed, joint, words = VELOCITIES[fault]
+    machine, trace = rig("planar-torques")
+    wrong = replace(trace, velocity=changed(lagging(trace)))
+    first = check_records(base_model(machine), [wrong])[0]
+    assert (first.kind, first.joint, words in first.line) == ("velocity-differs", joint, True), first.line
+
+
+@pytest.mark.parametrize(("ratio", "doubted"), [(0.0, False), (0.36, False), (1.3, False), (0.01, True), (9.5, True)])
+def test_motor_constants_that_no_magnet_has_are_doubted(ratio: float, doubted: bool, tmp_path: Path) -> None:
+    machine, trace = example("motor_bench")(tmp_path)
+    (joint,) = machine.joints
+    motor = joint.dc_motor
+    constant = motor.back_emf_constant.model_copy(update={"value": ratio and motor.torque_constant.value / ratio})
+    drive = motor.model_copy(update={"back_emf_constant": constant})
+    found = machine.model_copy(update={"joints": (joint.model_copy(update={"drive": drive}),)})
+    says = [one.line for one in check_records(base_model(found), [trace]) if one.kind == "motor-constants"]
+    assert ["torque_constant is" in line for line in says] == [True] * doubted
 
 
 @pytest.mark.parametrize("latency", [0.008, 0.016, 0.032])
@@ -331,6 +370,15 @@ def rig(name: str) -> tuple[Machine, Trace]:
         return RIGS[name](Path(folder))
 
 
+def lagging(trace: Trace) -> Floats:
+    """Speeds as a drive reports them: coarse, noisy and through a low pass of ten samples."""
+    raw = np.gradient(trace.position, trace.time, axis=0)
+    size = raw.std(axis=0)
+    noisy = raw + 0.3 * size * np.random.default_rng(0).standard_normal(raw.shape)
+    smooth = lfilter([0.1], [1.0, -0.9], noisy, axis=0)
+    return np.asarray(np.round(smooth / np.where(size > 0.0, 0.2 * size, 1.0)) * 0.2 * size)
+
+
 def said(found: tuple[RecordFinding, ...], fault: Faulty) -> list[RecordFinding]:
     """The findings that say a fault, at its joint and its time."""
     return [
@@ -361,6 +409,7 @@ def test_a_fault_is_said_with_its_place(name: str, kind: str) -> None:
 def test_a_rig_as_it_is_raises_no_doubt(name: str) -> None:
     machine, trace = rig(name)
     assert doubts_in(check_records(base_model(machine), [trace])) == ()
+    assert list(speed_findings(replace(trace, velocity=lagging(trace)), machine)) == []
 
 
 @pytest.mark.slow

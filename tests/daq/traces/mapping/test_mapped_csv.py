@@ -33,7 +33,13 @@ def test_a_mapping_names_columns_units_and_joints_and_is_kept_beside_the_file(tm
     assert (trace.joints, trace.record.drive_unit, trace.record.robot) == ((1, 2), "A", "bench 2")
     remember(path, choice, trace.record.columns)
     assert open_trace(path) == trace
-    assert path.with_suffix(".toml").read_text().startswith('# bench\nrobot = "bench 2"\n')
+    toml = path.with_suffix(".toml")
+    assert toml.read_text().startswith('# bench\nrobot = "bench 2"\n')
+    by_hand = '[map]  # by hand\ntime = "stamp in ms"\n'
+    for text in (by_hand, "map = { time = 'stamp in ms' }\n", "map.time = 'stamp in ms'\n"):
+        toml.write_text(text)
+        remember(path, choice, trace.record.columns)
+        assert open_trace(path).record.columns == trace.record.columns
     again = Choice(map={"time": "stamp in s"})
     remember(path, again, open_trace(path, choice=again).record.columns)
     assert open_trace(path).time[-1] == 30.0
@@ -56,6 +62,9 @@ def test_what_is_guessed_is_shown_and_asked_for(tmp_path: Path) -> None:
         "position": "q{} [deg] in deg",
         "drive": "tau{} [Nm] in Nm",
     }
+    named = "t,q_shoulder_joint,dq_shoulder_joint,q_wrist_1_joint,dq_wrist_1_joint,q_wrist_2_joint,dq_wrist_2_joint"
+    with pytest.raises(TraceError, match=r"--map 'position=q_\{\} in \?' --map 'velocity=dq_\{\} in \?'"):
+        open_trace(file(tmp_path / "named.csv", ["0,1,2,3,4,5,6"], named))
     speed = file(tmp_path / "bench.csv", ["0,1", "1,2"], "Time,Velo")  # words that are cut short
     with pytest.raises(TraceError, match=r"--map 'velocity=Velo in \?'"):
         open_trace(speed)
@@ -100,6 +109,8 @@ def test_expressions(tmp_path: Path, given: dict[str, str], expected: list[float
         ({"position": "q{}", "drive": "tau{}"}, "drive: its unit is not stated"),
         ({"position": "q{}", "drive": "tau0 in A"}, "drive: has no column of joint '0', which others have"),
         ({"position": "1.5 + 2"}, "'1.5 + 2' is not a column"),
+        ({"position": "q{}", "drive": "tau{} in ‰"}, "drive: '‰' is a share: of what? As of a supply: ‰ of 7.4 V"),
+        ({"position": "q{}", "drive": "tau{} in % of 12"}, "drive: '% of 12' is a share: of what?"),
     ],
 )
 def test_what_is_wrong_in_a_mapping_is_one_line(tmp_path: Path, given: dict[str, str], complaint: str) -> None:
@@ -108,6 +119,24 @@ def test_what_is_wrong_in_a_mapping_is_one_line(tmp_path: Path, given: dict[str,
         open_trace(path, choice=Choice(map={"time": "stamp in ms"} | given))
     assert complaint in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_a_drive_may_be_a_share_of_a_stated_whole(tmp_path: Path) -> None:
+    path = file(tmp_path / "servo.csv", ["0,1,500", "1,2,-250"], "t,q_1,present_load_1")
+    with pytest.raises(TraceError, match=r"of drive \(.*for a share: ‰ of 7.4 V\)"):
+        open_trace(path)
+    for unit, base, expected in (
+        ("‰ of 7.4 V", "V", 3.7),
+        ("per mille of 2.94 N·m", "N·m", 1.47),
+        ("% of 500 mA", "A", 2.5),
+    ):
+        given = {"time": "t in s", "position": "q_{} in rad", "drive": f"present_load_{{}} in {unit}"}
+        trace = open_trace(path, choice=Choice(map=given))
+        assert trace.drive is not None
+        assert (trace.record.drive_unit, trace.drive[0, 0]) == (base, pytest.approx(expected))
+        assert trace.record.columns["drive"] == given["drive"]
+    with pytest.raises(TraceError, match=r"--drive-unit ‰: write V, A, .* for a share of that"):
+        open_trace(path, choice=Choice(map=given, drive_unit="‰"))
 
 
 def test_formats_whose_makers_state_the_units_are_not_asked_about(tmp_path: Path) -> None:
@@ -136,6 +165,19 @@ def test_joints_with_names_keep_them_and_some_can_be_chosen(tmp_path: Path) -> N
     np.testing.assert_array_equal(numbered.position[0], [2, 1])
     with pytest.raises(TraceError, match="--joints pan,elbow: it has lift, pan, grip"):
         open_trace(path, choice=Choice(map=mapping, joints=("pan", "elbow")))
+    stated = path.with_suffix(".toml")
+    for columns in ("t,q1,q2,q3", "time,position_1,position_2,position_3"):
+        path.write_text(f"{columns}\n0,1,2,3\n1,1,2,3\n")
+        known = Choice(map={"time": "t in s", "position": "q{} in rad"} if "q1" in columns else {})
+        stated.write_text('joint_names = ["lift", "pan", "grip"]\n')
+        assert open_trace(path, choice=known).record.joint_names == ("lift", "pan", "grip")
+        stated.write_text('joint_names = ["lift", "pan"]\n')
+        with pytest.raises(TraceError, match="joint_names = lift, pan: its joints are 3 without names"):
+            open_trace(path, choice=known)
+    path.write_text(f"{head}\n0,1,2,3\n1,1,2,3\n")
+    stated.write_text('joint_names = ["lift", "pan", "elbow"]\n')
+    with pytest.raises(TraceError, match="joint_names = lift, pan, elbow: its joints are lift, pan, grip; state a"):
+        open_trace(path, choice=Choice(map=mapping))
 
 
 def test_records_in_one_file_rows_without_a_reading_and_times_that_come_twice(tmp_path: Path) -> None:
@@ -146,6 +188,10 @@ def test_records_in_one_file_rows_without_a_reading_and_times_that_come_twice(tm
         open_trace(path, choice=Choice(map=mapping))
     first = open_trace(path, choice=Choice(map=mapping, where="episode=0"))
     np.testing.assert_array_equal(first.position[:, 0], [1, 2])
+    assert first.record.where == "episode=0"
+    rising = file(tmp_path / "b.csv", ["0,1,0", "1,2,0", "2,4,1", "3,5,1"], "t,q,episode")
+    remember(rising, Choice(where="episode=0"), {"time": "t in s", "position": "q in rad"})
+    assert [len(open_trace(rising, choice=Choice(where=where))) for where in (None, "all")] == [2, 4]
     assert "not a number, left out: 1, the first is data row 2" in first.record.notes
     assert "repeat the previous time, left out: 1, the first is data row 4" in first.record.notes
     with pytest.raises(TraceError, match="no row is left where time=7"):

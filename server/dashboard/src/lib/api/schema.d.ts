@@ -5739,7 +5739,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "bursts" | "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "no-sensor" | "position-unit" | "saturated" | "short" | "spikes" | "stuck" | "time-scale" | "units-differ" | "wraps";
+            kind: "bursts" | "columns-swapped" | "drive-late" | "drive-scale" | "drive-sign" | "drive-zero" | "gap" | "gravity-magnitude" | "gravity-reversed" | "jump" | "motor-constants" | "no-sensor" | "position-unit" | "saturated" | "short" | "spikes" | "stuck" | "time-scale" | "units-differ" | "velocity-differs" | "wraps";
             /**
              * Consequence
              * @enum {string}
@@ -6906,6 +6906,11 @@ export interface components {
             columns?: {
                 [key: string]: string;
             };
+            /**
+             * Where
+             * @default
+             */
+            where?: string;
             /**
              * Joints Chosen
              * @default false
