@@ -90,7 +90,7 @@ def test_via_points_pass_their_times_and_are_checked_like_all_motions() -> None:
     ],
 )
 def test_via_points_that_do_not_fit(trajectory: dict[str, object], expected: str) -> None:
-    with pytest.raises(ValueError, match=expected):
+    with pytest.raises(SpecError, match=expected):
         planned(joints=(1,), trajectory={"kind": "via"} | trajectory)
 
 
