@@ -16,6 +16,7 @@ NoteKind = Literal[
     "drive-at-limit",
     "errors-follow-record",
     "larger-noise",
+    "limited-search",
     "no-experiment-left",
     "not-looked-for",
     "not-separable",

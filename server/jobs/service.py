@@ -18,6 +18,7 @@ from daq.contracts.machine import Machine
 from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import MACHINE, DiagnoseRequest, FitRequest, Job, JobRequest
 from daq.executors import Workers
+from server.access.caller import spoken
 from server.catalogue.catalogue import Catalogue
 from server.clock import Clock
 from server.experiments.states import Event
@@ -118,7 +119,7 @@ class JobService:
         context = self._context
         try:
             job = context.jobs.change(
-                context.robot, identity, Event.CANCELLED, context.clock.utc(), f"cancelled by {by}"
+                context.robot, identity, Event.CANCELLED, context.clock.utc(), f"cancelled by {spoken(by)}"
             )
         except ProblemError:  # the job does not wait, or no longer
             job = context.jobs.get(context.robot, identity)

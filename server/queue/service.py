@@ -110,7 +110,7 @@ class QueueService:
                 if running.answer is not None:
                     self._context.robot.send(HaltRun())
                 return self.with_progress(self._context.experiments.get(name, identity))
-        found = self._context.experiments.cancel_waiting(name, identity, self._context.clock.utc(), by)
+        found = self._context.experiments.cancel_waiting(name, identity, self._context.clock.utc(), spoken(by))
         self._context.record_event("experiment", "cancelled", actor=by, experiment=identity)
         return found
 
@@ -509,7 +509,7 @@ class QueueService:
         if self._closing:
             return replace(ending, event=Event.LOST, reason="the service was shut down while this ran")
         if running is not None and running.cancelled_by is not None:
-            return replace(ending, reason=f"cancelled by {running.cancelled_by}")
+            return replace(ending, reason=f"cancelled by {spoken(running.cancelled_by)}")
         return ending
 
 

@@ -75,7 +75,7 @@ def answer_of(
         seconds=0.0,
         robot_seconds=sum(float(t.time[-1] - t.time[0]) for t in traces),
         significant=case.options.least_evidence,
-        notes_data=(*_on_numbers(standing), *work.notes, *on_unfinished((*traces, *held_out))),
+        notes_data=(*_on_the_search(case), *_on_numbers(standing), *work.notes, *on_unfinished((*traces, *held_out))),
     )
 
 
@@ -140,6 +140,15 @@ def _resulting_model(standing: Standing, traces: tuple[str, ...]) -> Model:
     record = {"fitted": [u.name for u in _of_model(standing)], **learnt}
     lineage = Lineage(parent=given.identity, traces=traces, fit=record, note="diagnosis")
     return standing.model.with_lineage(lineage)
+
+
+def _on_the_search(case: Case) -> tuple[Note, ...]:
+    """That not every known effect was looked for, or not on every joint; nothing follows for the others."""
+    effects, joints = case.options.effects, case.options.joints
+    if set(joints or ()) >= set(case.given.machine.modelled_joints):
+        joints = None
+    values = {"effects": effects, "joints": joints}
+    return () if effects is None and joints is None else (Note(kind="limited-search", values=values),)
 
 
 def _on_numbers(standing: Standing) -> tuple[Note, ...]:

@@ -33,7 +33,7 @@ from model.discrepancy.explanation.effect_words import (
     size_words,
     sizes_of,
 )
-from model.discrepancy.explanation.notes import note_words
+from model.discrepancy.explanation.notes import limited_search, note_words
 from model.discrepancy.explanation.step_words import (
     NOISE_UNKNOWN,
     reason_text,
@@ -51,8 +51,8 @@ SHOWN = 3
 
 
 def headline(found: Diagnosis) -> str:
-    """The effects that were found, with joints and sizes; or that none was found, or none that is known; and joints
-    that were not examined. A clause for the terminal, the report, lists and the page."""
+    """The effects that were found, with joints and sizes; or that none was found, or none that is known; joints that
+    were not examined, and to what the search was limited. A clause for the terminal, the report, lists and the page."""
     shown = [s for s in found.steps if s.adopted]
     findings = [_group_headline(s, found) if s.group else _finding(s) for s in shown]
     match found.verdict:
@@ -68,8 +68,13 @@ def headline(found: Diagnosis) -> str:
             findings.append("none of the known effects explains what is left")
         case "partly":
             findings.append("and more is missing that no known effect explains")
+    limits = [limited_search(n.values) for n in found.notes_data if n.kind == "limited-search"]
     return "; ".join(
-        [*(findings or ["several effects that these traces cannot tell apart"]), *_not_examined(found.not_examined)]
+        [
+            *(findings or ["several effects that these traces cannot tell apart"]),
+            *_not_examined(found.not_examined),
+            *limits,
+        ]
     )
 
 

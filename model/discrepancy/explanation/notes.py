@@ -9,7 +9,7 @@ from daq.contracts.trace import Trace
 from model.discrepancy.diagnosis import Inseparable
 from model.discrepancy.explanation.effect_words import NOTES, class_words, plain, within
 from model.discrepancy.grounds import Note, NoteKind
-from model.effects.names import effect_name
+from model.effects.names import effect_name, joints_in_words
 from model.fitting.unknowns import Unknown
 from model.machine_model.parameter import Parameter
 from model.machine_model.record_verdict import FAR_OFF
@@ -154,6 +154,14 @@ def _rounded(value: float, unit: str) -> str:
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 
+def limited_search(v: Values) -> str:
+    """To which effects and joints a search was limited, as a clause."""
+    count = len(v["effects"] or ())
+    effects = f"{count} effect{'' if count == 1 else 's'}" if v["effects"] else "effects"
+    places = f" on {joints_in_words(v['joints'])}" if v["joints"] else ""
+    return f"only {effects}{places} {'was' if count == 1 else 'were'} looked for"
+
+
 WRITTEN: dict[NoteKind, Callable[[Values], Values]] = {
     "drive-at-limit": _drive_at_limit,
     "larger-noise": lambda v: {"joints": "; ".join(map(_noise_of, v["joints"]))},
@@ -177,6 +185,7 @@ WRITTEN: dict[NoteKind, Callable[[Values], Values]] = {
 }
 """Values that a phrase has otherwise than the note."""
 WHOLE: dict[NoteKind, Callable[[Values], str]] = {
+    "limited-search": limited_search,
     "one-class": lambda v: class_words(
         Inseparable.model_validate({name: v[name] for name in Inseparable.model_fields}), v["budget"]
     ),

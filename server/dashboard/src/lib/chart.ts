@@ -76,6 +76,12 @@ export function padded(low: number, high: number, least = 0): [number, number] {
   return [middle - span * 0.56, middle + span * 0.56];
 }
 
+/** The next lower number of one digit: numbers at a logarithmic axis are counted from its lower end. */
+function rounded(value: number): number {
+  const decade = 10 ** Math.floor(Math.log10(value));
+  return Math.floor(value / decade) * decade;
+}
+
 const PLAIN = new Intl.NumberFormat('en-GB', { maximumFractionDigits: 9 });
 
 /** px between two numbers of the vertical axis: low charts would have one alone, which is no scale. */
@@ -115,7 +121,7 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
       y: {
         distr: axes.logY ? 3 : 1,
         range: (_, low, high) =>
-          drawing.yRange() ?? (axes.logY ? [low, high] : padded(low, high, drawing.least)),
+          drawing.yRange() ?? (axes.logY ? [rounded(low), high] : padded(low, high, drawing.least)),
       },
     },
     axes: [

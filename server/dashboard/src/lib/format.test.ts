@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { bytes, duration, fixed, significant } from './format';
+import { bytes, duration, fixed, shortest, significant } from './format';
 
 describe('numbers', () => {
   it.each([
@@ -17,6 +17,14 @@ describe('numbers', () => {
     [1.5e-7, '1.50e−7'],
     [2.5e9, '2.50e9'],
   ])('%s is %s', (value, text) => expect(significant(value)).toBe(text));
+
+  it.each([
+    [0.006, '0.006'],
+    [1.83e-6, '1.83e−6'],
+    [2e-6, '2e−6'],
+    [10, '10'],
+    [1.5, '1.5'],
+  ])('%s, shortest, is %s', (value, text) => expect(shortest(value, 4)).toBe(text));
 
   it.each([
     [0, '0 B'],

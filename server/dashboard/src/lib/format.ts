@@ -22,6 +22,11 @@ export function significant(value: number | null | undefined, digits = 3): strin
   return fixed(value, Math.max(0, digits - 1 - size));
 }
 
+/** The same without zeros at its end, where numbers stand alone. */
+export function shortest(value: number | null | undefined, digits = 3): string {
+  return significant(value, digits).replace(/\.0+(?=e|$)|(\.\d*[1-9])0+(?=e|$)/, '$1');
+}
+
 const BYTES = ['B', 'kB', 'MB', 'GB', 'TB'] as const;
 
 /** A number of bytes: 1.2 GB. */

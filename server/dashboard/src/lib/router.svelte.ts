@@ -30,7 +30,9 @@ class Router {
 
   /** Takes over the address as it is now. */
   read(): void {
+    const before = this.route.page;
     this.route = routeOf(location.hash);
+    if (before !== this.route.page) scrollTo(0, 0); // another page begins at its top
   }
 
   /** A page with a query, such as `#/experiments?again=42`. */

@@ -117,3 +117,20 @@ def test_joints_that_were_not_examined_are_in_the_first_line(answer: Diagnosis) 
     both = silent.model_copy(update={"not_examined": (1, 3)})
     assert "joints 1 and 3 were not examined" in headline(both)
     assert "not examined" not in headline(answer)
+
+
+@pytest.mark.parametrize(
+    ("effects", "joints", "said"),
+    [
+        (None, (2,), "only effects on joint 2 were looked for"),
+        (("backlash",), None, "only 1 effect was looked for"),
+        (("backlash", "payload"), (2, 3), "only 2 effects on joints 2 and 3 were looked for"),
+    ],
+)
+def test_what_a_search_was_limited_to_is_in_the_first_line(
+    answer: Diagnosis, effects: tuple[str, ...] | None, joints: tuple[int, ...] | None, said: str
+) -> None:
+    limited = Note(kind="limited-search", values={"effects": effects, "joints": joints})
+    for verdict in ("named", "nothing-significant"):
+        found = answer.model_copy(update={"verdict": verdict, "notes_data": (limited,)})
+        assert headline(found).endswith(f"; {said}")

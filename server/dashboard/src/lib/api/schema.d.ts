@@ -4980,7 +4980,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "cutoff" | "drive-at-limit" | "errors-follow-record" | "larger-noise" | "no-experiment-left" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "shakes-above-cutoff" | "stated-numbers-moved" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "unfinished-record";
+            kind: "cutoff" | "drive-at-limit" | "errors-follow-record" | "larger-noise" | "limited-search" | "no-experiment-left" | "not-looked-for" | "not-separable" | "nothing-held-out" | "one-class" | "positions-of-links" | "resting-left-out" | "shakes-above-cutoff" | "stated-numbers-moved" | "taken-out-again" | "tolerances-fitted-first" | "tolerance-source" | "torque-left" | "unfinished-record";
             /**
              * Values
              * @default {}

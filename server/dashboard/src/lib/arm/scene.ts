@@ -148,11 +148,6 @@ export class ArmScene {
     if (this.isVisibleChange(before)) this.invalidate();
   }
 
-  /** Pictures a second, lately; null where every change is drawn. */
-  get rate(): number | null {
-    return this.budget?.rate(seconds()) ?? null;
-  }
-
   /** After a change of the theme. */
   setColours(colours: ArmColours): void {
     this.colours = colours;
@@ -340,7 +335,7 @@ export class ArmScene {
     this.pose();
     this.renderer.render(this.scene, this.camera);
     if (this.budget) {
-      this.budget.begun(begin);
+      this.budget.begun();
       this.whenDone((end) => {
         this.budget?.spent(begin, end - begin);
         if (this.isAwaited) this.invalidate();

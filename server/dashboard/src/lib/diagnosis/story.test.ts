@@ -108,5 +108,7 @@ describe('where, once there is an answer for joint 3', () => {
     expect(besideAnswer(left, answered, 3.5)).toBe('Joint 2: not explained by the answer at this moment.');
     expect(besideAnswer(sceneWith(before), answered, 3.5)).toContain('Joint 2 may glow');
     expect(besideAnswer(explained, [], 3.5)).toBe('');
+    expect(besideAnswer(explained, [], 3.5, [3])).toBe('Joint 2: not explained, and not examined.');
+    expect(besideAnswer(left, answered, 3.5, [3])).toBe('Joint 2: not explained, and not examined.');
   });
 });

@@ -172,8 +172,19 @@ export function worstMoment(scene: Scene, joints: readonly number[], count: numb
   return moments[worst.indexOf(Math.max(...worst))] ?? 0;
 }
 
+/** The joints to which the search was limited; null for all. */
+export function examinedJoints(found: Pick<DiagnosisData, 'notes_data'>): readonly number[] | null {
+  const note = (found.notes_data ?? []).find((one) => one.kind === 'limited-search');
+  return (note?.values?.joints ?? null) as readonly number[] | null;
+}
+
 /** Why joints glow that are not those of the answer, at a moment with the given model; empty where none does. */
-export function besideAnswer(scene: Scene, answered: readonly number[], moment: number): string {
+export function besideAnswer(
+  scene: Scene,
+  answered: readonly number[],
+  moment: number,
+  examined: readonly number[] | null = null,
+): string {
   const { drift, noise } = scene;
   const [before, after] = [0, 1].map((closed) => heatAt(drift, noise, moment, closed)) as [
     number[],
@@ -182,17 +193,22 @@ export function besideAnswer(scene: Scene, answered: readonly number[], moment: 
   const places = drift.joints.flatMap((joint, place) =>
     before[place]! > GLOWS && !answered.includes(joint) ? [place] : [],
   );
-  if (answered.length === 0 || places.length === 0) return '';
+  const unseen = examined === null ? [] : places.filter((one) => !examined.includes(drift.joints[one]!));
+  if (places.length === 0 || (answered.length === 0 && unseen.length === 0)) return '';
   const called = (some: readonly number[]): string =>
     `Joint${some.length > 1 ? 's' : ''} ${some.map((place) => drift.joints[place]).join(', ')}`;
+  const notSeen = `${called(unseen)}: not explained, and not examined.`;
+  if (answered.length === 0) return notSeen;
   if (drift.gap.length < 2) return `${called(places)} may glow because the joints push each other.`;
-  const left = places.filter((place) => after[place]! > GLOWS);
-  const gone = places.filter((place) => !left.includes(place));
+  const glowing = places.filter((place) => after[place]! > GLOWS);
+  const gone = places.filter((place) => !glowing.includes(place));
+  const left = glowing.filter((place) => !unseen.includes(place));
   return [
     gone.length > 0
       ? `${called(gone)}: explained by the answer too, because the joints push each other.`
       : '',
     left.length > 0 ? `${called(left)}: not explained by the answer at this moment.` : '',
+    glowing.length > left.length ? notSeen : '',
   ]
     .filter((sentence) => sentence !== '')
     .join(' ');

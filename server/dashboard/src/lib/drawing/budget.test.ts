@@ -8,7 +8,7 @@ describe('a budget for drawing', () => {
 
   it('has one drawing at a time', () => {
     const budget = new FrameBudget(0.2, 0.1, 1);
-    budget.begun(5);
+    budget.begun();
     expect(budget.wait(5.5)).toBe(Infinity);
     budget.spent(5, 0.6);
     expect(budget.wait(5.6)).toBeCloseTo(0.4);
@@ -29,15 +29,5 @@ describe('a budget for drawing', () => {
     expect(budget.wait(20)).toBeCloseTo(1);
     budget.spent(30, 3);
     expect(budget.wait(30)).toBeCloseTo(3);
-  });
-
-  it('tells how often it was drawn lately', () => {
-    const budget = new FrameBudget(1, 0, 1);
-    for (let at = 0; at < 4; at += 0.1) {
-      budget.begun(at);
-      budget.spent(at, 0);
-    }
-    expect(budget.rate(3.95)).toBeCloseTo(10, 0);
-    expect(budget.rate(9)).toBe(0);
   });
 });

@@ -1,11 +1,7 @@
 /** When something dear may be drawn again, so that it leaves time for everything else. Times in s. Pure. */
 
-/** What was drawn within this time counts for the rate. */
-const LATELY = 2;
-
 export class FrameBudget {
   private next = 0;
-  private drawn: number[] = [];
 
   /**
    * `share`: of the time that drawing may take. `soonest`, `latest`: the shortest and the longest time from one
@@ -17,10 +13,9 @@ export class FrameBudget {
     private readonly latest: number,
   ) {}
 
-  /** A drawing begins at `at`: the next has to wait until it is known what this one costs. */
-  begun(at: number): void {
+  /** A drawing begins: the next has to wait until it is known what this one costs. */
+  begun(): void {
     this.next = Infinity;
-    this.drawn = [...this.drawn.filter((one) => one > at - LATELY), at];
   }
 
   /** The drawing that began at `at` took `cost`. */
@@ -32,10 +27,5 @@ export class FrameBudget {
   /** s until the next drawing may begin; 0 when it may now, infinite while one is being drawn. */
   wait(at: number): number {
     return Math.max(0, this.next - at);
-  }
-
-  /** Drawings a second, lately. */
-  rate(at: number): number {
-    return this.drawn.filter((one) => one > at - LATELY).length / LATELY;
   }
 }

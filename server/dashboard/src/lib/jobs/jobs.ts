@@ -47,6 +47,12 @@ export function remaining(fraction: number | null, elapsed: number): number | nu
   return (elapsed / fraction) * (1 - fraction);
 }
 
+/** What fills the form of a diagnosis as it was for a job. */
+export function againQuery({ request }: Job): string {
+  const held = 'held_out' in request ? request.held_out : [];
+  return [...request.traces.map((one) => `trace=${one}`), ...held.map((one) => `hold=${one}`)].join('&');
+}
+
 /** How a trace is used by a request. */
 export type Role = 'none' | 'fit' | 'judge';
 

@@ -44,10 +44,11 @@ it.each([
   ['speed:', 'speed: is not a filter'],
   ['effect: backlash', 'effect: needs its value next to it'],
   ['joint:two', 'joint: needs a number from 1'],
+  ['joint:9', 'there is no joint 9, joints are 1 to 6'],
   ['effect:Backlash', 'effect: needs a name'],
   ['tag:a tag:b', 'tag: can be given once'],
 ])('%s is refused in one line', (line, problem) => {
-  expect(searchOf(line).problem).toContain(problem);
+  expect(searchOf(line, 6).problem).toContain(problem);
 });
 
 it('a filter that is being typed filters nothing yet', () => {

@@ -34,8 +34,8 @@ const WORD = /(?:(\w+):)?(?:"([^"]*)"?|(\S+))|(\w+):/g;
 const EFFECT = /^[a-z]\w*$/;
 const DAY = /^\d{4}-\d{2}-\d{2}$/;
 
-/** The search that a line asks for, or in one line what is wrong with it. */
-export function searchOf(line: string): { search: Search; problem: string } {
+/** The search that a line asks for, or in one line what is wrong with it. `joints`: how many the arm has. */
+export function searchOf(line: string, joints = 99): { search: Search; problem: string } {
   const search: Search = {};
   const words: string[] = [];
   const given = new Set<string>();
@@ -61,7 +61,7 @@ export function searchOf(line: string): { search: Search; problem: string } {
     }
     if (given.has(named)) problem ||= `${named}: can be given once`;
     given.add(named);
-    problem ||= taken(search, named, value);
+    problem ||= taken(search, named, value, joints);
   }
   if (words.length > 0) search.q = words.join(' ');
   return { search, problem };
@@ -72,7 +72,7 @@ function isKey(key: string): key is Key {
 }
 
 /** Adds one filter to `search`. What is wrong with it, if anything. */
-function taken(search: Search, key: Key, value: string): string {
+function taken(search: Search, key: Key, value: string, joints: number): string {
   const oneOf = <T extends string>(allowed: readonly T[], set: (one: T) => void): string => {
     const found = allowed.find((one) => one === value);
     if (found === undefined) return `${key}: needs one of ${allowed.join(', ')}`;
@@ -86,6 +86,7 @@ function taken(search: Search, key: Key, value: string): string {
       return oneOf(OUTCOMES, (one) => (search.outcome = one));
     case 'joint':
       if (!/^[1-9]\d?$/.test(value)) return 'joint: needs a number from 1, such as joint:2';
+      if (Number(value) > joints) return `there is no joint ${value}, joints are 1 to ${joints}`;
       search.joint = Number(value);
       return '';
     case 'effect':

@@ -213,7 +213,7 @@ export function specOf(form: SpecForm, rules: SpecRules, slides: Slides = NONE_S
   const trajectory = form.kept ?? trajectoryOf(form, fields, number, slides);
   if (form.joints.length === 0) problems.joints = 'choose at least one joint';
   if (form.name !== '' && !NAME.test(form.name))
-    problems.name = 'letters, digits, and . _ - inside, 64 at most';
+    problems.name = 'no spaces: letters, digits, and . _ - after the first; 64 at most';
   const spec: Spec = {
     trajectory,
     joints: [...form.joints].sort((one, other) => one - other),

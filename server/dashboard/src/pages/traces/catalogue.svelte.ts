@@ -18,7 +18,7 @@ export class Catalogue {
   loaded = $state(false);
   busy = $state(false);
   next = $state<string | null>(null);
-  asked = $derived(searchOf(this.line));
+  asked = $derived(searchOf(this.line, live.machine?.joints.length));
   isFiltered: boolean = $derived(this.line.trim() !== '');
   /** What can be completed: of what is listed, or was. */
   known: Known = $derived.by(() => {
@@ -56,6 +56,7 @@ export class Catalogue {
   /** For an effect that follows the fields of the search. */
   searchSoon(): () => void {
     if (this.line.includes('effect:')) void untrack(() => this.learnEffects());
+    this.problem = null; // it was of another line
     this.listing.beginAnew();
     this.reload.soon(untrack(() => this.loaded) ? QUIET : 0);
     return () => this.reload.leave();
