@@ -2,6 +2,7 @@
 
 import uPlot from 'uplot';
 import { placedFlags } from './chart_flags';
+import { significant } from './format';
 import { sparingPath } from './drawing/paths';
 
 export interface ChartSeries {
@@ -76,11 +77,8 @@ export function padded(low: number, high: number, least = 0): [number, number] {
   return [middle - span * 0.56, middle + span * 0.56];
 }
 
-/** The next lower number of one digit: numbers at a logarithmic axis are counted from its lower end. */
-function rounded(value: number): number {
-  const decade = 10 ** Math.floor(Math.log10(value));
-  return Math.floor(value / decade) * decade;
-}
+/** The power of ten below: numbers at a logarithmic axis are counted from its lower end. */
+const decade = (value: number): number => 10 ** Math.floor(Math.log10(value));
 
 const PLAIN = new Intl.NumberFormat('en-GB', { maximumFractionDigits: 9 });
 
@@ -121,7 +119,7 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
       y: {
         distr: axes.logY ? 3 : 1,
         range: (_, low, high) =>
-          drawing.yRange() ?? (axes.logY ? [rounded(low), high] : padded(low, high, drawing.least)),
+          drawing.yRange() ?? (axes.logY ? [decade(low), high] : padded(low, high, drawing.least)),
       },
     },
     axes: [
@@ -134,7 +132,13 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
           ? {}
           : { splits: (plot, __, low, high) => withRoom(places(low, high), plot.width) }),
       },
-      { ...axis, size: 56, gap: 6, space: ROOM_OF_A_NUMBER, ...written(axes.y) },
+      {
+        ...axis,
+        size: 56,
+        gap: 6,
+        space: ROOM_OF_A_NUMBER,
+        ...written(axes.y ?? (axes.logY ? (value) => significant(value, 1) : plain)),
+      },
     ],
     series: [
       {},

@@ -172,10 +172,10 @@ export function worstMoment(scene: Scene, joints: readonly number[], count: numb
   return moments[worst.indexOf(Math.max(...worst))] ?? 0;
 }
 
-/** The joints to which the search was limited; null for all. */
-export function examinedJoints(found: Pick<DiagnosisData, 'notes_data'>): readonly number[] | null {
-  const note = (found.notes_data ?? []).find((one) => one.kind === 'limited-search');
-  return (note?.values?.joints ?? null) as readonly number[] | null;
+/** The joints to which the search was limited; undefined for all. */
+export function examinedJoints(found: Pick<DiagnosisData, 'notes_data'>): readonly number[] | undefined {
+  const note = found.notes_data?.find((one) => one.kind === 'limited-search');
+  return (note?.values?.joints ?? undefined) as readonly number[] | undefined;
 }
 
 /** Why joints glow that are not those of the answer, at a moment with the given model; empty where none does. */
@@ -183,7 +183,7 @@ export function besideAnswer(
   scene: Scene,
   answered: readonly number[],
   moment: number,
-  examined: readonly number[] | null = null,
+  examined = scene.drift.joints,
 ): string {
   const { drift, noise } = scene;
   const [before, after] = [0, 1].map((closed) => heatAt(drift, noise, moment, closed)) as [
@@ -193,7 +193,7 @@ export function besideAnswer(
   const places = drift.joints.flatMap((joint, place) =>
     before[place]! > GLOWS && !answered.includes(joint) ? [place] : [],
   );
-  const unseen = examined === null ? [] : places.filter((one) => !examined.includes(drift.joints[one]!));
+  const unseen = places.filter((one) => !examined.includes(drift.joints[one]!));
   if (places.length === 0 || (answered.length === 0 && unseen.length === 0)) return '';
   const called = (some: readonly number[]): string =>
     `Joint${some.length > 1 ? 's' : ''} ${some.map((place) => drift.joints[place]).join(', ')}`;
