@@ -40,7 +40,7 @@ def test_a_diagnosis_is_begun_followed_and_ended(studied: Studied, studied_dashb
     assert studied.service.robot.get(f"/jobs/{job}").json()["state"] == "cancelled"
     page.get_by_role("button", name="Delete").click()
     page.get_by_role("button", name="permanently").click()
-    expect(page.get_by_role("link", name=re.compile("friction"))).to_have_count(1)
+    expect(page.get_by_role("link", name=re.compile("^Coulomb friction"))).to_have_count(1)
 
 
 def test_the_answer_is_told_with_the_numbers_that_were_found(
