@@ -26,7 +26,7 @@ from daq.contracts.errors import ReachError, SpecError
 from daq.contracts.frozen import like
 from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.system import stop_port_after
-from server.access.caller import Caller
+from server.access.caller import Caller, spoken
 from server.access.connections import MOST_CONNECTIONS, Connection
 from server.access.cookies import session_cookie
 from server.access.gate import Gate
@@ -262,7 +262,7 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
     listener."""
 
     def stopped(news: Stopped) -> None:
-        services.robot(news.robot).queue.stop_asked(news.actor)
+        services.robot(news.robot).queue.stop_asked(spoken(news.actor))
         with suppress(RuntimeError):  # the service is ending, and records no more events
             services.event_log.record_later(news.robot, "stop", news.text, actor=news.actor)
         note = _note_of_stop(news)

@@ -209,7 +209,7 @@ def _on_machine(machine: Machine, traces: Sequence[Trace]) -> Iterator[RecordFin
         if not 1 / OTHER_MAGNET < ratio < OTHER_MAGNET:
             yield RecordFinding(
                 kind="motor-constants",
-                consequence="doubt",
+                consequence="note",
                 joint=joint,
                 value=ratio,
                 allowed=1.0,

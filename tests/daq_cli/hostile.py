@@ -42,10 +42,10 @@ def hostile_file(kind: str, suffix: str) -> Path:
 
 
 def refuses(said: Said) -> None:
-    """It ended as for wrong input, with one line that is no page."""
+    """It ended as for wrong input, with one line that is no page; below it one for each mistake of a machine file."""
     assert said.code in (2, 3, 4), (said.code, said.err)
     lines = [line for line in said.err.splitlines() if not line.startswith("No robot is configured")]
-    assert len(lines) == 1, said.err
+    assert all(line.startswith("  ") and line.isprintable() for line in lines[1:]), said.err
     assert lines[0].startswith("daq: ")
     assert len(lines[0]) < 1000
     assert lines[0].isprintable()

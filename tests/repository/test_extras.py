@@ -15,6 +15,7 @@ from packaging.requirements import Requirement
 import ma2000
 from daq.client.websocket import WebSocket
 from daq.contracts.extras import CONTAINS, EXTRA_OF, Extra, MissingExtraError, missing_extras_named
+from daq.contracts.trace import Trace
 from daq.transport import MockPort
 from daq.transport.mock_process import start_mock
 from daq_cli.app.subcommands import called, extra_of, subcommands
@@ -27,7 +28,7 @@ OTHER_NAMES = {"serial": "pyserial", "pydantic_settings": "pydantic-settings", "
 OTHER_NAMES |= {"google": "protobuf", "markdown_it": "markdown-it-py", "rerun": "rerun-sdk", "foxglove": "foxglove-sdk"}
 OTHER_NAMES["PIL"] = "pillow"
 
-NO_TRACE: Any = None
+NO_TRACE: Any = Trace.__new__(Trace)
 PULLED = {"starlette": "fastapi", "dask": "distributed"}
 """Packages that come with another one."""
 
