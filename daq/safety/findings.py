@@ -54,6 +54,7 @@ NOTHING = Verdict()
 class Watched:
     """The joints of each sample, in order, with the calibrations from angles to counts and posture units."""
 
+    machine: Machine
     joints: tuple[int, ...]
     calibrations: tuple[JointCalibration, ...]
     period: float
@@ -63,7 +64,7 @@ class Watched:
     def of(cls, machine: Machine, limits: Limits, joints: tuple[int, ...]) -> Watched:
         """Raises SpecError for joints that the machine lacks, or that have no sensor."""
         calibrations = tuple(machine.calibration(joint) for joint in joints)
-        return cls(joints, calibrations, control_period(machine), limits)
+        return cls(machine, joints, calibrations, control_period(machine), limits)
 
     def counts(self, angles: tuple[float, ...]) -> tuple[float, ...]:
         """Converts angle differences (rad, in the sample's order) to ADC counts with the sign of the joint."""

@@ -10,16 +10,15 @@ Silence is detected by the link, which raises LinkTimeoutError once its retries 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from daq.contracts.joint_text import position_text
 from daq.contracts.limits import Limits
 from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleCount, SampleRow
 from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 from firmware_protocol.commands import StatusFlag
-from firmware_protocol.units import JointCalibration
 
 
 @dataclass
@@ -58,7 +57,7 @@ class FollowingError:
     def _outside(self, row: SampleRow, limit: int) -> Finding | None:
         for joint, own, error in zip(self.watched.joints, self.watched.calibrations, row.error, strict=True):
             if abs(round(error / own.rad_per_count)) > limit:
-                return _does_not_follow(joint, "set point", error, own, limit)
+                return self._waits(joint, "set point", error, own.rad_per_count)
         return None
 
     def _ahead(self, row: SampleRow, planned: Mapping[int, int], limit: int) -> Finding | None:
@@ -67,18 +66,16 @@ class FollowingError:
                 continue
             ahead = own.posture_to_rad(planned[joint]) - position
             if abs(ahead / own.rad_per_count) > limit:
-                return _does_not_follow(joint, "next set point", ahead, own, limit)
+                return self._waits(joint, "next set point", ahead, own.rad_per_count)
         return None
 
-
-def _does_not_follow(joint: int, goal: str, away: float, own: JointCalibration, limit: int) -> Finding:
-    """Returns the pause of set points for a joint that is `away` rad from where it should be."""
-    degrees = [f"{abs(math.degrees(one)):.1f}°" for one in (away, limit * own.rad_per_count)]
-    counts = abs(away / own.rad_per_count)
-    line = (
-        f"joint {joint} is {degrees[0]} ({counts:.0f} counts) from its {goal}; set points wait while it is more than "
-    )
-    return Finding("pause", f"{line}{degrees[1]} ({limit}) away", joint)
+    def _waits(self, joint: int, goal: str, away: float, count: float) -> Finding:
+        """Returns the pause of set points for a joint that is `away` (rad, m) from where it should be. count: of its
+        sensor, rad or m."""
+        limit = self.watched.limits.following_error_counts or 0
+        size, most = (position_text(self.watched.machine, joint, abs(one), 1) for one in (away, limit * count))
+        line = f"joint {joint} is {size} ({abs(away / count):.0f} counts) from its {goal}"
+        return Finding("pause", f"{line}; set points wait while it is more than {most} ({limit}) away", joint)
 
 
 LONGEST_SILENCE = 0.2

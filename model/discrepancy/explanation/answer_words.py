@@ -55,6 +55,7 @@ def headline(found: Diagnosis) -> str:
     were not examined, and to what the search was limited. A clause for the terminal, the report, lists and the page."""
     shown = [s for s in found.steps if s.adopted]
     findings = [_group_headline(s, found) if s.group else _finding(s) for s in shown]
+    limits = [limited_search(n.values) for n in found.notes_data if n.kind == "limited-search"]
     match found.verdict:
         case "check-the-record":
             return f"check the record: {doubts_headline(found.record)}"
@@ -63,12 +64,13 @@ def headline(found: Diagnosis) -> str:
         case "nothing-significant" if found.examined_nothing:
             findings = ["the traces say nothing of the model"]
         case "nothing-significant":
-            findings = [NOTHING[_why_nothing(found)[0]], *doubts_of(found)]
+            why = _why_nothing(found)[0]
+            # a search of some effects or joints does not say that the model explains the rest
+            findings = [NOTHING["doubted" if limits and why == "explained" else why], *doubts_of(found)]
         case "unknown-effect":
             findings.append("none of the known effects explains what is left")
         case "partly":
             findings.append("and more is missing that no known effect explains")
-    limits = [limited_search(n.values) for n in found.notes_data if n.kind == "limited-search"]
     return "; ".join(
         [
             *(findings or ["several effects that these traces cannot tell apart"]),

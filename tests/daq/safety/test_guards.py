@@ -1,6 +1,7 @@
 """What the guards say in each control period."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,13 +64,17 @@ def test_a_pause_is_counted_from_its_first_period_and_one_that_lasts_is_a_fault(
 
 def test_set_points_keep_the_limit_s_distance_whatever_other_joints_do() -> None:
     # A joint of 4 rad has 1024 counts a rad, so that nothing is rounded here
-    watched = Watched((1,), (JointCalibration(1, 4.0, 0.0),), 0.02, Limits(following_error_counts=127))
+    watched = Watched(MA2000, (1,), (JointCalibration(1, 4.0, 0.0),), 0.02, Limits(following_error_counts=127))
     for counts, held in ((127, False), (128, True), (-127, False), (-128, True)):
         at = 2.0 - counts / 1024
         sample = SampleRow(0, 0.0, 0.0, (at,), (at,), (0.0,), (0.0,), (0,), 0)
         verdict = FollowingError(watched).check(sample, {1: 500})
         assert verdict.hold is held
         assert [f.joint for f in verdict.findings] == [1] * held
+    sliding = MA2000.joint(1).model_copy(update={"kind": "prismatic"})
+    watched = replace(watched, machine=MA2000.model_copy(update={"joints": (sliding, *MA2000.joints[1:])}))
+    (finding,) = FollowingError(watched).check(sample, {1: 500}).findings
+    assert finding.message.startswith("joint 1 is 125.0 mm (128 counts) from its next set point"), "its m are mm"
     verdict = running().check(row(0), {2: REST_POSTURES[2] + 40, 3: 500})
     (finding,) = verdict.findings
     assert verdict.hold

@@ -134,3 +134,5 @@ def test_what_a_search_was_limited_to_is_in_the_first_line(
     for verdict in ("named", "nothing-significant"):
         found = answer.model_copy(update={"verdict": verdict, "notes_data": (limited,)})
         assert headline(found).endswith(f"; {said}")
+    nothing = found.model_copy(update={"steps": (), "rmse_fit": ()})
+    assert headline(nothing) == f"no known effect has the evidence to be named; {said}"
