@@ -1,4 +1,4 @@
-"""What a user waits for, by the clock: a start, a first motion, a page of 10⁵ traces; and what an hour costs in memory.
+"""What a user waits for, by the clock: a start, a first set point, a page of 10⁵ traces; and the memory of an hour.
 
 python -m benchmarks waits                     all of it (3 minutes)
 python -m benchmarks waits --only start list   some parts: start, list, memory
@@ -49,9 +49,9 @@ def python(program: str) -> None:
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
-def until_moved() -> float:
-    """Time (s) from the start of `daq run ramp` to the first sample of its record, a period after its first set point:
-    the trace has both clocks' moment, and holds still for a time that the experiment asks for.
+def until_driven() -> float:
+    """Time (s) from the start of `daq run ramp` to its first set point, which begins the record. The arm then rests for
+    0.5 s, as the experiment asks.
     """
     with tempfile.TemporaryDirectory() as name:
         command, begun = [*COMMAND, "--port", "mock://", "run", "ramp"], time.time()
@@ -75,8 +75,8 @@ def start(times: int) -> Iterator[Figure]:
     libraries, mock = waited(lambda: python(LIBRARIES), times)[0], waited(lambda: python(MOCK), times)[0]
     answer, spread = waited(served, times)
     yield at_most("daq serve to its first answer", answer, 1.0, "s", f"{spread}; its libraries {libraries:.2f} s")
-    moved, spread = waited(until_moved, times)
-    yield at_most("daq run ramp to its first motion", moved, 0.6, "s", f"{spread}; the mock's imports {mock:.2f} s")
+    driven, spread = waited(until_driven, times)
+    yield at_most("daq run ramp to its first set point", driven, 0.6, "s", f"{spread}; the mock's imports {mock:.2f} s")
 
 
 def fill(folder: Path, count: int) -> None:
