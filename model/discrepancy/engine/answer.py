@@ -147,7 +147,7 @@ def _on_the_search(case: Case) -> tuple[Note, ...]:
     effects, joints = case.options.effects, case.options.joints
     if set(joints or ()) >= set(case.given.machine.modelled_joints):
         joints = None
-    values = {"effects": effects, "joints": joints}
+    values = {"effects": effects and [*effects], "joints": joints and [*joints]}
     return () if effects is None and joints is None else (Note(kind="limited-search", values=values),)
 
 
