@@ -23,6 +23,8 @@ END_WITHIN = 15.0
 LONGEST_START = 90.0
 """Time (s) within which a queued experiment is being recorded, including its move to the start."""
 ENDS = ("done", "failed", "cancelled", "interrupted")
+MOST_CYCLES = 1000
+"""Of a sine, in the contract of an experiment: the sine of a long record is slower."""
 COMMAND = (sys.executable, "-c", "from daq_cli import main; main()")
 
 
@@ -113,7 +115,8 @@ def ramp(amplitude: float = 0.1, duration: float = 0.5) -> dict[str, Any]:
 
 def sway(seconds: float) -> dict[str, Any]:
     """Returns an experiment that keeps three joints moving."""
-    trajectory = {"kind": "sine", "amplitude": 0.1, "period": 4.0, "cycles": seconds / 4.0}
+    period = max(4.0, seconds / MOST_CYCLES)
+    trajectory = {"kind": "sine", "amplitude": 0.1, "period": period, "cycles": seconds / period}
     return {"trajectory": trajectory, "joints": [1, 2, 3], "settle": 0.2, "hold": 0.2}
 
 

@@ -14,7 +14,7 @@ internal and may change with any version.
 from __future__ import annotations
 
 from importlib import import_module
-from inspect import isfunction
+from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from ma2000.own_packages import require_own_packages
@@ -173,7 +173,7 @@ def __getattr__(name: str) -> Any:
 
     with missing_extras_named(f"ma2000.{name}", _extra_of(name)):
         found: object = getattr(import_module(home), name)
-        if isfunction(found):
+        if isinstance(found, FunctionType):
             from ma2000.given import checked
 
             found = checked(found, name)
