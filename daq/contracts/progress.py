@@ -37,3 +37,15 @@ class Never:
 
 def silent(_fraction: float, _text: str) -> None:
     """A `Progress` that does nothing."""
+
+
+def rising(progress: Progress) -> Progress:
+    """Returns a `Progress` whose fraction never falls, for a computation whose stages may be repeated."""
+    most = 0.0
+
+    def told(fraction: float, text: str) -> None:
+        nonlocal most
+        most = max(most, fraction)
+        progress(most, text)
+
+    return told

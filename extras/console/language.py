@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator
+from datetime import datetime
 from functools import cache
 from importlib import import_module
 from typing import Any
@@ -24,6 +25,7 @@ from daq_cli.app.subcommands import CORE
 from daq_cli.commands.run import KINDS, spec_of
 from daq_cli.robot.experiment import cron_of
 from extras.console.messages import ConsoleCommand, ConsoleOption, ConsoleOrder
+from server.experiments.schedule import Plan, first, in_words, zone_here
 
 ALLOWED = {
     "run": (*KINDS, "preset", "diagnostic"),
@@ -76,6 +78,15 @@ def read_words(words: list[str], machine: Machine) -> ConsoleOrder:
         cron=cron_of(values["daily"], values["cron"]),
         dry_run=values["dry_run"],
     )
+
+
+def with_rule(order: ConsoleOrder, now: datetime) -> ConsoleOrder:
+    """Returns an order with the rule in words and the first run that a schedule made `now` would have. Raises a 422
+    for an expression that says no times."""
+    if order.cron is None:
+        return order
+    plan = Plan(now, 0.0, None, order.cron, zone_here())
+    return order.model_copy(update={"next": first(plan), "rule": in_words(plan)})
 
 
 def _spec(kind: str, values: dict[str, Any], machine: Machine) -> ExperimentSpec:

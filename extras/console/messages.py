@@ -56,6 +56,10 @@ class ConsoleOrder(Wire):
     """The experiment of a `run`."""
     cron: str | None = None
     """When it is repeated; None for once."""
+    rule: str = ""
+    """The same in words."""
+    next: AwareDatetime | None = None
+    """The first run, if it were planned now."""
     dry_run: bool = False
 
 

@@ -10,7 +10,7 @@ from fastapi import Path, Query, Response
 from daq.contracts.errors import SpecError
 from daq.contracts.service.base import Moment
 from extras.console.calendar import planned
-from extras.console.language import commands, read
+from extras.console.language import commands, read, with_rule
 from extras.console.macros import examples, expand
 from extras.console.messages import (
     NAME,
@@ -29,6 +29,7 @@ from extras.console.store import all_macros, get_macro, put_macro, remove_macro
 from extras.console.written import line_of
 from server.api.dependencies import Experiments, Identity, Operator, RobotDep, Schedules, ServicesDep, Viewer
 from server.problems import PROBLEMS, ProblemError
+from server.robot_services import RobotServices
 from server.routes import Router
 
 router = Router(prefix="/robots/{robot}", tags=["console"], responses=PROBLEMS)
@@ -48,7 +49,7 @@ def list_console_commands(_: RobotDep, __: Viewer) -> tuple[ConsoleCommand, ...]
 @router.post("/console/read")
 def read_console_line(request: ConsoleLine, rig: RobotDep, _: Viewer) -> ConsoleOrder:
     """Returns what a line of the command line's language asks for. Carries out nothing."""
-    return read(request.line, rig.robot.machine)
+    return with_rule(read(request.line, rig.robot.machine), rig.robot.clock.utc())
 
 
 @router.get("/experiments/{experiment}/line")
@@ -66,7 +67,7 @@ def list_macros(rig: RobotDep, services: ServicesDep, _: Viewer) -> Macros:
 @router.post("/macros/read")
 def read_macro(request: Macro, rig: RobotDep, _: Viewer) -> MacroReading:
     """Checks a macro that is not stored, with the defaults of its parameters."""
-    return expand(request, {}, rig.robot.machine)
+    return _ruled(expand(request, {}, rig.robot.machine), rig)
 
 
 @router.put("/macros/{macro}")
@@ -98,7 +99,7 @@ def read_kept_macro(
     macro: MacroName, request: MacroValues, rig: RobotDep, services: ServicesDep, _: Viewer
 ) -> MacroReading:
     """Returns the experiments of a macro with these values. Queues nothing: a client submits them."""
-    return expand(get_macro(services.store, rig.robot.name, macro), request.values, rig.robot.machine)
+    return _ruled(expand(get_macro(services.store, rig.robot.name, macro), request.values, rig.robot.machine), rig)
 
 
 @router.get("/calendar")
@@ -111,3 +112,8 @@ def get_calendar(
         raise ProblemError(422, "not-valid", f"end: must come 1 s to {LONGEST.days} days after begin", "correct it")
     waiting = experiments.page(rig.robot.name, ("queued",), None, None, PAGE).items
     return planned(schedules.page(rig.robot.name, None, PAGE).items, waiting, begin, end)
+
+
+def _ruled(reading: MacroReading, rig: RobotServices) -> MacroReading:
+    now = rig.robot.clock.utc()
+    return reading.model_copy(update={"orders": tuple(with_rule(order, now) for order in reading.orders)})

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import secrets
 import threading
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -67,6 +66,7 @@ class Demonstrations(Part):
         if problem := _problem(rig):
             raise conflict("not-a-mock", problem, "start a service without a configured port: it has a mock")
         require_room(rig.catalogue.folder)
+        began = self._clock.utc()  # drawing takes some seconds on a busy computer
         sealed = draw(request)
         with self._lock:
             if self._thread is not None and self._thread.is_alive():
@@ -76,7 +76,7 @@ class Demonstrations(Part):
             hidden = Hidden(
                 id=secrets.token_hex(6),
                 state="recording",
-                began=self._clock.utc(),
+                began=began,
                 seal=sealed.seal,
                 picked=request,
             )
@@ -97,7 +97,6 @@ class Demonstrations(Part):
             thread.join(seconds)
 
     def _run(self, rig: RobotServices, sealed: Sealed, hidden: Hidden, by: str) -> None:
-        begun = time.monotonic()
         try:
             hidden = self._recorded(rig, sealed, hidden, by)
             hidden = self._asked(rig, hidden, by)
@@ -106,7 +105,8 @@ class Demonstrations(Part):
             with self._lock:
                 number, named = self._counts.get(rig.robot.name, (0, 0))
                 self._counts[rig.robot.name] = number + 1, named + (secret.outcome == "named")
-            self._keep(rig, hidden, state="opened", secret=secret, seconds=time.monotonic() - begun)
+            seconds = (self._clock.utc() - hidden.began).total_seconds()
+            self._keep(rig, hidden, state="opened", secret=secret, seconds=seconds)
         except (DaqError, ProblemError) as error:
             self._keep(rig, self._latest[rig.robot.name], state="failed", problem=str(error))
         except Exception as error:

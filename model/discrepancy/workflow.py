@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.machine import NoController, SampledPid
-from daq.contracts.progress import Cancel, Never, Progress, silent
+from daq.contracts.progress import Cancel, Never, Progress, rising, silent
 from daq.contracts.trace import Trace
 from model.discrepancy.by_simulation import diagnose_by_simulation
 from model.discrepancy.diagnosis import UNWRITTEN, Diagnosis
@@ -94,7 +94,7 @@ def diagnose(
         TraceError, SpecError: for traces or options that cannot give an answer; one line says why.
         CancelledError: when asked to end.
     """
-    options, cancel = options or DiagnosisOptions(), cancel or Never()
+    options, cancel, progress = options or DiagnosisOptions(), cancel or Never(), rising(progress)
     check_options(options, model)
     _refuse_shared(traces, holdout)
     progress(0.0, "checking the records")

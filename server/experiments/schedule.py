@@ -18,8 +18,6 @@ from server.problems import ProblemError
 LONGEST = 4 * 3600.0
 """Longest duration (s) of one experiment (a choice): 720 000 control periods, a trace of some 300 MB. Use a schedule
 for longer studies."""
-
-
 MOMENT = timedelta(microseconds=1)
 MINUTE = timedelta(minutes=1)
 LOOK_AHEAD = 400

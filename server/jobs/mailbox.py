@@ -68,8 +68,7 @@ class Mailbox:
         data = self.read(PROGRESS)
         if data is None:
             return None
-        leading = tuple(LeadingEffect.model_validate(one) for one in data.get("leading", ()))
-        return Reported(data["fraction"], data["text"], leading)
+        return Reported(data["fraction"], data["text"], tuple(map(LeadingEffect.model_validate, data["leading"])))
 
     # ---- the worker's side
 
@@ -81,8 +80,7 @@ class Mailbox:
         if now - self._told < TELL_EVERY and not at_once:
             return
         self._told = now
-        leading = [one.model_dump() for one in self._now.leading]
-        data = {"fraction": fraction, "text": text, "leading": leading}
+        data = {"fraction": fraction, "text": text, "leading": [one.model_dump() for one in self._now.leading]}
         with replacing(self.folder / PROGRESS, synced=False) as part:
             part.write_text(json.dumps(data), "utf-8")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
 import shutil
 import threading
 from collections.abc import Callable, Iterable
@@ -35,6 +36,8 @@ LOOK_EVERY = 0.5
 """Time (s) between two checks of the jobs' progress."""
 MOST_TOLD = 50
 """Most waiting jobs that are published again when a job before them has begun or ended."""
+BUSY = 2.0
+"""Tasks per core from which a job, which yields to others, gets too little of the computer (a choice)."""
 log = logging.getLogger("server.jobs")
 
 
@@ -169,7 +172,8 @@ class JobService:
         if job.state != "running":
             return job
         reported = self._reported(job.id) or Reported(0.0, "starting")
-        told = {"progress": reported.fraction, "progress_text": reported.text, "leading": reported.leading}
+        slowed = "; this computer is busy" if os.getloadavg()[0] > BUSY * (os.cpu_count() or 1) else ""
+        told = {"progress": reported.fraction, "progress_text": reported.text + slowed, "leading": reported.leading}
         return job.model_copy(update=told)
 
     def close(self, patience: float) -> None:
