@@ -128,7 +128,7 @@ def of_disk(error: OSError) -> ProblemError | None:
 def of_exit_code(exit_code: int, line: str) -> ProblemError:
     """Returns the problem for another process's error, from its line and exit code (docs/command-line.md)."""
     if exit_code == exit_codes.WRONG_INPUT:
-        return ProblemError(422, "not-valid", line, "correct the request")
+        return ProblemError(422, "not-valid", line)
     if exit_code == exit_codes.NOT_REACHED:
         return ProblemError(503, "not-reached", line, "check cable and supply, then connect again")
     if exit_code == exit_codes.STOPPED:

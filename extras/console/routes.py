@@ -109,7 +109,7 @@ def get_calendar(
     """Lists what will be due from `begin` until before `end`. A due run is submitted; it moves the arm only if the
     queue may."""
     if not timedelta() < end - begin <= LONGEST:
-        raise ProblemError(422, "not-valid", f"end: must come 1 s to {LONGEST.days} days after begin", "correct it")
+        raise ProblemError(422, "not-valid", f"end: must come 1 s to {LONGEST.days} days after begin")
     waiting = experiments.page(rig.robot.name, ("queued",), None, None, PAGE).items
     return planned(schedules.page(rig.robot.name, None, PAGE).items, waiting, begin, end)
 

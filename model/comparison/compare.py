@@ -100,7 +100,8 @@ def compare(
         row = []
         for place, (label, model) in enumerate(models):
             stop_if(cancel)
-            progress((number + place / len(models)) / len(records), f"{label}: {record.name}")
+            text = f"{label}: trace {number + 1} of {len(records)}"
+            progress((number + place / len(models)) / len(records), text)
             found = simulate(model, record.inputs, options)
             row.append(found.at_samples(found.velocity if signal == "velocity" else found.reading))
         simulated.append(row)

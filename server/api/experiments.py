@@ -201,7 +201,7 @@ def _preview(motions: Workers, rig: RobotServices, spec: ExperimentSpec, most_sh
     except ExhaustedError as error:
         raise ProblemError(422, "beyond-limits", f"spec: {error}", "make it shorter") from error
     if answer.problem:
-        raise ProblemError(422, "beyond-limits" if answer.exhausted else "not-valid", answer.problem, "correct it")
+        raise ProblemError(422, "beyond-limits" if answer.exhausted else "not-valid", answer.problem)
     return MotionPreview.model_validate(answer.data)
 
 

@@ -2365,6 +2365,13 @@ export interface components {
             /** Cron */
             cron?: string | null;
             /**
+             * Rule
+             * @default
+             */
+            rule?: string;
+            /** Next */
+            next?: string | null;
+            /**
              * Dry Run
              * @default false
              */

@@ -1,7 +1,7 @@
 /** What a job waits behind, in words. Pure. */
 
 import type { Job } from '../api/types';
-import { duration } from '../format';
+import { coarse } from '../format';
 import type { JobKind } from './jobs';
 
 /** What a job is, as a noun. */
@@ -38,10 +38,5 @@ export function namedTraces(job: Job): readonly string[] {
 function soFar(started: string | null, now: number): string {
   if (started === null) return '';
   const seconds = Math.max(0, (now - Date.parse(started)) / 1000);
-  return ` (${seconds < 60 ? `${Math.round(seconds)} s` : coarse(seconds)} so far)`;
-}
-
-/** Whole minutes, since nobody waits by the second for a job of minutes. */
-function coarse(seconds: number): string {
-  return seconds < 3600 ? `${Math.floor(seconds / 60)} min` : duration(seconds);
+  return ` (${coarse(seconds)} so far)`;
 }

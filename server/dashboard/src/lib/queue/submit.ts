@@ -1,8 +1,9 @@
 /** Handing experiments to the service: the same requests for the form, the console and the macros. They throw Problems. */
 
 import { api, ask, here, type ConsoleOrder, type Experiment, type ExperimentSpec } from '../api';
-import type { MotionPreview, Schedule } from '../api';
+import type { Machine, MotionPreview, Schedule } from '../api';
 import { dayAndTime, duration } from '../format';
+import { movesInWords } from '../trajectory/preview';
 import { fromNow } from '../trajectory/when';
 
 /** What a specification would move. Nothing is queued. */
@@ -50,16 +51,23 @@ export async function submit(order: ConsoleOrder, key: string, now: number): Pro
   return toldQueued(await addToQueue(spec, key));
 }
 
-/** A motion in one line, and the limits that it breaks. */
+/** When what a line asks for would be repeated; empty for once. `now` as for `toldScheduled`. */
+export const toldRule = ({ rule, next }: ConsoleOrder, now: number): string =>
+  rule && `would be planned ${rule}, first ${next ? fromNow(next, now) : 'never'}`;
+
+/** A motion in lines, when it would be repeated, and the limits that it breaks. */
 export function toldMotion(
-  spec: ConsoleOrder['spec'],
+  order: ConsoleOrder,
   motion: MotionPreview,
-): { text: string; violations: string[] } {
-  const kind = (spec?.trajectory.kind ?? 'motion').replaceAll('_', ' ');
-  const moving =
-    motion.moving.length > 0
-      ? `joint${motion.moving.length > 1 ? 's' : ''} ${motion.moving.join(', ')}`
-      : 'nothing';
-  const text = `${kind}: ${duration(motion.duration)}, moves ${moving}`;
-  return { text, violations: motion.violations.map((one) => one.message) };
+  machine: Machine | null,
+  now: number,
+): { lines: string[]; violations: string[] } {
+  const kind = (order.spec?.trajectory.kind ?? 'motion').replaceAll('_', ' ');
+  const moves = machine === null ? [] : movesInWords(motion, machine.joints, machine.limits);
+  const lines = [
+    `${kind}: ${duration(motion.duration)}${motion.moving.length > 0 ? '' : ', moves nothing'}`,
+    ...moves,
+    toldRule(order, now),
+  ];
+  return { lines: lines.filter(Boolean), violations: motion.violations.map((one) => one.message) };
 }

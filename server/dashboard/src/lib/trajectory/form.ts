@@ -62,6 +62,8 @@ const NONE_SLIDES: Slides = () => false;
 export interface FormResult {
   /** null while something is wrong with a field. */
   readonly spec: Spec | null;
+  /** The same without a name: null only while its motion cannot be told. */
+  readonly motion: Spec | null;
   /** By field: `trajectory.duration`, `trajectory.amplitude.2`, `start.1`, `gains.2.0`, `joints`, `name` … */
   readonly problems: Readonly<Record<string, string>>;
 }
@@ -233,7 +235,12 @@ export function specOf(form: SpecForm, rules: SpecRules, slides: Slides = NONE_S
     name: form.name === '' ? null : form.name,
     notes: form.notes,
   };
-  return { spec: Object.keys(problems).length === 0 ? spec : null, problems };
+  const wrong = Object.keys(problems);
+  return {
+    spec: wrong.length === 0 ? spec : null,
+    motion: wrong.every((field) => field === 'name') ? { ...spec, name: null } : null,
+    problems,
+  };
 }
 
 /** Where a problem that the service found belongs in the form: `spec.trajectory.ramp.duration` is `trajectory.duration`. */

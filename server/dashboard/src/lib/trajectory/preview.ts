@@ -1,6 +1,7 @@
 /** A previewed motion as curves and as a way through space, with what speaks against it in its place. */
 
 import { framesOf, type Chain, type Vector } from '../arm/chain';
+import { fixed } from '../format';
 import { DEGREES } from './fields';
 
 /** What the service answers; angles in rad, one row a moment, one column a joint of the machine. */
@@ -55,6 +56,28 @@ export function curvesOf(motion: Motion, limits: MotionLimits): Curve[] {
       low: own?.low == null ? null : own.low * DEGREES,
       high: own?.high == null ? null : own.high * DEGREES,
     };
+  });
+}
+
+/** What each joint that moves does, a line each: between which values, how fast, how near to an end of its range. */
+export function movesInWords(
+  motion: Motion,
+  joints: readonly { readonly kind: string }[],
+  limits: MotionLimits,
+): string[] {
+  return curvesOf(motion, limits).map(({ joint, values, low, high }) => {
+    const isLong = joints[joint - 1]?.kind === 'prismatic';
+    const [scale, unit] = isLong ? [1000 / DEGREES, ' mm'] : [1, '°'];
+    const told = (value: number): string => `${fixed(value * scale, 1)}${unit}`;
+    const [least, most] = [Math.min(...values), Math.max(...values)];
+    const speeds = values
+      .slice(1)
+      .map(
+        (value, index) => Math.abs(value - values[index]!) / (motion.time[index + 1]! - motion.time[index]!),
+      );
+    const margin = Math.min((high ?? Infinity) - most, least - (low ?? -Infinity));
+    const room = Number.isFinite(margin) ? `, ${told(margin)} to the end of its range` : '';
+    return `joint ${joint}: from ${told(values[0]!)}, between ${told(least)} and ${told(most)}, set points at most ${told(Math.max(0, ...speeds))}/s${room}`;
   });
 }
 

@@ -41,7 +41,7 @@ const SHOWN = 12;
 const say = (text: string, tone?: Told['tone']): Told => (tone === undefined ? { text } : { text, tone });
 const REAL_ARM = 'This is a real arm: its workspace is clear, and it may move.';
 
-export class Console {
+class Console {
   commands = $state.raw<readonly ConsoleCommand[]>([]);
   entries = $state.raw<readonly Entry[]>([]);
   busy = $state(false);
@@ -113,6 +113,9 @@ export class Console {
   }
 }
 
+/** It keeps its answers and earlier lines while other pages are looked at. */
+export const desk = new Console();
+
 function refusal(error: unknown): Told[] {
   const problem = asProblem(error);
   return [say(problem.detail, 'bad'), ...(problem.advice ? [say(sentence(problem.advice))] : [])];
@@ -128,8 +131,8 @@ async function carryOut(order: ConsoleOrder, isDry: boolean): Promise<Answer> {
 
 async function run(order: ConsoleOrder, isDry: boolean): Promise<Answer> {
   const motion = await previewOf(order.spec as unknown as ExperimentSpec);
-  const { text, violations } = toldMotion(order.spec, motion);
-  const told = [say(text), ...violations.map((one) => say(one, 'bad'))];
+  const { lines, violations } = toldMotion(order, motion, live.machine, live.wall);
+  const told = [...lines.map((one) => say(one)), ...violations.map((one) => say(one, 'bad'))];
   if (violations.length > 0) return { told: [...told, say('refused; nothing was sent', 'bad')] };
   if (isDry) return { told: [...told, say('no limit is violated; nothing was sent', 'good')] };
   const key = newKey();

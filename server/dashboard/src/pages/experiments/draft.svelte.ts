@@ -46,6 +46,10 @@ export class Draft {
     ...this.told(),
     ...this.result.problems,
   }));
+  /** Those but for a name, which moves nothing. */
+  wrongInMotion = $derived(
+    Object.fromEntries(Object.entries(this.problems).filter(([field]) => field !== 'name')),
+  );
   private readonly checking = new MotionCheck<ExperimentSpec, MotionPreview>({
     ask: previewOf,
     after: afterSeconds,
@@ -108,9 +112,9 @@ export class Draft {
     return this.result.spec as unknown as ExperimentSpec | null;
   }
 
-  /** Has the motion checked when typing has paused: for an effect that follows `spec`. */
-  checkSoon(spec: ExperimentSpec | null): () => void {
-    this.checking.changed(spec);
+  /** Has the motion checked when typing has paused: for an effect that follows what is in the fields. */
+  checkSoon(): () => void {
+    this.checking.changed(this.result.motion as unknown as ExperimentSpec | null);
     return () => this.checking.leave();
   }
 
@@ -132,8 +136,13 @@ function written(spec: Partial<Spec>): string {
 
 function parsed(text: string): FormResult {
   try {
-    return { spec: JSON.parse(text) as Spec, problems: {} };
+    const spec = JSON.parse(text) as Spec;
+    return { spec, motion: spec, problems: {} };
   } catch (error) {
-    return { spec: null, problems: { text: error instanceof Error ? error.message : String(error) } };
+    return {
+      spec: null,
+      motion: null,
+      problems: { text: error instanceof Error ? error.message : String(error) },
+    };
   }
 }

@@ -38,7 +38,7 @@ export class Sending {
   /** What became of the last one. */
   done = $state('');
   /** The last one as it is in the queue; null for a schedule. */
-  made: Experiment | null = null;
+  made = $state.raw<Experiment | null>(null);
   problems: Readonly<Record<string, string>> = $derived.by(() => this.wrong());
   private key = newKey();
 

@@ -12,6 +12,7 @@ import {
   type MacroReading,
   type Problem,
 } from '../../lib/api';
+import { duration } from '../../lib/format';
 import { live } from '../../lib/live/live.svelte';
 import { fieldsOf, valuesOf, type MacroField } from '../../lib/macros/form';
 import { previewOf, submit, toldMotion } from '../../lib/queue/submit';
@@ -19,7 +20,7 @@ import { previewOf, submit, toldMotion } from '../../lib/queue/submit';
 /** One experiment of a macro: its line, what it moves, and what is wrong with it. */
 export interface Step {
   readonly line: string;
-  readonly text: string;
+  readonly told: readonly string[];
   readonly violations: readonly string[];
 }
 
@@ -42,7 +43,19 @@ export class MacroDesk {
   problem = $state.raw<Problem | null>(null);
   filled = $derived(valuesOf(this.fields, this.typed));
   isWrong = $derived(Object.keys(this.filled.problems).length > 0);
-  private last: MacroReading | null = null;
+  /** What its lines ask for, and how many of them have been handed over. */
+  private orders = $state.raw<MacroReading['orders']>([]);
+  sent = $state(0);
+  /** How many of them are planned to be repeated. */
+  planned = $derived(this.orders.filter((one) => one.cron !== null).length);
+  /** What adding them does. */
+  adding = $derived(
+    this.planned === 0
+      ? 'Add to the queue'
+      : this.planned < this.orders.length
+        ? 'Add to queue and plan'
+        : `Add the schedule${this.planned > 1 ? 's' : ''}`,
+  );
 
   /** Asks for the macros, and shows the first. Throws a Problem. */
   async load(): Promise<void> {
@@ -61,11 +74,12 @@ export class MacroDesk {
     this.revision = revision;
     this.isEdited = false;
     this.typed = {};
-    this.steps = [];
+    this.steps = this.orders = [];
     this.done = '';
     await this.during(async () => {
       const reading = await readDraft(macro);
       this.fields = fieldsOf(reading.parameters);
+      this.orders = reading.orders;
     });
   }
 
@@ -118,20 +132,22 @@ export class MacroDesk {
   /** Has every motion worked out; nothing is sent. Whether all of them are allowed. */
   async check(): Promise<boolean> {
     let isAllowed = false;
+    this.sent = 0;
     this.done = '';
     await this.during(async () => {
       const reading = await this.read();
-      this.last = reading;
+      this.orders = reading.orders;
       const steps: Step[] = [];
+      let seconds = 0;
       for (const [place, order] of reading.orders.entries()) {
         const motion = await previewOf(order.spec as unknown as ExperimentSpec);
-        const repeated = order.cron === null ? '' : `, repeated (${order.cron})`;
-        const { text, violations } = toldMotion(order.spec, motion);
-        steps.push({ line: reading.lines[place] ?? '', text: text + repeated, violations });
+        const { lines: told, violations } = toldMotion(order, motion, live.machine, live.wall);
+        steps.push({ line: reading.lines[place] ?? '', told, violations });
+        seconds += motion.duration;
       }
       this.steps = steps;
       isAllowed = steps.every((one) => one.violations.length === 0);
-      this.done = isAllowed ? 'no limit is violated; nothing was sent' : '';
+      this.done = isAllowed ? `${duration(seconds)} in all; no limit is violated; nothing was sent` : '';
     });
     return isAllowed;
   }
@@ -139,18 +155,13 @@ export class MacroDesk {
   /** Checks all experiments, then adds them to the queue in their order. */
   async run(): Promise<void> {
     if (!(await this.check())) return;
+    this.done = '';
     await this.during(async () => {
-      const orders = this.last?.orders ?? [];
-      let sent = 0;
-      try {
-        for (const order of orders) {
-          await submit(order, newKey(), live.wall);
-          sent += 1;
-        }
-      } finally {
-        const all =
-          orders.length === 1 ? 'the experiment was' : `${sent} of ${orders.length} experiments were`;
-        this.done = sent === 0 ? '' : `${all} added; the queue runs them in this order`;
+      const { orders } = this;
+      for (const order of orders) {
+        const told = await submit(order, newKey(), live.wall);
+        this.sent += 1;
+        this.done = orders.length === 1 ? told : `${this.sent} of ${orders.length} were added, in this order`;
       }
     });
   }
