@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from daq.child import last_words
+from daq.contracts.effects import effect_names
 from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.machine import Machine
 from daq.contracts.service.hidden import HiddenNumber, HideChoice, HideRequest, OpenedSecret, Outcome
@@ -51,7 +52,8 @@ class Sealed:
 @cache
 def choices() -> tuple[HideChoice, ...]:
     """Returns the effects that the mock can hide."""
-    return tuple(HideChoice(called=effect_name(one["effect"]), **one) for one in _told("hide", "--list"))
+    known, names = _told("hide", "--list"), effect_names()
+    return tuple(HideChoice(called=effect_name(one["effect"]), line=names[one["effect"]].line, **one) for one in known)
 
 
 def draw(request: HideRequest) -> Sealed:

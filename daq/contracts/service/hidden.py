@@ -24,10 +24,11 @@ class HideRequest(Wire):
 
 
 class HideChoice(Wire):
-    """An effect that can be hidden. `joints` is empty if it acts on the whole arm."""
+    """An effect that can be hidden. `joints` is empty if it acts on the whole arm. `line`: its physics, in words."""
 
     effect: str
     called: str
+    line: str
     joints: tuple[int, ...]
 
 

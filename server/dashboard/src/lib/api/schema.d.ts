@@ -3937,13 +3937,15 @@ export interface components {
         };
         /**
          * HideChoice
-         * @description An effect that can be hidden. `joints` is empty if it acts on the whole arm.
+         * @description An effect that can be hidden. `joints` is empty if it acts on the whole arm. `line`: its physics, in words.
          */
         HideChoice: {
             /** Effect */
             effect: string;
             /** Called */
             called: string;
+            /** Line */
+            line: string;
             /** Joints */
             joints: number[];
         };

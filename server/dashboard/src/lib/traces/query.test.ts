@@ -37,10 +37,9 @@ it.each([
   ['after:yesterday', 'after: needs a date such as 2026-11-30'],
   ['after:2026-13-01', 'after: needs a date'],
   ['before:2026-02-31', 'before: needs a date'],
-  [
-    'speed:3 x',
-    'speed: is not a filter; there are joint, effect, tag, source, outcome, kind, after, before.',
-  ],
+  ['speed:3 x', 'speed: is not a filter; there are joint:2, effect:backlash, tag:cold'],
+  ['-tag:cold', 'nothing can be left out'],
+  ['effect:nonsense', 'there is no nonsense'],
   ['speed:', 'speed: is not a filter'],
   ['effect: backlash', 'effect: needs its value next to it'],
   ['joint:two', 'joint: needs a number from 1'],
@@ -48,7 +47,7 @@ it.each([
   ['effect:Backlash', 'effect: needs a name'],
   ['tag:a tag:b', 'tag: can be given once'],
 ])('%s is refused in one line', (line, problem) => {
-  expect(searchOf(line, 6).problem).toContain(problem);
+  expect(searchOf(line, 6, known.effects).problem).toContain(problem);
 });
 
 it('a filter that is being typed filters nothing yet', () => {

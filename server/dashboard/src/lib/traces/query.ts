@@ -28,14 +28,32 @@ export interface Known {
   effects: readonly string[];
 }
 
-const KEYS = ['joint', 'effect', 'tag', 'source', 'outcome', 'kind', 'after', 'before'] as const;
-type Key = (typeof KEYS)[number];
+/** The filters, each as it is used. */
+export const EXAMPLES = {
+  joint: 'joint:2',
+  effect: 'effect:backlash',
+  tag: 'tag:cold',
+  source: 'source:real',
+  outcome: 'outcome:fault',
+  kind: 'kind:ramp',
+  after: 'after:2026-11-01',
+  before: 'before:2026-12-01',
+} as const;
+type Key = keyof typeof EXAMPLES;
+const KEYS = Object.keys(EXAMPLES) as Key[];
 const WORD = /(?:(\w+):)?(?:"([^"]*)"?|(\S+))|(\w+):/g;
 const EFFECT = /^[a-z]\w*$/;
 const DAY = /^\d{4}-\d{2}-\d{2}$/;
 
-/** The search that a line asks for, or in one line what is wrong with it. `joints`: how many the arm has. */
-export function searchOf(line: string, joints = 99): { search: Search; problem: string } {
+/**
+ * The search that a line asks for, or in one line what is wrong with it. `joints`: how many the arm has; `effects`: those
+ * that are known, if they have been asked for.
+ */
+export function searchOf(
+  line: string,
+  joints = 99,
+  effects: readonly string[] = [],
+): { search: Search; problem: string } {
   const search: Search = {};
   const words: string[] = [];
   const given = new Set<string>();
@@ -46,12 +64,13 @@ export function searchOf(line: string, joints = 99): { search: Search; problem: 
     const value = quoted ?? plain ?? '';
     const half = quoted === undefined ? /^([A-Za-z]\w*):$/.exec(whole)?.[1] : undefined;
     const named = half ?? (key !== undefined && /^[A-Za-z]/.test(key) ? key : undefined);
+    if (/^-\w+:/.test(whole)) problem ||= `${whole}: a filter says what is there; nothing can be left out`;
     if (named === undefined) {
       words.push(whole.replaceAll('"', ''));
       continue;
     }
     if (!isKey(named)) {
-      problem ||= `${named}: is not a filter; there are ${KEYS.join(', ')}. Quotes make it words: "${whole.replaceAll('"', '')}"`;
+      problem ||= `${named}: is not a filter; there are ${Object.values(EXAMPLES).join(', ')}. Quotes make it words: "${whole.replaceAll('"', '')}"`;
       continue;
     }
     // The last one is being typed.
@@ -62,13 +81,15 @@ export function searchOf(line: string, joints = 99): { search: Search; problem: 
     if (given.has(named)) problem ||= `${named}: can be given once`;
     given.add(named);
     problem ||= taken(search, named, value, joints);
+    if (named === 'effect' && effects.length > 0 && !effects.includes(value))
+      problem ||= `effect: there is no ${value}; the arrow in the line lists those there are`;
   }
   if (words.length > 0) search.q = words.join(' ');
   return { search, problem };
 }
 
 function isKey(key: string): key is Key {
-  return (KEYS as readonly string[]).includes(key);
+  return Object.hasOwn(EXAMPLES, key);
 }
 
 /** Adds one filter to `search`. What is wrong with it, if anything. */

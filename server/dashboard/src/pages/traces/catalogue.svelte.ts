@@ -18,7 +18,8 @@ export class Catalogue {
   loaded = $state(false);
   busy = $state(false);
   next = $state<string | null>(null);
-  asked = $derived(searchOf(this.line, live.machine?.joints.length));
+  private effects = $state.raw<readonly string[] | null>(null);
+  asked = $derived(searchOf(this.line, live.machine?.joints.length, this.effects ?? []));
   isFiltered: boolean = $derived(this.line.trim() !== '');
   /** What can be completed: of what is listed, or was. */
   known: Known = $derived.by(() => {
@@ -34,7 +35,6 @@ export class Catalogue {
       effects: this.effects ?? [],
     };
   });
-  private effects = $state.raw<readonly string[] | null>(null);
   private readonly tags = new Set<string>();
   private readonly kinds = new Set<string>();
   private readonly listing = new Listing<CatalogueEntry>();
@@ -85,9 +85,9 @@ export class Catalogue {
 
   /** Loads it anew, as far as it is shown. */
   async load(): Promise<void> {
-    if (this.asked.problem !== '') return; // the list waits for a line that can be searched
-    const turn = ++this.turn;
-    this.busy = true;
+    const turn = ++this.turn; // what was asked for before is not of this line
+    this.busy = this.asked.problem === '';
+    if (!this.busy) return; // the list waits for a line that can be searched
     const { search } = this.asked;
     try {
       const page = await this.listing.load((limit, cursor) => {
