@@ -20,11 +20,14 @@ export interface StandingOfRun {
 
 const TONES = { done: 'good', failed: 'bad', cancelled: 'quiet', interrupted: 'warn' } as const;
 
+/** How an experiment has ended, as a tone. */
+export const toneOf = ({ state }: Experiment): StandingOfRun['tone'] =>
+  TONES[state as keyof typeof TONES] ?? 'quiet';
+
 export function standingOf(id: string, { waiting, running, ended }: Lists): StandingOfRun {
   const over = ended.find((one) => one.id === id);
   if (over !== undefined) {
-    const tone = TONES[over.state as keyof typeof TONES] ?? 'quiet';
-    return { state: 'ended', experiment: over, tone, text: over.state, said: '' };
+    return { state: 'ended', experiment: over, tone: toneOf(over), text: over.state, said: '' };
   }
   if (running?.id === id)
     return { state: 'running', experiment: running, tone: 'busy', text: 'running', said: '' };
