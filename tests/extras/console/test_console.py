@@ -17,11 +17,12 @@ from daq.contracts.machine import load_machine
 from daq.contracts.service.experiments import Schedule
 from daq.trajectories.presets import PRESETS
 from extras.console.calendar import planned
-from extras.console.language import commands, read
+from extras.console.language import commands, read, with_rule
 from extras.console.macros import examples, expand
 from extras.console.messages import Macro
 from extras.console.written import line_of
 from server.experiments.schedule import Plan, following
+from server.problems import ProblemError
 
 MACHINE = load_machine("ma2000")
 ANGLES = st.floats(-3.0, 3.0, allow_subnormal=False)
@@ -67,6 +68,11 @@ def test_a_line_is_read_by_the_command_lines_own_parser() -> None:
     assert order.spec.joints == (2,)
     assert order.spec.trajectory == Ramp(amplitude=math.radians(5))
     assert (order.cron, order.dry_run) == ("30 2 * * *", True)
+    planned_now = with_rule(order, datetime(2026, 3, 2, 12, tzinfo=UTC))
+    assert planned_now.rule.startswith("daily at 02:30 (")
+    assert planned_now.next is not None
+    with pytest.raises(ProblemError, match="five fields"):
+        with_rule(order.model_copy(update={"cron": "daily"}), datetime(2026, 3, 2, 12, tzinfo=UTC))
     described = {one.words: one for one in commands()}
     assert ("run", "spec") not in described
     assert ("queue", "resume") in described

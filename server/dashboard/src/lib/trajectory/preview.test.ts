@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Chain } from '../arm/chain';
-import { curvesOf, postureAt, wayOf, type Motion } from './preview';
+import { curvesOf, movesInWords, postureAt, wayOf, type Motion } from './preview';
 
 const JOINT = { name: '', revolute: true, alpha: 0, d: 0, theta: 0 };
 const PLANAR: Chain = [
@@ -25,6 +25,29 @@ describe('curves of a preview', () => {
       { joint: 2, values: [0, 90, -90], low: 0, high: 180 },
     ]);
     expect(curvesOf(MOTION, {})[0]).toMatchObject({ low: null, high: null });
+  });
+
+  it('are told with their speed and the room that they leave', () => {
+    const limits = { joints: [{}, { low: -Math.PI, high: Math.PI }] };
+    const kinds = [{ kind: 'revolute' }, { kind: 'revolute' }];
+    expect(movesInWords(MOTION, kinds, limits)).toEqual([
+      'joint 2: from 0.0°, between −90.0° and 90.0°, set points at most 180.0°/s, 90.0° to the end of its range',
+    ]);
+    const slides = [{ kind: 'revolute' }, { kind: 'prismatic' }];
+    expect(
+      movesInWords(
+        {
+          ...MOTION,
+          set_points: [
+            [0, 0],
+            [0, 0.1],
+            [0, 0.1],
+          ],
+        },
+        slides,
+        {},
+      ),
+    ).toEqual(['joint 2: from 0.0 mm, between 0.0 mm and 100.0 mm, set points at most 100.0 mm/s']);
   });
 });
 
