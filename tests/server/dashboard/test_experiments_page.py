@@ -116,6 +116,8 @@ def test_joints_can_have_amplitudes_starts_and_gains_of_their_own(dashboard: Das
     dashboard.service.robot.post("/queue/pause")
     form.get_by_role("button", name="Add to the queue").click()
     expect(_waiting(form)).to_have_count(1)
+    form.get_by_role("button", name="Motion of ramp").click()
+    expect(form.get_by_text("of ramp, which waits")).to_be_visible()
     (sent,) = dashboard.service.robot.get("/queue/experiments").json()
     degree = 0.017453292519943295
     assert sent["spec"]["trajectory"]["amplitude"] == pytest.approx({"1": 4 * degree, "2": -3 * degree})

@@ -34,6 +34,7 @@ def test_a_line_is_completed_tried_without_sending_it_and_run(dashboard: Dashboa
     page.get_by_role("button", name="Dry run").click()
     log = page.get_by_role("log")
     expect(log.get_by_text("no limit is violated; nothing was sent")).to_be_visible()
+    expect(log.get_by_text(re.compile(r"^joint 2: from \d+\.\d°, between"))).to_be_visible()
     assert robot.get("/queue/experiments").json() == []
     line.press("ArrowUp")
     expect(line).to_have_value("run ramp --joints 2")
@@ -45,6 +46,9 @@ def test_a_line_is_completed_tried_without_sending_it_and_run(dashboard: Dashboa
     line.press("Enter")
     expect(log.get_by_text("no such option: --jonts")).to_be_visible()
     dashboard.forgive()  # the browser reports the refusal, too
+    for place in ("#/traces", "#/experiments/console"):
+        page.evaluate("(place) => (location.hash = place)", place)
+    expect(log.get_by_text("no such option: --jonts")).to_be_visible()
     line.fill("stop")
     line.press("Enter")
     expect(page.locator("[role=alert] [data-stop=confirmed]")).to_be_visible()
@@ -75,7 +79,7 @@ def test_an_experiment_becomes_a_macro_whose_form_keeps_to_its_bounds(dashboard:
     expect(page.get_by_role("button", name="Add to the queue")).to_be_disabled()
     amplitude.fill("4")
     page.get_by_role("button", name="Add to the queue").click()
-    expect(page.get_by_text("2 of 2 experiments were added")).to_be_visible()
+    expect(page.get_by_text("2 of 2 were added, in this order")).to_be_visible()
     assert faults_of(page) == []
     names = [one["spec"]["name"] for one in robot.get("/queue/experiments").json()]
     assert names == ["seed", "ramp"]
@@ -97,7 +101,7 @@ def test_the_plan_shows_what_will_be_due_and_that_it_waits_for_the_queue(dashboa
     expect(page.get_by_role("main").get_by_text("Paused:")).to_be_visible()
     days.get_by_role("button", name=re.compile("once")).click()
     expect(page.get_by_role("heading", name="Preview")).to_be_visible()
-    expect(page.get_by_text("nothing moves yet")).to_be_visible()
+    expect(page.get_by_text("planned by you")).to_be_visible()
     assert faults_of(page) == []
     page.get_by_role("button", name="Turn off").click()
     expect(days.get_by_role("button", name=re.compile("nightly"))).to_have_count(0)
