@@ -53,7 +53,7 @@ export async function submit(order: ConsoleOrder, key: string, now: number): Pro
 
 /** When what a line asks for would be repeated; empty for once. `now` as for `toldScheduled`. */
 export const toldRule = ({ rule, next }: ConsoleOrder, now: number): string =>
-  rule && `would be planned ${rule}, first ${next ? fromNow(next, now) : 'never'}`;
+  rule && `repeated ${rule}, first run ${next ? fromNow(next, now) : 'never'}`;
 
 /** A motion in lines, when it would be repeated, and the limits that it breaks. */
 export function toldMotion(
