@@ -16,6 +16,12 @@ export function inWords(trajectory: Move): string[] {
   });
 }
 
+/** The same in a few words, for a list: with its numbers, since runs of one name may differ in them. */
+export function motionOf(trajectory: Move): string {
+  const [first, ...more] = inWords(trajectory);
+  return first !== undefined && more.length === 0 ? first : String(trajectory.kind).replaceAll('_', ' ');
+}
+
 function moveInWords(move: Move): string {
   const kind = String(move.kind).replaceAll('_', ' ');
   if (move.kind === 'path') {

@@ -10,6 +10,9 @@ const TOPICS = new Set(['queue', 'event', 'robot']);
 /** s in which several changes are taken together. */
 const TOGETHER = 0.15;
 const ENDED_SHOWN = 12;
+/** Where approvals are. */
+const EXPERIMENT = '/api/v1/robots/{robot}/experiments/{experiment}/approval';
+const SCHEDULE = '/api/v1/robots/{robot}/schedules/{schedule}/approval';
 
 export class QueueLists {
   waiting = $state.raw<readonly Experiment[]>([]);
@@ -104,38 +107,14 @@ export class QueueLists {
 
   /** Approves exactly what is shown: the service refuses it if it has changed meanwhile. */
   async approve(one: Experiment | Schedule, isSchedule: boolean): Promise<void> {
+    const params = { path: { ...here(), schedule: one.id, experiment: one.id } };
     const body = { content: one.content };
-    await this.change(() =>
-      isSchedule
-        ? ask(
-            api.PUT('/api/v1/robots/{robot}/schedules/{schedule}/approval', {
-              params: { path: { ...here(), schedule: one.id } },
-              body,
-            }),
-          )
-        : ask(
-            api.PUT('/api/v1/robots/{robot}/experiments/{experiment}/approval', {
-              params: { path: { ...here(), experiment: one.id } },
-              body,
-            }),
-          ),
-    );
+    await this.change(() => ask(api.PUT(isSchedule ? SCHEDULE : EXPERIMENT, { params, body })));
   }
 
   async withdrawApproval(one: Experiment | Schedule, isSchedule: boolean): Promise<void> {
-    await this.change(() =>
-      isSchedule
-        ? ask(
-            api.DELETE('/api/v1/robots/{robot}/schedules/{schedule}/approval', {
-              params: { path: { ...here(), schedule: one.id } },
-            }),
-          )
-        : ask(
-            api.DELETE('/api/v1/robots/{robot}/experiments/{experiment}/approval', {
-              params: { path: { ...here(), experiment: one.id } },
-            }),
-          ),
-    );
+    const params = { path: { ...here(), schedule: one.id, experiment: one.id } };
+    await this.change(() => ask(api.DELETE(isSchedule ? SCHEDULE : EXPERIMENT, { params })));
   }
 
   async pause(): Promise<void> {
