@@ -56,7 +56,7 @@ def test_the_answer_is_told_with_the_numbers_that_were_found(
     _see_the_story(page, found, tmp_path / "report.html")
     page.get_by_role("button", name="Everything behind it").click()
     _see_the_map(page, found["given"])
-    best = page.get_by_role("region", name="Candidates", exact=True).get_by_role("listitem").filter(has_text="named")
+    best = page.get_by_role("region", name="Candidates evidence").get_by_role("listitem").filter(has_text="named")
     expect(best).to_contain_text(f"{step['evidence'] + (step['evidence_held_out'] or 0.0):.0f}")
     expect(page.get_by_text("explains", exact=False).first).to_be_attached()
     (value,) = step["parameters"].values()
@@ -68,7 +68,7 @@ def test_the_answer_is_told_with_the_numbers_that_were_found(
     overlay = page.get_by_role("region", name="Measured, before and after")
     expect(overlay.get_by_role("img", name=re.compile("^Position of joint 2"))).to_be_visible()
     overlay.get_by_role("combobox", name="Joint").select_option("3")
-    expect(overlay.get_by_role("img", name=re.compile("^Measured minus simulated of joint 3"))).to_be_visible()
+    expect(overlay.get_by_role("img", name=re.compile("^Measured minus simulated position of joint 3"))).to_be_visible()
 
 
 def _see_the_story(page: Page, found: dict[str, Any], report: Path) -> None:
@@ -139,5 +139,5 @@ def test_on_a_tablet_nothing_is_wider_than_the_page(studied: Studied, studied_da
     page.set_viewport_size(TABLET)
     studied_dashboard.open(f"diagnosis/{studied.diagnosis}")
     page.get_by_role("button", name="Everything behind it").click()
-    expect(page.get_by_role("region", name="Candidates", exact=True)).to_be_visible()
+    expect(page.get_by_role("region", name="Candidates evidence")).to_be_visible()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
