@@ -353,12 +353,13 @@ class Live {
     const at = this.clock.at(seconds());
     if (at === null || this.toldRobot === null || this.toldRobot.activity === 'experiment') return;
     if (arm === this.toldRobot.arm || (arm !== 'stopped' && arm !== 'fault')) return;
-    const kind = arm === 'fault' ? arm : 'stop';
+    const [kind, message] =
+      arm === 'fault' ? ([arm, cause] as const) : (['stop', 'the arm was stopped'] as const);
     const where = { tick: this.newest?.tick ?? null, joint: null, experiment: null };
     this.recording?.addEvent({
       topic: 'record_event',
       kind,
-      message: cause,
+      message,
       host_time: at,
       time: at,
       ...where,
