@@ -355,15 +355,8 @@ class Live {
     if (arm === this.toldRobot.arm || (arm !== 'stopped' && arm !== 'fault')) return;
     const [kind, message] =
       arm === 'fault' ? ([arm, cause] as const) : (['stop', 'the arm was stopped'] as const);
-    const where = { tick: this.newest?.tick ?? null, joint: null, experiment: null };
-    this.recording?.addEvent({
-      topic: 'record_event',
-      kind,
-      message,
-      host_time: at,
-      time: at,
-      ...where,
-    });
+    const where = { tick: this.newest?.tick ?? null, joint: null, experiment: null, host_time: at, time: at };
+    this.recording?.addEvent({ topic: 'record_event', kind, message, ...where });
   }
 
   private tellStop(): void {
