@@ -23,8 +23,7 @@ END_WITHIN = 15.0
 LONGEST_START = 90.0
 """Time (s) within which a queued experiment is being recorded, including its move to the start."""
 ENDS = ("done", "failed", "cancelled", "interrupted")
-MOST_CYCLES = 1000
-"""Of a sine, in the contract of an experiment: the sine of a long record is slower."""
+MOST_CYCLES = 1000  # of a sine, in the contract of an experiment: that of a long record is slower
 COMMAND = (sys.executable, "-c", "from daq_cli import main; main()")
 
 

@@ -14,7 +14,6 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
-from math import ceil
 from pathlib import Path
 
 import httpx
@@ -28,8 +27,7 @@ from server.store.engine import Store
 from server.store.tables import TraceRow, TraceTagRow
 
 TRACES = 100_000
-LONGEST = 3.9
-"""Hours of one record; an experiment may last four."""
+LONGEST = 3.9  # hours of one record; an experiment may last four
 FIRST = datetime(2024, 1, 1, tzinfo=UTC)
 RARE = "brass bush replaced"
 WORDS = ("belt", "loose", "after", "service", "warm", "cold", "payload", "motor", "noise", "wear", "morning", "check")
@@ -149,7 +147,7 @@ def resident(process: int) -> float:
 
 def memory(hours: float) -> Iterator[Figure]:
     """What service and owner gain while long records are made in lock-step, after their first 15 s by the clock."""
-    count = ceil(hours / LONGEST)
+    count = int(-(-hours // LONGEST))  # rounded up
     with tempfile.TemporaryDirectory() as name, started_service(Path(name), "mock://?lock_step=1") as service:
         service.ask("POST", "/connect")
         numbers = [service.submit(sway(3600.0 * hours / count)) for _ in range(count)]

@@ -64,6 +64,7 @@ SHARED = 10
     BREAKAWAY,  # N·m above Coulomb friction
     DIRECTION,  # N·m, forward − backward
     VISCOUS_DIRECTION,  # N·m·s/rad, motor side, forward − backward
+    DRAG,  # N·m·s²/rad²
     GEAR_LOSS,  # share of the motor's torque
     GEAR_LOSS_DIRECTION,  # share of the motor's torque, driving − driven
     COMPLIANCE,  # rad/(N·m)
@@ -101,7 +102,7 @@ SHARED = 10
     SHAPE,  # of the link: CYLINDER, ROD or BODY
     PRISMATIC,  # 1, or 0 for a revolute joint
     USER,  # the first of USER_COLUMNS for effects from users' files
-) = range(80)
+) = range(81)
 BENDS = range(BEND_1, BEND_8 + 1)
 USER_COLUMNS = 8
 PER_JOINT = USER + USER_COLUMNS

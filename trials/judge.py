@@ -75,7 +75,7 @@ def score(truth: Json, answer: Json | None) -> Score:
     verdict = answer["verdict"] if answer else "failed"
     if case == "sound":
         return Score(alarm=verdict != "nothing-significant")
-    if case == "open":
+    if case == "open" and not truth["hidden"][0]["in_library"]:
         named = any(len(names) == 1 for names in steps) and verdict != "suspected"
         return Score(honest=verdict in HONEST and not named)
     known = [{_known_as(hidden)} for hidden in truth["hidden"]]

@@ -35,7 +35,7 @@ CLIENT_PATIENCE = 0.1
 class EndCause(Enum):
     """Why a run was ended from outside: the text that follows "stopped: " in messages."""
 
-    STOP = "on request, by daq stop or through the service"
+    STOP = "on request, by STOP on the page or daq stop"
     """Through the stop socket, which does not identify the sender."""
     PARENT = "by Ctrl-C, or by the program that started the run"
     CANCELLED = "by the service: the experiment was cancelled, or nobody had the control any more"

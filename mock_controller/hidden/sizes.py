@@ -161,4 +161,4 @@ OPEN_SIZES: tuple[SizeRange, ...] = (
     SizeRange("converter_bit_weight", "error", _alike(0.7, 8), signed=True, also={"bit": (5, 8)}),
     SizeRange("stuck_converter_bit", "bit", _alike(1, 4)),
 )
-"""Sizes of the effects that only the mock has."""
+"""Sizes of the effects that only the mock has, and of one that came to the library later and keeps its draws."""

@@ -29,6 +29,20 @@ class ViscousFriction:
 
 
 @dataclass
+class QuadraticDrag:
+    """Adds at `joint` friction that rises with the square of speed; a negative one takes off it."""
+
+    name: ClassVar[str] = "quadratic_drag"
+    line: ClassVar[str] = "torque = −c q̇ |q̇|"
+    source: ClassVar[str] = "churning of grease or a fan"
+    joint: int = joint_parameter()
+    coefficient: float = parameter(-1000.0, 1000.0, unit="N·m·s²/rad²", null=0.0)
+
+    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
+        return -self.coefficient * rate * abs(rate)
+
+
+@dataclass
 class CoulombFriction:
     """Adds `torque` of Coulomb friction at `joint`, whatever its load; the arm's own bristle carries it."""
 
@@ -163,6 +177,7 @@ class DirectionDependentViscousFriction:
 
 SHARED: tuple[type[Any], ...] = (
     ViscousFriction,
+    QuadraticDrag,
     CoulombFriction,
     LoadDependentFriction,
     GravityTorqueFriction,

@@ -29,20 +29,6 @@ class TightSpot:
 
 
 @dataclass
-class QuadraticDrag:
-    """Adds at `joint` friction that rises with the square of speed."""
-
-    name: ClassVar[str] = "quadratic_drag"
-    line: ClassVar[str] = "torque = −c q̇ |q̇|"
-    source: ClassVar[str] = "churning of grease or a fan"
-    joint: int = joint_parameter()
-    coefficient: float = parameter(0.0, 1000.0, unit="N·m·s²/rad²", null=0.0)
-
-    def joint_torque(self, time_s: float, angle: float, rate: float) -> float:  # noqa: ARG002  (the protocol's signature)
-        return -self.coefficient * rate * abs(rate)
-
-
-@dataclass
 class CableHysteresis:
     """A bundle of cables at `joint` that gives way over `reach`: elastic at first, then dragging with `torque`."""
 
@@ -96,4 +82,4 @@ class AgeingFriction:
         return level + self.torque * log1p(self._age / self.onset)
 
 
-OPEN_SET: tuple[type[Any], ...] = (TightSpot, QuadraticDrag, CableHysteresis, AgeingFriction)
+OPEN_SET: tuple[type[Any], ...] = (TightSpot, CableHysteresis, AgeingFriction)

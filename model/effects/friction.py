@@ -30,6 +30,19 @@ FRICTION = (
         ),
     ),
     Effect(
+        "quadratic_drag",
+        physics="τ = −k |q̇| q̇; beside viscous friction, k < 0 is a coefficient that falls with speed",
+        source="drag of a fluid; k < 0: Waiboer, Aarts and Jonker 2005, ECCOMAS Multibody (power of speed below 1)",
+        parameters=(
+            EffectParameter(
+                "coefficient",
+                at.DRAG,
+                "N·m·s²/rad²",
+                deviation=lambda s: s.gear**2 * noticeable_damping(s) / s.speed,
+            ),
+        ),
+    ),
+    Effect(
         "coulomb_friction",
         physics="τ = −T_c z",
         source="Coulomb 1785; contact as an elastic, perfectly plastic element (Prandtl 1928)",

@@ -144,6 +144,8 @@ def extra_torque(
     if joint[at.VISCOUS_DIRECTION] != 0.0:
         drag = joint[at.GEAR] * joint[at.GEAR] * magnitude(joint[at.VISCOUS_DIRECTION]) * speed
         torque -= where(joint[at.VISCOUS_DIRECTION].real * speed.real > 0.0, drag, 0.0 * drag)
+    if joint[at.DRAG] != 0.0:
+        torque -= joint[at.DRAG] * magnitude(speed) * speed
     if joint[at.GEAR_LOSS] != 0.0:
         torque -= z * joint[at.GEAR_LOSS] * magnitude(through)
     if joint[at.GEAR_LOSS_DIRECTION] != 0.0:

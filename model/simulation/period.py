@@ -33,6 +33,7 @@ EXTRA_TORQUES = (
     at.STRIBECK,
     at.DIRECTION,
     at.VISCOUS_DIRECTION,
+    at.DRAG,
     at.GEAR_LOSS,
     at.GEAR_LOSS_DIRECTION,
     at.RIPPLE_SINE,

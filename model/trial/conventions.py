@@ -59,6 +59,7 @@ def _tilt(values: Values, _joint: int, _truth: Truth, _machine: Machine) -> dict
 
 TRANSLATIONS: dict[str, Translation] = {
     "viscous_friction": _viscous,
+    "quadratic_drag": _same(coefficient="coefficient"),
     "coulomb_friction": _same(torque="torque"),
     "load_dependent_friction": _load_dependent,
     "gravity_torque_friction": _same(share="share"),

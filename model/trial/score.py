@@ -93,7 +93,7 @@ def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine
     }
     if truth.kind == "clean":
         return Score(**common, alarm=answer.verdict != "nothing-significant" or bool(named))
-    if truth.kind == "open_set":
+    if truth.is_strange:
         return Score(
             **common,
             honest=not named and answer.verdict in ("unknown-effect", "ambiguous"),
@@ -116,7 +116,7 @@ def score(truth: Truth, seen: Detectability, answer: Diagnosis, machine: Machine
 
 def score_of_failure(truth: Truth, seen: Detectability, seconds: float) -> Score:
     """Returns the score of a diagnosis without an answer: it is wrong in every question."""
-    known = truth.kind not in ("clean", "open_set")
+    known = truth.kind != "clean" and not truth.is_strange
     wrong = False if known else None
     return Score(
         **_case(truth, seen),
@@ -130,7 +130,7 @@ def score_of_failure(truth: Truth, seen: Detectability, seconds: float) -> Score
         at_least_one=wrong,
         joint_right=False if known and truth.effects[0].joints and len(truth.effects) == 1 else None,
         alarm=True if truth.kind == "clean" else None,
-        honest=False if truth.kind == "open_set" else None,
+        honest=False if truth.is_strange else None,
         seconds=seconds,
         robot_seconds=0.0,
     )

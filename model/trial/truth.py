@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from daq.contracts.effects import effect_names
+from daq.contracts.effects import UNKNOWN_EFFECT, effect_names
 
 Kind = Literal["clean", "single", "open_set", "pair", "shared_by_joints", "wrong_priors", "later_single"]
 
@@ -14,7 +14,7 @@ DETECTABLE = 5.0
 """Least d′ at which an effect counts as detectable."""
 MERGED_FRICTION = "friction"
 """Name of all kinds of friction when they are merged."""
-FRICTION_OF_MOCK = ("tight_spot", "quadratic_drag", "cable_hysteresis", "ageing_friction")
+FRICTION_OF_MOCK = ("tight_spot", "cable_hysteresis", "ageing_friction")
 """Effects that only the mock has and that are friction too."""
 
 
@@ -46,6 +46,11 @@ class Truth(_Part):
     load_kg: float | None
     effects: tuple[HiddenEffect, ...]
     deviations: dict[str, float]
+
+    @property
+    def is_strange(self) -> bool:
+        """Whether its effect is none of the library's; one that was drawn as such may have come to it later."""
+        return self.kind == "open_set" and any(e.known_as == UNKNOWN_EFFECT for e in self.effects)
 
 
 class SeenEffect(_Part):

@@ -119,7 +119,7 @@ class QueueService:
         with self._lock:
             paused = self._pause(reason, anew=by is not None)
         if paused:
-            self._context.record_event("queue", f"paused: {reason}", actor=by)
+            self._context.record_event("queue", "paused" if by else f"paused: {reason}", actor=by)
             if by is None:
                 self._context.paused(reason)
 

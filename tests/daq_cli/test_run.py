@@ -95,7 +95,7 @@ def test_a_stop_from_another_terminal_ends_the_run(daq: CommandLine) -> None:
     (answer,) = json.loads(said.out)
     assert (answer["robot"], answer["delivered"], answer["confirmed"]) == ("ma2000", True, True)
     assert code == 6
-    assert b"on request, by daq stop or through the service" in person.seen
+    assert b"on request, by STOP on the page or daq stop" in person.seen
 
 
 def test_a_command_line_that_is_killed_leaves_an_interrupted_trace() -> None:

@@ -27,7 +27,9 @@ ON_A_LENGTH = ("centre_of_mass", "link_mass")
 ACROSS_GRAVITY = ("load_dependent_friction",)
 """Effects of joints that are not vertical."""
 OPEN = ("tight_spot", "quadratic_drag")
-"""Effects that are in no library."""
+"""Effects of rigs that are drawn as open."""
+IN_NO_LIBRARY = ("tight_spot",)
+"""Those of them that are none of the library's: others were, and keep their draws."""
 
 
 OTHER_NAMES: dict[str, dict[int, tuple[str, tuple[str, ...]]]] = {
@@ -116,7 +118,7 @@ def hide(rig: Rig, name: str, joint: int | None, law: int, size: dict[str, float
     known_as, beside = known(name, law)
     if name == "load_dependent_friction" and law == PRESSING_WEIGHT and joint is not None and joint <= EVENLY_PRESSED:
         known_as = "coulomb_friction"
-    hidden = Hidden(name, joint, law, size, name not in OPEN, known_as, beside)
+    hidden = Hidden(name, joint, law, size, name not in IN_NO_LIBRARY, known_as, beside)
     changed, bodies = rig.joints.copy(), rig.bodies
     if joint is None:
         bodies = _changed_bodies(bodies, name, 0, size)

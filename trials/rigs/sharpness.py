@@ -35,7 +35,7 @@ from scipy.optimize import least_squares, lsq_linear
 from trials.rigs.bodies import Bodies, Link
 from trials.rigs.drawing import generator
 from trials.rigs.engine import Floats, simulate, step_within
-from trials.rigs.hiding import OPEN, WHOLE_MACHINE, drawn, effects_of, find_drawn_law, hide, joints_of
+from trials.rigs.hiding import IN_NO_LIBRARY, WHOLE_MACHINE, drawn, effects_of, find_drawn_law, hide, joints_of
 from trials.rigs.parameters import Records
 from trials.rigs.recorded_rig import COLOURED_CORNER, TRAINING, wanted, without_settling
 from trials.rigs.rig import Rig, Tolerance
@@ -153,7 +153,7 @@ class _Comparison:
         found.append(Rival("own", math.sqrt(own)))
         for known in names:
             name, law = find_drawn_law(known)
-            if name in OPEN or known == known_as:
+            if name in IN_NO_LIBRARY or known == known_as:
                 continue
             if name not in effects_of(self.rig):
                 found.append(Rival(known, math.sqrt(none)))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from daq.contracts.trace import Trace
-from model.discrepancy.diagnosis import UNWRITTEN, Diagnosis, Gap, SignalError, Step
+from model.discrepancy.diagnosis import UNWRITTEN, Candidate, Diagnosis, Gap, SignalError, Step
 from model.discrepancy.engine.case import Case
 from model.discrepancy.engine.fitting import Fit, evaluate, fit, found_values
 from model.discrepancy.engine.judging import is_left_beside
@@ -123,8 +123,17 @@ def _as_last_fitted(standing: Standing) -> tuple[Step, ...]:
         own = [standing.model.parameter(name) for name in step.parameters] if step.adopted else []
         bias = standing.case.bias(standing.now, own) if own else {}
         values = found_values(standing.now, own, bias) if own else {}
-        steps.append(step.model_copy(update={"parameters": values}) if own else step)
+        told = {"parameters": values, "group": _still_open(step, standing)}
+        steps.append(step.model_copy(update=told) if own else step)
     return tuple(steps)
+
+
+def _still_open(step: Step, standing: Standing) -> tuple[Candidate, ...]:
+    """The candidates of a step that leave its name open: none that was found too, by another step, which the effect
+    stands beside, and not in the place of."""
+    found = [(s.effect, set(s.joints)) for s in standing.adopted if s is not step]
+    group = [c for c in step.group if not any(c.effect == name and set(c.joints) <= joints for name, joints in found)]
+    return tuple(group) if len(group) > 1 else ()
 
 
 def _of_model(standing: Standing) -> list[Unknown]:

@@ -9,13 +9,9 @@ import numpy as np
 
 from model.arrays import Floats
 from model.discrepancy.engine.case import Case
-from model.discrepancy.engine.fitting import Fit, fit
+from model.discrepancy.engine.fitting import Fit
 from model.discrepancy.verdict import LEAST_EXCESS
 
-FOLDS = 4
-"""Blocks into which the fitted records are cut where none are held out; each is predicted from the others."""
-BLOCK_ROUNDS = 2
-"""Rounds of the fit to all blocks but one."""
 AFFECTED = 0.01
 """Share by which a joint's mean square must have fallen in the fit to count as one on which the effect acts."""
 
@@ -54,18 +50,7 @@ def evidence(case: Case, before: Fit, after: Sequence[Fit]) -> list[Told]:
 def squares_unseen(case: Case, now: Fit) -> Floats:
     """(n,) mean squares of records not fitted to: those held out, else quarters of the fitted ones, each predicted from
     the others."""
-    return case.held_squares(now) if case.held_out is not None else _block_squares(now)
-
-
-def _block_squares(now: Fit) -> Floats:
-    sums, counts = np.zeros(len(now.memory)), np.zeros(len(now.memory))
-    for fold in range(FOLDS):
-        others, inside = now.compared.within(fold, FOLDS)
-        found = fit(others, now.unknowns, now.values, now.memory, rounds=BLOCK_ROUNDS)
-        left = inside.samples
-        sums += np.nan_to_num(left.mean_squares(found.signals)) * left.told
-        counts += left.told
-    return np.asarray(np.where(counts > 0.0, sums / np.maximum(counts, 1.0), np.nan))
+    return case.held_squares(now) if case.held_out is not None else now.squares_of_blocks
 
 
 def squares_between(case: Case, one: Fit, other: Fit) -> Floats:

@@ -175,7 +175,7 @@ class Workflow:
         """Takes back the first effect whose law is of another form than what is there, and all effects after it."""
         steps = self.found.steps
         self.left = self._joints_left()
-        forms = ((k, self.case.wrong_on(self.found.now, s, self.left)) for k, s in enumerate(steps) if s.adopted)
+        forms = ((k, self.case.wrong_on(s, self.left)) for k, s in enumerate(steps) if s.adopted)
         first, wrong = next((found for found in forms if found[1]), (len(steps), ()))
         if not wrong:
             return

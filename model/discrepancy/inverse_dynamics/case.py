@@ -111,21 +111,20 @@ class TorqueCase(Case):
             shaped |= np.array([j in {s.joint for s in shapes} for j in joints])
         return tuple(j for j, left in zip(joints, slow | shaped, strict=True) if left)
 
-    def wrong_on(self, now: Fit, step: Step, left: Sequence[int]) -> tuple[int, ...]:
-        """Joints on which what is left is a function of a step's own torque.
+    def is_unlike(self, now: Fit, step: Step, left: Sequence[int]) -> bool:
+        """Whether what is left is a function of a step's own torque, on a joint with something `left`.
 
         The numbers of a law are fitted. What is left as a function of the law's own torque is then something that the
-        form of the law has not: it is another law of the same quantity, as drag that grows with the square of speed is
-        beside viscous friction.
+        form of the law has not: another law of the same quantity acts beside it, or in its place.
         """
         absent = {p.name: p.null for n in step.parameters if (p := now.model.by_name[n]).null is not None}
         on = set(left) & set(step.joints)
         if not on or not absent:
-            return ()
+            return False
         without = now.compared.at({**now.values, **absent})
         own = [less - all_of_it for less, all_of_it in zip(without, now.signals, strict=True)]
         joints = now.model.machine.modelled_joints
-        return tuple(j for k, j in enumerate(joints) if j in on and is_function_of(own, now, self.noise, k))
+        return any(j in on and is_function_of(own, now, self.noise, k) for k, j in enumerate(joints))
 
     def unit(self, joint: int) -> str:
         """N·m, or N on a prismatic joint."""

@@ -63,7 +63,8 @@ def diagnose_torques(
     work = Workflow(case, recorded, progress, cancel or Never())
     work.run()
     shares = _torque_left(case, work)
-    answer = answer_of(work, controller.steps, traces, held_out, doubted=shares["after"] > 1.0)
+    unlike = any(case.is_unlike(work.found.now, step, work.left) for step in work.found.adopted)
+    answer = answer_of(work, controller.steps, traces, held_out, doubted=unlike or shares["after"] > 1.0)
     unseen = {name: why for name, why in NOT_IN_TORQUES.items() if name not in controller.settled}
     limits = find_drives_at_limit((*records, *held), model.machine.modelled_joints)
     notes = (

@@ -266,7 +266,7 @@ class ReadingCase(Case):
         held = 0.0 if self.held_out is None else self.held_out.samples.told[0]
         return int(self.compared.samples.told[0]), int(held)
 
-    def wrong_on(self, now: Fit, step: Step, left: Sequence[int]) -> tuple[int, ...]:  # noqa: ARG002 (any law)
+    def wrong_on(self, step: Step, left: Sequence[int]) -> tuple[int, ...]:
         """Joints of an effect that are left: from there the search was on a wrong way."""
         return tuple(left) if not step.joints or set(step.joints) & set(left) else ()
 

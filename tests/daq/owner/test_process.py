@@ -85,7 +85,7 @@ def ask_at_the_socket(_process: Running) -> None:
         (send_signal(signal.SIGTERM), "by a signal"),
         (speak, "by Ctrl-C, or by the program that started the run"),
         (leave, "by Ctrl-C, or by the program that started the run"),
-        (ask_at_the_socket, "on request, by daq stop or through the service"),
+        (ask_at_the_socket, "on request, by STOP on the page or daq stop"),
     ],
     ids=["SIGTERM", "its client", "its client that leaves", "the stop socket"],
 )

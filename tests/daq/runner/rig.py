@@ -81,7 +81,7 @@ class Rig:
 
     def stop_as_the_guardian_does(self) -> None:
         """What `daq stop` leads to, in the middle of whatever is going on."""
-        self.wants_end = "on request, by daq stop or through the service"
+        self.wants_end = "on request, by STOP on the page or daq stop"
         self.control.stop(self.wants_end)
 
     def pretend_real(self) -> None:

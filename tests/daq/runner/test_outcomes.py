@@ -71,11 +71,11 @@ def test_a_stop_in_the_middle_freezes_the_arm_and_a_second_more_is_recorded(arm:
     arm.ears.at_sample[12] = arm.stop_as_the_guardian_does
     result = arm.run(LONG_RAMP)
     state = arm.ask("state")
-    with pytest.raises(StoppedError, match="stopped: on request, by daq stop or through the service"):
+    with pytest.raises(StoppedError, match="stopped: on request, by STOP on the page or daq stop"):
         arm.run()
     trace = read_trace(result.trace)
     assert (result.outcome, trace.record.outcome) == ("stopped", "stopped")
-    assert result.reason == "on request, by daq stop or through the service"
+    assert result.reason == "on request, by STOP on the page or daq stop"
     assert state["frozen"]
     assert AFTERMATH_PERIODS <= len(trace) - 12 <= AFTERMATH_PERIODS + 2
     assert trace.set_point is not None

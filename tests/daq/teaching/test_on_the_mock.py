@@ -132,7 +132,7 @@ def test_a_stop_in_the_moment_of_the_end_is_not_taken_for_a_good_end(arm: Watche
     def ended() -> bool:
         if len(arm.seen) < 10:
             return False
-        arm.control.stop("on request, by daq stop or through the service")
+        arm.control.stop("on request, by STOP on the page or daq stop")
         return True
 
     with pytest.raises(StoppedError, match="through the service; the board confirmed: set points are frozen"):

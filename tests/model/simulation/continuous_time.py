@@ -47,6 +47,7 @@ PERIOD, COUNTS, GAIN = 0.02, 4096, 2.0
     BREAKAWAY,
     DIRECTION,
     VISCOUS_DIRECTION,
+    DRAG,
     LOSS,
     LOSS_DIRECTION,
     GIVE,
@@ -66,7 +67,7 @@ PERIOD, COUNTS, GAIN = 0.02, 4096, 2.0
     LAGS,
     GIVES,
     STICKS,
-) = range(39)
+) = range(40)
 # Columns of the state. X is the relative rise of the resistance.
 Q, V, Z, I, M, W, X, STUCK = range(8)  # noqa: E741 (a current)
 
@@ -140,6 +141,7 @@ def _rates(t: float, s: Floats, volts: Floats, p: Floats, body: Floats, rate: Fl
         if a[DIRECTION] * z > 0:
             link -= abs(a[DIRECTION]) * z
         link -= a[GEAR] ** 2 * max(a[VISCOUS_DIRECTION] * v, 0.0) * (1.0 if v > 0 else -1.0)
+        link -= a[DRAG] * abs(v) * v
         if a[LOSS_DIRECTION] * motor * z > 0:
             link -= abs(a[LOSS_DIRECTION] * motor) * z
         link += a[RIPPLE_S] * sin(a[RIPPLE_N] * q) + a[RIPPLE_C] * cos(a[RIPPLE_N] * q) - a[SPRING] * (q - a[REST])
@@ -317,6 +319,7 @@ def _joint_numbers(model: Model, value: dict[str, float]) -> Floats:
                 of("stiction.breakaway"),
                 of("direction_dependent_friction.difference"),
                 of("direction_dependent_viscous_friction.difference"),
+                of("quadratic_drag.coefficient"),
                 of("gear_loss.loss"),
                 of("direction_dependent_gear_loss.difference"),
                 of("joint_compliance.compliance") + contact,

@@ -40,6 +40,7 @@ def _of(effect: str, name: str, sizes: tuple[float, float, float], shown_on: int
 
 CASES = (
     _of("viscous_friction", "coefficient", (2e-5, 1.2e-4, 1.2e-4), 3),
+    _of("quadratic_drag", "coefficient", (4.0, 6.0, -1.0), 1),
     _of("coulomb_friction", "torque", (1.2, 2.5, 0.5), 1),
     _of("load_dependent_friction", "arm", (0.4, 0.4, 0.4), 2),
     _of("gravity_torque_friction", "share", (0.2, 0.2, 0.2), 2),

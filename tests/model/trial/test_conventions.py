@@ -25,6 +25,7 @@ SOUND = base_model(MACHINE)
 
 SIZES: dict[str, tuple[int | None, dict[str, float]]] = {
     "viscous_friction": (2, {"coefficient": 80.0}),
+    "quadratic_drag": (2, {"coefficient": 20.0}),
     "coulomb_friction": (3, {"torque": 1.8}),
     "load_dependent_friction": (2, {"arm": 0.6}),
     "gravity_torque_friction": (2, {"share": 0.4}),

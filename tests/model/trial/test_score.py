@@ -129,7 +129,7 @@ def test_clean_arms_and_effects_outside_the_library_have_their_own_right_answers
     for verdict in ("named", "ambiguous", "unknown-effect"):
         assert judged(clean, answer(verdict, step("payload"))).alarm
     assert judged(clean, answer("nothing-significant")).named_right is None
-    strange = truth("open_set", ("quadratic_drag", (1,)), known=False)
+    strange = truth("open_set", ("tight_spot", (1,)), known=False)
     assert judged(strange, answer("unknown-effect")).honest
     assert judged(strange, answer("ambiguous", step("stiction", 1, group=("stiction", "viscous_friction")))).honest
     assert judged(strange, answer("named", step("viscous_friction", 1))).honest is False
@@ -173,5 +173,5 @@ def test_no_interval_counts_for_a_wrong_name_and_viscous_friction_is_all_of_the_
     failed = score_of_failure(known, seen(known), 600.0)
     assert (failed.named_right, failed.in_first, failed.joint_right, failed.place) == (False, False, False, "failed")
     assert score_of_failure(clean, seen(clean), 600.0).alarm
-    strange = truth("open_set", ("quadratic_drag", (1,)), known=False)
+    strange = truth("open_set", ("tight_spot", (1,)), known=False)
     assert score_of_failure(strange, seen(strange), 1.0).honest is False

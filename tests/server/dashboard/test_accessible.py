@@ -38,7 +38,7 @@ def test_the_keyboard_reaches_every_page_and_skips_what_is_repeated(dashboard: D
     page.keyboard.press("Tab")
     expect(page.get_by_role("link", name="Skip to the content")).to_be_focused()
     page.keyboard.press("Tab")
-    expect(page.get_by_role("link", name="Live")).to_be_focused()
+    expect(page.get_by_role("link", name="Live", exact=True)).to_be_focused()
     for name in ("Experiments", "Traces", "Models", "Diagnosis", "System"):
         page.keyboard.press("Tab")
         expect(page.get_by_role("link", name=name, exact=True)).to_be_focused()
@@ -51,6 +51,13 @@ def test_the_keyboard_reaches_every_page_and_skips_what_is_repeated(dashboard: D
     page.get_by_role("button", name="STOP").click(trial=True)  # the list blocks nothing
     page.keyboard.press("Escape")
     expect(keys).not_to_be_visible()
+    page.keyboard.press("g")
+    page.keyboard.press("t")
+    expect(page.get_by_role("heading", level=1, name="Traces")).to_be_attached()
+    line = page.get_by_role("search").get_by_role("combobox")
+    expect(line).to_be_visible()
+    page.keyboard.press("/")
+    expect(line).to_be_focused()
 
 
 def test_the_theme_is_the_systems_until_it_is_chosen_and_the_choice_is_kept(dashboard: Dashboard) -> None:

@@ -43,7 +43,7 @@ def test_a_layout_is_arranged_kept_shared_and_saved(dashboard: Dashboard, tmp_pa
     handle.focus()
     for key in ("ArrowRight", "ArrowRight", "Shift+ArrowRight", "Shift+ArrowDown"):
         page.keyboard.press(key)
-    expect(page.get_by_role("status").filter(has_text="Number: column 3, row")).to_contain_text("3 wide, 4 high")
+    expect(page.get_by_role("status").filter(has_text="Number: column 3, row")).to_contain_text("3 wide, 5 high")
     moved = _tile(page, "By hand").locator(".bar")
     moved.evaluate("one => one.scrollIntoView({ block: 'center' })")
     bar = moved.bounding_box()
@@ -69,6 +69,10 @@ def test_a_layout_is_arranged_kept_shared_and_saved(dashboard: Dashboard, tmp_pa
     assert faults_of(page) == []
     _see_it_elsewhere(dashboard, page, tmp_path)
     page.get_by_role("button", name="Arrange panels").click()
+    expect(page.get_by_role("heading", name="Arrange panels")).to_be_focused()
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("button", name="Arrange panels")).to_be_focused()
+    page.keyboard.press("Enter")
     page.get_by_role("button", name="Delete").click()
     expect(page.locator("[data-kind=link]")).to_be_visible()
 

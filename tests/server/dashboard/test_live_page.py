@@ -40,10 +40,28 @@ def test_an_experiment_is_seen_to_run_and_its_motion_in_the_numbers(dashboard: D
     sent = dashboard.service.robot.post("/experiments", json={"spec": {"trajectory": ramp, "joints": [1]}})
     assert sent.status_code == 201, sent.text
     expect(page.get_by_text("An experiment is running.")).to_be_visible()
+    expect(page.get_by_role("banner").get_by_text("moving")).to_be_visible()
     ended = dashboard.service.end_of(sent.json()["id"])
     assert ended["state"] == "done", ended
     expect(page.get_by_text("Nothing is running or waiting.")).to_be_visible()
+    expect(page.get_by_role("banner").get_by_text("moving")).not_to_be_attached()
     assert abs(_number(_cell(page, 1, 0)) - before) > 2
+
+
+def test_a_run_that_failed_is_told_until_it_was_read(dashboard: Dashboard) -> None:
+    ramp = {"kind": "ramp", "amplitude": 0.01, "duration": 0.1}
+    sent = dashboard.service.robot.post("/experiments", json={"spec": {"trajectory": ramp, "joints": [4]}}).json()
+    ended = dashboard.service.end_of(sent["id"]) | {"state": "failed", "reason": "joint 2 is far behind"}
+    dashboard.page.route("**/experiments?order=ended&limit=10", lambda route: route.fulfill(json={"items": [ended]}))
+    page = dashboard.until_live()
+    said = page.get_by_text("The last run, ramp, failed: joint 2 is far behind")
+    expect(said).to_be_visible()
+    dashboard.open("kiosk")
+    expect(said).to_be_visible()
+    page.get_by_role("button", name="Dismiss").click()
+    expect(said).not_to_be_attached()
+    dashboard.until_live()
+    expect(said).not_to_be_attached()
 
 
 def test_charts_are_drawn_with_the_past_when_the_page_is_loaded(dashboard: Dashboard) -> None:

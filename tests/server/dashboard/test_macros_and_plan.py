@@ -85,7 +85,7 @@ def test_an_experiment_becomes_a_macro_whose_form_keeps_to_its_bounds(dashboard:
     assert names == ["seed", "ramp"]
     page.get_by_role("button", name="Delete").click()
     page.get_by_role("button", name="Delete it for everybody").click()
-    expect(page.get_by_text("None is kept yet")).to_be_visible()
+    expect(page.get_by_text("No macro is kept yet")).to_be_visible()
 
 
 def test_the_plan_shows_what_will_be_due_and_that_it_waits_for_the_queue(dashboard: Dashboard) -> None:

@@ -72,7 +72,8 @@ def test_a_pressed_stop_freezes_the_board_before_it_is_let_go(dashboard: Dashboa
     expect(page.locator(CONFIRMED)).to_contain_text(
         re.compile(r"Stopped at [\d:]+, confirmed by the board after \d+ ms")
     )
-    expect(page.get_by_text("The arm is stopped.")).to_be_visible()
+    expect(page.locator("[data-stop]").get_by_text("The arm is stopped.")).to_be_visible()
+    expect(page.locator("[data-banner]")).not_to_be_attached()  # all is said once
 
 
 def test_the_key_stops_also_while_somebody_types(dashboard: Dashboard) -> None:
@@ -141,8 +142,12 @@ def test_a_reset_ends_the_stop_and_moves_nothing(dashboard: Dashboard) -> None:
     before = dashboard.mock.ask("state")["set_points"]
     page.keyboard.press("F8")
     expect(page.get_by_text("The arm is stopped.")).to_be_visible()
-    page.get_by_role("button", name="Reset").click()
+    page.reload()  # who stopped is known from the events
+    expect(page.locator("[data-banner=stopped]")).to_contain_text(re.compile(r"You pressed STOP at [\d:]+\."))
+    page.get_by_role("button", name="Reset").focus()
+    page.keyboard.press("Enter")
     expect(page.get_by_text("The arm is stopped.")).not_to_be_attached()
+    expect(page.get_by_role("button", name="Leave it paused")).to_be_focused()  # which moves nothing
     state = dashboard.mock.ask("state")
     assert not state["frozen"]
     assert all(abs(one - other) <= 2 for one, other in zip(before, state["set_points"], strict=True))

@@ -25,7 +25,7 @@ def test_what_becomes_of_an_experiment_is_told_with_its_number_and_whoever_asked
     bench.until(lambda event: event == "experiment: completed")
     assert bench.request["moves_real_arm"] is False  # nobody has given a word for this arm, which is simulated
     assert bench.records == [
-        ("queue: paused: for a look", "anna", None),
+        ("queue: paused", "anna", None),
         ("experiment: queued", "anna", made.id),
         ("experiment: queued", "anna", other.id),
         ("experiment: cancelled", "bert", other.id),
@@ -69,7 +69,7 @@ def test_the_first_reason_stays_unless_a_person_gives_another_or_resumes_the_que
     bench.queue.pause("a look", "anna")
     status = bench.queue.status()
     assert (status.reason, status.since) == ("a look", begun + timedelta(seconds=5))
-    assert bench.events == ["queue: paused: the first", "queue: paused: a look"]
+    assert bench.events == ["queue: paused: the first", "queue: paused"]
     assert bench.queues.get("ma2000").reason == "a look"
     bench.clock.turn(5)
     bench.queue.resume("bert", moves_real_arm=False)
@@ -186,4 +186,4 @@ def test_a_stopped_arm_is_named_to_whoever_wants_to_resume(bench: Bench) -> None
     with pytest.raises(ProblemError, match="the arm has a fault: joint 2 strayed"):
         bench.queue.resume("anna", moves_real_arm=False)
     assert bench.queue.status().reason == "a look"
-    assert bench.events == ["queue: paused: a look"]
+    assert bench.events == ["queue: paused"]

@@ -54,6 +54,7 @@ export function coarse(seconds: number): string {
 }
 
 const TIME = new Intl.DateTimeFormat('en-GB', { hour: '2-digit', minute: '2-digit', second: '2-digit' });
+const DAY = new Intl.DateTimeFormat('en-GB', { day: '2-digit', month: 'short' });
 const MINUTE = {
   day: '2-digit',
   month: 'short',
@@ -64,9 +65,11 @@ const MINUTE = {
 const DAY_AND_TIME = new Intl.DateTimeFormat('en-GB', MINUTE);
 const DAY_AND_SECOND = new Intl.DateTimeFormat('en-GB', { ...MINUTE, second: '2-digit' });
 
-/** The time of day of an ISO moment, in this computer's time zone. */
-export function timeOfDay(moment: string): string {
-  return TIME.format(new Date(moment));
+/** The time of day of an ISO moment, in this computer's time zone; of another day than `now` (ms) with that day. */
+export function timeOfDay(moment: string, now = Date.now()): string {
+  const at = new Date(moment);
+  const isToday = at.toDateString() === new Date(now).toDateString();
+  return isToday ? TIME.format(at) : `${DAY.format(at)}, ${TIME.format(at)}`;
 }
 
 /** Day and time of an ISO moment, in this computer's time zone. */

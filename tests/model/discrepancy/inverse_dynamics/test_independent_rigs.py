@@ -106,9 +106,14 @@ LOADED = "load_dependent_friction"
             "ambiguous",
             ({"centre_of_mass", "payload"}, ()),
         ),
-        # What the library has no law for. The second left six times the noise, in a shape that explains most of it.
-        rig("quadratic drag is no viscous friction", ("axis-current", 505, None), "unknown-effect"),
-        rig("quadratic drag without Coulomb friction", ("arm-sweep", 260802698626061, "open"), "unknown-effect"),
+        rig("quadratic drag is no viscous friction", ("axis-current", 505, None), "named", ({"quadratic_drag"}, (1,))),
+        rig(
+            "quadratic drag without Coulomb friction",
+            ("arm-sweep", 260802698626061, "open"),
+            "named",
+            ({"quadratic_drag"}, (2,)),
+        ),
+        # What the library has no law for.
         rig("friction at a place is not within noise", ("arm-current", 505, None), "unknown-effect"),
         # Rigs of which only one of two records shows the effect well.
         rig(
@@ -121,8 +126,8 @@ LOADED = "load_dependent_friction"
         rig(
             "drag that looks viscous in one motion",
             ("axis-current-steps", 278342827514058, "open"),
-            "unknown-effect",
-            fails="named, and told to leave something: 3.6 times the noise on the other motion",
+            "named",
+            ({"quadratic_drag"}, (1,)),
         ),
         # What a loss leaves where motion turns looks like Stribeck friction in steps, and not in a slow ramp.
         rig(

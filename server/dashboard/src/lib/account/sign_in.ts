@@ -33,7 +33,7 @@ export function signInAddress(start: string, robot: string): string {
 export function roleText(role: Me['role'], isOwner: boolean): string {
   if (role === 'viewer') return 'viewer: looks, and stops';
   if (role === 'operator' || !isOwner) return 'operator: moves the arm; changes their own experiments';
-  return `${role}: moves the arm; changes everybody's experiments`;
+  return `${role}: moves the arm; changes everybody’s experiments`;
 }
 
 export async function askLoginWays(): Promise<LoginWays> {

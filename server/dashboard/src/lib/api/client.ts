@@ -32,11 +32,6 @@ export function here(): { robot: string } {
   return { robot };
 }
 
-/** The names of all robots of the service. */
-export function allRobots(): readonly string[] {
-  return robots;
-}
-
 /** Whether the service has several robots. */
 export function isFleet(): boolean {
   return robots.length > 1;

@@ -18,7 +18,7 @@ const LONGEST_TEXT = 4000;
 export const KINDS = {
   charts: { title: 'All charts', w: 8, h: 15, least: [4, 6] },
   chart: { title: 'Chart', w: 4, h: 5, least: [2, 3] },
-  number: { title: 'Number', w: 2, h: 3, least: [1, 2] },
+  number: { title: 'Number', w: 2, h: 4, least: [1, 2] },
   arm: { title: 'Arm in 3-D', w: 4, h: 8, least: [3, 5] },
   table: { title: 'Numbers of all joints', w: 4, h: 6, least: [3, 3] },
   link: { title: 'Link', w: 4, h: 8, least: [3, 3] },

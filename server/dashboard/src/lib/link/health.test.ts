@@ -1,61 +1,70 @@
 import { describe, expect, it } from 'vitest';
 import type { LinkMessage } from '../api/types';
-import { healthOf, LinkHealth } from './health';
+import { LinkHealth, OVER, type Health } from './health';
 
-const told = (counters: Record<string, number>): LinkMessage => ({
+const told = (counters: Record<string, number>, state: LinkMessage['state'] = 'connected'): LinkMessage => ({
   topic: 'link',
-  state: 'connected',
+  state,
   counters,
   host_time: 0,
 });
-const retries = (health: LinkHealth) => health.figures().find((figure) => figure.name === 'Retries');
+const retries = (health: Health) => health.figures.find((figure) => figure.name === 'Retries');
 
-describe('link health', () => {
-  it('tells what is going on now from what once was', () => {
+describe('counters of the link', () => {
+  it('tell what is going on now from what once was', () => {
     const health = new LinkHealth();
     health.heard(told({ requests: 100, retries: 40 }), 0);
-    health.heard(told({ requests: 200, retries: 43 }), 30);
-    expect(retries(health)).toMatchObject({ total: 43, lately: 3 });
+    expect(retries(health.heard(told({ requests: 200, retries: 43 }), 30))).toMatchObject({
+      total: 43,
+      lately: 3,
+    });
     health.heard(told({ requests: 300, retries: 43 }), 120);
-    health.heard(told({ requests: 400, retries: 44 }), 121);
-    expect(retries(health)).toMatchObject({ total: 44, lately: 1 });
+    expect(retries(health.heard(told({ requests: 400, retries: 44 }), 121))).toMatchObject({ lately: 1 });
+    expect(retries(health.heard(told({ requests: 10, retries: 1 }), 122))).toMatchObject({ lately: 0 }); // a new link
   });
 
-  it('begins anew with a new link', () => {
+  it('have no round trip before the first', () => {
     const health = new LinkHealth();
-    health.heard(told({ requests: 1000, retries: 40 }), 0);
-    health.heard(told({ requests: 10, retries: 1 }), 1);
-    expect(retries(health)).toMatchObject({ total: 1, lately: 0 });
-  });
-
-  it('has no round trip before the first', () => {
-    const health = new LinkHealth();
-    expect(health.roundTrip()).toBeNull();
-    health.heard(told({ round_trip_p99_s: 0.004 }), 0);
-    expect(health.roundTrip()).toBeCloseTo(4);
+    expect(health.heard(told({}), 0).roundTrip).toBeNull();
+    expect(health.heard(told({ round_trip_p99_s: 0.004 }), 1).roundTrip).toBeCloseTo(4);
   });
 });
 
-describe('what is said of the link', () => {
-  const after = (more: Record<string, number>) => {
-    const health = new LinkHealth();
-    health.heard(told({ requests: 100 }), 0);
-    health.heard(told({ requests: 3100, ...more }), 60);
-    return healthOf('connected', health.figures());
-  };
+/** What is said each second at 50 requests a second, of which `wrong` a second go wrong until `until`. */
+function follow(wrong: number, until: number, seconds: number): string[] {
+  const health = new LinkHealth();
+  return Array.from({ length: seconds }, (_, at) => {
+    const late = wrong * Math.min(at, until);
+    return health.heard(told({ requests: 50 * at, late }, at % 2 ? 'degraded' : 'connected'), at).text;
+  });
+}
 
-  it('is healthy only while nothing is counted', () => {
-    expect(after({})).toEqual({ tone: 'good', text: 'healthy', advice: '' });
-    expect(after({ late: 300, retries: 2 })).toMatchObject({ tone: 'warn', text: 'late samples' });
-    expect(after({ retries: 2 })).toMatchObject({ text: 'retries', advice: '' });
+describe('the verdict on the link', () => {
+  it('is one over ten seconds: neither one repeat nor a moment in order changes it', () => {
+    expect(new Set(follow(0.3, 60, 60))).toEqual(new Set(['healthy']));
+    const said = follow(2, 20, 60);
+    expect(said.slice(1, 20 + OVER)).toEqual(Array(19 + OVER).fill('degraded'));
+    expect(said.slice(20 + 2 * OVER)).toEqual(Array(40 - 2 * OVER).fill('healthy'));
   });
 
-  it('says what to do about samples that come late', () => {
-    expect(after({ late: 300 }).advice).toMatch(/computer is busy, or the line is slow\. End other programs/);
+  it('says what is wrong and what to do', () => {
+    const health = new LinkHealth();
+    health.heard(told({ requests: 0 }), 0);
+    expect(health.heard(told({ requests: 500, late: 300 }), 10).why).toBe(
+      'Of 500 requests in 10 s: late samples 300. The service’s computer is busy, or the line is slow: end other programs on that computer.',
+    );
+  });
+
+  it('finds a board whose clock stands still, though no request goes wrong', () => {
+    const health = new LinkHealth();
+    health.heard(told({ requests: 0 }), 0, { tick: 0, host_time: 0 }, 0.02);
+    const slow = health.heard(told({ requests: 400 }), 10, { tick: 390, host_time: 10 }, 0.02);
+    expect([slow.text, slow.why]).toEqual(['degraded', expect.stringMatching(/^The board makes 78 %/)]);
   });
 
   it('is what the service says of one that is lost or not open', () => {
-    expect(healthOf('lost', []).tone).toBe('bad');
-    expect(healthOf('none', []).text).toBe('not open');
+    const health = new LinkHealth();
+    expect(health.heard(told({}, 'lost'), 0)).toMatchObject({ tone: 'bad', text: 'lost' });
+    expect(health.heard(told({}, 'none'), 1).text).toBe('not open');
   });
 });

@@ -5,13 +5,12 @@
  * what is shown as numbers (`live.sample`) follows ten times a second. Charts draw in `onFrame`.
  */
 
-import { here, isFleet, root } from '../api/client';
+import { api, ask, here, isFleet, root } from '../api/client';
 import { asProblem, type Problem } from '../api/problem';
 import { spoken } from '../format';
 import { isMissing, LiveSocket, SILENT_AFTER, type SocketState } from '../api/socket';
 import type {
   Job,
-  LinkMessage,
   LiveFrame,
   LiveMessage,
   LiveRequest,
@@ -24,11 +23,13 @@ import type {
   ServiceEvent,
   SystemStatus,
 } from '../api/types';
+import { LinkHealth, NOT_OPEN } from '../link/health';
 import { armNow } from '../stop/standing';
 import { fleet } from '../fleet/fleet.svelte';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
 import { asked, askSystem, newTicket } from './asked';
+import { newestEvents, withPauser, withStopper } from './events';
 import { SampleRate } from './rate';
 import { Recording } from './recording';
 
@@ -38,6 +39,7 @@ const KEPT = 300;
 const AT_START = 60;
 const POINTS = 1200;
 const EVENTS_KEPT = 100;
+const EVENTS_ASKED = 30;
 const LINES_KEPT = 20;
 /** s until the service is asked again what it has not said about itself. */
 const SYSTEM_AGAIN = 10;
@@ -68,15 +70,18 @@ class Live {
   isUnattended = $state(false);
   /** Whether the service has other robots, too. */
   isOfSeveral = $state(false);
-  robot = $state.raw<RobotMessage | null>(null);
-  link = $state.raw<LinkMessage | null>(null);
-  queue = $state.raw<QueueStatus | null>(null);
+  private toldRobot = $state.raw<RobotMessage | null>(null);
+  private toldQueue = $state.raw<QueueStatus | null>(null);
+  /** How the link does, in the same words on every page. */
+  link = $state.raw(NOT_OPEN);
   /** How far the experiment is that runs; null when none does. */
   progress = $state.raw<ProgressMessage | null>(null);
   /** The newest jobs' last messages, by number. Load the list from the API, then follow changes here. */
   jobs = $state.raw<ReadonlyMap<string, Job>>(new Map());
-  /** What happened since the page was opened, the newest first. */
+  /** What happened, the newest first. */
   events = $state.raw<readonly ServiceEvent[]>([]);
+  robot: RobotMessage | null = $derived(withStopper(this.toldRobot, this.events, (name) => this.who(name)));
+  queue: QueueStatus | null = $derived(withPauser(this.toldQueue, this.events, (name) => this.who(name)));
   /** Lines for whoever teaches, the newest last. */
   lines = $state.raw<readonly string[]>([]);
   /** The last refusal of something that was sent over the socket. */
@@ -118,6 +123,7 @@ class Live {
   private listeners = new Set<(message: LiveMessage) => void>();
   private lateness: number[] = [];
   private readonly received = new SampleRate();
+  private readonly health = new LinkHealth();
   /** What was said before it was known what the robot is, and when. */
   private unheard: [LiveFrame, number][] = [];
   private connection: LiveSocket | null = null;
@@ -201,6 +207,13 @@ class Live {
     }
   }
 
+  /** What happened before the connection opened: who stopped the arm is among it. */
+  private async learnEvents(): Promise<void> {
+    const params = { path: here(), query: { limit: EVENTS_ASKED } };
+    const before = await ask(api.GET('/api/v1/robots/{robot}/events', { params })).catch(() => null);
+    if (before !== null) this.events = newestEvents(this.events, before.items, EVENTS_KEPT);
+  }
+
   /** From now on what the service says can be kept: also what it has said already. */
   private know(machine: Machine): void {
     this.recording = new Recording(jointsOf(machine.joints.length), PERIOD, KEPT);
@@ -232,7 +245,9 @@ class Live {
       frame: (frame, at) => this.hear(frame, at),
       state: (state) => {
         this.socket = state;
-        if (state.phase === 'open' && state.again) this.healed += 1;
+        if (state.phase !== 'open') return;
+        if (state.again) this.healed += 1;
+        void this.learnEvents();
       },
       now: seconds,
       after: (wait, call) => {
@@ -292,15 +307,16 @@ class Live {
         this.recording?.addEvent(message);
         break;
       case 'robot':
-        this.robot = message;
+        this.markStop(message);
+        this.toldRobot = message;
         this.tellStop();
         break;
       case 'link':
-        this.link = message;
+        this.link = this.health.heard(message, seconds(), this.newest, this.robot?.identity?.period ?? null);
         break;
       case 'queue':
-        this.queue = message.status;
-        if (this.queue.running === null) this.progress = null;
+        this.toldQueue = message.status;
+        if (message.status.running === null) this.progress = null;
         break;
       case 'progress':
         this.progress = message;
@@ -330,6 +346,17 @@ class Live {
     this.lateness.push(sample.lateness);
     this.received.heard(sample.host_time);
     if (isFirst) this.tick();
+  }
+
+  /** A stop or fault is an event of the record while an experiment runs; at all other times it is marked here. */
+  private markStop({ arm, cause }: RobotMessage): void {
+    const at = this.clock.at(seconds());
+    if (at === null || this.toldRobot === null || this.toldRobot.activity === 'experiment') return;
+    if (arm === this.toldRobot.arm || (arm !== 'stopped' && arm !== 'fault')) return;
+    const [kind, message] =
+      arm === 'fault' ? ([arm, cause] as const) : (['stop', 'the arm was stopped'] as const);
+    const where = { tick: this.newest?.tick ?? null, joint: null, experiment: null, host_time: at, time: at };
+    this.recording?.addEvent({ topic: 'record_event', kind, message, ...where });
   }
 
   private tellStop(): void {

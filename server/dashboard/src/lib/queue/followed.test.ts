@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Experiment } from '../api';
-import { standingOf, type Lists } from './followed';
+import { standingOf, troubleOf, type Lists } from './followed';
 
 const one = (id: string, state = 'queued') => ({ id, state }) as Experiment;
 const nothing: Lists = { waiting: [], running: null, ended: [] };
@@ -26,4 +26,11 @@ describe('the run that was just sent', () => {
   it('is not known before the lists have been read', () => {
     expect(standingOf('a', nothing)).toMatchObject({ state: 'unknown', experiment: null });
   });
+});
+
+it('a run that failed is remembered until one succeeds, whatever was cancelled since', () => {
+  const failed = one('a', 'failed');
+  expect(troubleOf([one('c', 'cancelled'), failed, one('b', 'done')])).toBe(failed);
+  expect(troubleOf([one('b', 'done'), failed])).toBeNull();
+  expect(troubleOf([])).toBeNull();
 });

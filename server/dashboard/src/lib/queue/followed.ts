@@ -43,3 +43,9 @@ export function standingOf(id: string, { waiting, running, ended }: Lists): Stan
     said: ahead === 0 ? 'It is next.' : `It runs after ${ahead === 1 ? 'one other' : `${ahead} others`}.`,
   };
 }
+
+/** Of those that have ended, the newest first: the newest that failed, unless one succeeded after it. */
+export function troubleOf(ended: readonly Experiment[]): Experiment | null {
+  const last = ended.find((one) => one.state !== 'cancelled');
+  return last !== undefined && last.state !== 'done' ? last : null;
+}

@@ -15,10 +15,6 @@ class Stop {
   /** Time of day at which `state` was told. */
   private time = $state('');
   words = $derived(wordsOf(this.state, this.standing, this.arm, this.time));
-  /** Whether the arm is stopped now by a press on this page. */
-  isOwn = $derived(
-    (this.state.kind === 'confirmed' || this.state.kind === 'delivered') && this.standing === 'holds',
-  );
   /** Whether the stop was reset on this page, and the queue, which it paused, may still have to be resumed. */
   isReset = $state(false);
   /** The port of the listener that takes stops alone; null until the service has told it. */

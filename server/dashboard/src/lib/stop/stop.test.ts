@@ -122,7 +122,9 @@ describe('a press of Stop', () => {
     await pass(0.01);
     const text = (last() as { text: string }).text;
     expect(last().kind).toBe('not delivered');
-    expect(text).toContain('Use the emergency stop. It is no longer being sent; one may still arrive.');
+    expect(text).toContain(
+      'Use the emergency stop. Nothing is being sent now, and an earlier one may still arrive.',
+    );
     expect(text).not.toContain('sent again.');
     await pass(60);
     expect(last()).toEqual({ kind: 'not delivered', text });
@@ -132,7 +134,7 @@ describe('a press of Stop', () => {
     begin(refused('the service does not answer'));
     await pass(60);
     expect(last()).toMatchObject({
-      text: expect.stringContaining('It is no longer being sent. Press') as string,
+      text: expect.stringContaining('Nothing is being sent now. Press') as string,
     });
   });
 

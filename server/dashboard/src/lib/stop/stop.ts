@@ -99,11 +99,8 @@ export class StopCall {
   /** What may still come of it: said anew when the last request has been sent, and when the last has failed. */
   private prospect(): string {
     if (this.attempts < ATTEMPTS) return 'It is being sent again.';
-    const left =
-      this.failures < ATTEMPTS
-        ? 'It is no longer being sent; one may still arrive.'
-        : 'It is no longer being sent.';
-    return `${left} Press Stop to send it again.`;
+    const left = this.failures < ATTEMPTS ? ', and an earlier one may still arrive' : '';
+    return `Nothing is being sent now${left}. Press Stop again.`;
   }
 }
 

@@ -30,7 +30,7 @@ describe('the message about a stop', () => {
     expect(wordsOf(lost, 'past', 'free', '12:00:00')).toMatchObject({
       look: 'past',
       head: 'Past: the stop of 12:00:00 was NOT DELIVERED',
-      text: 'The arm is not stopped now: press Stop if it shall be.',
+      text: 'The arm is not stopped now. Press Stop to stop it.',
     });
     expect(wordsOf(lost, 'past', 'stopped', '')?.text).toBe('The arm is stopped now.');
   });

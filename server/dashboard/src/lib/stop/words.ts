@@ -40,7 +40,7 @@ function pastOf(kind: 'confirmed' | 'delivered' | 'not delivered', arm: ArmNow, 
   const what = kind === 'delivered' ? 'was sent and NOT CONFIRMED' : 'was NOT DELIVERED';
   const now = {
     stopped: 'The arm is stopped now.',
-    free: 'The arm is not stopped now: press Stop if it shall be.',
+    free: 'The arm is not stopped now. Press Stop to stop it.',
     unknown: 'How the arm is now is not known.',
   }[arm];
   return {

@@ -4,10 +4,8 @@ import { api, ask, here, Problem, readiness } from '../api';
 import type { AuditEntry } from '../api';
 import type { Seen } from './service_look.svelte';
 
-/** Events that are shown. */
-export const EVENTS = 30;
 /** Rows of the audit log that are shown. */
-const AUDIT = 8;
+const AUDIT = 20;
 
 /** The newest rows of the audit log; null for a caller who may not read it. */
 async function newestAudit(): Promise<readonly AuditEntry[] | null> {
@@ -24,10 +22,9 @@ export async function lookAtService(): Promise<Seen> {
   const ofJobs = { path, query: { state: ['queued', 'running'] as ('queued' | 'running')[], limit: 50 } };
   const health = await readiness();
   const [notifies, audits] = ['notifications', 'audit'].map((plugIn) => plugIn in health.checks);
-  const [system, jobs, events, audit, notifications] = await Promise.all([
+  const [system, jobs, audit, notifications] = await Promise.all([
     ask(api.GET('/api/v1/system')),
     ask(api.GET('/api/v1/robots/{robot}/jobs', { params: ofJobs })),
-    ask(api.GET('/api/v1/robots/{robot}/events', { params: { path, query: { limit: EVENTS } } })),
     audits ? newestAudit() : null,
     notifies ? ask(api.GET('/api/v1/notifications')) : null,
   ]);
@@ -35,7 +32,6 @@ export async function lookAtService(): Promise<Seen> {
     system,
     health,
     jobs: jobs.items,
-    events: events.items,
     audit,
     destinations: notifications?.destinations ?? null,
   };

@@ -1,5 +1,7 @@
 /** What the link's counters of a trace say: what went wrong, and how long an answer took. */
 
+import { counterName } from '../link/health';
+
 /** Seconds; the others are counts. */
 const TIMES = ['round_trip_p50_s', 'round_trip_p99_s'] as const;
 const ORDINARY = new Set([
@@ -11,19 +13,11 @@ const ORDINARY = new Set([
   ...TIMES,
 ]);
 
-/** As on Live. */
-const NAMES: Readonly<Record<string, string>> = {
-  timeouts: 'time-outs',
-  late: 'late samples',
-  damaged: 'CRC errors',
-  torn: 'torn readings',
-};
-
 /** One line: everything that was counted and is not in order, then the round trip; empty where nothing was counted. */
 export function linkInWords(counters: Readonly<Record<string, number>>): string {
   const wrong = Object.entries(counters)
     .filter(([name, count]) => count !== 0 && !ORDINARY.has(name))
-    .map(([name, count]) => `${count} ${NAMES[name] ?? name.replaceAll('_', ' ')}`);
+    .map(([name, count]) => `${counterName(name)} ${count}`);
   const [usual, slow] = TIMES.map((name) => counters[name]);
   const trip =
     usual === undefined || slow === undefined

@@ -11,11 +11,13 @@ it('tells a run beside earlier ones of the same experiment, and nothing where th
   const now = figures(3.9, 34);
   expect(besideEarlier(now, [], 'V')).toBe('');
   expect(besideEarlier(now, [figures(2.1, 34)], 'V')).toBe(
-    'Against the earlier run of this experiment: J2 largest error 3.90°, was 2.10°.',
+    'Beside the earlier run, too few to judge by: J2 largest error 3.90°, was 2.10°.',
   );
   const usual = [figures(3.8, 33), figures(4, 34), figures(4.1, 35)];
   expect(besideEarlier(now, usual, 'V')).toMatch(/^As in the 3 earlier runs/);
-  expect(besideEarlier(figures(9, 34), usual, 'V')).toContain('J2 largest error 9.00°, was 3.80° to 4.10°');
+  expect(besideEarlier(figures(9, 34), usual, 'V')).toBe(
+    'Outside the range of the 3 earlier runs: J2 largest error 9.00°, was 3.80° to 4.10°.',
+  );
 });
 
 it('knows the limits that the machine file has, and no others', () => {

@@ -65,8 +65,10 @@ export function besideEarlier(
       return [`J${one.joint} largest ${what} ${fixed(now, 2)}${unit}, was ${range}`];
     }),
   );
-  if (told.length > 0) return `Against ${runs} of this experiment: ${told.join('; ')}.`;
-  return `As in ${runs} of this experiment: error and drive are within their range.`;
+  if (told.length === 0) return `As in ${runs} of this experiment: error and drive are within their range.`;
+  const verdict =
+    earlier.length < FEWEST ? `Beside ${runs}, too few to judge by` : `Outside the range of ${runs}`;
+  return `${verdict}: ${told.join('; ')}.`;
 }
 
 function valueOf(figures: Figures, joint: number, key: 'largest_error' | 'largest_drive'): number[] {

@@ -96,7 +96,7 @@ describe('counters of the link', () => {
       round_trip_p50_s: 0.00717,
       round_trip_p99_s: 0.0299,
     };
-    expect(linkInWords(counters)).toBe('500 requests, 2 retries, round trip 7.2 ms, 99 % within 30 ms');
+    expect(linkInWords(counters)).toBe('500 requests, retries 2, round trip 7.2 ms, 99 % within 30 ms');
     expect(linkInWords({})).toBe('');
   });
 });

@@ -1,0 +1,49 @@
+import { describe, expect, it } from 'vitest';
+import type { QueueStatus, RobotMessage, ServiceEvent } from '../api/types';
+import { timeOfDay } from '../format';
+import { newestEvents, together, withPauser, withStopper } from './events';
+
+const event = (kind: string, at: string, actor: string | null = 'local'): ServiceEvent =>
+  ({ kind, at, actor }) as ServiceEvent;
+const numbered = (...numbers: number[]): ServiceEvent[] =>
+  numbers.map((number) => ({ number }) as ServiceEvent);
+const you = (name: string): string => (name === 'local' ? 'you' : name);
+const NOON = '2026-11-30T12:00:00Z';
+const LATER = '2026-11-30T12:00:09Z';
+
+it('events are told once, the newest first, however they were learnt', () => {
+  const told = numbered(9, 8, 7, 6);
+  expect(newestEvents(told, numbered(7, 6, 5, 4), 5).map((one) => one.number)).toEqual([9, 8, 7, 6, 5]);
+  expect(newestEvents([], numbered(2, 1), 5)).toHaveLength(2);
+});
+
+it('one press is one row, however often it was sent', () => {
+  expect(together(['stop', 'stop', 'reset', 'stop'], (row) => row)).toEqual([
+    { row: 'stop', times: 2 },
+    { row: 'reset', times: 1 },
+    { row: 'stop', times: 1 },
+  ]);
+});
+
+describe('who stopped the arm or paused the queue', () => {
+  const stopped = { arm: 'stopped', cause: 'on request' } as RobotMessage;
+  const paused = { paused: true, reason: 'prose', since: NOON } as QueueStatus;
+  const stop = `you pressed STOP at ${timeOfDay(NOON)}`;
+
+  it('is named alike at the arm and at the queue', () => {
+    expect(withStopper(stopped, [event('stop', NOON)], you)?.cause).toBe(stop);
+    expect(withPauser(paused, [event('stop', NOON)], you)?.reason).toBe(
+      `${stop}: look at the arm, then resume the queue`,
+    );
+    expect(withPauser(paused, [event('queue', LATER, 'anna')], you)?.reason).toBe(
+      `anna paused it at ${timeOfDay(LATER)}`,
+    );
+  });
+
+  it('is left to the service where nobody did through it', () => {
+    expect(withStopper(stopped, [event('reset', LATER), event('stop', NOON)], you)).toBe(stopped);
+    expect(withStopper({ ...stopped, arm: 'fault' }, [event('stop', NOON)], you)?.cause).toBe('on request');
+    const resumedBefore = event('queue', '2026-11-30T11:59:59Z');
+    expect(withPauser(paused, [event('queue', NOON, null), resumedBefore], you)).toBe(paused);
+  });
+});

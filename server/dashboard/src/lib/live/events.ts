@@ -1,0 +1,67 @@
+/** What happened at the arm and who asked for it, in one wording: events name the caller, the service's prose may not. Pure. */
+
+import type { QueueStatus, RobotMessage, ServiceEvent } from '../api/types';
+import { timeOfDay } from '../format';
+
+/** A name as the person at this page reads it. */
+type Who = (name: string) => string;
+/** ms by which a stop may come before the pause of the queue that it causes. */
+const CAUSED_WITHIN = 5000;
+
+/** The newest first: what was told since, before what was asked for; each once. */
+export function newestEvents(
+  told: readonly ServiceEvent[],
+  asked: readonly ServiceEvent[],
+  most: number,
+): readonly ServiceEvent[] {
+  const known = new Set(asked.map((event) => event.number));
+  return [...told.filter((event) => !known.has(event.number)), ...asked].slice(0, most);
+}
+
+/** Rows that follow one another and say the same, as one: a press of Stop is sent until it is answered. */
+export function together<T>(rows: readonly T[], said: (row: T) => string): { row: T; times: number }[] {
+  const found: { row: T; times: number }[] = [];
+  for (const row of rows) {
+    const last = found.at(-1);
+    if (last !== undefined && said(last.row) === said(row)) last.times += 1;
+    else found.push({ row, times: 1 });
+  }
+  return found;
+}
+
+const pressed = (event: ServiceEvent, who: Who): string =>
+  `${who(event.actor!)} pressed STOP at ${timeOfDay(event.at)}`;
+
+/** The robot, with who stopped it where somebody did by the service. */
+export function withStopper(
+  robot: RobotMessage | null,
+  events: readonly ServiceEvent[],
+  who: Who,
+): RobotMessage | null {
+  if (robot?.arm !== 'stopped') return robot;
+  const last = events.find((event) => event.kind === 'stop' || event.kind === 'reset');
+  return last?.kind === 'stop' && last.actor != null ? { ...robot, cause: pressed(last, who) } : robot;
+}
+
+/** The queue, with who paused or resumed it where somebody did. */
+export function withPauser(
+  queue: QueueStatus | null,
+  events: readonly ServiceEvent[],
+  who: Who,
+): QueueStatus | null {
+  if (queue === null) return null;
+  const since = Date.parse(queue.since);
+  const by = events.find(({ kind, actor, at }) => {
+    const after = Date.parse(at) - since;
+    return actor != null && ((kind === 'queue' && after >= 0) || (kind === 'stop' && after > -CAUSED_WITHIN));
+  });
+  if (by === undefined) return queue;
+  if (by.kind === 'stop')
+    return queue.paused
+      ? { ...queue, reason: `${pressed(by, who)}: look at the arm, then resume the queue` }
+      : queue;
+  return {
+    ...queue,
+    reason: `${who(by.actor!)} ${queue.paused ? 'paused' : 'resumed'} it at ${timeOfDay(by.at)}`,
+  };
+}
