@@ -20,13 +20,15 @@ from model.effects.transmission import TRANSMISSION
 BESIDE = {
     "direction_dependent_gear_loss": "gear_loss",
     "direction_dependent_viscous_friction": "viscous_friction",
+    "quadratic_drag": "viscous_friction",
 }
 """Effects that a diagnosis tries only on joints that already have a certain other effect, unless requested by name.
 
 A gear that loses κ only while its motor drives gives the same torque as one that loses κ/2 both ways with a constant
 K_T (1 − κ/2). Within the tolerance of K_T, that is `gear_loss`: trying both at once would make every gear loss
 ambiguous. Friction in proportion to speed in only one direction is no law of the field. Alone, it imitates a constant
-force plus friction.
+force plus friction. Drag takes the place of viscous friction that it makes superfluous; tried at once, it stood for
+viscous friction on a joint beside one with drag.
 """
 
 _own: dict[str, Effect] = {}
