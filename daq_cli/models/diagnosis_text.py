@@ -163,7 +163,7 @@ def _asked(experiment: NextExperiment) -> str:
 def _value(value: FoundValue) -> str:
     unit = "" if value.unit == "1" else f" {value.unit}"
     if value.low is None or value.high is None:
-        return f"{value.value:.4g}{unit} (not bounded by these traces)"
+        return f"{value.value:.4g}{unit} (no interval)"
     return f"{value.value:.4g}{unit} (95 %: {value.low:.4g} to {value.high:.4g})"
 
 

@@ -23,8 +23,6 @@ class DiagnosisOptions(UserRecord):
     joints: on these joints only; None for all that the model moves.
     most_steps: effects that may be added, one after another.
     method: how model and records are compared; None: as machine and traces allow (`workflow.choose_method`).
-    fitted: candidates per step that are fitted after the probes.
-    polished: how many of the best fits are taken to their ends.
     despite_doubts: compute although a record is doubted; the verdict stays `check-the-record`.
     """
 
@@ -32,8 +30,6 @@ class DiagnosisOptions(UserRecord):
     joints: tuple[int, ...] | None = None
     most_steps: Annotated[int, Field(ge=1, le=10)] = 3
     method: Method | None = None
-    fitted: Annotated[int, Field(ge=1, le=100)] = 8
-    polished: Annotated[int, Field(ge=1, le=100)] = 3
     despite_doubts: bool = False
 
 

@@ -21,8 +21,8 @@ MOST_ROUNDS = 20
 CHANCES = 3
 """Candidates of one ranking that records not fitted to may refuse before the search ends."""
 WITHIN_NOISE = 3.0
-"""Deviations of noise that may be noise alone. Residuals of sound rigs have up to 2.6, where friction turns
-(docs/how-well.md); a pair of rivals that far apart moves the evidence by 9, more than the margin of a name."""
+"""Deviations of noise that may be noise alone. A pair of rivals that far apart moves the evidence by 9, more than the
+margin of a name."""
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ def effect(name: str) -> Effect:
         raise SpecError(f"effect {name}: no longer in the library: {FORMER_EFFECTS[name]}")
     if found is None:
         near = nearest(name, library())
-        raise SpecError(f"effect {name!r:.80}: not in the library{near} (docs/reference/mock-effects.md lists it)")
+        raise SpecError(f"effect {name!r:.80}: not in the library{near}; it has {', '.join(library())}")
     return found
 
 

@@ -32,8 +32,9 @@ def evidence(case: Case, before: Fit, after: Sequence[Fit]) -> list[Told]:
     """Fall of −2 log likelihood of records that no fit has seen, by each of several later fits; above 0 where one
     predicts them better than the fit before.
 
-    Nothing was fitted to these records, so parameters cost nothing here: by the chain rule of probability it adds to
-    the evidence of the fitted records.
+    No parameter of the model was fitted to these records, so none costs anything here. It adds to the evidence of the
+    fitted records as by the chain rule of probability, at the fitted values in place of their whole posterior. What
+    belongs to a record (its start, the phase of a disturbance) is its own on either side.
     """
     if not after or case.held_out is None:
         return [Told(0.0, 0.0) for _ in after]

@@ -193,16 +193,16 @@ def suspect(standing: Standing, found: Findings, recorded: float) -> Suspicion |
 FAR_ABOVE_NOISE = 10.0
 """Residual, in deviations of noise, that is taken for something missing even where no shape of it is found: friction at
 a place, for one, depends on neither position nor direction alone. Sound rigs of other worlds leave up to 2.6, where
-friction turns (docs/how-well.md)."""
+friction turns."""
 
 
 def is_left_beside(standing: Standing) -> bool:
     """Whether far more than noise is left, on fitted and on held-out records, on a joint of an effect that was
     adopted: its name is then not all of the answer."""
-    own = {j for step in standing.steps if step.adopted for j in step.joints}
     joints = standing.model.machine.modelled_joints
+    own = {j for step in standing.adopted for j in step.joints or joints}
     far = noises_left(standing.case, standing.now) > FAR_ABOVE_NOISE
-    return any(is_far and (j in own or not own) for j, is_far in zip(joints, far, strict=True))
+    return any(is_far and j in own for j, is_far in zip(joints, far, strict=True))
 
 
 def noises_left(case: Case, now: Fit) -> Floats:

@@ -70,7 +70,7 @@ def headline(found: Diagnosis) -> str:
         case "unknown-effect":
             findings.append("none of the known effects explains what is left")
         case "partly":
-            findings.append("and more is missing that no known effect explains")
+            findings.append("and more is missing than was named")
     return "; ".join(
         [
             *(findings or ["several effects that these traces cannot tell apart"]),
@@ -99,7 +99,7 @@ def summary(found: Diagnosis) -> str:
             machine = found.model_before.machine
             said += [_undecided(s, found) if s.group else reason_text(s, machine) for s in found.steps if s.adopted]
             if found.remaining or found.verdict == "partly":
-                said.append("Something is left that none of the known effects explains.")
+                said.append("Something is left that these effects do not explain.")
     return " ".join(said)
 
 
@@ -174,7 +174,8 @@ def _unknown(found: Diagnosis) -> list[str]:
     """Why none of the known effects is named, and what a torque that would explain it goes with."""
     where, joints = found.where, found.unexplained_joints
     said = [] if where is None else [_left_on(joints, where) if joints and where.joint is None else where.summary]
-    said.append(sentence(f"no known effect explains it; {what_is_left(found.remaining)}"))
+    shape = f"; {what_is_left(found.remaining)}" if found.method == "inverse-dynamics" else ""
+    said.append(sentence(f"no known effect explains it{shape}"))
     if found.worse_held_out:
         said.append(
             "The fit of the tolerance parameters does not hold on held-out traces, where the error of "
@@ -257,7 +258,7 @@ def best_tried(candidates: Sequence[Candidate], significant: float) -> str:
     """
     fitted, probed = in_order(candidates)
     best = (fitted or probed)[0]
-    count = "The only candidate" if len(candidates) == 1 else f"The best of {len(candidates)} candidates"
+    count = "The only candidate" if len(candidates) == 1 else f"The best of the {len(candidates)} candidates listed"
     named = f"{count}, {effect_on(best.effect, best.joints)},"
     if not fitted:
         return (

@@ -103,7 +103,8 @@ def _size(value: FoundValue, *, several: bool, sliding: bool) -> str:
 
 
 def _removed(share: float) -> str:
-    return f"; it takes {percent_gone(share, 0)} off the mean square on records not fitted to"
+    square = "the mean square on records not fitted to"
+    return f"; {square} grows by {-share:.0%}" if share < 0.0 else f"; it takes {percent_gone(share, 0)} off {square}"
 
 
 def refusal_words(refusal: Refusal) -> str:
