@@ -174,7 +174,8 @@ def _unknown(found: Diagnosis) -> list[str]:
     """Why none of the known effects is named, and what a torque that would explain it goes with."""
     where, joints = found.where, found.unexplained_joints
     said = [] if where is None else [_left_on(joints, where) if joints and where.joint is None else where.summary]
-    shape = f"; {what_is_left(found.remaining)}" if found.method == "inverse-dynamics" else ""
+    looked = found.remaining or found.method == "inverse-dynamics"  # readings are looked at for no shape
+    shape = f"; {what_is_left(found.remaining)}" if looked else ""
     said.append(sentence(f"no known effect explains it{shape}"))
     if found.worse_held_out:
         said.append(

@@ -33,7 +33,7 @@ def test_a_machine_without_inertia_is_refused(daq: CommandLine, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("--effects warp_drive", ("effect 'warp_drive'", "docs/reference/mock-effects.md")),
+        ("--effects warp_drive", ("effect 'warp_drive'", "it has viscous_friction, quadratic_drag, ")),
         ("--effects st", ("effect 'st'", "could be", "stribeck_friction", "stiction")),
         ("--effects viscous:2", ("viscous_friction on joint 2", "[1]")),
         ("--effects payload:1", ("payload", "whole machine")),

@@ -19,10 +19,8 @@ def test_it_names_effect_joint_and_size(answer: Diagnosis) -> None:
 
 def test_it_says_that_a_name_is_a_part_of_the_answer(answer: Diagnosis) -> None:
     part = answer.model_copy(update={"verdict": "partly"})
-    assert headline(part) == (
-        "Coulomb friction on joint 2, 8 N·m (7.8 to 8.2); and more is missing that no known effect explains"
-    )
-    assert summary(part).endswith("Something is left that none of the known effects explains.")
+    assert headline(part) == "Coulomb friction on joint 2, 8 N·m (7.8 to 8.2); and more is missing than was named"
+    assert summary(part).endswith("Something is left that these effects do not explain.")
 
 
 def test_of_a_group_it_names_the_first_and_counts_the_others(answer: Diagnosis) -> None:

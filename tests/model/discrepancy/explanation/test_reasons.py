@@ -157,7 +157,7 @@ def test_what_is_left_is_called_a_shape_only_where_it_is_one() -> None:
 
 
 def test_joints_on_which_more_than_noise_is_left_are_named_where_the_map_names_none(arm: Model) -> None:
-    assert answer(arm).summary.startswith("Joint 2, after reversals: 2.1 ADC counts rms. No known effect explains it; ")
+    assert answer(arm).summary.startswith("Joint 2, after reversals: 2.1 ADC counts rms. No known effect explains it.")
     assert answer(arm, unexplained_joints=(2, 3)).summary.startswith(
         "Joints 2 and 3: more than noise is left. No known"
     )

@@ -81,6 +81,7 @@ def waves(seed: int, rates: tuple[float, ...], size: float) -> Wanted:
 SLIDE = {
     "mass": 12.0,
     "viscous": 0.0,
+    "drag": 0.0,
     "coulomb": 0.0,
     "stribeck": 0.0,
     "stribeck_speed": 0.05,
@@ -122,7 +123,9 @@ def slide_trace(seed: int, hidden: Mapping[str, float], duration: float = 16.0) 
         q, v = y
         u = force(t, q, v)
         way = np.tanh(v / 5e-4)
-        rub = p["viscous"] * v + (p["coulomb"] + p["stribeck"] * np.exp(-abs(v) / p["stribeck_speed"])) * way
+        rub = (p["viscous"] + p["drag"] * abs(v)) * v + (
+            p["coulomb"] + p["stribeck"] * np.exp(-abs(v) / p["stribeck_speed"])
+        ) * way
         rub += p["loss"] * abs(u) * way + p["tight"] * np.exp(-(((q - p["tight_at"]) / p["tight_width"]) ** 2)) * way
         other = -p["spring"] * (q - 0.02) + p["ripple"] * np.sin(p["cycles"] * q)
         other += p["hum"] * np.sin(2 * np.pi * p["hertz"] * t + 0.4)

@@ -152,6 +152,19 @@ def traces(**hidden: float) -> tuple[Trace, Trace]:
     return rigs.slide_trace(1, hidden), rigs.slide_trace(2, hidden)
 
 
+def test_viscous_friction_that_falls_with_speed_is_two_effects_and_partly_one() -> None:
+    """What viscous friction leaves is a function of its own force: another law of speed acts beside it."""
+    both = traces(viscous=60.0, drag=-25.0)
+    found = slide(*both)
+    assert found.verdict == "named", found.summary
+    (drag,) = (step for step in found.steps if step.effect == "quadratic_drag")
+    assert {"viscous_friction", "quadratic_drag"} <= {step.effect for step in found.steps if step.adopted}
+    assert all(step.group == () for step in found.steps)
+    assert drag.parameters["joint1.quadratic_drag.coefficient"].value == pytest.approx(-25.0, rel=0.05)
+    alone = slide(*both, TorqueOptions(effects=("viscous_friction",)))
+    assert (alone.verdict, [step.effect for step in alone.steps if step.adopted]) == ("partly", ["viscous_friction"])
+
+
 @pytest.mark.parametrize(("coulomb", "suspected"), [(0.002, False), (0.014, True)])
 def test_a_suspicion_needs_a_twentieth_of_what_is_left(coulomb: float, suspected: bool) -> None:
     """Both have more evidence than a suspicion asks for: a force so small explains little of what noise leaves."""
