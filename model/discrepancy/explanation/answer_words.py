@@ -259,7 +259,7 @@ def best_tried(candidates: Sequence[Candidate], significant: float) -> str:
     """
     fitted, probed = in_order(candidates)
     best = (fitted or probed)[0]
-    count = "The only candidate" if len(candidates) == 1 else f"The best of the {len(candidates)} candidates listed"
+    count = "The only candidate" if len(candidates) == 1 else f"The best of the {len(candidates)} listed"
     named = f"{count}, {effect_on(best.effect, best.joints)},"
     if not fitted:
         return (

@@ -11,7 +11,7 @@ def tried(evidence: float, **fields: float) -> Candidate:
 def test_a_candidate_is_held_to_the_evidence_that_it_needs_and_not_to_the_most_that_any_needs() -> None:
     said = best_tried([tried(7.0, needed=10.0), tried(-3.0)], 30.0)
     assert said == (
-        "The best of the 2 candidates listed, Coulomb friction on joint 1, has evidence of 7; it would be named from 10."
+        "The best of the 2 listed, Coulomb friction on joint 1, has evidence of 7; it would be named from 10."
     )
     assert best_tried([tried(7.0)], 30.0).endswith("has evidence of 7; an effect is named from 30.")
     above = best_tried([tried(12.0, needed=10.0)], 30.0)
