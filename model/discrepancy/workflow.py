@@ -97,6 +97,7 @@ def diagnose(
     options, cancel, progress = options or DiagnosisOptions(), cancel or Never(), rising(progress)
     check_options(options, model)
     _refuse_shared(traces, holdout)
+    _refuse_foreign(model, (*traces, *holdout))
     progress(0.0, "checking the records")
     found = check_records(model, (*traces, *holdout))
     if doubts_in(found) and not options.despite_doubts:
@@ -145,6 +146,14 @@ def _doubted(
         robot_seconds=float(sum(t.time[-1] - t.time[0] for t in traces if len(t))),
     )
     return with_sentences(answer)
+
+
+def _refuse_foreign(model: Model, traces: Sequence[Trace]) -> None:
+    """Raises SpecError for a trace that names another machine than the model's."""
+    for trace in traces:
+        own = trace.record.machine
+        if own is not None and own.name != model.machine.name:
+            raise SpecError(f"{trace.called}: was made on {own.name}, the model describes {model.machine.name}")
 
 
 def _refuse_shared(traces: Sequence[Trace], holdout: Sequence[Trace]) -> None:
