@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from daq.contracts.joint_text import position_text
 from daq.contracts.limits import Limits
@@ -19,6 +20,15 @@ from daq.contracts.machine import Machine
 from daq.contracts.sample import SampleCount, SampleRow
 from daq.safety.findings import NOTHING, Finding, Verdict, Watched
 from firmware_protocol.commands import StatusFlag
+
+
+class _Away(NamedTuple):
+    """A joint that is `far` (rad, m) from its `goal`. per_count: of its sensor, rad or m."""
+
+    joint: int
+    goal: str
+    far: float
+    per_count: float
 
 
 @dataclass
@@ -45,37 +55,42 @@ class FollowingError:
         findings: tuple[Finding, ...] = ()
         if self.held_since is None:
             self.held_since = row.tick
-            findings = (reason,)
+            findings = (Finding("pause", self._waits(reason), reason.joint),)
         held = (row.tick - self.held_since) * self.watched.period
         longest = self.watched.limits.following_error_time
         if longest is not None and held > longest:
-            why = "something blocks the joint, or its drive or sensor has failed"
-            line = f"{reason.message}. They waited {held:.2f} s, allowed are {longest:g} s: {why}"
+            size, most = self._distances(reason)
+            why = f"something blocks joint {reason.joint}, or its drive or sensor has failed"
+            line = f"{why}: it is {size} from its {reason.goal}, over {most} for {held:.2f} s (allowed: {longest:g} s)"
             return Verdict(hold=True, trips=(line,), findings=findings)
         return Verdict(hold=True, findings=findings)
 
-    def _outside(self, row: SampleRow, limit: int) -> Finding | None:
+    def _outside(self, row: SampleRow, limit: int) -> _Away | None:
         for joint, own, error in zip(self.watched.joints, self.watched.calibrations, row.error, strict=True):
             if abs(round(error / own.rad_per_count)) > limit:
-                return self._waits(joint, "set point", error, own.rad_per_count)
+                return _Away(joint, "set point", error, own.rad_per_count)
         return None
 
-    def _ahead(self, row: SampleRow, planned: Mapping[int, int], limit: int) -> Finding | None:
+    def _ahead(self, row: SampleRow, planned: Mapping[int, int], limit: int) -> _Away | None:
         for joint, own, position in zip(self.watched.joints, self.watched.calibrations, row.position, strict=True):
             if joint not in planned:
                 continue
             ahead = own.posture_to_rad(planned[joint]) - position
             if abs(ahead / own.rad_per_count) > limit:
-                return self._waits(joint, "next set point", ahead, own.rad_per_count)
+                return _Away(joint, "next set point", ahead, own.rad_per_count)
         return None
 
-    def _waits(self, joint: int, goal: str, away: float, count: float) -> Finding:
-        """Returns the pause of set points for a joint that is `away` (rad, m) from where it should be. count: of its
-        sensor, rad or m."""
+    def _distances(self, it: _Away) -> tuple[str, str]:
+        """Returns how far the joint is from where it should be, and how far it may be."""
         limit = self.watched.limits.following_error_counts or 0
-        size, most = (position_text(self.watched.machine, joint, abs(one), 1) for one in (away, limit * count))
-        line = f"joint {joint} is {size} ({abs(away / count):.0f} counts) from its {goal}"
-        return Finding("pause", f"{line}; set points wait while it is more than {most} ({limit}) away", joint)
+        machine, most = self.watched.machine, limit * it.per_count
+        return position_text(machine, it.joint, abs(it.far), 1), position_text(machine, it.joint, abs(most), 1)
+
+    def _waits(self, it: _Away) -> str:
+        size, most = self._distances(it)
+        line = f"joint {it.joint} is {size} ({abs(it.far / it.per_count):.0f} counts) from its {it.goal}"
+        limit = self.watched.limits.following_error_counts
+        return f"{line}; set points wait while it is more than {most} ({limit}) away"
 
 
 LONGEST_SILENCE = 0.2

@@ -86,7 +86,7 @@ def test_a_speed_is_kept_across_gaps_and_never_runs_ahead_of_the_arm() -> None:
     arm = StandIn()
     arm.push = {1: 0.0}
     arm.gain[1] = (0, 0, 0)  # joint 1 does not follow
-    with pytest.raises(TeachingError, match=r"joint 1 is .* from its next set point"):
+    with pytest.raises(TeachingError, match=r"blocks joint 1, .* from its next set point"):
         driven(arm, {1: JOG_SPEED}, held_until=300, periods=300)
     ahead = CALIBRATIONS[0].posture_to_rad(arm.postures[0]) - arm.position[0]
     assert ahead / CALIBRATIONS[0].rad_per_count <= 127
