@@ -16,7 +16,7 @@ const LOOKS: Readonly<Record<ReturnType<typeof homeOf>['screen'], Omit<KioskStat
   running: { tone: 'busy', sign: '◐' },
   waiting: { tone: 'warn', sign: '▲' },
   paused: { tone: 'warn', sign: '▲' },
-  stopped: { tone: 'bad', sign: '■' },
+  stopped: { tone: 'warn', sign: '▲' },
   fault: { tone: 'bad', sign: '■' },
   disconnected: { tone: 'quiet', sign: '○' },
   connecting: { tone: 'quiet', sign: '○' },
