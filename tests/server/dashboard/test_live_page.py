@@ -174,6 +174,10 @@ def test_where_there_is_no_3d_the_arm_is_told_in_words(dashboard: Dashboard) -> 
 def test_the_system_page_tells_health_storage_and_what_happened(dashboard: Dashboard) -> None:
     page = dashboard.open("system")
     expect(page.get_by_role("heading", name="Health")).to_be_visible()
-    expect(page.get_by_role("region", name="Health").get_by_text("ready", exact=True)).to_be_visible()
+    health = page.get_by_role("region", name="Health")
+    expect(health.get_by_text(re.compile("^(ready|look below)$"))).to_be_visible()
+    page.keyboard.press("F8")
+    expect(health.get_by_text("stopped", exact=True)).to_be_visible()
+    expect(health.get_by_text("look below", exact=True)).to_be_visible()  # as its worst row
     expect(page.get_by_text(dashboard.service.client.get("/system").json()["storage"]["traces_folder"])).to_be_visible()
     expect(page.get_by_role("cell", name="connection").first).to_be_visible()
