@@ -10,7 +10,7 @@ const FLAGS: Partial<Record<Kind, { label: string; tone: ChartMarker['tone'] }>>
   reversal: { label: 'reversal', tone: 'plain' },
   gains: { label: 'gains', tone: 'plain' },
   limit: { label: '▲ limit', tone: 'warn' },
-  pause: { label: '▲ pause', tone: 'warn' },
+  pause: { label: '▲ set points wait', tone: 'warn' },
   resume: { label: 'resume', tone: 'plain' },
   restart: { label: '■ restart', tone: 'bad' },
   link_lost: { label: '■ link lost', tone: 'bad' },
