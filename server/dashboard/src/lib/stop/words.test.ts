@@ -6,7 +6,7 @@ const confirmed = { kind: 'confirmed', text: 'its set points are frozen', second
 const lost = { kind: 'not delivered', text: 'nobody answers' } as const;
 
 describe('the message about a stop', () => {
-  it('is green only while it holds', () => {
+  it('is confirmed only while it holds', () => {
     expect(wordsOf(confirmed, 'holds', 'stopped', '12:00:00')).toMatchObject({
       look: 'confirmed',
       head: 'Stopped at 12:00:00, confirmed by the board after 30 ms',
