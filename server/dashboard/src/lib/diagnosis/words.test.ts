@@ -6,8 +6,10 @@ describe('the tone of a verdict', () => {
     expect(toneOfVerdict({ verdict: 'nothing-significant', not_examined: [] })).toBe('good');
   });
 
-  it('is a warning where nothing was found since joints could not be examined', () => {
+  it('is a warning where nothing was found since joints were not examined', () => {
     expect(toneOfVerdict({ verdict: 'nothing-significant', not_examined: [2] })).toBe('warn');
+    const notes_data = [{ kind: 'limited-search', values: { joints: [2] } }] as never;
+    expect(toneOfVerdict({ verdict: 'nothing-significant', not_examined: [], notes_data })).toBe('warn');
   });
 
   it('is that of what was found, whatever could not be examined beside it', () => {

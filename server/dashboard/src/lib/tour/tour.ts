@@ -29,7 +29,7 @@ export const STOPS: readonly Stop[] = [
     about: 'nav a[href="#/traces"]',
   },
   {
-    title: 'Now hide something from me',
+    title: 'Now the mock hides something',
     text: 'The mock changes one thing about the arm and tells nobody. The diagnosis finds it from the motion alone.',
     about: 'a[href="#/diagnosis/hide"]',
   },
