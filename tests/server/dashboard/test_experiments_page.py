@@ -165,6 +165,7 @@ def test_an_experiment_waits_for_its_time_and_one_is_run_every_so_often(dashboar
     form.get_by_role("combobox", name="Unit").select_option("s")
     expect(form.get_by_text("Every: allowed: 10 s to 366 d")).to_be_visible()
     form.get_by_role("combobox", name="Unit").select_option("h")
+    form.get_by_role("textbox", name="Number of runs").fill("10")
     dashboard.service.robot.post("/queue/pause")
     form.get_by_role("button", name="Add the schedule").click()
     row = form.get_by_role("row", name=re.compile("ramp"))
