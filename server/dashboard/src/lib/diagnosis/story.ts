@@ -173,9 +173,7 @@ export function worstMoment(scene: Scene, joints: readonly number[], count: numb
 }
 
 /** The joints to which the search was limited; undefined for all. */
-export function examinedJoints(
-  found: Partial<Pick<DiagnosisData, 'notes_data'>>,
-): readonly number[] | undefined {
+export function examinedJoints(found: Pick<DiagnosisData, 'notes_data'>): readonly number[] | undefined {
   const note = found.notes_data?.find((one) => one.kind === 'limited-search');
   return (note?.values?.joints ?? undefined) as readonly number[] | undefined;
 }

@@ -37,9 +37,7 @@ const TONES: Record<Verdict, Tone> = {
 };
 
 /** The tone of a verdict; nothing found is no good news of joints that were not examined. */
-export function toneOfVerdict(
-  found: Pick<DiagnosisData, 'verdict' | 'not_examined'> & Partial<Pick<DiagnosisData, 'notes_data'>>,
-): Tone {
+export function toneOfVerdict(found: Pick<DiagnosisData, 'verdict' | 'not_examined' | 'notes_data'>): Tone {
   const isPart = (found.not_examined ?? []).length > 0 || examinedJoints(found) !== undefined;
   return found.verdict === 'nothing-significant' && isPart ? 'warn' : TONES[found.verdict];
 }
@@ -51,19 +49,15 @@ export function listed(names: readonly string[], last = 'and'): string {
 }
 
 /** What to do next where no experiment is proposed. */
-export function nothingNext(
-  found: Pick<DiagnosisData, 'verdict' | 'suspicion'> & Partial<Pick<DiagnosisData, 'notes_data'>>,
-): string {
+export function nothingNext(found: Pick<DiagnosisData, 'verdict' | 'suspicion' | 'notes_data'>): string {
   if (found.suspicion) {
     return `Record ${Math.ceil(found.suspicion.seconds)} s more of the same motion: it would show or refute the effect.`;
   }
   if (found.verdict === 'named')
     return 'Nothing: these records leave no doubt. Use the model with the effect.';
-  const examined = examinedJoints(found);
-  if (found.verdict === 'nothing-significant')
-    return examined === undefined
-      ? 'Nothing: the model explains these records.'
-      : `Diagnose the other joints too: the search was limited to joint ${listed(examined.map(String))}.`;
+  if (found.verdict === 'nothing-significant' && examinedJoints(found) !== undefined)
+    return 'Diagnose the other joints too: the search was limited.';
+  if (found.verdict === 'nothing-significant') return 'Nothing: the model explains these records.';
   if (found.verdict === 'check-the-record')
     return 'Check what is doubted about the records, then diagnose again.';
   return 'No experiment is proposed. Look at what is left, and at the candidates, below.';

@@ -45,7 +45,6 @@ export class MacroDesk {
   isWrong = $derived(Object.keys(this.filled.problems).length > 0);
   /** What its lines ask for, and how many of them have been handed over. */
   private orders = $state.raw<MacroReading['orders']>([]);
-  /** How often its form was filled or changed: a check is of the values it began with. */
   private changes = 0;
   sent = $state(0);
   /** How many of them are planned to be repeated. */
@@ -92,7 +91,7 @@ export class MacroDesk {
     this.problem = null;
   }
 
-  /** What was checked or sent with other values is no longer told. */
+  /** What was checked or sent with other values is no longer told, nor is what is being checked. */
   private forget(): void {
     this.changes += 1;
     this.steps = [];
