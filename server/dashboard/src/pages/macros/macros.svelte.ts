@@ -45,6 +45,7 @@ export class MacroDesk {
   isWrong = $derived(Object.keys(this.filled.problems).length > 0);
   /** What its lines ask for, and how many of them have been handed over. */
   private orders = $state.raw<MacroReading['orders']>([]);
+  /** How often values were filled in: a check is of those that it began with. */
   private changes = 0;
   sent = $state(0);
   /** How many of them are planned to be repeated. */
@@ -175,9 +176,9 @@ export class MacroDesk {
     this.done = '';
     await this.during(async () => {
       const { orders } = this;
-      for (const order of orders) {
+      for (const [place, order] of orders.entries()) {
         const told = await submit(order, newKey(), live.wall);
-        this.sent += 1;
+        this.sent = place + 1;
         this.done = orders.length === 1 ? told : `${this.sent} of ${orders.length} were added, in this order`;
       }
     });
