@@ -74,7 +74,7 @@ def describe(fault: Fault) -> dict[str, Any]:
 
 def table() -> str:
     """Returns every fault with its parameters, for `--help-faults`."""
-    lines = []
+    lines = ["--fault stalled_joint:joint=2,start=25; in a port: mock://?seed=7&fault=stalled_joint:joint=2,start=25"]
     for name, kind in FAULTS.items():
         lines.append(f"{name}: {kind.summary()}")
         lines += [

@@ -336,8 +336,7 @@ def _without_words(gap: Gap) -> str:
 def _experiment_with_reason(asked: NextExperiment) -> NextExperiment:
     at = asked.differs_at
     if asked.information is not None:
-        why = f"it excites what these traces do not, and would add {asked.information:.0f} nats of information on the"
-        why += " arm's parameters"
+        why = "it excites what these traces do not, and adds the most information on the arm's parameters"
     elif at is not None:
         on_joint = f"on joint {at.joint} " if at.other_joint else ""
         why = (

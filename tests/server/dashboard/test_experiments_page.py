@@ -59,7 +59,7 @@ def test_a_limit_that_would_be_broken_is_marked_and_nothing_is_sent(dashboard: D
     expect(form.get_by_role("slider", name="Moment of the motion")).not_to_have_value("0")
     assert len(dashboard.service.robot.get("/experiments").json()["items"]) == before
     _amplitude(form).fill("5")
-    expect(form.get_by_text("within all limits")).to_be_visible()
+    expect(form.get_by_text("motion within its limits")).to_be_visible()
     expect(broken).not_to_be_attached()
 
 
@@ -92,7 +92,7 @@ def test_a_preset_fills_the_form_and_can_be_changed_as_text(dashboard: Dashboard
     expect(written.get_by_text(re.compile("trajectory: Input tag 'spiral'"))).to_be_visible()
     dashboard.forgive()  # what is not a specification is a 422, which the browser notes
     text.fill('{"trajectory": {"kind": "cubic", "amplitude": 0.1}, "joints": [2]}')
-    expect(form.get_by_text("within all limits")).to_be_visible()
+    expect(form.get_by_text("motion within its limits")).to_be_visible()
     form.get_by_role("button", name="Edit as text").click()
     expect(form.get_by_role("combobox", name="Motion")).to_have_value("cubic")
     expect(_amplitude(form)).to_have_value("5.72958")
@@ -112,7 +112,7 @@ def test_joints_can_have_amplitudes_starts_and_gains_of_their_own(dashboard: Das
     gain.fill("21")
     expect(gain).to_have_attribute("aria-invalid", "true")
     gain.fill("1")
-    expect(form.get_by_text("within all limits")).to_be_visible()
+    expect(form.get_by_text("motion within its limits")).to_be_visible()
     dashboard.service.robot.post("/queue/pause")
     form.get_by_role("button", name="Add to the queue").click()
     expect(_waiting(form)).to_have_count(1)
@@ -165,6 +165,7 @@ def test_an_experiment_waits_for_its_time_and_one_is_run_every_so_often(dashboar
     form.get_by_role("combobox", name="Unit").select_option("s")
     expect(form.get_by_text("Every: allowed: 10 s to 366 d")).to_be_visible()
     form.get_by_role("combobox", name="Unit").select_option("h")
+    form.get_by_role("textbox", name="Number of runs").fill("10")
     dashboard.service.robot.post("/queue/pause")
     form.get_by_role("button", name="Add the schedule").click()
     row = form.get_by_role("row", name=re.compile("ramp"))
@@ -277,7 +278,7 @@ def test_the_motion_is_told_in_words_where_a_browser_shows_no_3d(form: Page) -> 
 
 def test_it_fits_a_tablet(form: Page) -> None:
     form.set_viewport_size(TABLET)
-    expect(form.get_by_text("within all limits")).to_be_visible()
+    expect(form.get_by_text("motion within its limits")).to_be_visible()
     assert form.evaluate("document.documentElement.scrollWidth <= innerWidth")
     expect(form.get_by_role("button", name="Add to the queue")).to_be_in_viewport()
 
@@ -307,7 +308,7 @@ def test_an_experiment_that_has_ended_is_run_again_by_way_of_the_form(dashboard:
     form.get_by_role("button", name="Add to the queue").click()
     own = form.locator("section", has=form.get_by_role("heading", name="Your run"))
     own.get_by_role("button", name="Back to the preview").click()
-    expect(form.get_by_text("within all limits")).to_be_visible()
+    expect(form.get_by_text("motion within its limits")).to_be_visible()
     again = service.robot.get("/experiments", params={"limit": 1}).json()["items"][0]
     assert again["id"] != first["id"]
     assert again["spec"] == first["spec"]

@@ -17,7 +17,7 @@ def test_a_ramp_is_started_from_the_form_and_its_trace_appears(dashboard: Dashbo
     form.get_by_role("textbox", name="Hold before").fill("0.2")
     form.get_by_role("textbox", name="Hold after").fill("0.2")
     form.get_by_role("textbox", name="Name").fill("from-the-form")
-    expect(form.get_by_text("within all limits")).to_be_visible()
+    expect(form.get_by_text("motion within its limits")).to_be_visible()
     form.get_by_role("button", name="Add to the queue").click()
     own = form.locator("section", has=form.get_by_role("heading", name="Your run"))
     expect(own.get_by_text("done", exact=True)).to_be_visible()

@@ -77,7 +77,12 @@ def test_an_experiment_becomes_a_macro_whose_form_keeps_to_its_bounds(dashboard:
     amplitude.fill("7")
     expect(page.get_by_text(re.compile("allowed: .*6°"))).to_be_visible()
     expect(page.get_by_role("button", name="Add to the queue")).to_be_disabled()
+    amplitude.fill("5")
+    page.get_by_role("button", name="Dry run").click()
+    checked = page.get_by_text("no limit is violated; nothing was sent")
+    expect(checked).to_be_visible()
     amplitude.fill("4")
+    expect(checked).to_have_count(0)
     page.get_by_role("button", name="Add to the queue").click()
     expect(page.get_by_text("2 of 2 were added, in this order")).to_be_visible()
     assert faults_of(page) == []

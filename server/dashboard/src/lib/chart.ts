@@ -22,7 +22,7 @@ export interface ChartSeries {
 export interface ChartMarker {
   x: number;
   label: string;
-  /** `warn`: a limit; `plain`: a ramp begins; `tick`: a short line at the foot, without a name: a retry. */
+  /** `warn`: a limit; `plain`: a ramp begins; `tick`: a diamond at the foot, without a name: a retry. */
   tone?: 'plain' | 'warn' | 'bad' | 'tick';
 }
 
@@ -205,11 +205,17 @@ function drawMarkers(plot: uPlot, drawing: ChartDrawing): void {
       rank: RANKS[tone],
     }));
   for (const { x, tone } of marks) {
-    ctx.strokeStyle = colours[tone];
+    ctx.strokeStyle = ctx.fillStyle = colours[tone];
+    if (tone === 'tick') {
+      // A shape of its own: a stroke would be taken for one of the axis.
+      const [foot, half] = [bbox.top + bbox.height, 4 * ratio];
+      ctx.fill(new Path2D(`M${x - half} ${foot - half}l${half} ${-half} ${half} ${half} ${-half} ${half}z`));
+      continue;
+    }
     ctx.lineWidth = ratio;
     ctx.setLineDash(tone === 'plain' ? [2 * ratio, 3 * ratio] : []);
     ctx.beginPath();
-    ctx.moveTo(x, tone === 'tick' ? bbox.top + bbox.height - 6 * ratio : bbox.top);
+    ctx.moveTo(x, bbox.top);
     ctx.lineTo(x, bbox.top + bbox.height);
     ctx.stroke();
   }
@@ -220,6 +226,8 @@ function drawMarkers(plot: uPlot, drawing: ChartDrawing): void {
     width: (text: string) => ctx.measureText(text).width,
   };
   for (const { left, text, index } of placedFlags(marks, room)) {
+    ctx.fillStyle = drawing.colours.surface; // no curve runs through a name
+    ctx.fillRect(left - ratio, bbox.top + ratio, ctx.measureText(text).width + 2 * ratio, 13 * ratio);
     ctx.fillStyle = colours[marks[index]?.tone ?? 'plain'];
     ctx.fillText(text, left, bbox.top + 2 * ratio);
   }

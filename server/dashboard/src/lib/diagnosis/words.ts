@@ -2,6 +2,7 @@
 
 import type { DiagnosisData, PhaseCell } from '../api/types';
 import type { Tone } from '../jobs/jobs';
+import { examinedJoints } from './story';
 
 export type Phase = PhaseCell['phase'];
 export type Verdict = DiagnosisData['verdict'];
@@ -35,10 +36,10 @@ const TONES: Record<Verdict, Tone> = {
   'check-the-record': 'bad',
 };
 
-/** The tone of a verdict; nothing found is no good news of joints that could not be examined. */
-export function toneOfVerdict(found: Pick<DiagnosisData, 'verdict' | 'not_examined'>): Tone {
-  const nothing = found.verdict === 'nothing-significant';
-  return nothing && (found.not_examined ?? []).length > 0 ? 'warn' : TONES[found.verdict];
+/** The tone of a verdict; nothing found is no good news of joints that were not examined. */
+export function toneOfVerdict(found: Pick<DiagnosisData, 'verdict' | 'not_examined' | 'notes_data'>): Tone {
+  const isPart = (found.not_examined ?? []).length > 0 || examinedJoints(found) !== undefined;
+  return found.verdict === 'nothing-significant' && isPart ? 'warn' : TONES[found.verdict];
 }
 
 /** `a`, `a and b`, `a, b and c`. */
@@ -48,12 +49,14 @@ export function listed(names: readonly string[], last = 'and'): string {
 }
 
 /** What to do next where no experiment is proposed. */
-export function nothingNext(found: Pick<DiagnosisData, 'verdict' | 'suspicion'>): string {
+export function nothingNext(found: Pick<DiagnosisData, 'verdict' | 'suspicion' | 'notes_data'>): string {
   if (found.suspicion) {
     return `Record ${Math.ceil(found.suspicion.seconds)} s more of the same motion: it would show or refute the effect.`;
   }
   if (found.verdict === 'named')
     return 'Nothing: these records leave no doubt. Use the model with the effect.';
+  if (found.verdict === 'nothing-significant' && examinedJoints(found) !== undefined)
+    return 'Diagnose the other joints too: the search was limited.';
   if (found.verdict === 'nothing-significant') return 'Nothing: the model explains these records.';
   if (found.verdict === 'check-the-record')
     return 'Check what is doubted about the records, then diagnose again.';

@@ -30,7 +30,7 @@ export const OUTCOMES: Record<Outcome, { tone: Tone; title: string; text: string
   },
 };
 
-/** The two numbers of a row, in the unit in which people read them. */
+/** The two numbers of a row, in the unit in which people read them; one of the mock's own has no unit, and no match. */
 export function bothNumbers(one: HiddenNumber): { hidden: string; found: string; range: string } {
   const [factor, unit] = one.unit === 'rad' ? [180 / Math.PI, '°'] : [1, one.unit];
   const written = (value: number | null): string =>
@@ -38,7 +38,7 @@ export function bothNumbers(one: HiddenNumber): { hidden: string; found: string;
   const isBounded = one.low !== null && one.high !== null;
   return {
     hidden: written(one.hidden),
-    found: written(one.found) || 'not given',
+    found: written(one.found) || (one.unit === '' ? 'not comparable' : 'not given'),
     range: isBounded ? `95 %: ${significant(one.low! * factor)} to ${written(one.high)}` : '',
   };
 }

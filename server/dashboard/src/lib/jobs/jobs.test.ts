@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Job } from '../api/types';
-import { byRole, isEnded, merged, remaining, toneOf } from './jobs';
+import { byRole, isEnded, merged, toneOf } from './jobs';
 
 const job = (id: string, state: Job['state'], submitted: string, kind = 'fit'): Job =>
   ({ id, state, submitted, request: { kind } }) as unknown as Job;
@@ -45,13 +45,6 @@ describe('jobs', () => {
       true,
       true,
     ]);
-  });
-
-  it('say how long they will take once that is more than a guess', () => {
-    expect(remaining(0.25, 10)).toBe(30);
-    expect(remaining(0.01, 10)).toBeNull();
-    expect(remaining(0.5, 1)).toBeNull();
-    expect(remaining(null, 10)).toBeNull();
   });
 
   it('name their traces by role', () => {

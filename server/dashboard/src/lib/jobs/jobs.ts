@@ -41,12 +41,6 @@ export function toneOf(job: Job): Tone {
   }
 }
 
-/** s that are still to come if it goes on as fast as before; null while that is a guess. */
-export function remaining(fraction: number | null, elapsed: number): number | null {
-  if (fraction === null || fraction < 0.05 || fraction >= 1 || elapsed < 2) return null;
-  return (elapsed / fraction) * (1 - fraction);
-}
-
 /** What fills the form of a diagnosis as it was for a job. */
 export function againQuery({ request }: Job): string {
   const held = 'held_out' in request ? request.held_out : [];

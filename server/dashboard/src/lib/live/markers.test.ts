@@ -41,6 +41,6 @@ it('explains what is unusual, with how often it came and what was said last', ()
   ];
   expect(explanationsOf(events, 0, 5)).toEqual([
     { label: '▲ set points wait', count: 2, text: 'joint 2: positional error of 150 ADC counts' },
-    { label: 'repeated requests', count: 1, text: '2 requests had to be repeated' },
+    { label: '◆ repeated requests', count: 1, text: '2 requests had to be repeated' },
   ]);
 });

@@ -58,7 +58,7 @@ const UNUSUAL: readonly Kind[] = [
   'missing',
   'retry',
 ];
-const TICKS: Partial<Record<Kind, string>> = { missing: 'missing samples', retry: 'repeated requests' };
+const TICKS: Partial<Record<Kind, string>> = { missing: '◆ missing samples', retry: '◆ repeated requests' };
 
 /** The events of something that should not have happened, or held the arm up; repeated requests are left to the link. */
 export function unusualOf(events: readonly RecordEventMessage[]): RecordEventMessage[] {

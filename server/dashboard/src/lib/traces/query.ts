@@ -78,11 +78,14 @@ export function searchOf(
       if (index + whole.length < line.trimEnd().length) problem ||= `${half}: needs its value next to it`;
       continue;
     }
-    if (given.has(named)) problem ||= `${named}: can be given once`;
+    if (given.has(named))
+      problem ||= `${named}: can be given once${named === 'joint' ? '; each row of the list says which other joints moved' : ''}`;
     given.add(named);
     problem ||= taken(search, named, value, joints);
-    if (named === 'effect' && effects.length > 0 && !effects.includes(value))
-      problem ||= `effect: there is no ${value}; the arrow in the line lists those there are`;
+    if (named === 'effect' && effects.length > 0 && !effects.includes(value)) {
+      const near = effects.filter((one) => one.includes(value.toLowerCase())).join(', ');
+      problem ||= `effect: there is no ${value}; ${near ? `there is ${near}` : 'type effect: alone to choose from the list'}`;
+    }
   }
   if (words.length > 0) search.q = words.join(' ');
   return { search, problem };

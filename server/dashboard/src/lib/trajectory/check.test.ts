@@ -127,7 +127,7 @@ describe('what is said of a check', () => {
   const broken: Standing['check'] = { state: 'checked', motion: { violations: ['one', 'two'] } };
 
   it('is good for a checked motion alone', () => {
-    expect(words({})).toEqual(['within all limits', '']);
+    expect(words({})).toEqual(['motion within its limits', '']);
     expect(words({ check: { state: 'checking' } })).toEqual(['checking', 'the motion is being checked']);
     expect(words({ check: broken })).toEqual([
       '2 limits broken',

@@ -89,7 +89,7 @@ export function toldOf({ check, wrong, isConnected }: Standing): Told {
       return { tone: 'warn', text: 'not checked' };
     case 'checked': {
       const broken = check.motion.violations.length;
-      if (broken === 0) return { tone: 'good', text: 'within all limits' };
+      if (broken === 0) return { tone: 'good', text: 'motion within its limits' };
       return { tone: 'bad', text: `${broken} limit${broken > 1 ? 's' : ''} broken` };
     }
   }

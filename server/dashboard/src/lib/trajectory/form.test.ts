@@ -154,7 +154,7 @@ describe('what is wrong with what is typed', () => {
       'trajectory.duration': 'allowed: more than 0, up to 3600 s',
       repeats: 'a whole number is needed',
       hold: 'a number is needed: 0 to 3600 s',
-      name: 'letters and digits, then also . _ and -; no spaces; at most 64',
+      name: 'letters, digits, . _ and - only, no spaces, 64 at most; begin with a letter or a digit',
       joints: 'choose at least one joint',
     });
   });

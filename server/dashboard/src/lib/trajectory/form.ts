@@ -215,7 +215,7 @@ export function specOf(form: SpecForm, rules: SpecRules, slides: Slides = NONE_S
   const trajectory = form.kept ?? trajectoryOf(form, fields, number, slides);
   if (form.joints.length === 0) problems.joints = 'choose at least one joint';
   if (form.name !== '' && !NAME.test(form.name))
-    problems.name = 'letters and digits, then also . _ and -; no spaces; at most 64';
+    problems.name = 'letters, digits, . _ and - only, no spaces, 64 at most; begin with a letter or a digit';
   const spec: Spec = {
     trajectory,
     joints: [...form.joints].sort((one, other) => one - other),

@@ -31,7 +31,7 @@ export class Sending {
   days = $state<number[]>([]);
   every = $state('30');
   unit = $state<Unit>('min');
-  count = $state('10');
+  count = $state('');
   priority = $state('0');
   busy = $state(false);
   problem = $state.raw<Problem | null>(null);

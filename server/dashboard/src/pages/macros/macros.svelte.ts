@@ -45,6 +45,8 @@ export class MacroDesk {
   isWrong = $derived(Object.keys(this.filled.problems).length > 0);
   /** What its lines ask for, and how many of them have been handed over. */
   private orders = $state.raw<MacroReading['orders']>([]);
+  /** How often values were filled in: a check is of those that it began with. */
+  private changes = 0;
   sent = $state(0);
   /** How many of them are planned to be repeated. */
   planned = $derived(this.orders.filter((one) => one.cron !== null).length);
@@ -74,13 +76,28 @@ export class MacroDesk {
     this.revision = revision;
     this.isEdited = false;
     this.typed = {};
-    this.steps = this.orders = [];
-    this.done = '';
+    this.orders = [];
+    this.forget();
     await this.during(async () => {
       const reading = await readDraft(macro);
       this.fields = fieldsOf(reading.parameters);
       this.orders = reading.orders;
     });
+  }
+
+  /** Fills one field. */
+  fill(name: string, value: string): void {
+    this.typed[name] = value;
+    this.forget();
+    this.problem = null;
+  }
+
+  /** What was checked or sent with other values is no longer told, nor is what is being checked. */
+  private forget(): void {
+    this.changes += 1;
+    this.steps = [];
+    this.sent = 0;
+    this.done = '';
   }
 
   /** Edits the macro shown, a copy of it, or a new one. */
@@ -132,8 +149,8 @@ export class MacroDesk {
   /** Has every motion worked out; nothing is sent. Whether all of them are allowed. */
   async check(): Promise<boolean> {
     let isAllowed = false;
-    this.sent = 0;
-    this.done = '';
+    this.forget();
+    const began = this.changes;
     await this.during(async () => {
       const reading = await this.read();
       this.orders = reading.orders;
@@ -145,6 +162,7 @@ export class MacroDesk {
         steps.push({ line: reading.lines[place] ?? '', told, violations });
         seconds += motion.duration;
       }
+      if (began !== this.changes) throw new Error('a value was changed meanwhile; nothing was sent');
       this.steps = steps;
       isAllowed = steps.every((one) => one.violations.length === 0);
       this.done = isAllowed ? `${duration(seconds)} in all; no limit is violated; nothing was sent` : '';
@@ -158,9 +176,9 @@ export class MacroDesk {
     this.done = '';
     await this.during(async () => {
       const { orders } = this;
-      for (const order of orders) {
+      for (const [place, order] of orders.entries()) {
         const told = await submit(order, newKey(), live.wall);
-        this.sent += 1;
+        this.sent = place + 1;
         this.done = orders.length === 1 ? told : `${this.sent} of ${orders.length} were added, in this order`;
       }
     });

@@ -62,10 +62,6 @@ export class Catalogue {
     return () => this.reload.leave();
   }
 
-  clear(): void {
-    this.line = '';
-  }
-
   async more(): Promise<void> {
     this.listing.more(this.items.length);
     await this.load();
