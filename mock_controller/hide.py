@@ -15,23 +15,29 @@ from hashlib import sha256
 from random import Random, SystemRandom
 
 from mock_controller.hidden.arm import HiddenArm, Kind, Load, SecretError, compose_seed, draw_arm
-from mock_controller.hidden.sizes import LATER_SIZES, SHARED_SIZES, SizeRange
+from mock_controller.hidden.sizes import LATER_SIZES, OPEN_SIZES, SHARED_SIZES, SizeRange
+from mock_controller.modifications.registry import is_shared
 
 CLEAR = 0.5
 """Least strength: the upper half of the sizes that blind trials draw, on their logarithmic scale."""
 _NUMBERS = 2**48
 """Number of possible seeds, so large that nobody finds a seed by its seal."""
+KNOWN = {
+    Kind.SINGLE: SHARED_SIZES,
+    Kind.LATER_SINGLE: LATER_SIZES,
+    Kind.OPEN_SET: tuple(size for size in OPEN_SIZES if is_shared(size.effect)),
+}
+"""Effects that those who diagnose know, by the kind of arm that hides them."""
 
 
 def seed_that_hides(random: Random, effect: str | None = None, joint: int | None = None) -> int:
     """Returns a drawn seed whose arm hides only this effect on this joint, clearly. Raises SecretError if no arm
     does."""
-    fitting = [size for size in (*SHARED_SIZES, *LATER_SIZES) if effect in (None, size.effect)]
-    if not any(joint is None or joint in _joints(size) for size in fitting):
+    fitting = [(kind, size) for kind, sizes in KNOWN.items() for size in sizes if effect in (None, size.effect)]
+    if not any(joint is None or joint in _joints(size) for _, size in fitting):
         on = "" if joint is None else f" on joint {joint}"
         raise SecretError(f"effect {effect or 'any'}{on}: cannot be hidden; --list says what can")
-    later = effect in {size.effect for size in LATER_SIZES}
-    kind = Kind.LATER_SINGLE if later else Kind.SINGLE
+    kind = fitting[0][0]
     while True:
         arm = draw_arm(compose_seed(random.randrange(_NUMBERS), kind, Load.NOMINAL))
         if _fits(arm, effect, joint):
@@ -59,7 +65,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--list", action="store_true", help="the effects that can be hidden")
     given = parser.parse_args(arguments)
     if given.list:
-        print(json.dumps(_choices((*SHARED_SIZES, *LATER_SIZES))))
+        print(json.dumps(_choices(size for sizes in KNOWN.values() for size in sizes)))
         return 0
     try:
         seed = seed_that_hides(SystemRandom(), given.effect, given.joint)
