@@ -1,4 +1,4 @@
-"""What a user waits for, by the clock: a start, a first set point, a page of 10⁵ traces; and the memory of an hour.
+"""What a user waits for, by the clock: a start, a first set point, a page of 10⁵ traces; and the memory of hours.
 
 python -m benchmarks waits                     all of it (3 minutes)
 python -m benchmarks waits --only start list   some parts: start, list, memory
@@ -27,7 +27,6 @@ from server.store.engine import Store
 from server.store.tables import TraceRow, TraceTagRow
 
 TRACES = 100_000
-LONGEST = 1.0  # hours of one record
 FIRST = datetime(2024, 1, 1, tzinfo=UTC)
 RARE = "brass bush replaced"
 WORDS = ("belt", "loose", "after", "service", "warm", "cold", "payload", "motor", "noise", "wear", "morning", "check")
@@ -51,9 +50,7 @@ def python(program: str) -> None:
 
 
 def until_driven() -> float:
-    """Time (s) from the start of `daq run ramp` to its first set point, which begins the record. The arm then rests for
-    0.5 s, as the experiment asks.
-    """
+    """Time (s) from the start of `daq run ramp` to its first set point, after which the arm rests for 0.5 s."""
     with tempfile.TemporaryDirectory() as name:
         command, begun = [*COMMAND, "--port", "mock://", "run", "ramp"], time.time()
         subprocess.run(command, cwd=name, env=environment_of(Path(name)), capture_output=True, check=True)
@@ -145,33 +142,30 @@ def resident(process: int) -> float:
     return 1024.0 * int(status.partition("VmRSS:")[2].split()[0])
 
 
-def memory(hours: float) -> Iterator[Figure]:
-    """What service and owner gain while long records are made in lock-step, after the first of them."""
-    count = int(-(-hours // LONGEST))  # rounded up
+def memory(hours: int) -> Iterator[Figure]:
+    """What service and owner gain while records of an hour are made in lock-step, after the first of them."""
     with tempfile.TemporaryDirectory() as name, started_service(Path(name), "mock://?lock_step=1") as service:
         service.ask("POST", "/connect")
-        numbers = [service.submit(sway(3600.0 * hours / count)) for _ in range(count)]
+        numbers = [service.submit(sway(3600.0)) for _ in range(hours)]
         service.until_recording(numbers[0])
         programs = {"service": service.process.pid, "owner": child(service.process.pid, b"server.owner")}
-        sizes: dict[str, list[float]] = {what: [] for what in programs}
-        begun = time.monotonic()
+        each, begun = [], time.monotonic()
         for number in numbers:
             while (found := service.ask("GET", f"/experiments/{number}", params={"wait": 1}))["state"] not in ENDS:
-                now = {what: resident(process) for what, process in programs.items()}
-            for what, size in now.items():
-                sizes[what].append(size)
+                now = {what: resident(process) / 2**20 for what, process in programs.items()}
+            each.append(now)
         told = f"{found['state']}, {3600.0 * hours / (time.monotonic() - begun):.0f} times real time"
-    for what, each in sizes.items():
-        gained, first = each[-1] - each[0], each[0]
-        beside = f"MB after each: {' '.join(f'{size / 2**20:.0f}' for size in each)}; {told}"
-        yield at_most(f"memory gained by the {what} in {hours:g} hours", 100 * gained / first, 2.0, "%", beside)
+    for what in programs:
+        beside = f"MB after each: {' '.join(f'{size[what]:.0f}' for size in each)}; {told}"
+        gained = 100 * (each[-1][what] / each[0][what] - 1)
+        yield at_most(f"memory gained by the {what} in {hours} hours", gained, 2.0, "%", beside)
 
 
 def main() -> int:
     """The exit code: 1 when a target was missed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks waits", description=__doc__)
     parser.add_argument("--times", type=int, default=9, help="repeats of each start; ten times as many questions")
-    parser.add_argument("--hours", type=float, default=1.0, help="length of the records whose memory is measured")
+    parser.add_argument("--hours", type=int, default=2, help="records of an hour whose memory is measured")
     parser.add_argument("--only", nargs="+", choices=("start", "list", "memory"), default=("start", "list", "memory"))
     given = parser.parse_args()
     parts = {"start": start(given.times), "list": lists(10 * given.times), "memory": memory(given.hours)}
