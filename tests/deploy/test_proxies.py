@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 import trustme
-from playwright.sync_api import expect
+from playwright.sync_api import Page, expect
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -178,19 +178,24 @@ def test_the_page_works_below_a_path(behind: Behind) -> None:
     """In a real browser, which refuses what comes from elsewhere: the live stream, links, the reference of the API."""
     resolved = "--host-resolver-rules=MAP lab 127.0.0.1"
     with playwright() as driver, chromium(driver, *WITHOUT_3D, resolved) as browser:
-        page = browser.new_context(ignore_https_errors=True).new_page()
+        window = browser.new_context(ignore_https_errors=True, service_workers="block")  # asks for a real certificate
         complaints: list[str] = []
-        page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
-        page.on("requestfailed", lambda failed: complaints.append(failed.url))
         root = f"https://lab:{behind.port}/arm"
-        page.on(
-            "request", lambda asked: None if asked.url.startswith((root, "data:")) else complaints.append(asked.url)
-        )
-        page.add_init_script(f"sessionStorage.setItem('ma2000-token', '{behind.token}')")
+
+        def watch(page: Page) -> None:
+            page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+            page.on("requestfailed", lambda failed: complaints.append(failed.url))
+            page.on("request", lambda r: None if r.url.startswith((root, "data:")) else complaints.append(r.url))
+
+        window.on("page", watch)
+        window.add_init_script(f"sessionStorage.setItem('ma2000-token', '{behind.token}')")
+        page = window.new_page()
         page.goto(root)
         expect(page.get_by_role("banner").get_by_text(LIVE)).to_be_visible()
         page.goto(f"{root}/#/system")
-        page.get_by_role("link", name="API reference").click()
+        with window.expect_page() as opened:
+            page.get_by_role("link", name="API reference").click()
+        page = opened.value
         expect(page.get_by_text("Lists the robots", exact=False).or_(page.get_by_text("robots").first)).to_be_visible()
         page.get_by_role("link", name="Dashboard").click()
         expect(page).to_have_url(f"{root}/")
