@@ -135,7 +135,7 @@ def test_a_stop_in_the_moment_of_the_end_is_not_taken_for_a_good_end(arm: Watche
         arm.control.stop("on request, by STOP on the page or daq stop")
         return True
 
-    with pytest.raises(StoppedError, match="through the service; the board confirmed: set points are frozen"):
+    with pytest.raises(StoppedError, match="or daq stop; the board confirmed: set points are frozen"):
         jog(arm, MA2000, MA2000.limits, lambda _row: None, ended, print)
     with pytest.raises(StoppedError):
         arm.set_points({1: 600})
