@@ -23,7 +23,6 @@ END_WITHIN = 15.0
 LONGEST_START = 90.0
 """Time (s) within which a queued experiment is being recorded, including its move to the start."""
 ENDS = ("done", "failed", "cancelled", "interrupted")
-MOST_CYCLES = 1000  # of a sine, in the contract of an experiment: that of a long record is slower
 COMMAND = (sys.executable, "-c", "from daq_cli import main; main()")
 
 
@@ -114,8 +113,7 @@ def ramp(amplitude: float = 0.1, duration: float = 0.5) -> dict[str, Any]:
 
 def sway(seconds: float) -> dict[str, Any]:
     """Returns an experiment that keeps three joints moving."""
-    period = max(4.0, seconds / MOST_CYCLES)
-    trajectory = {"kind": "sine", "amplitude": 0.1, "period": period, "cycles": seconds / period}
+    trajectory = {"kind": "sine", "amplitude": 0.1, "period": 4.0, "cycles": seconds / 4.0}
     return {"trajectory": trajectory, "joints": [1, 2, 3], "settle": 0.2, "hold": 0.2}
 
 

@@ -27,8 +27,8 @@ BESIDE = {
 A gear that loses κ only while its motor drives gives the same torque as one that loses κ/2 both ways with a constant
 K_T (1 − κ/2). Within the tolerance of K_T, that is `gear_loss`: trying both at once would make every gear loss
 ambiguous. Friction in proportion to speed in only one direction is no law of the field. Alone, it imitates a constant
-force plus friction. Drag takes the place of viscous friction that it makes superfluous; tried at once, it stood for
-viscous friction on a joint beside one with drag.
+force plus friction. Drag nearly always acts beside viscous friction. Where it acts alone, it makes the viscous friction
+superfluous that was found before it.
 """
 
 _own: dict[str, Effect] = {}

@@ -35,7 +35,7 @@ def answer_of(
 
     Args:
         proved: steps that need no fit. traces, held_out: those that were fitted to, and that were not. doubted: whether
-            more is left than there is.
+            more is left than there is, or what is left has the form of an effect that was added.
     """
     standing, case = work.found, work.case
     named = bool(standing.adopted)
