@@ -40,7 +40,7 @@ def filmed(page: Page, effect: str | None, joint: int | None) -> list[Image.Imag
     """Plays one demonstration, and returns its pictures. Raises TimeoutError where no secret is opened."""
     pictures = [_picture(page)]
     if effect is not None:
-        page.get_by_text("Pick the effect yourself").click()
+        page.get_by_text("Choose yourself what is hidden").click()
         page.get_by_role("combobox", name="Effect").select_option(effect)
         page.get_by_role("combobox", name="Joint").select_option("" if joint is None else str(joint))
         pictures += [_picture(page)] * 3
