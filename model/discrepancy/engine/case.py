@@ -14,7 +14,7 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import Candidate, RemainingShape, Step, Where
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.fitting import Fit, evaluate, fit
-from model.discrepancy.engine.priors import strain
+from model.discrepancy.engine.priors import prior_distance
 from model.discrepancy.engine.probing import Probe, Projection, Start, Trial
 from model.discrepancy.engine.residual import Residual, Signals, Values
 from model.discrepancy.grounds import Method
@@ -31,9 +31,14 @@ def expected_values(now: Fit) -> dict[str, float]:
     return {**now.values, **{u.name: u.expected for u in now.unknowns if u.deviation is not None}}
 
 
+def far_off(now: Fit) -> list[Unknown]:
+    """Numbers far from what is expected of them: what is missing has driven them off."""
+    return [u for u in now.unknowns if abs(prior_distance(u, now.values[u.name])[0]) > FAR_OFF]
+
+
 def is_strained(now: Fit) -> bool:
-    """Whether a number is far from what is expected of it: what is missing has driven it off."""
-    return strain(now.unknowns, now.values) > FAR_OFF
+    """Whether there is such a number."""
+    return bool(far_off(now))
 
 
 Watch = Callable[[tuple[Candidate, ...]], None]

@@ -12,18 +12,16 @@ from daq.contracts.progress import Cancel, Progress, stop_if
 from model.arrays import Floats
 from model.discrepancy.diagnosis import Candidate
 from model.discrepancy.engine.candidate import Fitted
-from model.discrepancy.engine.case import Case, is_strained
+from model.discrepancy.engine.case import Case, far_off, is_strained
 from model.discrepancy.engine.fitting import LONG, Fit, Slopes, evaluate, fit, start_values
 from model.discrepancy.engine.priors import free_unknown
-from model.discrepancy.engine.probing import Probe, Start, Trial, projection
+from model.discrepancy.engine.probing import Probe, Projection, Start, Trial, projection
 from model.discrepancy.thresholds import LARGER_PART, THRESHOLDS
 from model.effects.names import effect_on
 from model.fitting.unknowns import Unknown
 
 SHORTLIST = 7
-"""Most effects that are fitted after probing."""
-RESTARTED = 4
-"""Most candidates that are begun from what the file states as well."""
+"""Most effects that are fitted after probing, and most that are begun from other numbers as well."""
 REFINED = 6
 """Most candidates that are fitted with derivatives of their own."""
 OF_A_JOINT = 3
@@ -176,12 +174,13 @@ class _Search:
         now, case = self.now, self.case
         if not math.isfinite(there.cost):
             return list(found)
-        clear = projection(there.with_slopes())
+        clear, alike = self._at_numbers_of(there), there.compared is now.compared
+        known = there.slopes() if alike else {}
         done = {(f.effect, f.joints) for f in found if f.ended and not is_strained(f.fit)}
         best: dict[tuple[str, tuple[int, ...]], Probe] = {}
         for probe in sorted((clear.probe(t) for t in tried if not t.stated), key=lambda p: -p.gain):
             place = probe.trial.effect, probe.trial.joints
-            if len(best) < RESTARTED and place not in done:
+            if len(best) < SHORTLIST and place not in done:
                 best.setdefault(place, probe)
         every = list(found)
         for probe in best.values():
@@ -193,12 +192,21 @@ class _Search:
             begin = _nearest(
                 [{**there.values, **start} for start in (probe.start, *trial.starts)], there, trial, unknowns
             )
-            if there.compared is now.compared:
-                fitted = fit(compared, unknowns, begin, now.memory, clear.now.known, goal=goal)
+            if alike:
+                fitted = fit(compared, unknowns, begin, now.memory, known, goal=goal)
             else:
                 fitted = case.from_expected(compared, unknowns, begin, now.memory, goal)
             every.append(Fitted(trial.effect, trial.joints, trial.model, trial.parameters, fitted, trial.places))
         return best_of_each(self.weigh(every))
+
+    def _at_numbers_of(self, there: Fit) -> Projection:
+        """What is left for an effect where the numbers that the fit has far off are as in another one, and stay so: an
+        effect that they imitate explains nothing beside them. By the fit's own derivatives, which follow the record."""
+        now = self.now
+        far = {u.name for u in far_off(now)}
+        row = now.row + sum((there.values[name] - now.values[name]) * self.slopes[name] for name in far)
+        near = tuple(u for u in now.unknowns if u.name not in far)
+        return projection(replace(now, unknowns=near, row=row, known={u.name: self.slopes[u.name] for u in near}))
 
     def narrowed(self, found: Sequence[Fitted]) -> list[Fitted]:
         """The candidates, with each that stands beside the same effect on more joints fitted from where that is, too:
