@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from daq.contracts.machine import Machine
 from model.arrays import Floats
 from model.discrepancy.diagnosis import Step, Suspicion
 from model.discrepancy.engine import holdout
@@ -47,7 +48,8 @@ class Comparison:
     @property
     def removed(self) -> float:
         """Share of the mean square that is gone on records not fitted to."""
-        return holdout.share_removed(self.reference.squares, self.chosen.fit.squares, self.before, self.after)
+        fitted = _of_own(self.reference.model.machine, self.chosen, self.reference.squares)
+        return holdout.share_removed(fitted, self.chosen.fit.squares, self.before, self.after)
 
 
 def compare(standing: Standing, chosen: Fitted) -> Comparison | None:
@@ -95,8 +97,9 @@ def share_of_rest(standing: Standing, step: Step) -> float:
     case, now = standing.case, standing.now
     stated = [p for name, p in standing.stated.items() if name in step.parameters]
     reference = _reference(standing.remove(step), now.values, stated)
-    fitted = [f.squares for f in (reference, now)]
-    own = fitted[1] < (1 - holdout.AFFECTED) * fitted[0]
+    fitted = [_of_own(standing.model.machine, step, reference.squares), now.squares]
+    with np.errstate(invalid="ignore"):
+        own = fitted[1] < (1 - holdout.AFFECTED) * fitted[0]
     before, after = (holdout.squares_unseen(case, f) for f in (reference, now))
     seen = own & (before > 0.0) & np.isfinite(after)
     noise = case.noise
@@ -119,10 +122,17 @@ def _is_beyond_noise(standing: Standing, chosen: Fitted, fell: Floats, left: Flo
     Args:
         fell, left: mean squares (n,) without and with the candidate. noise: (n,) standard deviation of noise.
     """
-    if chosen.joints and find_named_effect(chosen.effect).shared_name.acts_on == "joint torque":
-        elsewhere = np.array([j not in chosen.joints for j in standing.model.machine.modelled_joints])
-        fell = np.where(elsewhere, np.nan, fell)
-    return holdout.is_beyond_noise(fell, left, noise * (1.0 + standing.case.noise_error))
+    own = _of_own(standing.model.machine, chosen, fell)
+    return holdout.is_beyond_noise(own, left, noise * (1.0 + standing.case.noise_error))
+
+
+def _of_own(machine: Machine, one: Fitted | Step, squares: Floats) -> Floats:
+    """(n,) mean squares of the joints on which an effect acts, NaN elsewhere: what other joints leave moves with the
+    numbers of the machine. A weight or a sensor acts on other joints, too."""
+    if not one.joints or one.effect is None or find_named_effect(one.effect).shared_name.acts_on in ("load", "sensor"):
+        return squares
+    columns = np.isin(machine.modelled_joints, one.joints)
+    return np.where(columns, squares, np.nan)
 
 
 def judge(standing: Standing, chosen: Fitted, refused: Sequence[Fitted]) -> Comparison | None:
