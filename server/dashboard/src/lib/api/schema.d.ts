@@ -5063,7 +5063,7 @@ export interface components {
              * Outcome
              * @enum {string}
              */
-            outcome: "named" | "among" | "joint" | "missed" | "wrong";
+            outcome: "named" | "among" | "joint" | "missed" | "wrong" | "cancelled";
         };
         /**
          * OutputRequest
