@@ -37,8 +37,7 @@ from server.services import Services
 from server.steady import keep_steady, most_connections
 from server.stopping.door import StopDoor
 from server.stopping.messages import Begin, Stopped
-from server.store.address import address_of
-from server.store.lock import sole_use, sqlite_file
+from server.store.lock import sole_use
 
 END_WITHIN = 4.2
 """Time (s) from the signal to the end of this process."""
@@ -142,7 +141,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     """Serves until a signal comes. Calls `ready` with the address. Raises ReachError, SpecError."""
     section = settings.server
     with (
-        sole_use(address_of(section)),
+        sole_use(section.database),
         listening(section) as (listener, beside),
         # The listener's process starts first, gets ready in parallel, and ends whenever this process ends.
         closing(StopDoor(beside, _begin(settings, listener))) as door,
@@ -230,7 +229,6 @@ def _is_open_here(section: ServiceSettings) -> bool:
 def _begin(settings: Settings, listener: socket.socket) -> Begin:
     """Returns the first message to the stop listener."""
     section = settings.server
-    database = address_of(section)
     return Begin(
         descriptor=-1,  # the door sets it
         service_port=listener.getsockname()[1],
@@ -238,8 +236,7 @@ def _begin(settings: Settings, listener: socket.socket) -> Begin:
         names=tuple(name.lower() for name in section.names),
         cookie=session_cookie(section.address),
         urls={own.robot.name: own.port for own in settings.each_robot()},
-        database_url=database.render_as_string(hide_password=False),
-        sqlite=sqlite_file(database),
+        database=section.database,
     )
 
 

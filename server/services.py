@@ -59,7 +59,6 @@ from server.robot.robot import Robot, RobotPlace
 from server.robot.stop import StopService
 from server.robot.teaching import TeachingService
 from server.robot_services import RobotServices, robot_named
-from server.store.address import address_of
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
@@ -117,7 +116,7 @@ class Services:
         self.clock = clock or SystemClock()
         self.closed = False
         """Whether `close` has finished."""
-        self.store = Store(address_of(settings.server))
+        self.store = Store(settings.server.database)
         self.store.migrate()
         self.store.require_sound()
         self.experiments = ExperimentStore(self.store)

@@ -62,8 +62,6 @@ class ServiceSettings(FrozenRecord):
     """Port of the stop listener; None for the one after `port`, 0 for any free one."""
     folder: Path = Path("service")
     """Folder of the database, the models and the jobs' results."""
-    database: str | None = None
-    """URL of the database; None for a SQLite file in `folder`."""
     connect_at_start: bool = True
     """Whether the service connects to the robot when it starts; connecting moves nothing."""
     unattended: TrueOrFalse = False
@@ -87,6 +85,11 @@ class ServiceSettings(FrozenRecord):
     @classmethod
     def _is_protected(cls, address: str | None) -> str | None:
         return protected(address)
+
+    @property
+    def database(self) -> Path:
+        """The file of the database."""
+        return self.folder.absolute() / "service.sqlite"
 
     @field_validator("folder")
     @classmethod

@@ -24,9 +24,7 @@ class Begin(FrozenRecord):
     cookie: str
     """Name of the cookie of signed-in people."""
     urls: dict[str, str]
-    database_url: str
-    sqlite: Path | None
-    """The database's file, if it is a SQLite database."""
+    database: Path
     tokens: dict[str, tuple[str, Role]] | None = None
     """Name and role of each valid token, by its digest; None while the service has not read them."""
 

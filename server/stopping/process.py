@@ -124,7 +124,7 @@ def main() -> int:
     begin = ORDER.validate_json(first)
     assert isinstance(begin, Begin)
     robots = Robots(begin.urls)
-    tokens = StopTokens(reader_of(begin.database_url, begin.sqlite), _callers(begin.tokens))
+    tokens = StopTokens(reader_of(begin.database), _callers(begin.tokens))
     gate = StopGate(tokens, begin.open_on_loopback, begin.names, begin.service_port, begin.cookie)
     teller = Teller(sys.stdout.fileno())
 

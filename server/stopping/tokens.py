@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -144,15 +143,13 @@ class StopTokens:
                 self._changed.notify_all()
 
 
-def reader_of(database_url: str, sqlite: Path | None) -> Callable[[], Callers]:
-    """Returns a function that reads all tokens: from a SQLite file by the standard library, from other databases by
-    their plug-in."""
-    read_both = partial(_of_file, sqlite) if sqlite is not None else _of_database(database_url)
+def reader_of(file: Path) -> Callable[[], Callers]:
+    """Returns a function that reads all tokens from the database's file, by the standard library."""
     last: Callers = {}
 
     def read() -> Callers:
         nonlocal last
-        tokens, sessions = read_both()
+        tokens, sessions = _of_file(file)
         last = last if sessions is None else sessions  # like tokens, the last known sessions stay valid
         return tokens | last
 
@@ -180,12 +177,3 @@ def _of_file(file: Path) -> tuple[Callers, Callers | None]:
 def callers_of(rows: Iterable[Sequence[Any]]) -> Callers:
     """Returns the callers in rows of digest, name and role."""
     return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
-
-
-def _of_database(url: str) -> Callable[[], tuple[Callers, Callers | None]]:
-    from server.store.databases import database_of
-
-    read: Callable[[], tuple[Callers, Callers | None]] = database_of(url.partition(":")[0].partition("+")[0]).reader(
-        url
-    )
-    return read

@@ -67,7 +67,6 @@ class StorageStatus(Wire):
     """Size of the disk of the traces (bytes)."""
     traces: int
     """Number of traces in the catalogue."""
-    database: str
     database_size: int | None
 
 
@@ -79,7 +78,7 @@ class SystemStatus(Wire):
     """Time (s) since the service started."""
     storage: StorageStatus
     warnings: tuple[str, ...] = ()
-    """Things that will soon need a person, one line each: a disk that fills, an archive that cannot be reached."""
+    """Things that will soon need a person, one line each: a disk that fills."""
     live_clients: int
     live_dropped: int
     jobs_at_once: int

@@ -32,7 +32,6 @@ from server.parts import Part
 from server.problems import PROBLEMS
 from server.routes import Router
 from server.services import Services
-from server.store.address import address_of, masked
 
 STARTED = "start_service"
 
@@ -65,9 +64,6 @@ def _digests(settings: Settings) -> dict[str, str]:
             said: Any = value.digested()
         else:
             said = value.model_dump(mode="json") if isinstance(value, BaseModel) else value
-        if name == "server":
-            # Without its password, which somebody could guess and verify by the digest.
-            said |= {"database": masked(address_of(settings.server))}
         text = json.dumps(said, sort_keys=True, default=_plain)
         found[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
     return found

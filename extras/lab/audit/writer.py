@@ -18,11 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import ValidationError
-from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.audit import AuditNote
 from extras.lab.audit.log import AuditLog
-from server.database_errors import is_value, one_line
+from server.database_errors import one_line
 
 COUNTED_FOR = 60.0
 """Time (s) for which repeated requests are counted before a row states their number."""
@@ -215,15 +214,7 @@ class AuditWriter:
         return True
 
     def _append(self, notes: Sequence[AuditNote]) -> None:
-        try:
-            head = self._audit.append(notes)
-        except DatabaseError as error:
-            if not is_value(error):
-                raise
-            # One of them has content that this database cannot hold. It must not block the others.
-            for note in notes:
-                log.warning("audit: a row without its words: %s", note.model_dump_json(exclude_none=True))
-            head = self._audit.append([note.model_copy(update=_WITHOUT_WORDS) for note in notes])
+        head = self._audit.append(notes)
         self.written += len(notes)
         log.debug("audit: %s", head)
 

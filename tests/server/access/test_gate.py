@@ -157,7 +157,7 @@ def test_an_old_cookie_delays_no_stop_that_needs_no_token(store: Store) -> None:
 
 
 def test_an_old_cookie_refuses_no_stop_while_the_database_cannot_be_read(tmp_path: Path) -> None:
-    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")  # without tables
+    store = Store(tmp_path / "service.sqlite")  # without tables
     gate = _gate(KnownTokens(TokenStore(store), HandClock()))
     headers = {"cookie": "daq-session=old", "origin": "http://127.0.0.1:8300"}
     assert Request("POST", f"{ROBOT}/stop", headers=headers).through(gate).status == 200

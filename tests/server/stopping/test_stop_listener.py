@@ -179,7 +179,7 @@ def _beside(service: Service) -> str:
 def listener_of(folder: Path, stops: dict[str, Stop], told: OnStop) -> Iterator[Any]:
     """A listener without a service, of robots that are stopped so. Its address."""
     with (
-        closing(Store(f"sqlite:///{folder / 'service.sqlite'}")) as store,
+        closing(Store(folder / "service.sqlite")) as store,
         socket.create_server(("127.0.0.1", 0)) as door,
         closing(StopListener(door, StopGate(KnownTokens(TokenStore(store), HandClock()), True, (), 8300), stops, told)),
     ):
@@ -369,7 +369,7 @@ def test_no_stop_with_a_known_token_waits_for_a_database_that_does_not_answer() 
 
 def test_an_old_cookie_refuses_no_stop_that_needs_no_token(tmp_path: Path) -> None:
     stale = {"host": "127.0.0.1:8301", "cookie": "daq-session=old", "origin": "http://127.0.0.1:8300"}
-    with closing(StopTokens(reader_of("sqlite://", tmp_path / "none.sqlite"))) as unread:
+    with closing(StopTokens(reader_of(tmp_path / "none.sqlite"))) as unread:
         assert StopGate(unread, True, (), 8300).admit(stale) == LOCAL
         with pytest.raises(TokensCannotBeReadError):
             StopGate(unread, False, (), 8300).admit(stale)
@@ -388,8 +388,7 @@ def _door(
         names=(),
         cookie="daq-session",
         urls={"ma2000": "mock://"},
-        database_url="sqlite://",
-        sqlite=folder / "none.sqlite",
+        database=folder / "none.sqlite",
     )
     with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, begin, *times)) as door:
         address = f"http://127.0.0.1:{listener.getsockname()[1]}/api/v1/robots/ma2000/stop"

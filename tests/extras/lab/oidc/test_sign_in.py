@@ -241,7 +241,7 @@ def test_refused_sign_ins_and_sign_outs_by_command_have_rows(provider: Provider,
         assert browser.back(f"{service.url}/api/v1/login/callback?state=unknown") == "/?sign-in=sign-in-unknown"
         assert _rows(service, "finish_login") == [("refused", "sign-in-unknown")]
         browser.sign_in(provider)
-        with closing(Store(f"sqlite:///{service.folder / 'service' / 'service.sqlite'}")) as store:
+        with closing(Store(service.folder / "service" / "service.sqlite")) as store:
             now = datetime.now(UTC)
             assert SessionStore(store).end_all("anna", now, "root") == 1
             assert SessionStore(store).end_all("anna", now, "root") == 0

@@ -1337,70 +1337,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/robots/{robot}/archive": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Archive
-         * @description Returns whether the archive answers, and the traces that wait for it.
-         */
-        get: operations["get_archive"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/robots/{robot}/traces/{trace}/archive": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Trace Archive
-         * @description Returns where a trace is, and the progress of its transfer.
-         */
-        get: operations["get_trace_archive"];
-        put?: never;
-        /**
-         * Archive Trace
-         * @description Sends a trace to the archive now; with `drop`, its local copy is deleted afterwards.
-         */
-        post: operations["archive_trace"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/robots/{robot}/traces/{trace}/fetch": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Fetch Trace
-         * @description Fetches a trace that only the archive has, as opening it does; returns the progress.
-         */
-        post: operations["fetch_trace"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/v1/audit": {
         parameters: {
             query?: never;
@@ -1950,46 +1886,6 @@ export interface components {
             content: string;
         };
         /**
-         * ArchiveOrder
-         * @description Requests that a trace is archived now. `drop`: then delete the local copy, whatever the policy is.
-         */
-        ArchiveOrder: {
-            /**
-             * Drop
-             * @default false
-             */
-            drop?: boolean;
-        };
-        /**
-         * ArchiveStatus
-         * @description State of the archive.
-         */
-        ArchiveStatus: {
-            /** Place */
-            place: string;
-            /**
-             * State
-             * @enum {string}
-             */
-            state: "ok" | "away" | "refused";
-            /** Problem */
-            problem: string;
-            /** Since */
-            since: string | null;
-            /** Next Try */
-            next_try: number | null;
-            /** Archived */
-            archived: number;
-            /** Waiting */
-            waiting: number;
-            /** Fetching */
-            fetching: number;
-            /** Local Bytes */
-            local_bytes: number;
-            /** Local Limit */
-            local_limit: number | null;
-        };
-        /**
          * ArmComparison
          * @description A robot's fits to one experiment, the oldest first, and the changes from `reference` to the newest.
          *
@@ -2242,16 +2138,6 @@ export interface components {
              * @default false
              */
             missing?: boolean;
-            /**
-             * Archived
-             * @default false
-             */
-            archived?: boolean;
-            /**
-             * Local
-             * @default true
-             */
-            local?: boolean;
         };
         /**
          * Combination
@@ -2577,19 +2463,13 @@ export interface components {
             waiting: number;
             /** Sent */
             sent: number;
-            /** Failed */
-            failed: number;
             /** Given Up */
             given_up: number;
-            /** Last Sent */
-            last_sent?: string | null;
             /**
              * Problem
              * @default
              */
             problem?: string;
-            /** Next Attempt */
-            next_attempt?: string | null;
         };
         /**
          * DiagnoseRequest
@@ -6587,8 +6467,6 @@ export interface components {
             traces_size: number;
             /** Traces */
             traces: number;
-            /** Database */
-            database: string;
             /** Database Size */
             database_size: number | null;
         };
@@ -6806,25 +6684,6 @@ export interface components {
             joints: components["schemas"]["JointAgreement"][];
         };
         /**
-         * TraceArchive
-         * @description Where a trace is stored, and its transfer if there is one.
-         */
-        TraceArchive: {
-            /** Id */
-            id: string;
-            /** Local */
-            local: boolean;
-            /** Archived */
-            archived: string | null;
-            /** Checked */
-            checked: string | null;
-            /** Size */
-            size: number | null;
-            /** Sha256 */
-            sha256: string | null;
-            transfer: components["schemas"]["Transfer"] | null;
-        };
-        /**
          * TraceChange
          * @description New tags or notes; fields that are None stay unchanged.
          */
@@ -7006,31 +6865,6 @@ export interface components {
             rms: number;
             /** Largest */
             largest: number;
-        };
-        /**
-         * Transfer
-         * @description A transfer of a trace between this computer and the archive.
-         */
-        Transfer: {
-            /**
-             * Direction
-             * @enum {string}
-             */
-            direction: "send" | "fetch";
-            /**
-             * State
-             * @enum {string}
-             */
-            state: "waiting" | "moving" | "failed";
-            /** Done */
-            done: number;
-            /** Total */
-            total: number;
-            /**
-             * Problem
-             * @default
-             */
-            problem?: string;
         };
         /**
          * TriedEffect
@@ -9441,105 +9275,6 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["SystemStatus"];
-                };
-            };
-        };
-    };
-    get_archive: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ArchiveStatus"];
-                };
-            };
-        };
-    };
-    get_trace_archive: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                trace: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["TraceArchive"];
-                };
-            };
-        };
-    };
-    archive_trace: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                trace: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: {
-            content: {
-                "application/json": components["schemas"]["ArchiveOrder"];
-            };
-        };
-        responses: {
-            /** @description Successful Response */
-            202: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["TraceArchive"];
-                };
-            };
-        };
-    };
-    fetch_trace: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                trace: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            202: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["TraceArchive"];
                 };
             };
         };
