@@ -73,19 +73,13 @@ def _plain(value: object) -> object:
     return value.model_dump(mode="json") if isinstance(value, BaseModel) else str(value)
 
 
-KEPT = "audit-waiting.jsonl"
-"""File of the rows that could not be written before the service ended."""
-KEEPING = 0.6
-"""Share of the time for shutdown that is reserved for saving unwritten rows to that file."""
-
-
 class AuditPart(Part, Collector):
     """Writes rows, and reports the number of waiting ones to Prometheus."""
 
     def __init__(self, services: Services) -> None:
         self._services = services
         self.log = AuditLog(services.store)
-        self.writer = AuditWriter(self.log, services.folder / KEPT)
+        self.writer = AuditWriter(self.log)
 
     def robots_made(self, robots: Sequence[Any]) -> None:
         """Notes the start, and changes of the configuration."""
@@ -106,7 +100,7 @@ class AuditPart(Part, Collector):
 
     def close(self, seconds: float) -> None:
         """Writes the last rows."""
-        self.writer.close(seconds * (1 - KEEPING))
+        self.writer.close(seconds)
 
     def describe(self) -> Iterable[Metric]:
         """Returns nothing: values are computed when Prometheus requests them."""
@@ -145,7 +139,7 @@ def list_audit(
 ) -> Page[AuditEntry]:
     """Lists who requested which change, from where, and its outcome, the newest first. Needs the role operator.
 
-    Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
+    Nothing changes or deletes a row.
     """
     audit.writer.flush(FLUSHED_WITHIN)
     search = AuditSearch(actor, robot, action, subject, outcome, since, until)

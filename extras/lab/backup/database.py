@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from contextlib import closing, suppress
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -112,15 +112,6 @@ def forget_what_may_have_ended(database: Path) -> None:
                 connection.execute(line)
     except sqlite3.Error as error:
         raise SpecError(f"database {database.name}: its sessions cannot be ended: {error}") from error
-
-
-def head_of_audit(database: Path) -> str:
-    """Returns the last row of a database's audit log, `NUMBER:DIGEST`; `nothing` if it has none, or is damaged."""
-    with suppress(sqlite3.Error), closing(open_to_read(database)) as connection:
-        row = connection.execute("SELECT sequence, digest FROM audit ORDER BY sequence DESC LIMIT 1").fetchone()
-        if row is not None:
-            return f"{row[0]}:{row[1]}"
-    return "nothing"
 
 
 def note_restored(database: Path, at: datetime, command: str, archive: str, detail: str) -> None:

@@ -22,7 +22,6 @@ from daq.traces import disk
 from daq.traces.layout import PART_SUFFIX, SUFFIX
 from extras.lab.backup.database import (
     forget_what_may_have_ended,
-    head_of_audit,
     hold_queue,
     keep_own_objects,
     note_restored,
@@ -144,10 +143,9 @@ class _Staged:
             forget_what_may_have_ended(self._staged(DATABASE))
 
     def note_in_audit_log(self, manifest: Manifest) -> None:
-        """Notes in the restored audit log which log it replaces: rows that the backup lacks are in the database that
-        was moved aside."""
-        ended = head_of_audit(self._places.database)
-        detail = f"a backup of {manifest.created:%Y-%m-%d %H:%M:%S %Z} takes the place of a log that ended with {ended}"
+        """Notes the restore in the restored audit log; rows that the backup lacks are in the database that was moved
+        aside."""
+        detail = f"a backup of {manifest.created:%Y-%m-%d %H:%M:%S %Z}"
         command = f"daq restore {self._archive.name}"
         note_restored(self._staged(DATABASE), self._now, command, self._archive.name, detail)
 

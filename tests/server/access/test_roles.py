@@ -7,7 +7,7 @@ import httpx
 import pytest
 
 from server.clock import SystemClock
-from tests.server.access.people import LATER, SPEC, Person, kind_of, people_at
+from tests.server.access.people import SPEC, Person, kind_of, people_at
 from tests.server.inside import service_inside
 from tests.server.polling import until
 
@@ -80,10 +80,3 @@ def test_an_arm_may_name_its_owners(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         assert kind_of(robot.post(f"/experiments/{annas}/cancel")) == (403, "owner-needed")  # a user of this computer
         assert people["olga"].ask("PATCH", f"/experiments/{annas}", {"priority": 1}).status_code == 200
         assert people["ada"].ask("POST", f"/experiments/{annas}/cancel").status_code == 200
-
-
-def test_a_fleet_s_experiment_belongs_to_whoever_submits_it(people: dict[str, Person]) -> None:
-    url = people["anna"].robot.base_url.copy_with(path="/api/v1/fleet/experiments")
-    body = {"request": {"spec": SPEC, "at": LATER}}
-    made = people["anna"].robot.post(url, json=body, headers=people["anna"].headers).json()["experiments"]
-    assert [one["owner"] for one in made] == ["anna"]

@@ -10,16 +10,9 @@ from sqlalchemy import Connection
 from extras.lab.audit.tables import AuditTable
 
 REFUSED = "the audit log is append-only"
-NEXT = "new.sequence = COALESCE((SELECT MAX(sequence) FROM audit), 0) + 1"
-FOLLOWS = f"new.previous = COALESCE((SELECT digest FROM audit ORDER BY sequence DESC LIMIT 1), '{'0' * 64}')"
-
-# The trigger of inserts also forbids SQLite's INSERT OR REPLACE, which deletes a row without the trigger of deletes.
 TRIGGERS = (
     f"CREATE TRIGGER audit_update BEFORE UPDATE ON audit BEGIN SELECT RAISE(ABORT, '{REFUSED}'); END",
     f"CREATE TRIGGER audit_delete BEFORE DELETE ON audit BEGIN SELECT RAISE(ABORT, '{REFUSED}'); END",
-    f"""CREATE TRIGGER audit_insert BEFORE INSERT ON audit WHEN NOT ({NEXT} AND {FOLLOWS}) BEGIN
-        SELECT RAISE(ABORT, '{REFUSED}');
-    END""",
 )
 
 

@@ -1348,7 +1348,7 @@ export interface paths {
          * List Audit
          * @description Lists who requested which change, from where, and its outcome, the newest first. Needs the role operator.
          *
-         *     Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
+         *     Nothing changes or deletes a row.
          */
         get: operations["list_audit"];
         put?: never;
@@ -1583,49 +1583,6 @@ export interface paths {
          * @description Hides an effect in a separate mock, records it in lock-step, and has it diagnosed. Only for robots on a mock.
          */
         post: operations["hide_effect"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/fleet/experiments": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Submit Fleet Experiment
-         * @description Puts the same experiment into the queue of several robots. If one of them cannot run it, none gets it.
-         *
-         *     It begins when its robot's queue allows it: a paused queue stays paused. With the same Idempotency-Key each robot
-         *     gets it once.
-         */
-        post: operations["submit_fleet_experiment"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/fleet/comparison": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Compare Fleet
-         * @description Compares the robots' fits to the same experiment over time, and reports values that have changed.
-         */
-        get: operations["compare_fleet"];
-        put?: never;
-        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -1886,50 +1843,8 @@ export interface components {
             content: string;
         };
         /**
-         * ArmComparison
-         * @description A robot's fits to one experiment, the oldest first, and the changes from `reference` to the newest.
-         *
-         *     `reference`: the newest fit that is older than the last one by the requested time; None if there is none.
-         */
-        ArmComparison: {
-            /** Robot */
-            robot: string;
-            /** Fits */
-            fits: components["schemas"]["ArmFit"][];
-            /** Reference */
-            reference?: string | null;
-            /**
-             * Changes
-             * @default []
-             */
-            changes?: components["schemas"]["NumberChange"][];
-        };
-        /**
-         * ArmFit
-         * @description One fit of one robot. `at`: when the newest of its traces was recorded.
-         */
-        ArmFit: {
-            /** Job */
-            job: string;
-            /**
-             * At
-             * Format: date-time
-             */
-            at: string;
-            /** Traces */
-            traces: string[];
-            /** Converged */
-            converged: boolean;
-            /** Whitened Mean Square */
-            whitened_mean_square: number;
-            /** Residuals */
-            residuals: components["schemas"]["daq__contracts__service__fleet__JointResidual"][];
-            /** Numbers */
-            numbers: components["schemas"]["FittedNumber"][];
-        };
-        /**
          * AuditEntry
-         * @description One row of the log. `number` grows by 1 with each row.
+         * @description One row of the log. `number` grows with each row.
          */
         AuditEntry: {
             /**
@@ -1977,10 +1892,6 @@ export interface components {
             count?: number;
             /** Number */
             number: number;
-            /** Previous */
-            previous: string;
-            /** Digest */
-            digest: string;
         };
         /**
          * AwaitInput
@@ -3364,24 +3275,6 @@ export interface components {
             name?: string | null;
         };
         /**
-         * FittedNumber
-         * @description A parameter estimated by a fit, with its 95 % interval.
-         */
-        FittedNumber: {
-            /** Name */
-            name: string;
-            /** Unit */
-            unit: string;
-            /** Value */
-            value: number;
-            /** Deviation */
-            deviation: number;
-            /** Low */
-            low: number;
-            /** High */
-            high: number;
-        };
-        /**
          * FittedParameter
          * @description One parameter after a fit.
          *
@@ -3418,41 +3311,6 @@ export interface components {
             expected_deviation: number | null;
             /** At Bound */
             at_bound: ("low" | "high") | null;
-        };
-        /**
-         * FleetComparison
-         * @description The robots' fits to the same experiment, over time.
-         */
-        FleetComparison: {
-            /** Experiments */
-            experiments: string[];
-            /** Experiment */
-            experiment: string | null;
-            /** Days */
-            days: number;
-            /** Robots */
-            robots: components["schemas"]["ArmComparison"][];
-            /** Words */
-            words?: {
-                [key: string]: components["schemas"]["ParameterWords"];
-            };
-        };
-        /**
-         * FleetExperimentRequest
-         * @description An experiment for several robots; None for all of them. It is added to the queue of each.
-         */
-        FleetExperimentRequest: {
-            request: components["schemas"]["ExperimentRequest"];
-            /** Robots */
-            robots?: string[] | null;
-        };
-        /**
-         * FleetExperiments
-         * @description The queued experiments, one per robot.
-         */
-        FleetExperiments: {
-            /** Experiments */
-            experiments: components["schemas"]["Experiment"][];
         };
         /**
          * FleetRobot
@@ -4148,6 +4006,24 @@ export interface components {
             high?: number | null;
             /** Speed */
             speed?: number | null;
+        };
+        /**
+         * JointResidual
+         * @description Measured − expected acceleration of a joint (rad/s²; None where it does not move) and its correlations.
+         *
+         *     `noise` is its noise floor: the root mean square residual of records that the model itself makes.
+         */
+        JointResidual: {
+            /** Joint */
+            joint: number;
+            /** Values */
+            values: (number | null)[];
+            /** Noise */
+            noise: number;
+            /** Rms */
+            rms: number;
+            /** Against */
+            against: components["schemas"]["Correlation"][];
         };
         /**
          * KeptLayouts
@@ -4890,28 +4766,6 @@ export interface components {
         NotificationStatus: {
             /** Destinations */
             destinations: components["schemas"]["DestinationStatus"][];
-        };
-        /**
-         * NumberChange
-         * @description A parameter that two fits of one robot estimated. `low` to `high`: 95 % interval of the difference.
-         */
-        NumberChange: {
-            /** Name */
-            name: string;
-            /** Unit */
-            unit: string;
-            /** Before */
-            before: number;
-            /** After */
-            after: number;
-            /** Difference */
-            difference: number;
-            /** Low */
-            low: number;
-            /** High */
-            high: number;
-            /** Changed */
-            changed: boolean;
         };
         /**
          * OpenIdWay
@@ -6646,7 +6500,7 @@ export interface components {
             /** Time */
             time: number[];
             /** Joints */
-            joints: components["schemas"]["model__validation__variation__JointResidual"][];
+            joints: components["schemas"]["JointResidual"][];
             /** Parameters */
             parameters: components["schemas"]["Variation"][];
             /**
@@ -7092,38 +6946,6 @@ export interface components {
         WrittenLine: {
             /** Line */
             line: string;
-        };
-        /**
-         * JointResidual
-         * @description Residual of a fit at one joint: root mean square of simulated − measured, and of the measurement noise.
-         */
-        daq__contracts__service__fleet__JointResidual: {
-            /** Joint */
-            joint: number;
-            /** Unit */
-            unit: string;
-            /** After */
-            after: number;
-            /** Floor */
-            floor: number;
-        };
-        /**
-         * JointResidual
-         * @description Measured − expected acceleration of a joint (rad/s²; None where it does not move) and its correlations.
-         *
-         *     `noise` is its noise floor: the root mean square residual of records that the model itself makes.
-         */
-        model__validation__variation__JointResidual: {
-            /** Joint */
-            joint: number;
-            /** Values */
-            values: (number | null)[];
-            /** Noise */
-            noise: number;
-            /** Rms */
-            rms: number;
-            /** Against */
-            against: components["schemas"]["Correlation"][];
         };
     };
     responses: never;
@@ -9654,58 +9476,6 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Hidden"];
-                };
-            };
-        };
-    };
-    submit_fleet_experiment: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description A request sent again with the same key is carried out once. */
-                "idempotency-key"?: string | null;
-            };
-            path?: never;
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["FleetExperimentRequest"];
-            };
-        };
-        responses: {
-            /** @description Successful Response */
-            201: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["FleetExperiments"];
-                };
-            };
-        };
-    };
-    compare_fleet: {
-        parameters: {
-            query?: {
-                /** @description Its name; else the most fitted one. */
-                experiment?: string | null;
-                /** @description Least time between the compared fits, in days. */
-                days?: number;
-            };
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["FleetComparison"];
                 };
             };
         };

@@ -31,7 +31,6 @@ export type ExperimentPreset = Told<Schemas['ExperimentPreset']>;
 export type ExperimentRequest = Schemas['ExperimentRequest'];
 export type ExperimentSpec = Schemas['ExperimentSpec'];
 export type Fidelity = Told<Schemas['Fidelity']>;
-export type FleetComparison = Told<Schemas['FleetComparison']>;
 export type FleetRobot = Told<Schemas['FleetRobot']>;
 export type FitData = Told<Schemas['FitData']>;
 export type FittedParameter = Told<Schemas['FittedParameter']>;

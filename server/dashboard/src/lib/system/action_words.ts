@@ -8,7 +8,6 @@ const WORDS: Readonly<Record<string, string>> = {
   submit_job: 'begin a computation',
   jog_robot: 'jog',
   upload_trace: 'take in a trace',
-  submit_fleet_experiment: 'add an experiment for several arms',
   create_schedule: 'plan',
   change_schedule: 'switch in the plan',
   delete_schedule: 'delete from the plan',
