@@ -22,9 +22,7 @@ Extra = Literal[
     "ros",
     "oidc",
     "mcp",
-    "rerun",
     "webrtc",
-    "foxglove",
 ]
 
 CONTAINS: dict[Extra, tuple[Extra, ...]] = {
@@ -32,8 +30,6 @@ CONTAINS: dict[Extra, tuple[Extra, ...]] = {
     "model": ("robot", "live"),
     "server": ("robot", "live"),
     "mcp": ("robot", "live"),
-    "foxglove": ("robot", "live"),
-    "rerun": ("model", "robot", "live"),
     "webrtc": ("server", "robot", "live"),
 }
 """Extras that an extra includes."""
@@ -67,9 +63,7 @@ EXTRA_OF: dict[str, Extra] = {
     "google": "ros",
     "authlib": "oidc",
     "mcp": "mcp",
-    "rerun": "rerun",
     "aiortc": "webrtc",
-    "foxglove": "foxglove",
 }
 """The smallest extra that installs each module."""
 
