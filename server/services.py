@@ -33,9 +33,8 @@ from daq.contracts.service.robot import RobotStatus
 from daq.owner.messages import Answer
 from daq.plugins import named, plugins
 from daq.trajectories.set_points import control_period
-from server.access.caller import Caller, spoken
+from server.access.caller import spoken
 from server.access.lanes import Lanes
-from server.access.sessions import SessionStore
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
 from server.bounded.messages import Limits
@@ -139,10 +138,6 @@ class Services:
         """Separate from uploads, so that those delay no preview."""
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
-        self.sessions = SessionStore(self.store)
-        self.signed_in: Callable[[Caller], None] = lambda _caller: None
-        """Called with the caller when a session has begun, or was ended by signing out."""
-        self.signed_out: Callable[[Caller], None] = lambda _caller: None
         self._robots: dict[str, RobotServices] = {}
         self.parts: list[Part] = [named(part)(self) for plugin in plugins() for part in plugin.parts]
         self.workers = SharedWorkers(settings.server.jobs_at_once)

@@ -20,7 +20,6 @@ Extra = Literal[
     "server",
     "tables",
     "ros",
-    "oidc",
     "mcp",
     "webrtc",
 ]
@@ -61,7 +60,6 @@ EXTRA_OF: dict[str, Extra] = {
     "xarray": "tables",
     "rosbags": "ros",
     "google": "ros",
-    "authlib": "oidc",
     "mcp": "mcp",
     "aiortc": "webrtc",
 }

@@ -62,7 +62,6 @@ async def get_me(services: ServicesDep, caller: Viewer) -> Me:
         role=caller.role,
         owner_of=owned,
         is_known=caller.token is not None,
-        session_until=caller.expires,
     )
 
 

@@ -11,7 +11,7 @@ from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.errors import SpecError
 from daq_cli.app.database import computers_user
-from server.access.sessions import note_command
+from server.access.tokens import note_command
 from server.database_errors import line_of, one_line, open_to_read
 from server.store.engine import BUSY_TIMEOUT_MS, Store
 from server.store.schema import (
@@ -96,7 +96,6 @@ def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
 
 _NOT_APPROVED = "approved_content = NULL, approved_by = NULL, approved_as_owner = NULL, approved = NULL"
 _FORGOTTEN = (
-    "DELETE FROM sessions",
     f"UPDATE experiments SET {_NOT_APPROVED} WHERE state = 'queued'",
     f"UPDATE schedules SET {_NOT_APPROVED}",
 )
@@ -104,14 +103,13 @@ _FORGOTTEN = (
 
 
 def forget_what_may_have_ended(database: Path) -> None:
-    """Ends sessions and approvals of waiting experiments: they may have been ended after the backup. Raises
-    SpecError."""
+    """Ends approvals of waiting experiments: they may have been ended after the backup. Raises SpecError."""
     try:
         with closing(sqlite3.connect(database)) as connection, connection:
             for line in _FORGOTTEN:
                 connection.execute(line)
     except sqlite3.Error as error:
-        raise SpecError(f"database {database.name}: its sessions cannot be ended: {error}") from error
+        raise SpecError(f"database {database.name}: its approvals cannot be ended: {error}") from error
 
 
 def note_restored(database: Path, at: datetime, command: str, archive: str, detail: str) -> None:

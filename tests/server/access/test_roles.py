@@ -34,7 +34,6 @@ def test_everybody_is_told_their_role_and_their_arms(people: dict[str, Person]) 
             "role": PEOPLE[name],
             "owner_of": owned,
             "is_known": True,
-            "session_until": None,
         }
 
 

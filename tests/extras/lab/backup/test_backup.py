@@ -27,7 +27,6 @@ from extras.lab.backup.manifest import MANIFEST, verify
 from extras.lab.backup.places import DATABASE, Places
 from extras.lab.backup.restore import restore
 from extras.lab.backup.write import back_up
-from server.access.sessions import SessionStore
 from server.experiments.review import Given, Review
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
@@ -140,7 +139,6 @@ def test_the_queue_comes_back_paused(tmp_path: Path, before: QueueState | None) 
 def test_what_may_have_ended_since_does_not_come_back(tmp_path: Path) -> None:
     here, there = filled(tmp_path / "here"), places_in(tmp_path / "there")
     with closing(Store(here.database)) as store:
-        SessionStore(store).begin(lambda _session: "anna", "owner", NOW, timedelta(days=9))
         experiments, review = ExperimentStore(store), Review.of("ma2000", load_machine("ma2000"), "operator")
         made, _ = experiments.submit("ma2000", ExperimentRequest(spec=SPEC), NOW, "anna")
         content = review.content(experiments.get("ma2000", made.id).content)
@@ -148,7 +146,6 @@ def test_what_may_have_ended_since_does_not_come_back(tmp_path: Path) -> None:
     back_up(here, tmp_path / "arm.zip", NOW, quietly)
     restore(tmp_path / "arm.zip", there, NOW + timedelta(days=1), quietly)
     with closing(Store(there.database)) as store:
-        assert SessionStore(store).callers(NOW) == {}
         assert ExperimentStore(store).get("ma2000", made.id).approval is None
 
 

@@ -1635,46 +1635,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/login": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Login Ways
-         * @description Returns the ways to sign in: always by token, and by OpenID Connect if it is configured. Needs no token.
-         */
-        get: operations["get_login_ways"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/logout": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Log Out
-         * @description Ends the caller's session; a token stays valid. Returns the URL that ends the provider's own session.
-         */
-        post: operations["log_out"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/metrics": {
         parameters: {
             query?: never;
@@ -4205,13 +4165,6 @@ export interface components {
             messages: (components["schemas"]["SampleMessage"] | components["schemas"]["HistoryMessage"] | components["schemas"]["RecordEventMessage"] | components["schemas"]["RobotMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["QueueMessage"] | components["schemas"]["ProgressMessage"] | components["schemas"]["JobMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TeachingMessage"] | components["schemas"]["ThinnedMessage"] | components["schemas"]["RefusedMessage"])[];
         };
         /**
-         * LoginWays
-         * @description Ways to sign in besides a token. `openid` is None if no provider is configured.
-         */
-        LoginWays: {
-            openid?: components["schemas"]["OpenIdWay"] | null;
-        };
-        /**
          * Machine
          * @description A machine file. `modelled_joints`: the joints (from 1) whose motion the model describes. The others are held
          *     still, and their mass is part of `load`, a point mass at the end of the last modelled link.
@@ -4367,8 +4320,6 @@ export interface components {
              * @default true
              */
             is_known?: boolean;
-            /** Session Until */
-            session_until?: string | null;
         };
         /**
          * MeasuredGain
@@ -4766,16 +4717,6 @@ export interface components {
         NotificationStatus: {
             /** Destinations */
             destinations: components["schemas"]["DestinationStatus"][];
-        };
-        /**
-         * OpenIdWay
-         * @description A provider of OpenID Connect. `start`: the path on this service that a browser opens to sign in.
-         */
-        OpenIdWay: {
-            /** Label */
-            label: string;
-            /** Start */
-            start: string;
         };
         /**
          * OpenedSecret
@@ -6138,14 +6079,6 @@ export interface components {
             after: number;
             /** Floor */
             floor: number;
-        };
-        /**
-         * SignedOut
-         * @description The session has ended. `provider`: the address that ends the provider's own session, if there is one.
-         */
-        SignedOut: {
-            /** Provider */
-            provider?: string | null;
         };
         /**
          * Sine
@@ -9540,46 +9473,6 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["NotificationStatus"];
-                };
-            };
-        };
-    };
-    get_login_ways: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["LoginWays"];
-                };
-            };
-        };
-    };
-    log_out: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["SignedOut"];
                 };
             };
         };

@@ -54,7 +54,6 @@ export type ModelDetails = Told<Schemas['ModelDetails']>;
 export type ModelEntry = Told<Schemas['ModelEntry']>;
 export type ModelLineage = Told<Schemas['ModelLineage']>;
 export type ModelParameter = Told<Schemas['ModelParameter']>;
-export type LoginWays = Told<Schemas['LoginWays']>;
 export type MotionPreview = Told<Schemas['MotionPreview']>;
 export type NextExperiment = Told<Schemas['NextExperiment']>;
 export type Overlay = Told<Schemas['Overlay']>;

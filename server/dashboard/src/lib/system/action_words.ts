@@ -21,8 +21,6 @@ const WORDS: Readonly<Record<string, string>> = {
   hide_effect: 'hide something in the mock',
   change_trace: 'note on a trace',
   give_control_back: 'release control',
-  log_out: 'sign out',
-  finish_login: 'sign in',
   rows_left_out: 'rows left out',
   start_service: 'the service began',
 };
