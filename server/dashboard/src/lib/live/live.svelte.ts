@@ -247,7 +247,7 @@ class Live {
     return socket;
   }
 
-  /** A session that has ended, or a token that was revoked, leads to the sign-in. */
+  /** A token that was revoked leads to the sign-in. */
   private notAdmitted(error: unknown): never {
     const problem = asProblem(error);
     if (problem.status === 401) this.problem = problem;

@@ -1,77 +1,29 @@
-"""The URLs of clusters, what `daq batch` refuses, and its tables."""
+"""`daq batch` on this computer: what it refuses, a worker that is killed, and the commands of its page."""
 
 from __future__ import annotations
 
+import csv
+import json
 import re
+import shlex
+import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from daq.contracts.errors import SpecError
-from daq.contracts.extras import MissingExtraError
+import ma2000
 from daq.contracts.service.jobs import DiagnoseStudy
-from daq.executors.workers import OtherVersionError
 from daq_cli.robot.operations import RobotAccess
 from extras.lab.batches import command
 from extras.lab.batches.command import Asked
-from extras.lab.batches.executors import open_workers, parse_address
 from extras.lab.batches.folder import write_parquet
-from extras.lab.batches.program import Checked, Program
 from extras.lab.batches.study import Study
-from tests.daq.executors.by_hand import square
 from tests.daq_cli.invoke import CommandLine
+from tests.extras.lab.batches.traces import folder_of_traces, number
 
-
-@pytest.mark.parametrize(
-    ("url", "kind", "place"),
-    [
-        ("local://4", "local", "4"),
-        ("local://", "local", ""),
-        ("dask://host", "dask", "host:8786"),
-        ("dask://[::1]:9000", "dask", "[::1]:9000"),
-        ("dask+tls://host:8786", "dask+tls", "host:8786"),
-    ],
-)
-def test_what_is_understood(url: str, kind: str, place: str) -> None:
-    found = parse_address(url)
-    assert (found.kind, found.target) == (kind, place)
-
-
-@pytest.mark.parametrize(
-    ("url", "says"),
-    [
-        ("", "is not an executor URL; write local://4"),
-        ("slurm://compute", "is not an executor URL; write local://4 or dask://host:8786"),
-        ("local://four", "write the number of processes"),
-        ("local://0", "0 workers; 1 to 10000"),
-        ("http://[", "Invalid IPv6 URL"),
-        ("dask://host:port", "Port could not be cast"),
-        ("dask://", "names no scheduler"),
-    ],
-)
-def test_what_is_refused(url: str, says: str) -> None:
-    with pytest.raises(SpecError) as refused:
-        parse_address(url)
-    assert says in str(refused.value)
-    assert "\n" not in str(refused.value)
-
-
-def test_without_its_package_a_cluster_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(MissingExtraError, match=r"executor dask://.*distributed.*\[cluster\]"):
-        open_workers("dask://127.0.0.1:9")
-
-
-def test_every_executor_of_the_page_is_understood() -> None:
-    page = Path(__file__).parents[4].joinpath("docs", "batches.md").read_text("utf-8")
-    urls = re.findall(r"`((?:local|dask|dask\+tls)://[^`]*)`", page)
-    assert {parse_address(url).kind for url in urls} == {"local", "dask", "dask+tls"}
-
-
-def test_a_worker_of_another_version_is_refused_by_name() -> None:
-    with pytest.raises(OtherVersionError, match=r"worker .*process \d+: has ma2000-daq .*, but ma2000-daq 0\.0\.1 on "):
-        Checked(square, Program("0.0.1", "3.9"))(2)
+TRACES = 40
 
 
 # ---- what `daq batch` refuses, in one line each, before anything is computed
@@ -84,8 +36,7 @@ def test_a_worker_of_another_version_is_refused_by_name() -> None:
         ("simulate traces --out o", "has no trace that matches"),
         ("simulate ramp --out o", "has no trace that matches"),
         ("simulate colour:red --out o", "unknown term; allowed are kind"),
-        ("simulate traces --out o --executor 4", "executor '4': is not an executor URL; write local://4"),
-        ("simulate traces --out o --executor local://0", "0 workers; 1 to 10000"),
+        ("simulate traces --out o --workers 0", "--workers"),
         ("simulate traces --out o --model none.json", "none.json"),
         ("fit traces --out o --effects rust", "effect 'rust': not in the library"),
         ("fit traces --out o --bound link1.mass=2:1", "the lower bound 2 is not below the upper 1"),
@@ -139,3 +90,47 @@ def test_no_parquet_of_an_earlier_run_stays_where_none_can_be_written(
     monkeypatch.setattr(sys, "path", [])
     assert write_parquet([{"trace": "a"}], table) is None
     assert not table.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+def test_a_worker_killed_in_mid_batch_costs_no_trace_and_none_is_in_the_result_twice(tmp_path: Path) -> None:
+    traces, out = folder_of_traces(tmp_path / "traces", TRACES), tmp_path / "out"
+    program = [sys.executable, "-m", "tests.extras.lab.batches.killing", str(traces), str(out)]
+    done = subprocess.run(program, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    assert (said["done"], said["failed"]) == (TRACES, 0)
+    keys = Counter(json.loads(line)["key"] for line in (out / "rows.jsonl").read_text("utf-8").splitlines())
+    assert keys == dict.fromkeys(map(number, range(TRACES)), 1)
+    with (out / "table.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["trace"] for row in rows] == [number(index) for index in range(TRACES)]
+    assert {row["state"] for row in rows} == {"done"}
+
+
+# ---- docs/batches.md
+
+
+PAGE = Path(__file__).parents[4].joinpath("docs", "batches.md").read_text("utf-8")
+COMMANDS = re.findall(r"^\$ daq (.+)$", PAGE, re.MULTILINE)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_the_commands_of_the_page_give_a_table_each(daq: CommandLine) -> None:
+    folder_of_traces(Path("traces"), 2)
+    assert len(COMMANDS) >= 5
+    for line in COMMANDS:
+        words = shlex.split(line)
+        said = daq(*words, "--workers", "1")
+        assert said.code == 0, (line, said.err)
+        out = Path(words[words.index("--out") + 1])
+        with (out / "table.csv").open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        assert [row["state"] for row in rows] == ["done", "done"]
+        assert len(list((out / "answers").iterdir())) == 2
+    answer = next(Path("fits", "answers").iterdir())
+    assert daq("simulate", answer, "traces/000.mcap").code == 0
+    found = ma2000.batch("simulate", "traces", "simulated", workers=1)
+    assert (len(found.rows), found.failed) == (2, {})
