@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from model.base_parameters.result import BaseParameters
 from model.blocks import Cell, Report, Section, Table
 from model.comparison.compare import Comparison
 from model.fitting.result import FitResult
 from model.fitting.shown import parameter_table
-from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.motion import agreement_table, in_sample, motion_section
 from model.reports.page import effect_list, listed, trace_names
 from model.reports.parameter_blocks import interval_picture, undetermined_blocks
@@ -19,19 +17,17 @@ from model.reports.record_section import record_sections
 def fit_report(
     found: FitResult,
     comparison: Comparison,
-    base: BaseParameters | None = None,
     files: Mapping[str, str] | None = None,
 ) -> Report:
     """Returns the page of a fit.
 
-    `comparison` is of the model before and after, on the traces fitted to and held out; `base`, the base parameters of
-    the fitted model on the traces fitted to; `files`, the names of the traces' files by ID, if known.
+    `comparison` is of the model before and after, on the traces fitted to and held out; `files`, the names of
+    the traces' files by ID, if known.
     """
     files = files or {}
     sections = [
         Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.model, found.parameters))),
         Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
-        *(() if base is None else (base_parameter_section(base),)),
         Section("How large the error is", (agreement_table(comparison.models),)),
         motion_section(comparison.signals, [m.label for m in comparison.models], files=files),
         Section("How it was done", (_how(found),)),
