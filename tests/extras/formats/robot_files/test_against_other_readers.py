@@ -8,7 +8,7 @@ import pytest
 from extras.formats.robot_files.machine_of_arm import machine_from_urdf
 from model.dynamics import recursive
 from model.machine_model.model import base_model
-from model.simulation.chain_of_model import chain_of
+from model.simulation.bodies import chain_of
 from tests.extras.formats.robot_files.arms import ARMS, InMujoco, InPinocchio
 
 AGREEMENT = 1e-9
