@@ -1,1 +1,0 @@
-"""Base parameters: the fewest combinations of masses, moments and friction that determine an arm's torques."""
