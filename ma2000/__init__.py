@@ -43,8 +43,10 @@ if TYPE_CHECKING:
     from ma2000.files import read_traces as read_traces
     from ma2000.files import write_table as write_table
     from ma2000.files import write_trace as write_trace
+    from ma2000.fitting import base_parameters as base_parameters
     from ma2000.fitting import fit as fit
     from ma2000.fitting import fit_torques as fit_torques
+    from ma2000.fitting import profile as profile
     from ma2000.local_service import LocalService as LocalService
     from ma2000.machine_file import save_machine as save_machine
     from ma2000.pictures import plot as plot
@@ -54,11 +56,13 @@ if TYPE_CHECKING:
     from ma2000.studies import design as design
     from ma2000.studies import diagnose as diagnose
     from ma2000.studies import validate as validate
+    from model.base_parameters.result import BaseParameters as BaseParameters
     from model.design.search import DesignedExperiments as DesignedExperiments
     from model.design.search import DesignOptions as DesignOptions
     from model.discrepancy.diagnosis import Diagnosis as Diagnosis
     from model.discrepancy.options import DiagnosisOptions as DiagnosisOptions
     from model.fitting.options import FitOptions as FitOptions
+    from model.fitting.profile import Profile as Profile
     from model.fitting.result import FitResult as FitResult
     from model.inverse_dynamics.fit import TorqueFit as TorqueFit
     from model.machine_model.model import Model as Model
@@ -72,6 +76,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Arm": "ma2000.arm",
+    "BaseParameters": "model.base_parameters.result",
     "Client": "daq.client",
     "CompareRequest": "daq.contracts.service.jobs",
     "DaqError": "daq.contracts.errors",
@@ -89,6 +94,7 @@ _HOME = {
     "Machine": "daq.contracts.machine",
     "Model": "model.machine_model.model",
     "PRESETS": "daq.trajectories.presets",
+    "Profile": "model.fitting.profile",
     "Run": "ma2000.running",
     "RunError": "ma2000.running",
     "ServiceError": "daq.client",
@@ -99,6 +105,7 @@ _HOME = {
     "TraceSummary": "daq.traces.catalogue",
     "ValidateRequest": "daq.contracts.service.jobs",
     "base_model": "model.machine_model.model",
+    "base_parameters": "ma2000.fitting",
     "connect": "ma2000.arm",
     "design": "ma2000.studies",
     "diagnose": "ma2000.studies",
@@ -108,6 +115,7 @@ _HOME = {
     "load_machine": "daq.contracts.machine",
     "load_model": "model.machine_model.model_file",
     "plot": "ma2000.pictures",
+    "profile": "ma2000.fitting",
     "read_trace": "ma2000.files",
     "read_traces": "ma2000.files",
     "run": "ma2000.running",
@@ -127,12 +135,15 @@ _ON_A_SERVICE = {"LocalService"}
 _WITH_MODELS = {
     "DesignOptions",
     "DesignedExperiments",
+    "Profile",
     "Simulation",
     "TorqueFit",
+    "base_parameters",
     "design",
     "diagnose",
     "fit",
     "fit_torques",
+    "profile",
     "simulate",
     "simulate_many",
     "validate",

@@ -219,6 +219,7 @@ def _models(place: Path) -> list[Question]:
         )
     for number, options in enumerate(DESIGNS):
         found.append(Question(f"design/{number}", ("design", *options, "--json")))
+    fitted, held_out = _traces(place, by_name[FITS[0][0]])
     for number, options in enumerate(COMPARISONS):
         files = tuple(str(place / word) if "/" in word else word for word in options)
         found.append(Question(f"compare/{number}", ("compare", *files, "--json")))

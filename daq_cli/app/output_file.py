@@ -22,6 +22,18 @@ def check_folder(path: Path, what: str) -> None:
         raise SpecError(f"{what} {path}: the folder {folder} may not be written to")
 
 
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def table_or_picture(path: Path | None) -> Path | None:
+    """Rejects an unsuitable or unwritable file of --output before the computation."""
+    if path is not None:
+        if path.suffix not in (".csv", *PICTURES):
+            raise SpecError(f"--output {path}: curves are written as .csv, or as a picture ({', '.join(PICTURES)})")
+        check_folder(path, "--output")
+    return path
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Like `daq.contracts.whole_file.replacing`, but raises SpecError if the file cannot be written."""

@@ -61,6 +61,14 @@ CORE = {
         ),
         Command("fit", "Fit a model's parameters to traces.", "daq_cli.commands.fit", needs="model", group="Model"),
         Command(
+            "profile",
+            "Show what traces bound: profile likelihoods of parameters.",
+            "daq_cli.commands.profile",
+            about="computer",
+            needs="model",
+            group="Model",
+        ),
+        Command(
             "validate",
             "Validate a model against traces (Σλ²).",
             "daq_cli.commands.validate",

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from daq.contracts.trace import Trace
+    from model.base_parameters.result import BaseParameters
     from model.comparison.agreement import ModelAgreement
     from model.fitting.options import FitOptions
     from model.fitting.result import FitResult
@@ -168,6 +169,7 @@ def _fit_motion(
 ) -> None:
     """Fits motion on this computer, writes the model, and prints the result."""
     from daq_cli.app.progress import shown_progress
+    from model.base_parameters.base_parameters import base_parameters
     from model.comparison.compare import compare
     from model.fitting.fit import fit as run_fit
     from model.simulation.prepared import Options
@@ -182,12 +184,15 @@ def _fit_motion(
             options=Options(loop=options.loop or "closed"),
             progress=lambda f, text: progress(0.9 + 0.1 * f, text),
         )
-    _print_result(found, comparison.models, out, as_json=as_json)
+    base = base_parameters(found.model, traces)
+    _print_result(found, comparison.models, out, base, as_json=as_json)
     if report is not None:
         from model.reports.fit_report import fit_report
         from model.reports.page import write_report
 
-        console().print(f"report: {write_report(fit_report(found, comparison, files_of([*traces, *held])), report)}")
+        console().print(
+            f"report: {write_report(fit_report(found, comparison, base, files_of([*traces, *held])), report)}"
+        )
     end_if_doubted(found.record)
 
 
@@ -220,16 +225,18 @@ def _print_result(
     found: FitResult,
     agreement: Sequence[ModelAgreement],
     out: Path,
+    base: BaseParameters | None = None,
     *,
     as_json: bool,
 ) -> None:
     if as_json:
-        _print_json(found, agreement, out)
+        _print_json(found, agreement, out, base)
     else:
-        _print(found, agreement)
+        _print(found, agreement, base)
 
 
-def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path) -> None:
+def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path, base: BaseParameters | None) -> None:
+
     print_json(
         {
             "model": found.model.identity,
@@ -237,6 +244,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
             "parameters": [p.model_dump(mode="json") for p in found.parameters],
             "undetermined": [c.model_dump(mode="json") for c in found.identifiability.undetermined],
             "verdict": None if found.verdict is None else found.verdict.model_dump(mode="json"),
+            "base_parameters": None if base is None else base.model_dump(mode="json"),
             "agreement": [one.model_dump(mode="json") for one in agreement],
             "whitened_mean_square": found.whitened_mean_square,
             "converged": found.converged,
@@ -248,7 +256,7 @@ def _print_json(found: FitResult, agreement: Sequence[ModelAgreement], out: Path
     )
 
 
-def _print(found: FitResult, agreement: Sequence[ModelAgreement]) -> None:
+def _print(found: FitResult, agreement: Sequence[ModelAgreement], base: BaseParameters | None) -> None:
     from model.reports.motion import AGREEMENT, agreement_table
 
     print_record(found.record)
@@ -257,6 +265,10 @@ def _print(found: FitResult, agreement: Sequence[ModelAgreement]) -> None:
     print(f"\nknown: {known} of {len(found.parameters)}", end="")
     print("; of the others, in brackets, the model has one value of many" if known < len(found.parameters) else "")
     print_undetermined(found.identifiability)
+    if base is not None:
+        from model.base_parameters.result import headline
+
+        print_prose(headline(base))
     print()
     print_rows(agreement_table(agreement).only(*AGREEMENT))
     if not found.converged:

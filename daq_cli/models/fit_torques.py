@@ -35,19 +35,23 @@ def fit_recorded_torques(
 ) -> None:
     """Fits, saves the model, and prints the result. Raises SpecError and TraceError as the fit does."""
     from daq_cli.app.progress import shown_progress
+    from model.base_parameters.base_parameters import base_parameters
+    from model.base_parameters.result import headline
     from model.inverse_dynamics.fit import fit_torques
     from model.machine_model.model_file import save_model
 
     files = files_of([*traces, *held_out])
     with shown_progress("fitting torques") as progress:
         found = fit_torques(begin, traces, held_out, options, progress=progress)
+        base = base_parameters(found.model, traces)
     with replacing(out) as part:
         save_model(found.model, part)
     if as_json:
-        own = {"model": found.model.identity, "file": out}
+        own = {"base_parameters": base.model_dump(mode="json"), "model": found.model.identity, "file": out}
         print_json(found.model_dump(mode="json", exclude={"model"}) | own)
     else:
         _print(found, files)
+        print_prose(headline(base))
         if found.verdict is not None:
             print_prose(found.verdict.text)
         console().print(f"model {found.model.identity}: {out}")
@@ -57,7 +61,7 @@ def fit_recorded_torques(
         from model.reports.torque_report import torque_report
 
         curves = [torque_curves(found.model, t, found.cutoff) for t in (*traces, *held_out)[:MOST_DRAWN]]
-        console().print(f"report: {write_report(torque_report(found, curves, files), report)}")
+        console().print(f"report: {write_report(torque_report(found, curves, base, files), report)}")
     end_if_doubted(found.record)
 
 

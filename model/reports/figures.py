@@ -57,6 +57,18 @@ def drawn(draw: Callable[[Figure], None], height: float, width: float = WIDTH) -
     return text.replace("font-family", "data-font")
 
 
+def saved(draw: Callable[[Figure], None], height: float, path: Path, kind: str, width: float = WIDTH) -> None:
+    """Saves the same as a file of that kind (png, svg, pdf), on white. Raises OSError."""
+    from daq.contracts.notebook_figure import NotebookFigure
+
+    with _style():
+        figure = NotebookFigure(figsize=(width, height), layout="constrained")
+        draw(figure)
+        _plain_powers(figure)
+        dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+        figure.savefig(path, format=kind, dpi=200, facecolor="white", metadata=dates.get(kind))
+
+
 def _style() -> AbstractContextManager[None]:
     import matplotlib as mpl
 

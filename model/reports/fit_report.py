@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from model.base_parameters.result import BaseParameters
 from model.blocks import Cell, Picture, Points, Report, Section, Table, Text
 from model.comparison.compare import Comparison
 from model.fitting.fitted import FittedParameter, parameter_table
 from model.fitting.identifiability import IdentifiabilityReport
 from model.fitting.result import FitResult
 from model.machine_model.model import Model
+from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.figures import COLOURS, QUIET, drawn, panels
 from model.reports.motion import agreement_table, in_sample, motion_section
 from model.reports.page import effect_list, listed, record_sections, trace_names
@@ -22,17 +24,19 @@ if TYPE_CHECKING:
 def fit_report(
     found: FitResult,
     comparison: Comparison,
+    base: BaseParameters | None = None,
     files: Mapping[str, str] | None = None,
 ) -> Report:
     """Returns the page of a fit.
 
-    `comparison` is of the model before and after, on the traces fitted to and held out; `files`, the names of
-    the traces' files by ID, if known.
+    `comparison` is of the model before and after, on the traces fitted to and held out; `base`, the base parameters of
+    the fitted model on the traces fitted to; `files`, the names of the traces' files by ID, if known.
     """
     files = files or {}
     sections = [
         Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.model, found.parameters))),
         Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
+        *(() if base is None else (base_parameter_section(base),)),
         Section("How large the error is", (agreement_table(comparison.models),)),
         motion_section(comparison.signals, [m.label for m in comparison.models], files=files),
         Section("How it was done", (_how(found),)),

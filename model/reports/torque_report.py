@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from model.base_parameters.result import BaseParameters
 from model.blocks import Cell, Picture, Report, Section, Table, Text, cells
 from model.discrepancy.explanation.notes import note_words, on_drives_at_limit
 from model.discrepancy.explanation.step_words import sentence
 from model.fitting.fitted import parameter_table
 from model.inverse_dynamics.fit import TorqueCurves, TorqueFit
+from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.figures import COLOURS, INK, baseline, drawn, panels, thinned
 from model.reports.fit_report import interval_picture, undetermined_blocks
 from model.reports.page import effect_list, listed, record_sections, trace_names
@@ -25,15 +27,17 @@ RESIDUAL = "Error and residual: torque that the model needs − torque that the 
 def torque_report(
     found: TorqueFit,
     curves: Sequence[TorqueCurves],
+    base: BaseParameters | None = None,
     files: Mapping[str, str] | None = None,
 ) -> Report:
-    """Returns the page; `curves` are those of the fitted model on the traces to draw, `files` the names of
-    the traces' files by number, where they are known."""
+    """Returns the page; `curves` are those of the fitted model on the traces to draw, `base` its base parameters on
+    those that were fitted to, `files` the names of the traces' files by number, where they are known."""
     files = files or {}
     machine = found.model.machine
     sections = (
         Section("Parameters", (parameter_table(found.parameters), *interval_picture(found.model, found.parameters))),
         Section("What the traces cannot tell", undetermined_blocks(found.identifiability)),
+        *(() if base is None else (base_parameter_section(base),)),
         Section(
             "What is left of the torque",
             (*_at_limit(found), _error_table(found, files), *(_picture(c, found, files) for c in curves)),

@@ -92,6 +92,7 @@ class _Worker:
 
     def fit(self, request: FitRequest) -> Ended:
         """Computes the same as `daq fit`."""
+        from model.base_parameters.base_parameters import base_parameters
         from model.fitting.fit import fit
         from model.fitting.identifiability import undetermined_in_words
         from model.fitting.options import FitOptions
@@ -119,7 +120,7 @@ class _Worker:
             undetermined=undetermined_in_words(found.identifiability, words_by_name(found.model.parameters)),
         )
         result = FitJobResult(id=self._job, data=data)
-        report = fit_report(found, comparison)
+        report = fit_report(found, comparison, base_parameters(found.model, traces))
         return self._done(result, report, of_fit(found, comparison), found.model)
 
     def validate(self, request: ValidateRequest) -> Ended:

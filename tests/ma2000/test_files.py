@@ -67,6 +67,7 @@ def test_a_choice_says_what_is_taken_of_a_file_of_another_program(tmp_path: Path
         (lambda: ma2000.diagnose("ur10e", 5), "traces: give a Trace or several, not int"),
         (lambda: ma2000.fit("ma2000", (), {}), "fit: options: found {}, must be FitOptions or None"),
         (lambda: ma2000.simulate("nosuch", 3), "machine 'nosuch': no such file, and not a packaged machine"),
+        (lambda: ma2000.profile("ma2000", (), "x"), "profile: fitted: found 'ma2000', must be FitResult"),
         (lambda: ma2000.ExperimentSpec.model_validate({"joints": "a"}), "joints: Input should be a valid"),
     ],
 )

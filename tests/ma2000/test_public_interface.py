@@ -127,6 +127,8 @@ def test_a_wrong_part_of_an_experiment_is_refused_in_one_line() -> None:
 
 def test_a_machine_s_name_stands_for_its_model_and_anything_else_is_refused_in_one_line() -> None:
     assert ma2000.base_model("ma2000").identity == ma2000.base_model(load_machine("ma2000")).identity
+    found = ma2000.base_parameters("ma2000")
+    assert found == ma2000.base_parameters(load_machine("ma2000"))
     wrong: Any = 3
     with pytest.raises(
         ma2000.DaqError, match="model: give a Model, a Machine, or the name or file of a machine, not int"

@@ -31,6 +31,7 @@ WORDS = {
     "fit": "{trace} --out fitted.json",
     "follow": "run ramp --model ma2000 --dry-run",
     "hide": "",
+    "profile": "ma2000 {trace} --parameter load.mass",
     "simulate": "ma2000 {trace}",
     "thesis": "",
     "validate": "ma2000 {trace}",

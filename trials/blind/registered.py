@@ -30,6 +30,7 @@ REGISTERED = (
     "model/kinematics",
     "model/design",
     "model/validation",
+    "model/analysis",
     "model/trial",
     "model/units.py",
     "mock_controller",

@@ -84,6 +84,7 @@ COMMANDS = {
     "fit": ("fit", "{}", "--machine", SINGLE_AXIS, "-o", "out.json"),
     "torques": ("fit", "{}", *WORDS),
     "validate": ("validate", SINGLE_AXIS, "{}"),
+    "profile": ("profile", SINGLE_AXIS, "{}", "--parameter", "link1.mass"),
     "compare": ("compare", SINGLE_AXIS, SINGLE_AXIS, "{}"),
     "simulate": ("simulate", SINGLE_AXIS, "{}"),
     "diagnose": ("diagnose", "{}", "--model", SINGLE_AXIS, "-o", "out.json"),

@@ -25,6 +25,7 @@ from model.fitting.consistent_bodies import (
 )
 from model.fitting.fit import fit
 from model.fitting.options import FitOptions
+from model.fitting.profile import profile
 from model.machine_model.model import Model, base_model
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
@@ -200,6 +201,8 @@ def test_a_fit_of_motion_finds_a_body_that_can_exist() -> None:
     assert least_share(held.model) > 0
     assert held.model.parameter("link1.inertia_zz").value == pytest.approx(0.081, rel=0.03)
     assert held.errors[0].after < 1.02 * plain.errors[0].after
+    with pytest.raises(SpecError, match="not possible for a fit with consistent inertias"):
+        profile(held, [swing], "link1.inertia_zz")
 
 
 def test_searches_from_drawn_beginnings_stay_among_bodies_that_can_exist() -> None:

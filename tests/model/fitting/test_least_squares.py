@@ -277,27 +277,3 @@ def test_a_direction_counts_in_natural_sizes_with_a_member_of_its_own() -> None:
     own = [any(abs(row[k]) > 0.1 and abs(other[k]) < 1e-9 for k in range(4)) for row, other in (basis, basis[::-1])]
     assert own == [True, True]
     assert sparse_basis(np.zeros((0, 4))) == []
-
-
-CONCENTRATION = np.repeat([0.02, 0.06, 0.11, 0.22, 0.56, 1.10], 2)
-VELOCITY = np.array([76, 47, 97, 107, 123, 139, 159, 152, 191, 201, 207, 200], dtype=float)
-"""Treated cells of the puromycin data (Bates and Watts 1988, Nonlinear Regression Analysis, table A1.3)."""
-
-
-def enzyme() -> Formula:
-    """V c/(K + c), Michaelis and Menten."""
-
-    def velocity(v: Floats) -> Floats:
-        return np.asarray(v[0] * CONCENTRATION / (v[1] + CONCENTRATION))
-
-    def slopes(v: Floats) -> Floats:
-        return np.array([velocity(v) / v[0], -velocity(v) / (v[1] + CONCENTRATION)])
-
-    return Formula(VELOCITY, velocity, slopes, (free("V", 200.0), free("K", 0.05, 0.0, 10.0)))
-
-
-def test_the_fit_of_the_puromycin_data_is_that_of_r() -> None:
-    """`nls(rate ~ Vm * conc/(K + conc), Puromycin, subset = state == "treated")`."""
-    search = Search(robust=False, tolerance=1e-12, most_evaluations=200)
-    found = solve(enzyme(), [white(1.0)], np.array([200.0, 0.05]), Never(), search)
-    assert found.values == pytest.approx([212.7, 0.06412], rel=1e-3)

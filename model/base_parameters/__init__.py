@@ -1,0 +1,1 @@
+"""Base parameters: the fewest combinations of masses, moments and friction that determine an arm's torques."""
