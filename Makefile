@@ -158,7 +158,7 @@ COMPILE = $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 
 requirements: $(FOR_DEVELOPMENT) ## pin what pyproject.toml asks for (UPGRADE=--upgrade: the newest of everything)
 	@$(COMPILE) --group installer --output-file requirements-installer.txt
 	@$(COMPILE) pyproject.toml --extra all --group build --group dev --output-file requirements-dev.txt
-	@$(COMPILE) pyproject.toml --extra rerun --extra webrtc --group thorough --constraint requirements-dev.txt --output-file requirements-thorough.txt
+	@$(COMPILE) pyproject.toml --extra webrtc --group thorough --constraint requirements-dev.txt --output-file requirements-thorough.txt
 	@$(COMPILE) pyproject.toml --extra all --group build --constraint requirements-dev.txt --output-file requirements.txt
 	@$(COMPILE) --group release --constraint requirements-dev.txt --output-file requirements-release.txt
 	@$(MAKE) --no-print-directory $(FOR_DEVELOPMENT)

@@ -79,7 +79,7 @@ def start(times: int) -> Iterator[Figure]:
 
 def fill(folder: Path, count: int) -> None:
     """A database and a folder of traces as `daq serve` finds them: ten kinds, forty tags, notes in words."""
-    dice, store = random.Random(count), Store(f"sqlite:///{folder / 'daq.sqlite'}")
+    dice, store = random.Random(count), Store(folder / "service" / "service.sqlite")
     usual: dict[str, object] = {
         "robot": ROBOT,
         "source": "real",
@@ -105,7 +105,7 @@ def fill(folder: Path, count: int) -> None:
     (folder / "traces").mkdir()
     for row in rows:  # the service compares both when it starts
         (folder / "traces" / str(row["file"])).touch()
-    (folder / "daq.toml").write_text(f'{QUIET}database = "sqlite:///{folder / "daq.sqlite"}"\n', "utf-8")
+    (folder / "daq.toml").write_text(QUIET, "utf-8")
 
 
 def asked(count: int, times: int) -> dict[str, float]:

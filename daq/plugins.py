@@ -93,8 +93,6 @@ class Plugin:
     migrations: Mapping[str, str] = field(default_factory=dict)
     """Packages of migrations (`server/store/schema.py`), by a name that no other plug-in uses. The names of their
     database tables must begin with this name."""
-    databases: Mapping[str, str] = field(default_factory=dict)
-    """Databases besides SQLite, by SQLAlchemy's name: `server.store.databases.Database`, as "module:object"."""
     noted: tuple[str, ...] = ()
     """Functions called with a database session and an `AuditNote`, as "module:function". They are called within the
     transaction of every command, outside the service, that changes its users."""

@@ -20,8 +20,8 @@ from model.discrepancy.options import DiagnosisOptions
 from model.fitting.options import FitOptions
 from model.simulation.prepared import Options
 from model.validation.criterion import Fidelity
+from model.validation.expected_deviation import names_to_validate
 from model.validation.fidelity import validate_by_distortion
-from model.validation.names import names_to_validate
 from server.jobs.next_experiment import experiment_chooser
 
 

@@ -93,8 +93,7 @@ def _board(
                 "own controller needs every register"
             )
         return Board(parameters, told, plant, options.seed, modifications, arm_seed)
-    from mock_controller.hidden.memory import draw_memory
-    from mock_controller.hidden.secret_board import SecretBoard
+    from mock_controller.hidden.memory import SecretBoard, draw_memory
 
     secret = draw_memory(options.secret_map, options.documented)
     if options.gains is None:

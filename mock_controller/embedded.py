@@ -16,8 +16,8 @@ from typing import Any
 from mock_controller.control import Control
 from mock_controller.control_port import ControlPort
 from mock_controller.device import build_device
-from mock_controller.lock_step import LockStepPace
 from mock_controller.options import read_options
+from mock_controller.pace import LockStepPace
 
 
 class EmbeddedMock:

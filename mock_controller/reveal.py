@@ -16,7 +16,7 @@ from mock_controller.board.parameters import default_board
 from mock_controller.hidden.arm import draw_arm
 from mock_controller.hidden.memory import draw_memory
 from mock_controller.hidden.sensors import draw_sensors, truth_of
-from mock_controller.servos.secret import draw_secret
+from mock_controller.servos.plant import draw_secret
 
 
 def main(arguments: list[str]) -> int:

@@ -15,10 +15,9 @@ from typing import Any
 from mock_controller.control import Control
 from mock_controller.control_port import ControlPort
 from mock_controller.device import Device, build_device
-from mock_controller.lock_step import LockStepPace
 from mock_controller.options import Options
+from mock_controller.pace import LockStepPace, RealTimePace
 from mock_controller.ports import Port, PortError, PtyPort, TcpPort, host_and_port
-from mock_controller.real_time import RealTimePace
 
 _STDIN, _STDOUT = 0, 1
 _RETRY_S = 0.1

@@ -18,8 +18,6 @@ TRY_AGAIN = "try again; if this goes on, see the database's own log"
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
 """SQLite's result codes for a damaged file or damaged tables. The last one is also that of a missing table or column,
 or one that a migration finds already present."""
-_FULL = "53100"
-"""PostgreSQL's code of a full disk."""
 _TABLE = re.compile(r'\b(?:FROM|INTO|UPDATE)\s+"?(\w+)', re.IGNORECASE)
 _LONGEST = 200
 
@@ -59,18 +57,11 @@ def advice_of(error: DatabaseError) -> str:
 
 def is_full(error: DatabaseError) -> bool:
     """Whether the database found the disk full."""
-    return _result_code(error) == sqlite3.SQLITE_FULL or getattr(error.orig, "sqlstate", None) == _FULL
-
-
-def is_value(error: DatabaseError) -> bool:
-    """Whether the database rejected a value: PostgreSQL rejects text with the character NUL, for example."""
-    from sqlalchemy.exc import DataError
-
-    return isinstance(error, DataError)
+    return _result_code(error) == sqlite3.SQLITE_FULL
 
 
 def _result_code(error: object) -> int | None:
-    """SQLite's primary result code; None for another database. The higher bits would give details."""
+    """SQLite's primary result code; None for another error. The higher bits would give details."""
     code = getattr(getattr(error, "orig", error), "sqlite_errorcode", None)
     return code & 0xFF if isinstance(code, int) else None
 

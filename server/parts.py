@@ -45,9 +45,6 @@ class Part:
     they start, and is found by `services.part(Class)`. It overrides the methods that it needs. The name of its logger
     must begin with `server.`, so that its log is written like all others."""
 
-    lets_people_in = False
-    """Whether people may sign in without a token (`services.sessions`)."""
-
     def robots_made(self, robots: Sequence[Any]) -> None:
         """Receives the `RobotServices` of every robot, before anything starts."""
 

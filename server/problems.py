@@ -14,7 +14,7 @@ from daq.contracts.frozen import like
 from daq.contracts.service.problems import FieldProblem, ProblemDetails
 from daq.transport import PortBusyError
 from firmware_protocol.invalid import message_of
-from server.database_errors import BRING_BACK, DamagedError, advice_of, is_full, is_value, line_of
+from server.database_errors import BRING_BACK, DamagedError, advice_of, is_full, line_of
 
 if TYPE_CHECKING:
     from fastapi import FastAPI, Request
@@ -98,10 +98,8 @@ def of_error(error: DaqError) -> ProblemError:
 
 
 def of_database(error: DatabaseError) -> ProblemError:
-    """Returns a 503 that names the table, a 507 if the disk is full, a 422 for a value that a row cannot store."""
+    """Returns a 503 that names the table, a 507 if the disk is full."""
     line = line_of(error)
-    if is_value(error):
-        return ProblemError(422, "not-valid", f"the database: {line}", "leave out what it cannot hold")
     log.error("database: %s", line)
     if is_full(error):
         return ProblemError(507, "no-room", "the disk of the database is full", "free some space on it")

@@ -26,9 +26,8 @@ from daq.contracts.errors import ReachError, SpecError
 from daq.contracts.frozen import like
 from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.system import stop_port_after
-from server.access.caller import Caller, spoken
+from server.access.caller import spoken
 from server.access.connections import MOST_CONNECTIONS, Connection
-from server.access.cookies import session_cookie
 from server.access.gate import Gate
 from server.access.origin import is_loopback
 from server.access.tokens import KnownTokens
@@ -37,8 +36,7 @@ from server.services import Services
 from server.steady import keep_steady, most_connections
 from server.stopping.door import StopDoor
 from server.stopping.messages import Begin, Stopped
-from server.store.address import address_of
-from server.store.lock import sole_use, sqlite_file
+from server.store.lock import sole_use
 
 END_WITHIN = 4.2
 """Time (s) from the signal to the end of this process."""
@@ -142,7 +140,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     """Serves until a signal comes. Calls `ready` with the address. Raises ReachError, SpecError."""
     section = settings.server
     with (
-        sole_use(address_of(section)),
+        sole_use(section.database),
         listening(section) as (listener, beside),
         # The listener's process starts first, gets ready in parallel, and ends whenever this process ends.
         closing(StopDoor(beside, _begin(settings, listener))) as door,
@@ -153,8 +151,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         except SpecError:
             services.close()
             raise
-        door.set_tokens(services.tokens.callers(services.clock.utc()))
-        _tell_sessions(services, gate, door)
+        door.set_tokens(services.tokens.callers())
         config, address = _configuration(make_app(services, gate)), _address_of(listener)
         _connect(services, door, beside)
 
@@ -199,8 +196,7 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
     """Makes the gate. Raises SpecError if tokens are needed and there are none."""
     loopback = is_loopback(section.host)
     local = _is_open_here(section)
-    let_in = any(part.lets_people_in for part in services.parts)
-    if not local and not let_in and all(token.revoked is not None for token in services.tokens.all()):
+    if not local and all(token.revoked is not None for token in services.tokens.all()):
         why, instead = 'server.tokens is "always"', 'say "remote"'
         if not loopback:
             why = f"server.host {section.host}: people at other computers could reach the robot"
@@ -217,7 +213,6 @@ def _gate(services: Services, section: ServiceSettings, stop_port: int) -> Gate:
         stop_port,
         lambda *answered: services.notify_parts(lambda part: part.request_answered(*answered)),
         lambda kind: services.notify_parts(lambda part: part.refused(kind)),
-        cookie=session_cookie(section.address),
         parts=services.parts,
     )
 
@@ -230,16 +225,13 @@ def _is_open_here(section: ServiceSettings) -> bool:
 def _begin(settings: Settings, listener: socket.socket) -> Begin:
     """Returns the first message to the stop listener."""
     section = settings.server
-    database = address_of(section)
     return Begin(
         descriptor=-1,  # the door sets it
         service_port=listener.getsockname()[1],
         open_on_loopback=_is_open_here(section),
         names=tuple(name.lower() for name in section.names),
-        cookie=session_cookie(section.address),
         urls={own.robot.name: own.port for own in settings.each_robot()},
-        database_url=database.render_as_string(hide_password=False),
-        sqlite=sqlite_file(database),
+        database=section.database,
     )
 
 
@@ -272,21 +264,6 @@ def _connect(services: Services, door: StopDoor, listener: socket.socket) -> Non
     door.stopped = stopped
     for rig in services.robots():
         rig.robot.reached.append(lambda reach: door.set_owner(reach.robot, reach.owner, reach.terminal))
-
-
-def _tell_sessions(services: Services, gate: Gate, door: StopDoor) -> None:
-    """Informs the gate and the stop listener of new and ended sessions at once; they read the others from the
-    database."""
-
-    def signed_in(caller: Caller) -> None:
-        gate.tokens.add(caller)
-        door.add(caller)
-
-    def signed_out(caller: Caller) -> None:
-        gate.tokens.forget(caller)
-        door.remove(caller)
-
-    services.signed_in, services.signed_out = signed_in, signed_out
 
 
 class _Server(uvicorn.Server):

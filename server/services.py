@@ -33,9 +33,8 @@ from daq.contracts.service.robot import RobotStatus
 from daq.owner.messages import Answer
 from daq.plugins import named, plugins
 from daq.trajectories.set_points import control_period
-from server.access.caller import Caller, spoken
+from server.access.caller import spoken
 from server.access.lanes import Lanes
-from server.access.sessions import SessionStore
 from server.access.tickets import Tickets
 from server.access.tokens import TokenStore
 from server.bounded.messages import Limits
@@ -59,7 +58,6 @@ from server.robot.robot import Robot, RobotPlace
 from server.robot.stop import StopService
 from server.robot.teaching import TeachingService
 from server.robot_services import RobotServices, robot_named
-from server.store.address import address_of
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
@@ -117,7 +115,7 @@ class Services:
         self.clock = clock or SystemClock()
         self.closed = False
         """Whether `close` has finished."""
-        self.store = Store(address_of(settings.server))
+        self.store = Store(settings.server.database)
         self.store.migrate()
         self.store.require_sound()
         self.experiments = ExperimentStore(self.store)
@@ -140,10 +138,6 @@ class Services:
         """Separate from uploads, so that those delay no preview."""
         self.tokens = TokenStore(self.store)
         self.tickets = Tickets(self.clock)
-        self.sessions = SessionStore(self.store)
-        self.signed_in: Callable[[Caller], None] = lambda _caller: None
-        """Called with the caller when a session has begun, or was ended by signing out."""
-        self.signed_out: Callable[[Caller], None] = lambda _caller: None
         self._robots: dict[str, RobotServices] = {}
         self.parts: list[Part] = [named(part)(self) for plugin in plugins() for part in plugin.parts]
         self.workers = SharedWorkers(settings.server.jobs_at_once)

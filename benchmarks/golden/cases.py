@@ -194,7 +194,7 @@ def _diagnoses(place: Path) -> list[Question]:
 
 
 def _models(place: Path) -> list[Question]:
-    """Returns several each of `fit`, `validate`, `compare`, `design`, `simulate` and `sensitivity`."""
+    """Returns several each of `fit`, `validate`, `compare`, `design` and `simulate`."""
     found, by_name = [], {arm.name: arm for arm in arms()}
     made = place / "models"
     for number, (name, options) in enumerate(FITS):
@@ -220,7 +220,6 @@ def _models(place: Path) -> list[Question]:
     for number, options in enumerate(DESIGNS):
         found.append(Question(f"design/{number}", ("design", *options, "--json")))
     fitted, held_out = _traces(place, by_name[FITS[0][0]])
-    found.append(Question("sensitivity/ma2000", ("sensitivity", "ma2000", held_out, "--json")))
     for number, options in enumerate(COMPARISONS):
         files = tuple(str(place / word) if "/" in word else word for word in options)
         found.append(Question(f"compare/{number}", ("compare", *files, "--json")))

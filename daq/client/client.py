@@ -8,12 +8,9 @@ from typing import Self
 
 from daq.client import stopping
 from daq.client.connection import Connection, Request
-from daq.client.experiments import new_key
 from daq.client.robot import Robot
 from daq.contracts.errors import SpecError
-from daq.contracts.experiment import ExperimentSpec
-from daq.contracts.service.experiments import Experiment, ExperimentRequest
-from daq.contracts.service.fleet import FleetExperimentRequest, FleetExperiments, FleetStatus
+from daq.contracts.service.fleet import FleetStatus
 from daq.contracts.service.robot import FleetStopResult, RobotSummary, StopResult
 from daq.contracts.service.system import Me, SystemStatus
 
@@ -74,18 +71,6 @@ class Client:
     def fleet(self) -> FleetStatus:
         """Returns an overview of every robot."""
         return self._connection.get(FleetStatus, "fleet")
-
-    def submit_to_all(
-        self, spec: ExperimentSpec, robots: Sequence[str] | None = None, *, key: str | None = None
-    ) -> Sequence[Experiment]:
-        """Adds the same experiment to the queue of each of `robots`; None for all. If one of them cannot run it, none
-        gets it."""
-        body = FleetExperimentRequest(
-            request=ExperimentRequest(spec=spec), robots=None if robots is None else tuple(robots)
-        )
-        headers = {"Idempotency-Key": key or new_key()}
-        request = Request("POST", "fleet/experiments", body, headers=headers, repeatable=True)
-        return self._connection.ask(FleetExperiments, request).experiments
 
     def robot(self, name: str | None = None) -> Robot:
         """Returns a robot by name; without a name, the only robot. Raises SpecError if there are several."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -10,8 +10,6 @@ from daq.client.connection import PART, Connection, Request
 from daq.client.errors import ServiceError
 from daq.contracts.errors import TraceError
 from daq.contracts.labels import Outcome, Source
-from daq.contracts.service.archive import ArchiveOrder, ArchiveStatus, TraceArchive, Transfer
-from daq.contracts.service.problems import ProblemDetails
 from daq.contracts.service.teaching import MeasuredGain
 from daq.contracts.service.traces import CatalogueEntry, TraceChange, TraceDetails, TraceSignals
 
@@ -22,9 +20,6 @@ MCAP = b"\x89MCAP0\r\n"
 KINDS = {".mcap": "application/octet-stream", ".csv": "text/csv"}
 MOST_NAMED = 4
 """Most traces listed in the error about an ambiguous name."""
-FETCH_LOOK = 0.5
-"""Pause (s) between two checks of a trace that is being fetched from the archive."""
-Progress = Callable[[Transfer], None]
 UPLOAD_WITHIN = 600.0
 """Time-out (s) for the answer to an upload."""
 
@@ -87,76 +82,21 @@ class Traces:
             raise TraceError(f"trace {wanted!r}: {len(found)} of the service match: {names}; give more characters")
         return exact[0] if exact else found[0]
 
-    def archive(self) -> ArchiveStatus:
-        """Returns the state of the archive. Raises ServiceError (`no-archive`) if there is none."""
-        return self._connection.get(ArchiveStatus, f"{self._robot}/archive")
-
-    def archived(self, trace: str) -> TraceArchive:
-        """Returns where a trace is stored, and its transfer to or from the archive."""
-        return self._connection.get(TraceArchive, f"{self._path}/{trace}/archive")
-
-    def send_to_archive(self, trace: str, *, drop: bool = False) -> TraceArchive:
-        """Archives a trace now; with `drop`, the service then deletes its local copy. Does not wait."""
-        request = Request("POST", f"{self._path}/{trace}/archive", ArchiveOrder(drop=drop), repeatable=True)
-        return self._connection.ask(TraceArchive, request)
-
-    def fetch(self, trace: str, progress: Progress = lambda _transfer: None) -> TraceArchive:
-        """Fetches a trace from the archive, and waits until the service has it; calls `progress` meanwhile.
-
-        Raises ServiceError if it cannot be fetched. While the archive cannot be reached, this waits.
-        """
-        request = Request("POST", f"{self._path}/{trace}/fetch", repeatable=True)
-        found = self._connection.ask(TraceArchive, request)
-        while not found.local:
-            if found.transfer is None:  # the failure was reported to another client
-                found = self._connection.ask(TraceArchive, request)
-            else:
-                progress(found.transfer)
-                if found.transfer.state == "failed":
-                    line = found.transfer.problem
-                    problem = ProblemDetails(type="#archive", title="Not available", status=503, detail=line)
-                    raise ServiceError(problem)
-            self._connection.pause(FETCH_LOOK)
-            found = self.archived(trace)
-        return found
-
-    def _details(self, trace: str) -> TraceDetails:
-        """Like `get`, but first fetches the trace from the archive if necessary."""
-        try:
-            return self.get(trace)
-        except ServiceError as error:
-            if error.kind != "trace-in-archive":
-                raise
-            self.fetch(trace)
-            return self.get(trace)
-
-    def _download(self, trace: str, name: str, target: Path, progress: Progress) -> None:
-        """Downloads a file of a trace, which is first fetched from the archive if necessary."""
-        path = f"{self._path}/{trace}/{name}"
-        try:
-            self._connection.download(path, target)
-        except ServiceError as error:
-            if error.kind != "trace-in-archive":
-                raise
-            self.fetch(trace, progress)
-            self._connection.download(path, target)
-
-    def download(self, trace: str, target: Path, progress: Progress = lambda _transfer: None) -> Path:
-        """Downloads the recorded file to `target`; to a folder, under its own name. Calls `progress` while the service
-        fetches it from the archive.
+    def download(self, trace: str, target: Path) -> Path:
+        """Downloads the recorded file to `target`; to a folder, under its own name.
 
         Returns the file. Raises TraceError if another file exists there, or it cannot be written.
         """
         target = Path(target)
         if target.is_dir():
-            target = target / Path(self._details(trace).entry.file).name
+            target = target / Path(self.get(trace).entry.file).name
         try:
             if not target.exists():
-                self._download(trace, "data.mcap", target, progress)
+                self._connection.download(f"{self._path}/{trace}/data.mcap", target)
                 return target
             fetched = target.with_name(f".{target.name}.fetched")
             try:
-                self._download(trace, "data.mcap", fetched, progress)
+                self._connection.download(f"{self._path}/{trace}/data.mcap", fetched)
                 if fetched.read_bytes() != target.read_bytes():
                     raise TraceError(f"{target}: exists and is not trace {trace}; nothing was overwritten")
             finally:
@@ -168,7 +108,7 @@ class Traces:
     def download_csv(self, trace: str, target: Path) -> Path:
         """Downloads time and signals as plain CSV, in s, rad and V. Raises TraceError if it cannot be written."""
         try:
-            self._download(trace, "data.csv", target, lambda _transfer: None)
+            self._connection.download(f"{self._path}/{trace}/data.csv", target)
         except OSError as error:
             raise TraceError(f"{target}: cannot be written: {error.strerror or error}") from error
         return target

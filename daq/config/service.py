@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import ipaddress
 from pathlib import Path
 from typing import Annotated, Literal
-from urllib.parse import urlsplit
 
 from pydantic import BeforeValidator, Field, field_validator
 
@@ -25,29 +23,6 @@ TrueOrFalse = Annotated[bool, BeforeValidator(_true_or_false)]
 """A consent that may move an arm: only `true`, and no other truthy value."""
 
 
-def protected(address: str | None) -> str | None:
-    """Raises ValueError for an invalid address, or one over which a secret could be intercepted."""
-    if address is None:
-        return None
-    try:
-        parts = urlsplit(address)
-        _ = parts.port
-    except ValueError:
-        raise ValueError("is no address; write https://host") from None
-    if not parts.hostname or parts.username is not None or parts.query or parts.fragment:
-        raise ValueError("is no address; write https://host")
-    if parts.scheme != "https" and not (parts.scheme == "http" and _is_loopback(parts.hostname)):
-        raise ValueError("must begin with https://, unless it is on this computer")
-    return address
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
-
-
 class ServiceSettings(FrozenRecord):
     """Section `[server]`."""
 
@@ -62,8 +37,6 @@ class ServiceSettings(FrozenRecord):
     """Port of the stop listener; None for the one after `port`, 0 for any free one."""
     folder: Path = Path("service")
     """Folder of the database, the models and the jobs' results."""
-    database: str | None = None
-    """URL of the database; None for a SQLite file in `folder`."""
     connect_at_start: bool = True
     """Whether the service connects to the robot when it starts; connecting moves nothing."""
     unattended: TrueOrFalse = False
@@ -80,13 +53,11 @@ class ServiceSettings(FrozenRecord):
     """Time limit (s) of that process."""
     names: tuple[Annotated[str, Field(max_length=253)], ...] = ()
     """Names by which browsers reach this service besides its address; other names are refused."""
-    address: Annotated[str, Field(max_length=500)] | None = None
-    """Address by which browsers reach this service, for signing in."""
 
-    @field_validator("address")
-    @classmethod
-    def _is_protected(cls, address: str | None) -> str | None:
-        return protected(address)
+    @property
+    def database(self) -> Path:
+        """The file of the database."""
+        return self.folder.absolute() / "service.sqlite"
 
     @field_validator("folder")
     @classmethod

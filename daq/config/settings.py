@@ -100,7 +100,7 @@ class TraceSettings(FrozenRecord):
     limits: TraceLimits = TraceLimits()
     """Limits for reading files of any origin."""
     warn_at: Annotated[float, Field(gt=0, le=1)] = 0.9
-    """Used share of the disk of the traces, or of `archive.keep_size`, at which the service warns."""
+    """Used share of the disk of the traces, at which the service warns."""
 
     @field_validator("folder")
     @classmethod

@@ -20,14 +20,8 @@ Extra = Literal[
     "server",
     "tables",
     "ros",
-    "cluster",
-    "postgresql",
-    "archive",
-    "oidc",
     "mcp",
-    "rerun",
     "webrtc",
-    "foxglove",
 ]
 
 CONTAINS: dict[Extra, tuple[Extra, ...]] = {
@@ -35,8 +29,6 @@ CONTAINS: dict[Extra, tuple[Extra, ...]] = {
     "model": ("robot", "live"),
     "server": ("robot", "live"),
     "mcp": ("robot", "live"),
-    "foxglove": ("robot", "live"),
-    "rerun": ("model", "robot", "live"),
     "webrtc": ("server", "robot", "live"),
 }
 """Extras that an extra includes."""
@@ -68,15 +60,8 @@ EXTRA_OF: dict[str, Extra] = {
     "xarray": "tables",
     "rosbags": "ros",
     "google": "ros",
-    "dask": "cluster",
-    "distributed": "cluster",
-    "psycopg": "postgresql",
-    "obstore": "archive",
-    "authlib": "oidc",
     "mcp": "mcp",
-    "rerun": "rerun",
     "aiortc": "webrtc",
-    "foxglove": "foxglove",
 }
 """The smallest extra that installs each module."""
 

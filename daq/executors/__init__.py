@@ -1,4 +1,4 @@
-"""Executors that compute jobs: processes of this computer, or those of a plug-in."""
+"""Executors that compute jobs in processes of this computer."""
 
 from daq.executors.each import done_in_any_order
 from daq.executors.local import LocalWorkers, cores

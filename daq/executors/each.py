@@ -8,9 +8,8 @@ from concurrent.futures import BrokenExecutor, Future
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
-from daq.contracts.errors import ReachError
 from daq.contracts.progress import Cancel, Never, stop_if
-from daq.executors.workers import BlamedError, OtherVersionError, Workers
+from daq.executors.workers import Workers
 
 MOST_ALONE = 2
 """How often a job is run alone after its worker died. A job that kills its worker this often is at fault itself."""
@@ -46,8 +45,7 @@ def done_in_any_order(
     If a worker dies, the cause may be any of the lost tasks, so all of them are run again, one at a time. A task that
     kills its worker each time yields a `BrokenExecutor` exception.
 
-    Raises CancelledError if cancelled; OtherVersionError for a worker of another version; ReachError if a scheduler is
-    lost.
+    Raises CancelledError if cancelled.
     """
     return _Rounds(workers, function, tasks).run(cancel or Never())
 
@@ -71,11 +69,7 @@ class _Rounds:
                 stop_if(cancel)
                 continue
             self._given -= 1
-            error = answer.exception()
-            if isinstance(error, OtherVersionError | ReachError):
-                raise error
-            blamed = alone == MOST_ALONE or (alone > 0 and isinstance(error, BlamedError))
-            if isinstance(error, BrokenExecutor) and not blamed:
+            if isinstance(answer.exception(), BrokenExecutor) and alone < MOST_ALONE:
                 self._lost.append((task, alone))
             else:
                 yield task, answer

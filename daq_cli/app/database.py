@@ -13,10 +13,9 @@ if TYPE_CHECKING:
 
 def service_database(call: Invocation) -> Store:
     """Returns the configured database, migrated to the newest schema. Raises SpecError."""
-    from server.store.address import address_of
     from server.store.engine import Store
 
-    store = Store(address_of(call.configuration.server))
+    store = Store(call.configuration.server.database)
     store.migrate()
     return store
 

@@ -76,14 +76,6 @@ CORE = {
             group="Model",
         ),
         Command(
-            "sensitivity",
-            "Show which parameter moves which joint, and when.",
-            "daq_cli.commands.sensitivity",
-            about="computer",
-            needs="model",
-            group="Model",
-        ),
-        Command(
             "simulate",
             "Simulate recorded traces with a model.",
             "daq_cli.commands.simulate",

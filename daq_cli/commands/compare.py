@@ -26,8 +26,7 @@ from daq_cli.robot.access import robot_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from model.comparison.agreement import ModelAgreement
-    from model.comparison.difference import ParameterDifference
+    from model.comparison.agreement import ModelAgreement, ParameterDifference
     from model.machine_model.model import Model
 
 app = typer.Typer(add_completion=False)
@@ -50,8 +49,8 @@ def compare(
     A trace counts as held out when none of the models says that it was fitted to it.
     """
     from daq_cli.app.progress import shown_progress
+    from model.comparison.agreement import differences
     from model.comparison.compare import compare
-    from model.comparison.difference import differences
 
     robot = robot_of(context)
     load_effects(effect_file, robot)

@@ -21,10 +21,6 @@ def show(context: typer.Context, json: JsonOption = False) -> None:
 
     call = invocation(context)
     settings, path = load_settings(call.config_file)
-    if settings.server.database is not None:
-        from server.store.address import masked_settings  # imported here, since it needs the extra `server`
-
-        settings = masked_settings(settings)
     if json:
         print_json({"file": path, "settings": settings.model_dump(mode="json")})
         return
@@ -109,10 +105,6 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
 
     call = invocation(context)
     settings, path = load_settings(call.config_file)
-    if settings.server.database is not None:
-        from server.store.address import parse_address  # imported here, since it needs the extra `server`
-
-        parse_address(settings.server.database)
     for plugin in plugins():
         for reference in plugin.checks:
             named(reference)(settings)

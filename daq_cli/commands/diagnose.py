@@ -207,8 +207,7 @@ def _written(found: Diagnosis, begin: Model, traces: Sequence[Trace], path: Path
     """Writes the report, with the models before and after on every trace if these can be simulated."""
     from daq.plugins import report_sections
     from model.reports.diagnosis_data import told
-    from model.reports.page import write_page
-    from model.reports.saved_report import saved_report
+    from model.reports.page import saved_report, write_page
 
     page = saved_report(told(found, begin, traces), files_of(traces), report_sections(found, traces))
     return write_page(page, path)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     add_completion=False,
-    help="Make, list and revoke tokens of the service; list and end sessions.",
+    help="Make, list and revoke tokens of the service.",
     no_args_is_help=True,
 )
 
@@ -65,34 +65,6 @@ def revoke(context: typer.Context, name: NameArgument) -> None:
     _require_name(name)
     _tokens(invocation(context)).revoke(name, SystemClock().utc(), computers_user())
     print(f"token of {name} revoked")
-
-
-@app.command()
-def sessions(context: typer.Context, json: JsonOption = False) -> None:
-    """List people who have signed in by OpenID Connect, and until when."""
-    from server.access.sessions import SessionStore
-    from server.clock import SystemClock
-
-    found = SessionStore(service_database(invocation(context))).all(SystemClock().utc())
-    if json:
-        print_json([{"name": one.name, "role": one.role, "expires": one.expires} for one in found])
-        return
-    if not found:
-        print("nobody is signed in")
-    for one in found:
-        print(f"{one.name:20} {one.role:9} until {one.expires:%Y-%m-%d %H:%M} UTC")
-
-
-@app.command()
-def sign_out(context: typer.Context, name: Annotated[str, typer.Argument(help="Name of the person.")]) -> None:
-    """End all sessions of a person; within two seconds they must sign in again."""
-    from server.access.sessions import SessionStore
-    from server.clock import SystemClock
-
-    count = SessionStore(service_database(invocation(context))).end_all(name, SystemClock().utc(), computers_user())
-    if count == 0:
-        raise SpecError(f"{shown(name)} has no session; `daq token sessions` lists those there are")
-    print(f"{count} session{'s' * (count > 1)} of {name} ended")
 
 
 def _require_name(name: str) -> None:

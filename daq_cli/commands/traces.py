@@ -15,7 +15,6 @@ from daq_cli.app.context import JsonOption, console, print_json, print_prose, pr
 from daq_cli.robot.access import robot_of
 
 if TYPE_CHECKING:
-    from daq.contracts.service.archive import ArchiveStatus, TraceArchive
     from daq.contracts.trace import Trace, TraceRecord
     from daq.traces.salvage import Salvaged
     from daq_cli.robot.operations import RobotAccess
@@ -298,68 +297,6 @@ def check(
         print("trustworthy" if found.trustworthy else "NOT trustworthy")
     if not found.trustworthy:
         raise typer.Exit(exit_codes.FAULT)
-
-
-@app.command()
-def archive(
-    context: typer.Context,
-    trace: Annotated[
-        str | None, typer.Argument(help="The trace to send now; without one, the state of the archive is shown.")
-    ] = None,
-    drop: Annotated[
-        bool, typer.Option("--drop", help="Drop the service's local copy when the archive has the trace.")
-    ] = False,
-    json: JsonOption = False,
-) -> None:
-    """Show a server's archive, or send a trace there now."""
-    if trace is None and drop:
-        raise SpecError("--drop: name a trace")
-    with robot_of(context).service("traces archive") as robot:
-        if trace is None:
-            _print_archive(robot.traces.archive(), as_json=json)
-        else:
-            found = robot.traces.send_to_archive(robot.traces.find(trace).id, drop=drop)
-            _print_place(found, as_json=json)
-
-
-@app.command()
-def fetch(context: typer.Context, trace: TraceArgument = "last", json: JsonOption = False) -> None:
-    """Make a server fetch a trace from its archive, and wait for it."""
-    from daq_cli.robot.remote.traces import fetch_progress
-
-    with robot_of(context).service("traces fetch") as robot:
-        entry = robot.traces.find(trace)
-        with fetch_progress(entry.file) as progress:
-            found = robot.traces.fetch(entry.id, progress)
-    _print_place(found, as_json=json)
-
-
-def _print_archive(found: ArchiveStatus, *, as_json: bool) -> None:
-    if as_json:
-        print_json(found.model_dump(mode="json"))
-        return
-    print(printable(f"archive:  {found.place}"))
-    print(
-        f"state:    {found.state}, {found.archived} traces; {found.waiting} wait to be sent, {found.fetching} fetched"
-    )
-    limit = "" if found.local_limit is None else f" of {found.local_limit / 1e6:.0f}"
-    print(f"here:     {found.local_bytes / 1e6:.1f}{limit} MB")
-    if found.problem:
-        print(printable(f"problem:  {found.problem}, since {found.since:%Y-%m-%d %H:%M:%S %Z}"))
-
-
-def _print_place(found: TraceArchive, *, as_json: bool) -> None:
-    if as_json:
-        print_json(found.model_dump(mode="json"))
-        return
-    from daq_cli.robot.remote.traces import transfer_words
-
-    places = ["here"] if found.local else []
-    if found.archived is not None:
-        places.append(f"in the archive since {found.archived:%Y-%m-%d %H:%M:%S %Z}, SHA-256 {found.sha256}")
-    print(f"{found.id}: {' and '.join(places)}")
-    if found.transfer is not None:
-        print(printable(f"{found.transfer.direction}: {found.transfer.state}, {transfer_words(found.transfer)}"))
 
 
 @app.command()

@@ -65,9 +65,9 @@ def validate(
     from daq_cli.app.progress import shown_progress
     from daq_cli.models.record_doubts import end_if_doubted, stop_if_doubted
     from model.simulation.prepared import Options
-    from model.validation.conventions import in_convention
+    from model.validation.criterion import in_convention
+    from model.validation.expected_deviation import names_to_validate
     from model.validation.fidelity import validate_by_distortion
-    from model.validation.names import names_to_validate
     from model.validation.time_domain import vary_in_time
 
     robot = robot_of(context)

@@ -147,7 +147,7 @@ def load_effects(files: Sequence[Path] | None, robot: RobotAccess | None = None)
             robot.require_local(
                 "--effect-file: a service runs no programs that it is sent; fetch the traces and compute here"
             )
-        from model.effects.effect_files import load_effect_file
+        from model.effects.library import load_effect_file
 
         for file in files:
             load_effect_file(file)

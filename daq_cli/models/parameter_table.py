@@ -28,7 +28,7 @@ def print_rows(table: Table) -> None:
 
 def print_parameters(parameters: Sequence[FittedParameter]) -> None:
     """Prints one line per parameter; without a value if the data do not determine it."""
-    from model.fitting.shown import COLUMNS, parameter_table
+    from model.fitting.fitted import COLUMNS, parameter_table
 
     print_rows(parameter_table(parameters).only(*COLUMNS))
 

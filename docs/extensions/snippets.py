@@ -16,11 +16,11 @@ BLOCK = re.compile(r"^[ ]*```(python|console)\n(.*?)^[ ]*```$", re.DOTALL | re.M
 RUN: Mapping[tuple[str, str], str] = {
     ("any-arm.md", "python"): "tests/extras/formats/command_line/test_pages.py",
     ("audit.md", "console"): "tests/extras/lab/audit/test_requests.py",
-    ("batches.md", "console"): "tests/extras/lab/batches/test_cluster.py",
-    ("batches.md", "python"): "tests/extras/lab/batches/test_cluster.py",
+    ("batches.md", "console"): "tests/extras/lab/batches/test_batch_command.py",
+    ("batches.md", "python"): "tests/extras/lab/batches/test_batch_command.py",
     ("feedforward.md", "python"): "tests/extras/motion/test_command.py",
-    ("fleet.md", "console"): "tests/extras/lab/fleet/test_several_arms.py",
-    ("fleet.md", "python"): "tests/extras/lab/fleet/test_several_arms.py",
+    ("fleet.md", "console"): "tests/server/fleet/test_fleet_service.py",
+    ("fleet.md", "python"): "tests/server/fleet/test_fleet_service.py",
     ("index.md", "python"): "tests/repository/test_documentation.py",
     ("notifications.md", "console"): "tests/extras/lab/notifications/test_service.py",
     ("own-effect.md", "python"): "tests/model/effects/test_effects.py",
@@ -32,7 +32,6 @@ RUN: Mapping[tuple[str, str], str] = {
 }
 """The test that runs a page's blocks of a language."""
 NOT_RUN: Mapping[tuple[str, str], str] = {
-    ("archive.md", "console"): "needs a store; tests/extras/lab/archive/test_service.py gives the same commands",
     ("thesis.md", "python"): "takes minutes; tests/extras/thesis/test_reproduction.py makes the same calls",
 }
 """Why a page's blocks of a language are not run. That what they import exists is checked all the same."""

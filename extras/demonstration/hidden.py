@@ -95,8 +95,8 @@ def record(
     return finished
 
 
-def opened(sealed: Sealed, answer: Diagnosis, machine: Machine) -> OpenedSecret:
-    """Returns the secret beside an answer, scored as in blind trials."""
+def opened(sealed: Sealed, answer: Diagnosis | None, machine: Machine) -> OpenedSecret:
+    """Returns the secret beside an answer, scored as in blind trials; None if the search was cancelled."""
     truth = parse_truth(_told("reveal", str(sealed.seed)))
     (hidden,) = truth.effects
     return OpenedSecret(
@@ -109,7 +109,9 @@ def opened(sealed: Sealed, answer: Diagnosis, machine: Machine) -> OpenedSecret:
     )
 
 
-def _outcome(truth: Truth, answer: Diagnosis, machine: Machine) -> Outcome:
+def _outcome(truth: Truth, answer: Diagnosis | None, machine: Machine) -> Outcome:
+    if answer is None:
+        return "cancelled"
     judged = score(truth, Detectability(seed=truth.seed, d_prime=0.0), answer, machine)
     place = judged.joint_right is not False
     if answer.verdict == "nothing-significant":
@@ -121,10 +123,11 @@ def _outcome(truth: Truth, answer: Diagnosis, machine: Machine) -> Outcome:
     return "joint" if judged.joint_right else "wrong"
 
 
-def _numbers(truth: Truth, answer: Diagnosis, machine: Machine) -> tuple[HiddenNumber, ...]:
+def _numbers(truth: Truth, answer: Diagnosis | None, machine: Machine) -> tuple[HiddenNumber, ...]:
     """Returns the hidden effect's parameters, in the model's conventions if they have one, else in the mock's."""
     (hidden,) = truth.effects
-    found = {name: value for step in answer.steps if step.adopted for name, value in step.parameters.items()}
+    steps = () if answer is None else answer.steps
+    found = {name: value for step in steps if step.adopted for name, value in step.parameters.items()}
     numbers: list[HiddenNumber] = []
     for joint in hidden.joints or (None,):
         on = () if joint is None else (joint,)

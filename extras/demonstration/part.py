@@ -104,7 +104,8 @@ class Demonstrations(Part):
             secret = opened(sealed, answer, rig.robot.machine)
             with self._lock:
                 number, named = self._counts.get(rig.robot.name, (0, 0))
-                self._counts[rig.robot.name] = number + 1, named + (secret.outcome == "named")
+                if answer is not None:
+                    self._counts[rig.robot.name] = number + 1, named + (secret.outcome == "named")
             seconds = (self._clock.utc() - hidden.began).total_seconds()
             self._keep(rig, hidden, state="opened", secret=secret, seconds=seconds)
         except (DaqError, ProblemError) as error:
@@ -149,13 +150,15 @@ class Demonstrations(Part):
         diagnosis, _ = rig.jobs.submit(request, by, None)
         return self._keep(rig, hidden, state="diagnosing", diagnosis=diagnosis.id)
 
-    def _answered(self, rig: RobotServices, hidden: Hidden) -> Diagnosis:
-        """Waits for the answer. Raises HidingError without one."""
+    def _answered(self, rig: RobotServices, hidden: Hidden) -> Diagnosis | None:
+        """Waits for the answer; None if the search was cancelled. Raises HidingError if it failed."""
         from server.jobs.results import DiagnosisJobResult  # imported late because it is slow to import
 
         while (job := self._job(rig, hidden)).state not in ENDED:
             if self._closing.wait(LOOK_EVERY):
                 raise HidingError("the service ended")
+        if job.state == "cancelled":
+            return None
         if job.state != "done":
             raise HidingError(f"the diagnosis has no answer: {job.reason}")
         result = DiagnosisJobResult.model_validate_json(rig.jobs.result_file(job.id, RESULT).read_bytes())

@@ -31,9 +31,9 @@ from model.fitting.options import FitOptions, Prior
 from model.machine_model.model import Model
 from model.simulation.prepared import Options
 from model.validation.criterion import Fidelity
+from model.validation.doubling import squared_error
 from model.validation.expected_deviation import gaussian_share
 from model.validation.fidelity import validate_by_distortion
-from model.validation.squared_error import squared_error
 
 Method = Literal["nelder_mead", "least_squares"]
 

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from firmware_protocol.framing import Frame, FrameDecoder, encode_frame
-from mock_controller.bridge.line import Line
-from mock_controller.bridge.pieces import PieceSplitter
+from mock_controller.bridge.pieces import Line, PieceSplitter
 
 
 class Responder(Protocol):

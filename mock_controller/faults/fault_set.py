@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from mock_controller.faults.connection import Stall
 from mock_controller.faults.fault import Chunk, Direction, Fault, FaultError, FaultyParts, PartFault, WireFault
+from mock_controller.faults.parts import Stall
 from mock_controller.faults.registry import describe, parse_fault
 
 

@@ -5,9 +5,16 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from mock_controller.faults.connection import Disconnect, Stall
 from mock_controller.faults.fault import Fault, FaultError, fields_of
-from mock_controller.faults.parts import BrownOut, BusyMemory, NoisyPotentiometer, StalledJoint, StuckPotentiometer
+from mock_controller.faults.parts import (
+    BrownOut,
+    BusyMemory,
+    Disconnect,
+    NoisyPotentiometer,
+    Stall,
+    StalledJoint,
+    StuckPotentiometer,
+)
 from mock_controller.faults.wire import Delay, Drop, Duplicate, Flip, Junk, Split
 
 FAULTS: dict[str, type[Fault]] = {

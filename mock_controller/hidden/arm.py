@@ -13,11 +13,11 @@ from random import Random
 from typing import Any
 
 from mock_controller.board.parameters import BoardParameters
-from mock_controller.hidden.closed_loop import LoopParts
+from mock_controller.hidden.experiment import LoopParts
 from mock_controller.hidden.sizes import LATER_SIZES, OPEN_SIZES, SHARED_SIZES, SizeRange, draw_values
 from mock_controller.hidden.tolerances import deviating_board, deviating_plant, draw_deviations, tolerances
 from mock_controller.modifications import Modification, build_modifications
-from mock_controller.modifications.changes import change_body
+from mock_controller.modifications.parameter import change_body
 from mock_controller.modifications.registry import is_shared
 from mock_controller.plant import PlantParameters
 

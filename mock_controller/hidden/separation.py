@@ -26,8 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mock_controller.board.parameters import BoardParameters
-from mock_controller.hidden.closed_loop import LoopParts, reading_deviation, readings
-from mock_controller.hidden.experiment import Experiment
+from mock_controller.hidden.experiment import Experiment, LoopParts, reading_deviation, readings
 from mock_controller.hidden.imitation import imitation
 from mock_controller.hidden.tolerances import (
     HARMONICS,

@@ -16,7 +16,7 @@ from typing import ClassVar
 
 from firmware_protocol.units import ADC_COUNTS
 from mock_controller.board.parameters import BoardParameters
-from mock_controller.modifications.changes import change_body, change_joint
+from mock_controller.modifications.parameter import change_body, change_joint
 from mock_controller.plant.parameters import PlantParameters
 from mock_controller.quantities import QuantityReader
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from math import exp
 from typing import Any, ClassVar
 
-from mock_controller.modifications.bristle import Bristle
-from mock_controller.modifications.changes import change_joint
-from mock_controller.modifications.parameter import joint_parameter, parameter
+from mock_controller.modifications.parameter import change_joint, joint_parameter, parameter
+from mock_controller.plant.drive_train import deflect
 from mock_controller.plant.parameters import PlantParameters
 
 
@@ -186,3 +185,24 @@ SHARED: tuple[type[Any], ...] = (
     DirectionDependentFriction,
     DirectionDependentViscousFriction,
 )
+
+
+# --- A bristle for effects that need their own
+
+
+class Bristle:
+    """Dahl's bristle: deflection −1 to 1, built up over `presliding` rad of motion, in steps of `step_s`."""
+
+    def __init__(self, presliding: float, step_s: float) -> None:
+        self._presliding = presliding
+        self._step_s = step_s
+        self.restart()
+
+    def restart(self) -> None:
+        """Resets the deflection."""
+        self._deflection = 0.0
+
+    def advance(self, rate: float) -> float:
+        """Returns the deflection after a step at `rate` (rad/s)."""
+        (self._deflection,) = deflect([self._deflection], [self._step_s * rate], self._presliding)
+        return self._deflection

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from math import cos, sin
 from typing import Any, ClassVar
 
-from mock_controller.modifications.changes import change_body
-from mock_controller.modifications.parameter import joint_parameter, parameter
+from mock_controller.modifications.parameter import change_body, joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from math import exp
 from typing import Any, ClassVar
 
-from mock_controller.modifications.changes import change_joint
-from mock_controller.modifications.parameter import joint_parameter, parameter
+from mock_controller.modifications.parameter import change_joint, joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 
 _COPPER_PER_KELVIN = 0.0039

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 from typing import Any
+
+from mock_controller.plant.parameters import PlantParameters
 
 
 def parameter(
@@ -24,3 +27,18 @@ def joint_parameter(high: int = 6, low: int = 1) -> Any:
 def fields_of(kind: type[Any]) -> dict[str, dataclasses.Field[Any]]:
     """Returns the parameters of a modification class, by name."""
     return {field.name: field for field in dataclasses.fields(kind) if field.init}
+
+
+# --- Makes changed copies of the arm's constants
+
+
+def change_joint(parameters: PlantParameters, number: int, **values: float) -> PlantParameters:
+    """Returns the arm with other constants at one joint (from 1)."""
+    joints = list(parameters.joints)
+    joints[number - 1] = replace(joints[number - 1], **values)
+    return replace(parameters, joints=tuple(joints))
+
+
+def change_body(parameters: PlantParameters, **values: float) -> PlantParameters:
+    """Returns the arm with other rigid-body constants."""
+    return replace(parameters, rigid_body=replace(parameters.rigid_body, **values))  # type: ignore[arg-type]

@@ -13,7 +13,16 @@ from functools import cache
 from typing import Any
 
 from mock_controller.modification import Modification
-from mock_controller.modifications.library import LIBRARY, SHARED
+from mock_controller.modifications import (
+    amplifier,
+    controller,
+    friction,
+    load,
+    motor,
+    sensor,
+    strange_friction,
+    transmission,
+)
 from mock_controller.modifications.parameter import fields_of
 
 
@@ -85,3 +94,28 @@ def _check(name: str, field: dataclasses.Field[Any], value: object) -> None:
     high = field.metadata.get("high", math.inf)
     if not low <= value <= high:
         raise ModificationError(f"modification {name}: {field.name} is {value}, allowed are {low} to {high}")
+
+
+# --- All modifications, collected from the files of this folder
+
+
+SHARED: tuple[type[Any], ...] = (
+    *friction.SHARED,
+    *motor.SHARED,
+    *amplifier.SHARED,
+    *transmission.SHARED,
+    *load.SHARED,
+    *sensor.SHARED,
+    *controller.SHARED,
+)
+"""Effects whose names the diagnosis also uses."""
+
+OPEN_SET: tuple[type[Any], ...] = (
+    *strange_friction.OPEN_SET,
+    *transmission.OPEN_SET,
+    *amplifier.OPEN_SET,
+    *sensor.OPEN_SET,
+)
+"""Effects that only the mock has; to the diagnosis they are unknown."""
+
+LIBRARY: tuple[type[Any], ...] = SHARED + OPEN_SET

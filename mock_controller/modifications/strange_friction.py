@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import exp, log1p
 from typing import Any, ClassVar
 
-from mock_controller.modifications.bristle import Bristle
+from mock_controller.modifications.friction import Bristle
 from mock_controller.modifications.parameter import joint_parameter, parameter
 from mock_controller.plant.parameters import PlantParameters
 

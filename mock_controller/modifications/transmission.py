@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from math import sin
 from typing import Any, ClassVar
 
-from mock_controller.modifications.bristle import Bristle
+from mock_controller.modifications.friction import Bristle
 from mock_controller.modifications.parameter import joint_parameter, parameter
+from mock_controller.plant.drive_train import Transmission
 from mock_controller.plant.parameters import PlantParameters
-from mock_controller.plant.transmission import Transmission
 
 
 @dataclass

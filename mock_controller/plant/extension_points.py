@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
 from mock_controller.modification import Modification
+from mock_controller.plant.drive_train import Transmission
 from mock_controller.plant.parameters import PlantParameters
-from mock_controller.plant.transmission import Transmission
 
 
 @runtime_checkable

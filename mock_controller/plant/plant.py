@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from mock_controller.modification import Modification, Restartable, of_kind
-from mock_controller.plant.drive_train import DriveTrain
+from mock_controller.plant.drive_train import CoulombLevel, DriveTrain, FreeRotor, deflect
 from mock_controller.plant.extension_points import (
     AddsJointTorque,
     AddsTorque,
@@ -29,11 +29,8 @@ from mock_controller.plant.extension_points import (
     KnowsPlant,
     RubsUnderGravity,
 )
-from mock_controller.plant.friction import CoulombLevel, deflect
 from mock_controller.plant.parameters import JOINTS, PlantParameters
-from mock_controller.plant.rigid_body import build_model
-from mock_controller.plant.rigid_steps import RigidSteps
-from mock_controller.plant.transmission import FreeRotor
+from mock_controller.plant.rigid_body import RigidSteps, build_model
 
 STEP_US = 1000
 """Integration step (µs); halving it changes the default ramp by less than a hundredth of an ADC count."""

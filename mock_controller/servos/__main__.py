@@ -21,7 +21,7 @@ from firmware_protocol.dynamixel.control_table import HardwareError
 from firmware_protocol.dynamixel.packets import LARGEST_ID
 from mock_controller.ports import Port, PortError, PtyPort, TcpPort, host_and_port
 from mock_controller.servos.bench import Bench, Options
-from mock_controller.servos.secret import NONE, draw_secret
+from mock_controller.servos.plant import NONE, draw_secret
 
 _STDIN = 0
 _WAKE_S = 0.02

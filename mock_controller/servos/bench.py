@@ -10,8 +10,7 @@ from firmware_protocol.dynamixel.control_table import COUNTS_A_TURN, HardwareErr
 from firmware_protocol.dynamixel.instructions import Instruction, StatusError, areas_read, areas_written, status
 from firmware_protocol.dynamixel.packets import BROADCAST, STATUS, Packet, PacketDecoder, encode
 from firmware_protocol.errors import ProtocolError
-from mock_controller.servos.plant import STEP_US, Head, Motor, PanTilt
-from mock_controller.servos.secret import NONE, Secret
+from mock_controller.servos.plant import NONE, STEP_US, Head, Motor, PanTilt, Secret
 from mock_controller.servos.servo import Servo
 
 PERIOD_US = 1000

@@ -7,9 +7,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from model import layout as at
-from model.drives.magnet import back_emf_constant
 from model.drives.piecewise import clamped, outside, passed
-from model.dynamics.compilation import borrowing
+from model.dynamics.compilation import borrowing, inlined
 from model.dynamics.wide_numbers import exponential
 
 
@@ -44,3 +43,18 @@ def risen(time: Any, joint: NDArray[Any]) -> Any:
     if joint[at.TIMED_RISE] == 0.0:
         return 0.0 * time
     return joint[at.TIMED_RISE] * (1.0 - exponential(-time / joint[at.RISING_TIME]))
+
+
+# --- A DC motor's two constants. Both are proportional to the flux of its magnet, so they weaken together
+
+
+@inlined
+def torque_constant(joint: NDArray[Any]) -> Any:
+    """Returns N·m/A, with the remaining flux."""
+    return joint[at.TORQUE_CONSTANT] * (1.0 - joint[at.FLUX_LOSS])
+
+
+@inlined
+def back_emf_constant(joint: NDArray[Any]) -> Any:
+    """Returns V·s/rad, with the remaining flux."""
+    return joint[at.BACK_EMF] * (1.0 - joint[at.FLUX_LOSS])

@@ -16,20 +16,18 @@ from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.fitting.choice import BEND, chosen_unknowns, friction_forms, start_postures, with_bends
 from model.fitting.consistent_bodies import coordinates_of, on_the_edge
-from model.fitting.coordinates import Coordinates
 from model.fitting.covariance import sandwich
 from model.fitting.fitted import FittedParameter, JointError
 from model.fitting.identifiability import IdentifiabilityReport, ParameterVerdict, judged
-from model.fitting.least_squares import Search, Solution, solve
+from model.fitting.least_squares import Search, Solution, influence, solve
 from model.fitting.nelder_mead import climb
 from model.fitting.noise import noise_effect
 from model.fitting.options import FitOptions
 from model.fitting.problem import Evaluation, whitened
 from model.fitting.records import Signal, noise_floor, records_of
 from model.fitting.result import FitResult
-from model.fitting.robust import influence
 from model.fitting.simulated import SimulatedProblem
-from model.fitting.unknowns import Unknown, prior_precision, scales
+from model.fitting.unknowns import Coordinates, Unknown, prior_precision, scales
 from model.fitting.whitening import Whitener, fitted_whitener, white
 from model.machine_model.model import Lineage, Model
 from model.machine_model.posterior import summarise_posterior

@@ -13,11 +13,8 @@ import numpy as np
 from daq.contracts.errors import SpecError
 from daq.contracts.progress import Cancel, stop_if
 from model.arrays import Floats
-from model.fitting.bounded_step import bounded_step
-from model.fitting.coordinates import Coordinates, Scaled
 from model.fitting.problem import Problem, whitened
-from model.fitting.robust import huber
-from model.fitting.unknowns import prior_precision
+from model.fitting.unknowns import Coordinates, Scaled, prior_precision
 from model.fitting.whitening import Whitener
 
 DIVERGED = 1e3
@@ -204,3 +201,58 @@ def _inside(x: Floats, low: Floats, high: Floats) -> Floats:
     """Moves coordinates off the bounds by a thousandth of the natural size (or of the distance between the bounds)."""
     room = np.minimum(1e-3, 0.25 * (high - low))
     return np.clip(x, low + room, high - room)
+
+
+# --- Computes the step of a Gauss–Newton or Levenberg–Marquardt search within bounds
+
+
+def bounded_step(curvature: Floats, descent: Floats, low: Floats, high: Floats) -> Floats:
+    """Returns the step (p,) that minimises ½ sᵀ A s − dᵀ s within bounds.
+
+    Unknowns that the step would take over a bound stop at the bound and are held there; the others are then solved for
+    again. Cutting the first step off instead would spoil the descent of the others.
+
+    Args:
+        curvature: A (p, p), symmetric and positive definite: the damped information.
+        descent: d (p,), minus the gradient.
+        low, high: (p,) distances to the bounds, low ≤ 0 ≤ high.
+    """
+    step = np.zeros_like(descent)
+    held = np.zeros(len(descent), dtype=bool)
+    while not held.all():
+        free = ~held
+        pull = descent[free] - curvature[np.ix_(free, held)] @ step[held]
+        step[free] = np.linalg.solve(curvature[np.ix_(free, free)], pull)
+        outside = free & ((step < low) | (step > high))
+        if not outside.any():
+            break
+        step[outside] = np.clip(step, low, high)[outside]
+        held |= outside
+    return step
+
+
+# --- Huber's loss: quadratic for ordinary residuals, linear for outliers, so that a sensor's spikes have little weight
+
+
+THRESHOLD = 4.0
+"""Residual, in standard deviations, beyond which a sample counts as an outlier. Gaussian noise reaches it once in
+16 000 samples."""
+
+
+def huber(squares: Floats, samples: int, threshold: float = THRESHOLD) -> Floats:
+    """Returns ρ, ρ′, ρ″ (3, m) of squared residuals, the form that `scipy.optimize.least_squares` expects.
+
+    The first `samples` are data; the rest (priors) stay quadratic.
+    """
+    result = np.stack([squares, np.ones_like(squares), np.zeros_like(squares)])
+    outliers = np.flatnonzero(squares[:samples] > threshold**2)
+    z = squares[outliers]
+    result[0, outliers] = 2 * threshold * np.sqrt(z) - threshold**2
+    result[1, outliers] = threshold / np.sqrt(z)
+    result[2, outliers] = -0.5 * threshold * z**-1.5
+    return result
+
+
+def influence(residual: Floats, threshold: float = THRESHOLD) -> Floats:
+    """Returns ψ(r): the residual, with outliers cut to the threshold."""
+    return np.clip(residual, -threshold, threshold)

@@ -14,10 +14,9 @@ from daq.contracts.errors import SpecError
 from daq.contracts.extras import require_extra
 from daq.contracts.frozen import FrozenRecord
 from firmware_protocol.invalid import first_invalid
-from model.fitting.fitted import FittedParameter, JointError
+from model.fitting.fitted import FittedParameter, JointError, doubt_of, html_of, known_of, text_of
 from model.fitting.identifiability import IdentifiabilityReport
 from model.fitting.options import FitOptions
-from model.fitting.shown import doubt_of, html_of, known_of, text_of
 from model.machine_model.model import Model
 from model.machine_model.record_verdict import RecordVerdict
 from model.record_check.finding import RecordFinding, doubts_headline

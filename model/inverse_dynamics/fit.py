@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,18 +17,15 @@ from model.fitting.choice import chosen_unknowns
 from model.fitting.consistent_bodies import coordinates_of, on_the_edge
 from model.fitting.covariance import sandwich
 from model.fitting.fit import fitted_parameter
-from model.fitting.fitted import FittedParameter
+from model.fitting.fitted import FittedParameter, html_of, known_of, text_of
 from model.fitting.identifiability import IdentifiabilityReport, judged
-from model.fitting.least_squares import Search, solve
+from model.fitting.least_squares import Search, influence, solve
 from model.fitting.options import FitOptions
-from model.fitting.problem import whitened
+from model.fitting.problem import Evaluation, whitened
 from model.fitting.records import records_of
-from model.fitting.robust import influence
-from model.fitting.shown import html_of, known_of, text_of
-from model.fitting.unknowns import prior_precision, scales
+from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.inverse_dynamics.drive_limits import find_drives_at_limit
-from model.inverse_dynamics.problem import TorqueProblem
 from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_motion, recorded_motions
 from model.inverse_dynamics.recorded_sizes import recorded_sizes, with_recorded_sizes
 from model.inverse_dynamics.repeats import noise_left
@@ -287,3 +285,41 @@ def _rms(signal: Floats) -> tuple[float, ...]:
 
 def _share(errors: Sequence[tuple[TorqueError, float, float]]) -> float:
     return float(np.sqrt(sum(e[1] for e in errors) / sum(e[2] for e in errors)))
+
+
+# --- A fit of torques as a problem for the numerics of fitting: residual torques and their derivatives by the unknowns
+
+
+DIFFERENCE = 1e-3
+"""Step of the finite differences, as a share of a parameter's natural size. With smaller steps, derivatives by
+parameters without influence are rounding errors (such as the mass of a link that only turns about itself). A fit
+without priors then ends where it began."""
+
+
+@dataclass(frozen=True)
+class TorqueProblem:
+    """Torque that the motion needs − torque that was applied, N·m (N), for records of one machine."""
+
+    model: Model
+    records: tuple[RecordedMotion, ...]
+    unknowns: tuple[Unknown, ...]
+    floor: Floats
+
+    @cached_property
+    def balance(self) -> TorqueBalance:
+        """The torque balance of all records."""
+        return TorqueBalance(self.model, self.records, difference=DIFFERENCE)
+
+    @property
+    def runs(self) -> Sequence[Sequence[slice]]:
+        """Per record, all of its compared samples."""
+        return [[slice(0, len(record.moving))] for record in self.records]
+
+    def evaluate(self, values: Floats, derivatives: bool) -> list[Evaluation]:
+        """Returns residuals of every record, with their derivatives on request."""
+        named = {u.name: float(v) for u, v in zip(self.unknowns, values, strict=True)}
+        residual = self.balance.residual(named)
+        if not derivatives:
+            return [Evaluation(r, None) for r in residual]
+        slopes = [self.balance.slope(named, residual, u) for u in self.unknowns]
+        return [Evaluation(r, np.stack([slope[i] for slope in slopes])) for i, r in enumerate(residual)]

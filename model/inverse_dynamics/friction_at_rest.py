@@ -9,8 +9,8 @@ import numpy as np
 from model import layout as at
 from model.arrays import Floats
 from model.inverse_dynamics.link_motion import LinkMotion
+from model.inverse_dynamics.readings import low_pass
 from model.inverse_dynamics.recorded_motion import RecordedMotion
-from model.inverse_dynamics.smoothing import low_pass
 
 HOLDING_ROUNDS = 4
 """Rounds in which friction of a slow joint takes torque that remains below the cutoff. On a healthy rig, steps of a set

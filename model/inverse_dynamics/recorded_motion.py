@@ -15,8 +15,7 @@ from daq.contracts.machine import Machine, NoController
 from daq.contracts.trace import Trace
 from model.arrays import Floats, Mask
 from model.inverse_dynamics.drive_limits import pieces_of, stands_at_limit
-from model.inverse_dynamics.readings import Readings, readings_of
-from model.inverse_dynamics.smoothing import derivative, low_pass
+from model.inverse_dynamics.readings import Readings, derivative, low_pass, readings_of
 
 Rows = NDArray[np.int64]
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
-from daq.contracts.service.jobs import ParameterWords
-from model.effects.names import effect_name
+from daq.contracts.frozen import like
+from daq.contracts.service.jobs import EffectInModel, ModelParameter, ParameterWords
+from model.effects.names import effect_name, placed
+from model.machine_model.model import Model
 from model.machine_model.parameter import Kind, Parameter
 
 
@@ -36,3 +39,23 @@ def _short(parameter: Parameter) -> str:
     if parameter.kind not in (Kind.GEOMETRY, Kind.INERTIA, Kind.DRIVE, Kind.CONTROLLER):
         return parameter.kind.value
     return f"{parameter.component} {part}" if parameter.component in ("motor", "drive") else part
+
+
+# --- The effects and the parameters of a model for clients
+
+
+def effects_of(model: Model) -> tuple[EffectInModel, ...]:
+    """Returns the effects with their names for people."""
+    return tuple(like(EffectInModel, use, called=placed(use.name, use.joints)) for use in model.effects)
+
+
+def parameters_of(model: Model) -> tuple[ModelParameter, ...]:
+    """Returns the parameters; a bound that is infinite is None."""
+    return tuple(
+        like(ModelParameter, one, words=words_of(one), low=_finite(one.low), high=_finite(one.high))
+        for one in model.parameters
+    )
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or math.isinf(value) else value

@@ -22,7 +22,7 @@ from model.arrays import Floats
 from model.machine_model.model import Model
 from model.record_check.columns import column_findings
 from model.record_check.drives import drive_findings
-from model.record_check.finding import FindingKind, RecordFinding, doubts_in
+from model.record_check.finding import FindingKind, RecordFinding, at_times, doubts_in, number, times_of
 from model.record_check.law import is_formed_as_recorded
 from model.record_check.pieces import (
     SHORTEST,
@@ -47,7 +47,6 @@ from model.record_check.readings import (
     unwrapped,
 )
 from model.record_check.speeds import speed_findings
-from model.record_check.words import at_times, number, times_of
 
 FEWEST = 3
 """Least number of samples of a record that shows a motion."""

@@ -24,10 +24,9 @@ from model.record_check.balance import (
     likelier,
     motion_of,
 )
-from model.record_check.finding import FindingKind, RecordFinding
+from model.record_check.finding import CHECK_COLUMNS, FindingKind, RecordFinding, number, times_of
 from model.record_check.law import DEGREE, LawFit, best_fit, fits_of, formed_drive, time_matters
 from model.record_check.law import Reading as ColumnReading
-from model.record_check.words import CHECK_COLUMNS, number, times_of
 
 FACTOR_OF_UNIT = 1.2
 """Ratio within which a factor counts as that of another unit: gains and motors hardly differ by more."""

@@ -12,10 +12,9 @@ import numpy as np
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
-from model.record_check.finding import RecordFinding
+from model.record_check.finding import RecordFinding, at_times, number, times_of
 from model.record_check.law import best_fit, fits_of, formed_drive
 from model.record_check.readings import find_jumps, sort_jumps
-from model.record_check.words import at_times, number, times_of
 
 BEYOND = 2.0
 """Distance of a spike from all other values, in their range: a controller's kick at a step reaches once that range."""

@@ -14,9 +14,9 @@ from daq.contracts.machine_form import defaults_of
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import Model
+from model.record_check.finding import number, times_of
 from model.record_check.pieces import cut_off, free_part
 from model.record_check.readings import find_gaps, noise_of
-from model.record_check.words import number, times_of
 
 FEW_LEVELS = 16
 """Number of different values up to which a signal counts as coarse: four bits."""

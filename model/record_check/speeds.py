@@ -14,11 +14,10 @@ from daq.contracts.machine import Machine
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.record_check.fields import LEAST_TRAVEL
-from model.record_check.finding import RecordFinding
+from model.record_check.finding import CHECK_COLUMNS, RecordFinding, number
 from model.record_check.law import DEGREE
 from model.record_check.pieces import measures_speed
 from model.record_check.readings import ISOLATED, noise_of
-from model.record_check.words import CHECK_COLUMNS, number
 
 LIKE = 0.9
 """Least cosine between ways and integrated velocities for a factor to be read from them: a low pass that lags by less

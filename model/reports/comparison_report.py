@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from model.blocks import Cell, Report, Section, Table, cells, numbers
-from model.comparison.agreement import ModelAgreement
+from model.comparison.agreement import ModelAgreement, ParameterDifference
 from model.comparison.compare import Comparison
-from model.comparison.difference import ParameterDifference
 from model.reports.motion import ROLES, agreement_table, motion_section
 from model.reports.page import effect_list, listed
 from model.units import squared

@@ -9,8 +9,8 @@ import numpy as np
 
 from daq.contracts.machine import NoController
 from daq.contracts.service.jobs import LeadingEffect
+from model.comparison.agreement import differences
 from model.comparison.compare import compare
-from model.comparison.difference import differences
 from model.discrepancy.explanation.answer_words import not_a_finding
 from model.discrepancy.explanation.step_words import where_with_summary
 from model.discrepancy.inverse_dynamics.efforts import recorded_and_predicted
@@ -23,8 +23,7 @@ from model.fitting.records import noise_floor, records_of
 from model.machine_model.effect_parameters import effect_parameters
 from model.machine_model.parameter_words import words_by_name
 from model.record_check.check import as_used
-from model.reports.overlays import overlays
-from model.reports.result_data import DiagnosisData, DiagnosisStep, GivenWhere, TriedEffect
+from model.reports.result_data import DiagnosisData, DiagnosisStep, GivenWhere, TriedEffect, overlays
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 

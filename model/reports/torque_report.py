@@ -9,13 +9,12 @@ from model.base_parameters.result import BaseParameters
 from model.blocks import Cell, Picture, Report, Section, Table, Text, cells
 from model.discrepancy.explanation.notes import note_words, on_drives_at_limit
 from model.discrepancy.explanation.step_words import sentence
-from model.fitting.shown import parameter_table
+from model.fitting.fitted import parameter_table
 from model.inverse_dynamics.fit import TorqueCurves, TorqueFit
 from model.reports.base_parameter_blocks import base_parameter_section
 from model.reports.figures import COLOURS, INK, baseline, drawn, panels, thinned
-from model.reports.page import effect_list, listed, trace_names
-from model.reports.parameter_blocks import interval_picture, undetermined_blocks
-from model.reports.record_section import record_sections
+from model.reports.fit_report import interval_picture, undetermined_blocks
+from model.reports.page import effect_list, listed, record_sections, trace_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,8 +9,7 @@ import numpy as np
 
 from model.blocks import Cell, Picture, Points, Report, Section, Table, Text, Tone, cells, numbers
 from model.reports.figures import COLOURS, INK, QUIET, baseline, drawn, panels, thinned
-from model.reports.page import listed
-from model.reports.record_section import record_sections
+from model.reports.page import listed, record_sections
 from model.units import joint_unit, squared
 from model.validation.criterion import Curve, Fidelity
 from model.validation.variation import TimeDomain, Variation

@@ -14,15 +14,16 @@ from model import layout as at
 from model.drives.piecewise import magnitude
 from model.dynamics import effective_inertia as lumped
 from model.dynamics import recursive, three_joint
-from model.dynamics.compilation import borrowing, compiled, compiled_borrowing, internal
+from model.dynamics.compilation import borrowing, compiled, compiled_borrowing, inlined, internal
 from model.dynamics.dual import sin_cos
-from model.dynamics.three_joint_motion import accelerations
+from model.dynamics.linear_solve import solve_3
+from model.dynamics.three_joint import mass_matrix_and_bias
 from model.dynamics.wide_numbers import root
 from model.kinematics.chain import ChainArrays
 from model.simulation.bodies import chain_body, rod_arm_body
 from model.simulation.closed_form_motion import friction_levels
 from model.simulation.joint_torques import rubs_under_gravity
-from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, uncompiled
+from model.simulation.run_arrays import OPTIONS, AnyChain, ClosedForm, Flexible, uncompiled
 
 
 @borrowing
@@ -215,3 +216,27 @@ def _gravity_of(kind: Any, q: Any, joints: Any, body: Any) -> Any:
         return rod_arm_gravity(q, joints, body)
 
     return of_rods if _of(kind, ClosedForm, Flexible) else None
+
+
+# --- Computes accelerations of the waist-shoulder-elbow arm from the closed form
+
+
+@inlined
+def accelerations(
+    theta_2: complex,
+    theta_3: complex,
+    rate_1: complex,
+    rate_2: complex,
+    rate_3: complex,
+    torque_1: complex,
+    torque_2: complex,
+    torque_3: complex,
+    p: NDArray[Any],
+) -> Any:
+    """Returns joint accelerations (3), rad/s², for given joint torques, N·m, and gravity along z0.
+
+    For a tilted base subtract `three_joint.horizontal_gravity_torques` from the torques first. The waist's angle is not
+    an argument: on a level base nothing depends on it.
+    """
+    d11, d12, d13, d22, d23, d33, b1, b2, b3 = mass_matrix_and_bias(theta_2, theta_3, rate_1, rate_2, rate_3, p)
+    return solve_3(d11, d12, d13, d22, d23, d33, torque_1 - b1, torque_2 - b2, torque_3 - b3)

@@ -14,7 +14,7 @@ import numpy as np
 
 from model import layout as at
 from model.arrays import Array
-from model.drives.magnet import back_emf_constant, torque_constant
+from model.drives.amplifier import back_emf_constant, torque_constant
 from model.drives.piecewise import clamped, magnitude, outside
 from model.dynamics.compilation import borrowing, inlined
 from model.dynamics.dual import sin_cos

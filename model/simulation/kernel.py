@@ -46,8 +46,18 @@ from model.simulation.period import (
     switching_times,
     warms,
 )
-from model.simulation.run_arrays import Arm, RecordArrays, RunArrays, record_row
-from model.simulation.specialised import OPTIONS, AnyChain, ClosedForm, Flexible, entry, uncompiled
+from model.simulation.run_arrays import (
+    OPTIONS,
+    AnyChain,
+    Arm,
+    ClosedForm,
+    Flexible,
+    RecordArrays,
+    RunArrays,
+    entry,
+    record_row,
+    uncompiled,
+)
 
 
 def advance_of(kind: Any, state: Any, volts: Any, start: Any, duration: Any, steps: Any, arm: Any, work: Any) -> None:

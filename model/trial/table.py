@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict
 
 from daq.contracts.frozen import FrozenRecord
-from model.trial.rates import Rate, rate
+from model.trial.conventions import LEFT_OUT
 from model.trial.score import SINGLE, Score
 from model.trial.truth import is_mock_friction
 
@@ -150,3 +153,146 @@ def answer_in_words(score: Score) -> str:
     if score.place == "group":
         return f"group with it of {len(score.answered)}" if score.in_answer else "group without it"
     return score.place
+
+
+# --- Shares with their uncertainty
+
+
+class Rate(BaseModel):
+    """`hits` of `cases` with the exact 95 % interval (Clopper and Pearson 1934); None without cases."""
+
+    model_config = ConfigDict(frozen=True)
+
+    hits: int
+    cases: int
+    share: float | None
+    low: float | None
+    high: float | None
+
+    def __str__(self) -> str:
+        if self.share is None or self.low is None or self.high is None:
+            return "no cases"
+        return f"{self.hits}/{self.cases} = {100 * self.share:.1f} % ({100 * self.low:.1f}–{100 * self.high:.1f})"
+
+
+def rate(outcomes: Iterable[bool | None]) -> Rate:
+    """Returns the share of True; None is not counted."""
+    from scipy.stats import binomtest  # imported late, so that the command line starts without it
+
+    counted = [outcome for outcome in outcomes if outcome is not None]
+    hits = sum(counted)
+    if not counted:
+        return Rate(hits=0, cases=0, share=None, low=None, high=None)
+    interval = binomtest(hits, len(counted)).proportion_ci(0.95, method="exact")
+    return Rate(hits=hits, cases=len(counted), share=hits / len(counted), low=interval.low, high=interval.high)
+
+
+# --- Every case of a trial as one line of a table, from which its rates can be counted again
+
+
+_FIELDS = (
+    *("seed", "kind", "load", "detectable", "verdict", "named_right", "merged_right", "in_answer", "in_first"),
+    *("joint_right", "at_least_one", "alarm", "honest", "excess_removed", "excess_removed_whole"),
+    *("seconds", "robot_seconds"),
+)
+"""Columns that are fields of a score."""
+_DERIVED: dict[str, Callable[[Score], str]] = {
+    "hidden": lambda score: " + ".join(score.effects),
+    "joints": lambda score: " + ".join("".join(map(str, joints)) or "-" for joints in score.joints),
+    "strength": lambda score: " + ".join(f"{strength:.2f}" for strength in score.strengths),
+    "d_prime": lambda score: " + ".join(f"{value:.1f}" for value in score.d_primes),
+    "answered": lambda score: (" | " if score.place == "group" else " + ").join(score.answered),
+    "intervals": lambda score: str(len(score.covered)),
+    "intervals_right": lambda score: str(sum(covered.inside for covered in score.covered)),
+}
+"""Columns that are computed from a score, with their functions."""
+COLUMNS = (*_FIELDS[:3], *list(_DERIVED)[:4], *_FIELDS[3:5], *list(_DERIVED)[4:], *_FIELDS[5:])
+"""Columns of the table, in order."""
+
+
+def as_csv(scores: Iterable[Score]) -> str:
+    """Returns CSV with one line per case, in the order of their seeds; empty if a question does not apply."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(COLUMNS)
+    for score in sorted(scores, key=lambda each: each.seed):
+        table.writerow(
+            [_DERIVED[column](score) if column in _DERIVED else _plain(getattr(score, column)) for column in COLUMNS]
+        )
+    return text.getvalue()
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return "" if value is None else str(value)
+
+
+# --- Formats the trial's table as Markdown
+
+
+def as_markdown(table: TrialTable) -> str:
+    """Returns the whole content of a page about the trial: rates, quantiles, effects, and confusions."""
+    if not table.cases:
+        return "No case has been scored yet.\n"
+    kinds = ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in table.kinds.items())
+    first = (
+        f"{table.cases} cases ({kinds}); {table.not_acquired} more could not be recorded to the end. "
+        "Rates are of detectable cases (d′ ≥ 5), with exact 95 % intervals."
+    )
+    parts = [
+        first,
+        _rows(["what", "result", "to reach"], [[line.what, str(line.rate), line.reach or ""] for line in table.lines]),
+        _rows(
+            ["over detectable single cases", "cases", "median", "10th percentile", "95th percentile", "largest"],
+            [
+                ["held-out excess variance removed (%)", *_quantiles(table.excess_removed, 100.0)],
+                ["the same, of the model as it was given (%)", *_quantiles(table.excess_removed_whole, 100.0)],
+                ["time of a diagnosis (s)", *_quantiles(table.seconds, 1.0)],
+            ],
+        ),
+        _headed("Effects of the library:", _effect_lines(table.by_effect, "named right")),
+        _headed("Effects that only the mock knows:", _effect_lines(table.by_open_effect, "unknown, or a group")),
+        "No interval is counted for: " + "; ".join(f"{name} ({why})" for name, why in LEFT_OUT.items()) + ".",
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _headed(head: str, rows: str) -> str:
+    return f"{head}\n\n{rows}" if rows else ""
+
+
+def _effect_lines(lines: tuple[EffectLine, ...], right: str) -> str:
+    return _rows(
+        ["hidden", "cases", "detectable", right, "in first three", "joint right", "answered instead"],
+        [
+            [
+                line.effect,
+                str(line.cases),
+                str(line.detectable),
+                _short(line.named_right),
+                _short(line.in_first),
+                _short(line.joint_right),
+                ", ".join(f"{name} {count}" for name, count in line.answers.items()),
+            ]
+            for line in lines
+        ],
+    )
+
+
+def _short(found: Rate) -> str:
+    return f"{found.hits}/{found.cases}" if found.cases else "–"
+
+
+def _quantiles(found: Quantiles, scale: float) -> list[str]:
+    values = (found.median, found.tenth, found.ninety_fifth, found.largest)
+    return [str(found.cases), *("–" if value is None else f"{scale * value:.1f}" for value in values)]
+
+
+def _rows(head: list[str], rows: list[list[str]]) -> str:
+    if not rows:
+        return ""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -26,7 +26,7 @@ from model.simulation.joint_torques import extra_torque, motor_damping, motor_ga
 from model.simulation.own_table import own_table
 from model.simulation.own_torque import own_torque
 from model.simulation.period import extra_flags
-from model.simulation.specialised import AnyChain, ClosedForm, entry
+from model.simulation.run_arrays import AnyChain, ClosedForm, entry
 from model.validation.differentiation import smoothed
 
 

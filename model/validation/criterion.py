@@ -7,9 +7,10 @@ from typing import ClassVar
 
 from daq.contracts.errors import SpecError
 from daq.contracts.frozen import FrozenRecord
+from model.machine_model.model import Model
 from model.machine_model.record_verdict import RecordVerdict
 from model.record_check.finding import RecordFinding
-from model.validation.expected_deviation import Basis, Convention
+from model.validation.expected_deviation import Basis, Convention, expected_deviation
 
 DAMPING_RATIO = 0.5
 """ζ of the associate system (section 7.2.2)."""
@@ -111,3 +112,19 @@ def required_deviation(doubling_change: float, damping_ratio: float = DAMPING_RA
 def contribution(required: float | None, expected: float) -> float:
     """Returns λ² = τ′²/σ² (4.92); zero for an insensitive parameter."""
     return 0.0 if required is None else (expected / required) ** 2
+
+
+# --- Re-evaluates distortions with another convention of τ′. The changes that double the error do not depend on it
+
+
+def in_convention(found: Fidelity, model: Model, convention: Convention) -> Fidelity:
+    """Returns `found` with τ′, λ² and Σλ² of another convention, without simulating again."""
+    parameters = []
+    for one in found.parameters:
+        expected, basis = expected_deviation(model.parameter(one.name), convention)
+        judged = {"expected": expected, "basis": basis, "contribution": contribution(one.required, expected)}
+        parameters.append(one.model_copy(update=judged))
+    total = math.fsum(p.contribution for p in parameters)
+    return found.model_copy(
+        update={"parameters": tuple(parameters), "convention": convention, "sum_of_contributions": total}
+    )

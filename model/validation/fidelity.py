@@ -28,9 +28,8 @@ from model.validation.criterion import (
     contribution,
     required_deviation,
 )
-from model.validation.doubling import Doubling, doubling_changes
+from model.validation.doubling import Doubling, SquaredError, doubling_changes, squared_error
 from model.validation.expected_deviation import expected_deviation
-from model.validation.squared_error import SquaredError, squared_error
 
 SEARCH_DEVIATIONS = 50.0
 """Largest change that is tried, in expected deviations; a parameter that needs more adds less than 0.0003 to Σλ²."""

@@ -6,18 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from daq.contracts.errors import SpecError
+from daq.contracts.errors import DaqError, SpecError
 from daq.contracts.trace import Trace
 from model.arrays import Floats, Mask
 from model.machine_model.model import Model
 from model.record_check.check import as_used
+from model.record_check.replicas import SEED, made_by
+from model.simulation.bodies import gravity_loads
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.expected_deviation import expected_deviation
-from model.validation.measured_motion import SmoothedTrace, smooth
-from model.validation.noise_floor import noise_floor
-from model.validation.regressors import correlations, regressors
-from model.validation.variation import JointResidual, TimeDomain, Variation
+from model.validation.measured_motion import SmoothedTrace, smooth, smooth_motion
+from model.validation.variation import Correlation, JointResidual, TimeDomain, Variation
 
 SIGNIFICANT = 2.0
 """A variation counts as significant above this many standard deviations of its noise."""
@@ -165,3 +166,98 @@ def _notes(given: _Equations, solution: _Solution, *, simulated: bool) -> list[s
     if parameters > joints:
         notes.append(f"{parameters} parameters for {joints} accelerations per sample: α is the least in units of τ′")
     return notes
+
+
+# --- Noise floor of the time-domain form: the residual (rad/s²) of records that the model itself makes
+#
+# It has three causes, and only the first follows from a formula.
+#
+# 1. Differentiation and the model's dependence on speed amplify noise and rounding of the readings
+#   (`measured_motion.smooth`).
+# 2. Between two samples the drive steps and the speed differs from that of the samples.
+# 3. At a reversal friction changes sign, and one count of noise changes the time.
+#
+# The model therefore simulates the record's set points with drawn noise and rounded readings. The same differentiation
+# is applied to the result.
+
+
+FEWEST, MOST = 12, 40
+"""Least and largest number of replicas of a record."""
+SECONDS = 400.0
+"""Total length of motion (s) of a record's replicas: in a short record friction changes sign only a few times."""
+
+
+def noise_floor(model: Model, trace: Trace, smoothed: SmoothedTrace) -> tuple[Floats, bool]:
+    """Returns the root mean square (n,) of each joint's acceleration residual for a right model, rad/s² (m/s²).
+
+    It is the median over simulated records. The second value is whether they could be simulated. If not, and for joints
+    that do not move in them, the floor is only the noise of the readings, as in `smoothed`.
+    """
+    smoothing = smoothed.motion.width * smoothed.motion.period
+    rng = np.random.default_rng(SEED)
+    replicas = int(np.clip(SECONDS / (trace.time[-1] - trace.time[0]), FEWEST, MOST))
+    sizes = np.zeros((replicas, model.joint_count))
+    try:
+        for replica in sizes:
+            own = smooth_motion(model, made_by(model, trace, rng), smoothing)
+            left = np.where(own.usable, own.acceleration - expected_accelerations(model, own.motion, ())[0], 0.0)
+            replica[:] = np.sqrt((left**2).sum(axis=0) / np.maximum(own.usable.sum(axis=0), 1))
+    except DaqError:
+        return smoothed.noise, False
+    median = np.median(sizes, axis=0)
+    return np.where(median > 0, median, smoothed.noise), True
+
+
+# --- Quantities on which a variation may depend (a joint's position, speed, load and so on), and their correlations
+
+
+FEWEST_INDEPENDENT = 6
+"""Least number of independent samples for a correlation."""
+
+
+def regressors(model: Model, smoothed: SmoothedTrace) -> dict[str, Floats]:
+    """Returns every regressor (samples, joints) of the modelled joints along a motion."""
+    motion = smoothed.motion
+    return {
+        "position": motion.position,
+        "speed": motion.speed,
+        "magnitude of speed": np.abs(motion.speed),
+        "direction": np.sign(motion.speed),
+        "load": gravity_loads(model, motion.position),
+        "acceleration": smoothed.acceleration,
+        "drive": motion.drive,
+        "time": np.repeat(motion.time[:, None], motion.position.shape[1], axis=1),
+    }
+
+
+def correlations(
+    signal: Floats, present: NDArray[np.bool_], known: dict[str, Floats], joints: list[int], width: float
+) -> tuple[Correlation, ...]:
+    """Returns correlations of a signal (samples,) with the regressors of some joints, strongest first.
+
+    Args:
+        present: (samples,) where the signal is defined.
+        known: regressors by name, (samples, joints).
+        joints: indices from 0.
+        width: the signal was smoothed by a Gaussian of this standard deviation in samples; one sample in 2√π·width
+            counts as independent.
+    """
+    count = present.sum() / max(1.0, 2 * np.sqrt(np.pi) * width)
+    if count < FEWEST_INDEPENDENT:
+        return ()
+    found = []
+    for name, values in known.items():
+        for j in joints:
+            value = _pearson(signal[present], values[present, j])
+            if value is not None:
+                found.append(Correlation(regressor=name, joint=j + 1, value=value, noise=float(1 / np.sqrt(count))))
+    return tuple(sorted(found, key=lambda c: -abs(c.value)))
+
+
+def _pearson(x: Floats, y: Floats) -> float | None:
+    x, y = x - x.mean(), y - y.mean()
+    size = float(np.sqrt((x**2).sum() * (y**2).sum()))
+    # a constant regressor (one direction only, one posture) has no correlation
+    if size <= 1e-9 * len(x) * max(1e-300, float(np.abs(x).max() * np.abs(y).max())):
+        return None
+    return float((x * y).sum() / size)

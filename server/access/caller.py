@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from datetime import datetime
 from typing import TYPE_CHECKING
 
 from daq.contracts.service.queue import Role
@@ -19,14 +18,12 @@ class Caller:
     """A person or program that sends requests. `name`: name of its token; `local` for a user of this computer without a
     token.
 
-    token:   hash of the token, or of the session's secret, that was accepted; None if none was needed
-    expires: end of the session; None without a session
+    token: hash of the token that was accepted; None if none was needed
     """
 
     name: str
     role: Role
     token: str | None = field(default=None, compare=False, repr=False)
-    expires: datetime | None = field(default=None, compare=False)
 
     @property
     def spoken(self) -> str:

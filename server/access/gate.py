@@ -26,7 +26,6 @@ from starlette.websockets import WebSocketClose
 
 from server import logs
 from server.access.caller import LOCAL, Caller, other_origin, token_needed, token_unknown, unknown_name
-from server.access.cookies import says_where_it_is_from, session_cookie, session_of
 from server.access.headers import secure
 from server.access.limits import LARGEST_BODY, MOST_FIELDS, MOST_OF_A_PROGRAM, Buckets, counted
 from server.access.origin import (
@@ -129,7 +128,6 @@ class Gate:
     stop_port:        port of the stop listener, at which the page may request a stop too
     observed:         called with method, status and duration (s) of every request
     refused:          called with the kind of problem of every refused request and WebSocket
-    cookie:           name of the cookie of signed-in people
     """
 
     tokens: KnownTokens
@@ -144,7 +142,6 @@ class Gate:
     """Number of open WebSockets by caller's name."""
     turns: Turns = field(default_factory=Turns)
     look_every: float = LOOK_EVERY
-    cookie: str = session_cookie(None)
     parts: Sequence[Part] = ()
     """Parts of plug-ins, which may watch requests."""
 
@@ -283,7 +280,7 @@ class Gate:
         kind, _, token = headers.get("authorization", "").partition(" ")
         if token and kind.lower() == "bearer":
             caller = await self._known(scope, token.strip())
-            if caller is None or caller.expires is not None:  # a session's secret is valid only as a cookie
+            if caller is None:
                 raise token_unknown()
             return caller
         if scope["type"] == "websocket":
@@ -294,34 +291,11 @@ class Gate:
                     line = "this ticket was used, is too old, or its token was revoked"
                     raise ProblemError(401, "ticket-unknown", line, "ask for a new one")
                 return caller
-        local = LOCAL if self.open_on_loopback and is_this_computers_user(headers) else None
-        if secret := session_of(headers, self.cookie):
-            caller = await self._of_session(scope, secret, needed=local is None)
-            if caller is not None and (not self.tokens.is_over(caller) or _is_post(scope, STOP)):
-                changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
-                if changes and not says_where_it_is_from(headers):
-                    line = (
-                        "a session changes something only from the page, and this request does not say where it is from"
-                    )
-                    raise ProblemError(403, "other-origin", line, "programs send a token")
-                return caller
-        return local
-
-    async def _of_session(self, scope: Scope, secret: str, *, needed: bool) -> Caller | None:
-        """Returns the person of a session. A stop that does not need the session waits at most STOP_WAITS s for the
-        database, and then uses the last known person: an old cookie must not delay or refuse it."""
-        if needed or not _is_post(scope, STOP):
-            return await self._known(scope, secret)
-        last = self.tokens.last_known(secret)
-        reading = asyncio.ensure_future(self._known(scope, secret))
-        # retrieve its error, so that asyncio does not report it
-        reading.add_done_callback(lambda done: done.cancelled() or done.exception())
-        await asyncio.wait({reading}, timeout=STOP_WAITS)
-        return reading.result() if reading.done() and reading.exception() is None else last
+        return LOCAL if self.open_on_loopback and is_this_computers_user(headers) else None
 
     async def _known(self, scope: Scope, token: str) -> Caller | None:
-        """Returns the caller of a token or a session's secret; None if it is unknown. A stop does not wait for the
-        database if the token was in it at the last read. Raises a 429 and a 503."""
+        """Returns the caller of a token; None if it is unknown. A stop does not wait for the database if the token was
+        in it at the last read. Raises a 429 and a 503."""
         known, caller = self.tokens.remembered(token)
         if known:
             return caller

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from server.access.caller import LOCAL, Caller, other_origin, token_needed, token_unknown, unknown_name
-from server.access.cookies import says_where_it_is_from, session_cookie, session_of
 from server.access.origin import is_known_name, is_this_computers_user, name_of, place_of
 
 
@@ -30,13 +29,12 @@ class Tokens(Protocol):
 @dataclass(frozen=True)
 class StopGate:
     """Accepts everybody who may see the robot. `service_port`: port of the service's page, which may request a stop
-    too. `cookie`: name of the cookie of signed-in people."""
+    too."""
 
     tokens: Tokens
     open_on_loopback: bool
     names: tuple[str, ...]
     service_port: int
-    cookie: str = session_cookie(None)
 
     def admit(self, headers: Mapping[str, str]) -> Caller:
         """Returns the caller. Raises a 401 or 403, and TokensCannotBeReadError."""
@@ -47,31 +45,15 @@ class StopGate:
             raise other_origin(headers.get("origin"))
         kind, _, token = headers.get("authorization", "").partition(" ")
         if not token or kind.lower() != "bearer":
-            local = self.open_on_loopback and is_this_computers_user(headers)
-            try:
-                caller = self._of_session(headers)
-            except TokensCannotBeReadError:
-                if not local:
-                    raise
-                caller = None  # an old cookie must not prevent a stop that needs no session
-            if caller is not None:
-                return caller
-            if local:
+            if self.open_on_loopback and is_this_computers_user(headers):
                 return LOCAL
             raise token_needed()
-        caller = self._known(token.strip())
+        known, caller = self.tokens.remembered(token.strip())
+        if not known:
+            caller = self.tokens.look_up(token.strip())
         if caller is None:
             raise token_unknown()
         return caller
-
-    def _of_session(self, headers: Mapping[str, str]) -> Caller | None:
-        """Returns the signed-in person. The request must come from the page."""
-        secret = session_of(headers, self.cookie)
-        return self._known(secret) if secret and says_where_it_is_from(headers) else None
-
-    def _known(self, token: str) -> Caller | None:
-        known, caller = self.tokens.remembered(token)
-        return caller if known else self.tokens.look_up(token)
 
     def is_from_here(self, headers: Mapping[str, str]) -> bool:
         """Whether a request comes from the service's own page, or from a program, which sends no origin."""

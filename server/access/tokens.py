@@ -15,12 +15,14 @@ from datetime import datetime
 
 from sqlalchemy import select
 from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.orm import Session
 
 from daq.contracts.errors import SpecError
+from daq.contracts.service.audit import AuditNote
 from daq.contracts.service.queue import Role, role_of
+from daq.plugins import named, plugins
 from server.access.caller import LOCAL, Caller
 from server.access.digest import digest_of
-from server.access.sessions import SessionStore, note_command
 from server.clock import Clock
 from server.database_errors import DamagedError
 from server.store.engine import Store
@@ -38,6 +40,17 @@ CANNOT_BE_READ = (SQLAlchemyError, DamagedError)
 log = logging.getLogger("server.access")
 
 
+def note_command(
+    session: Session, at: datetime, by: str, action: str, command: str, subject: str, detail: str = ""
+) -> None:
+    """Informs plug-ins within the transaction that makes the change. `by`: name of the user who makes it."""
+    said = {"actor": by, "action": action, "request": command, "subject": subject, "detail": detail}
+    note = AuditNote(at=at, origin="command line", outcome="done", **said)
+    for plugin in plugins():
+        for reference in plugin.noted:
+            named(reference)(session, note)
+
+
 @dataclass(frozen=True)
 class TokenInfo:
     """A token's row in the database, without its hash."""
@@ -49,11 +62,10 @@ class TokenInfo:
 
 
 class TokenStore:
-    """Tokens in the database; `callers` also includes people's sessions."""
+    """Tokens in the database."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
-        self._sessions = SessionStore(store)
 
     def add(self, name: str, role: Role, now: datetime, by: str = "unknown") -> str:
         """Makes a new token and returns it; it cannot be shown again. `by`: name of the user who makes it. Raises
@@ -85,17 +97,11 @@ class TokenStore:
             rows = session.scalars(select(TokenRow).order_by(TokenRow.created))
             return [TokenInfo(row.name, role_of(row.role), row.created, row.revoked) for row in rows]
 
-    def callers(self, now: datetime) -> dict[str, Caller]:
-        """Returns the callers by digest of all valid tokens, and of all sessions that may at least stop the robot.
-        Reads no other columns of tokens, so that a damaged time locks nobody out."""
+    def callers(self) -> dict[str, Caller]:
+        """Returns the callers by digest of all valid tokens. Reads no other columns: damage there locks nobody out."""
         with self._store.reading() as session:
             rows = session.execute(select(TokenRow.digest, TokenRow.name, TokenRow.role).filter_by(revoked=None))
-            tokens = {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
-        try:
-            return tokens | self._sessions.callers(now)
-        except CANNOT_BE_READ:  # damaged sessions must not invalidate tokens
-            log.exception("sessions cannot be read")
-            return tokens
+            return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
 
 
 @dataclass(frozen=True)
@@ -123,22 +129,6 @@ class KnownTokens:
         """Returns a token's caller as of the last read of the database, however long ago."""
         return self._known.callers.get(digest_of(token))
 
-    def is_over(self, caller: Caller) -> bool:
-        """Whether the caller's session has ended. It may still stop the robot for some time."""
-        return caller.expires is not None and caller.expires <= self._clock.utc()
-
-    def add(self, caller: Caller) -> None:
-        """Adds a session that has just begun and is already in the database."""
-        if caller.token is not None:
-            with self._reading:
-                self._known = _Known({**self._known.callers, caller.token: caller}, self._known.at)
-
-    def forget(self, caller: Caller) -> None:
-        """Removes a session at once after signing out."""
-        with self._reading:
-            left = {digest: one for digest, one in self._known.callers.items() if digest != caller.token}
-            self._known = _Known(left, self._known.at)
-
     def look_up(self, token: str) -> Caller | None:
         """Returns a token's caller from the database. If the database cannot be read, the last known tokens stay valid:
         nobody can have revoked one meanwhile, and everybody can still stop the robot. Raises CANNOT_BE_READ if the
@@ -149,8 +139,6 @@ class KnownTokens:
         """Whether the token by which a caller was accepted is still valid. For the event loop."""
         if caller.token is None:
             return True
-        if self.is_over(caller):
-            return False
         known, found = self._remembered(caller.token)
         if not known:
             try:
@@ -171,7 +159,7 @@ class KnownTokens:
             if known:
                 return caller
             try:
-                self._known = _Known(self._tokens.callers(self._clock.utc()), self._clock.monotonic())
+                self._known = _Known(self._tokens.callers(), self._clock.monotonic())
             except CANNOT_BE_READ as error:
                 if self._known.at == -math.inf:
                     raise

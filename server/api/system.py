@@ -10,7 +10,6 @@ from pathlib import Path
 
 from fastapi import Request, Response
 from sqlalchemy import func, select
-from sqlalchemy.engine import make_url
 from sqlalchemy.exc import SQLAlchemyError
 
 from daq.contracts.service.system import Health, Me, StorageStatus, SystemStatus
@@ -63,14 +62,12 @@ async def get_me(services: ServicesDep, caller: Viewer) -> Me:
         role=caller.role,
         owner_of=owned,
         is_known=caller.token is not None,
-        session_until=caller.expires,
     )
 
 
 @router.get("/system")
 def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
     """Returns version, uptime, storage and live clients of the service."""
-    file = _database_file(services)
     # Even if a disk fails, the page must learn the port of the stop listener.
     room = room_of(rig.catalogue.folder for rig in services.robots())
     with services.store.reading() as session:
@@ -84,8 +81,7 @@ def get_system(services: ServicesDep, _: Viewer) -> SystemStatus:
             traces_reserve=RESERVE,
             traces_size=room.size,
             traces=count,
-            database=make_url(services.store.url).get_backend_name(),
-            database_size=None if file is None else _size_of(file),
+            database_size=_size_of(services.store.file),
         ),
         warnings=tuple(services.warnings()),
         live_clients=sum(rig.hub.clients for rig in services.robots()),
@@ -110,10 +106,8 @@ def _size_of(file: Path) -> int | None:
 
 def _checks(services: Services) -> dict[str, str]:
     checks = {"database": ""}
-    file = _database_file(services)
     try:
-        if file is not None:
-            _require_writable(file.parent)
+        _require_writable(services.store.file.parent)
         services.store.require_writable()
     except (SQLAlchemyError, OSError) as error:
         checks["database"] = one_line(error)
@@ -142,8 +136,3 @@ def _require_writable(folder: Path) -> None:
     """Raises OSError if nothing can be written. The probe is an unnamed file, so nobody sees it."""
     with tempfile.TemporaryFile(dir=folder) as probe:
         probe.write(b"written")
-
-
-def _database_file(services: Services) -> Path | None:
-    url = make_url(services.store.url)
-    return Path(url.database) if url.get_backend_name() == "sqlite" and url.database else None

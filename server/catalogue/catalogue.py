@@ -6,15 +6,12 @@ import logging
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
 
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.errors import TraceError
-from daq.contracts.service.archive import Transfer
 from daq.contracts.trace_limits import DEFAULT_TRACE_LIMITS, TraceLimits
 from daq.contracts.whole_file import sync_folder
 from daq.traces import disk, layout
@@ -30,10 +27,6 @@ UPLOAD = ".upload-"
 """Prefix of the name of a folder for an upload."""
 UPLOAD_IS_OLD = 2 * 3600.0
 """Time (s) after which such a folder is no longer used, since its reader has at most an hour."""
-OPENED_STAYS = 600.0
-"""Time (s) for which the file of a trace stays after it was opened."""
-PRUNE_EVERY = 60.0
-"""Time (s) between two searches for opened files that may be deleted."""
 log = logging.getLogger("server.catalogue")
 SHOWN = 200
 """Most characters of an error in the log."""
@@ -44,24 +37,8 @@ def is_text(name: str) -> bool:
     return not any("\ud800" <= sign <= "\udfff" for sign in name)
 
 
-class Fetching(Protocol):
-    """The catalogue's requests to the archive. No method waits for the store."""
-
-    def send(self, trace: str) -> None:
-        """Reports that a trace is now in the folder."""
-
-    def fetch(self, trace: str) -> ProblemError:
-        """Fetches a trace that only the archive has. Returns the problem that describes the progress."""
-
-    def bring(self, traces: Iterable[str], since: float) -> Transfer:
-        """Fetches traces. Returns their total progress, or the first failure since that moment (s, monotonic)."""
-
-    def deleted(self) -> None:
-        """Reports that a trace was deleted."""
-
-
 class Catalogue:
-    """One folder and its table. Safe to use from any thread. `archive`: the archive behind the folder, if any."""
+    """One folder and its table. Safe to use from any thread."""
 
     def __init__(
         self,
@@ -77,11 +54,6 @@ class Catalogue:
         self._experiments = experiments
         self._lock = threading.Lock()
         self.limits = limits
-        self.archive: Fetching | None = None
-        self._opened: dict[str, float] = {}
-        self._pruned = time.monotonic()
-        self._opening = threading.Lock()
-        """Held briefly to open a file, and to delete a local copy."""
 
     def bring_up_to_date(self) -> int:
         """Salvages traces that a crash left unfinished, and adds every file that is not in the table. Returns the
@@ -144,81 +116,15 @@ class Catalogue:
 
         with self._lock:
             self._traces.remove(self._robot, identity, take_away)
-        if self.archive is not None:
-            self.archive.deleted()
         return path
 
     def path_of(self, identity: str) -> Path:
-        """Returns the file of a trace. Raises a 404, also if the file is gone; a 503 if only the archive has it, which
-        starts fetching it."""
-        path = self.place_of(identity)
-        if not self.is_here(identity, path):
-            assert self.archive is not None
-            raise self.archive.fetch(identity)
-        return path
-
-    def place_of(self, identity: str) -> Path:
-        """Returns the path of a trace's file, even if it must still be fetched from the archive. Raises a 404 if
-        neither folder nor archive has it, a 409 if there is no archive any more."""
+        """Returns the file of a trace. Raises a 404, also if the file is gone."""
         path = self.folder / self._traces.file_of(self._robot, identity)
-        if path.is_file():
-            return path
-        if not self._traces.is_archived(identity):
+        if not path.is_file():
             advice = "it was removed from the folder of traces: upload it again, or delete the trace"
             raise not_found(f"file for trace {identity!r} any more", advice)
-        if self.archive is None:
-            line = f"only the archive has trace {identity!r}, and this service has no archive"
-            raise conflict("no-archive", line, "set [archive] in its daq.toml (docs/archive.md)")
         return path
-
-    def bring(self, traces: Iterable[str], since: float) -> Transfer | None:
-        """Fetches missing traces from the archive. Returns None if the folder has all of these traces, otherwise the
-        progress, or the first failure since that moment (s, monotonic). Raises a 404 for a trace that neither folder
-        nor archive has."""
-        if self.archive is None:
-            return None
-        names = self._traces.files_of(self._robot, traces)
-        absent = {one: self.folder / name for one, name in names.items() if not self.is_here(one, self.folder / name)}
-        if not absent:
-            return None
-        for one in absent.keys() - self._traces.archived_of(absent):
-            self.place_of(one)
-        return self.archive.bring(absent, since)
-
-    def is_here(self, identity: str, path: Path) -> bool:
-        """Whether the folder has the file of a trace, which then stays there for some time."""
-        with self._opening:
-            if not path.is_file():
-                return False
-            now = time.monotonic()
-            self._opened[identity] = now
-            if now - self._pruned >= PRUNE_EVERY:
-                self._pruned = now
-                self._opened = {one: at for one, at in self._opened.items() if now - at < OPENED_STAYS}
-        return True
-
-    def take_back(self, identity: str, source: Path) -> Path:
-        """Moves a file that was fetched from the archive into the folder. Raises a 404, and OSError."""
-        target = self.folder / self._traces.file_of(self._robot, identity)
-        with self._lock:
-            if not target.exists():
-                disk.rename(source, target)
-            self._traces.mark_missing(self._robot, [target.name], missing=False)
-        self.is_here(identity, target)
-        return target
-
-    def drop(self, identity: str, is_allowed: Callable[[], bool] = lambda: True) -> bool:
-        """Deletes the local copy of an archived trace. Returns False, and changes nothing, if it was opened recently,
-        or deletion is no longer allowed. Raises a 404, and OSError."""
-        path = self.folder / self._traces.file_of(self._robot, identity)
-        with self._lock, self._opening:
-            if time.monotonic() - self._opened.get(identity, -OPENED_STAYS) < OPENED_STAYS or not is_allowed():
-                return False
-            # After a crash between the two steps, the next start finds the file.
-            self._traces.mark_missing(self._robot, [path.name], missing=True)
-            path.unlink(missing_ok=True)
-            sync_folder(self.folder)
-        return True
 
     def _take_in(self, path: Path) -> TraceSummary | None:
         """Adds one file. An error is logged, so that one file does not exclude the others. Raises OperationalError if
@@ -243,8 +149,6 @@ class Catalogue:
         """Passes the outcome to the trace's experiment, if there is one."""
         assert summary.trace_id is not None
         self._experiments.traced(summary.trace_id, summary.outcome)
-        if self.archive is not None:
-            self.archive.send(summary.trace_id)
 
     def _summary(self, path: Path) -> TraceSummary | None:
         try:
@@ -267,7 +171,7 @@ class Catalogue:
                 self._robot,
                 summary.model_copy(update={"path": path, "moved": moved}),
                 self._experiments.of_trace(summary.trace_id),
-                lambda file: (self.folder / file).is_file() or self._traces.is_archived(summary.trace_id or ""),
+                lambda file: (self.folder / file).is_file(),
             )
         except ProblemError as error:
             log.warning("not in the catalogue: %s: %s", path, error)

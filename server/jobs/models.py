@@ -78,8 +78,8 @@ class Models:
 
     def details(self, identity: str) -> ModelDetails:
         """Returns a model's effects, parameters and ancestors. Raises a 404."""
-        from model.machine_model.listed import effects_of, parameters_of
         from model.machine_model.model_file import load_model
+        from model.machine_model.parameter_words import effects_of, parameters_of
 
         entry = self.store.get(self._robot, identity)
         model = load_model(self.path_of(identity))
@@ -96,7 +96,7 @@ class Models:
 
     def machine_parameters(self) -> tuple[ModelParameter, ...]:
         """Returns the parameters of the model that the machine file describes."""
-        from model.machine_model.listed import parameters_of
+        from model.machine_model.parameter_words import parameters_of
 
         return parameters_of(self._base())
 

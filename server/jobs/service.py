@@ -16,7 +16,6 @@ from pathlib import Path
 from sqlalchemy.exc import OperationalError
 
 from daq.contracts.machine import Machine
-from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import MACHINE, DiagnoseRequest, FitRequest, Job, JobRequest
 from daq.executors import Workers
 from server.access.caller import spoken
@@ -57,16 +56,6 @@ class JobContext:
     workers: SharedWorkers
 
 
-@dataclass(frozen=True)
-class _Fetched:
-    """A waiting job whose traces are being fetched: their progress, and the times (s, monotonic) of its first request
-    and its last check."""
-
-    transfer: Transfer
-    asked: float
-    looked: float
-
-
 class JobService:
     """Passes jobs to executors and follows them. Safe to use from any thread."""
 
@@ -76,8 +65,6 @@ class JobService:
         self._closing = False
         self._workers = context.workers
         self._running: dict[str, tuple[Job, Future[Ended]]] = {}
-        self._fetched: dict[str, _Fetched] = {}
-        """Waiting jobs whose traces are being fetched from the archive."""
         self._given_to: dict[str, Workers] = {}
         self._thread = threading.Thread(target=self._follow, name="jobs", daemon=True)
         context.jobs.settle_after_restart(context.robot, context.clock.utc())
@@ -96,7 +83,7 @@ class JobService:
         task = Task(
             request=request,
             machine=context.machine,
-            traces={number: context.catalogue.place_of(number) for number in traces_of(request)},
+            traces={number: context.catalogue.path_of(number) for number in traces_of(request)},
             models={number: context.models.path_of(number) for number in models_of(request) if number != MACHINE},
             names={number: context.models.name_of(number) for number in models_of(request)},
             limits=context.catalogue.limits,
@@ -166,9 +153,6 @@ class JobService:
         )
 
     def _with_progress(self, job: Job) -> Job:
-        fetched = self._fetched.get(job.id)
-        if job.state == "queued" and fetched is not None:
-            return job.model_copy(update={"progress_text": _words_of(fetched.transfer)})
         if job.state != "running":
             return job
         reported = self._reported(job.id) or Reported(0.0, "starting")
@@ -213,7 +197,7 @@ class JobService:
                 failed = True
                 for lane in LANES:  # a lane serves robots in turn; `self._wake.set` identifies this robot there
                     self._workers.wait_no_more(lane, self._wake.set)
-            self._wake.wait(LOOK_EVERY if self._running or self._fetched or failed else None)
+            self._wake.wait(LOOK_EVERY if self._running or failed else None)
 
     def _begin(self) -> bool:
         """Passes waiting jobs to free workers of their lanes. Returns whether any has begun."""
@@ -228,21 +212,15 @@ class JobService:
             if not self._workers.take_place(lane, self._wake.set):
                 busy.add(lane)
                 continue
-            begun: Job | None = None
             try:
-                away = self._away(job)
-                if away is None or away.state == "failed":
-                    # Change the state first: a job cancelled before that is never computed.
-                    begun = context.jobs.change(context.robot, job.id, Event.TAKEN, context.clock.utc())
-            except BaseException as error:  # such as an unreadable folder or database
+                # Change the state first: a job cancelled before that is never computed.
+                begun = context.jobs.change(context.robot, job.id, Event.TAKEN, context.clock.utc())
+            except BaseException as error:  # such as an unreadable database
                 self._workers.give_place_back(lane)
                 if isinstance(error, ProblemError):  # the job was cancelled just now
                     continue
                 raise
-            if begun is None:
-                self._workers.give_place_back(lane)
-                continue
-            future = self._handed_over(job.id, lane) if away is None else _refused(away.problem)
+            future = self._handed_over(job.id, lane)
             self._running[job.id] = begun, future
             future.add_done_callback(partial(self._leave, lane))
             has_begun = True
@@ -250,31 +228,7 @@ class JobService:
         for lane in LANES:
             if lane not in busy:
                 self._workers.wait_no_more(lane, self._wake.set)
-        self._fetched = {job: fetched for job, fetched in self._fetched.items() if job in waiting}
         return has_begun
-
-    def _away(self, job: Job) -> Transfer | None:
-        """Returns the progress of a job's traces that only the archive has; None if all are local. Checks at most once
-        per LOOK_EVERY, since each fetched trace wakes this thread."""
-        now, before = self._context.clock.monotonic(), self._fetched.get(job.id)
-        if before is not None and now - before.looked < LOOK_EVERY:
-            return before.transfer
-        asked = now if before is None else before.asked
-        try:
-            away = self._context.catalogue.bring(traces_of(job.request), asked)
-        except ProblemError as error:
-            away = Transfer(direction="fetch", state="failed", done=0, total=0, problem=error.detail)
-        if away is None or away.state == "failed":
-            self._fetched.pop(job.id, None)
-        else:
-            self._fetched[job.id] = _Fetched(away, asked, now)
-            if before is None or before.transfer != away:
-                self._tell(job)
-        return away
-
-    def look(self) -> None:
-        """Checks whether a waiting job can begin, after traces were fetched."""
-        self._wake.set()
 
     def _leave(self, lane: Lane, _future: Future[Ended]) -> None:
         """Handles the end of a job's computation: its place is free."""
@@ -367,19 +321,6 @@ def _failed(error: Exception) -> Future[Ended]:
     future: Future[Ended] = Future()
     future.set_exception(error)
     return future
-
-
-def _refused(problem: str) -> Future[Ended]:
-    future: Future[Ended] = Future()
-    future.set_result(Ended(problem=problem))
-    return future
-
-
-def _words_of(fetched: Transfer) -> str:
-    """Returns what a job waits for while its traces are fetched."""
-    if fetched.problem:
-        return f"its traces are in the archive: {fetched.problem}"
-    return f"fetching its traces from the archive: {fetched.done / 1e6:.1f} of {fetched.total / 1e6:.1f} MB"
 
 
 def _fault(error: Exception) -> str:

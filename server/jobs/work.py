@@ -98,8 +98,7 @@ class _Worker:
         from model.fitting.options import FitOptions
         from model.machine_model.parameter_words import words_by_name
         from model.reports.fit_report import fit_report
-        from model.reports.overlays import overlays
-        from model.reports.result_data import FitData, of_fit
+        from model.reports.result_data import FitData, of_fit, overlays
         from model.simulation.prepared import Options
         from server.jobs.results import FitJobResult
 
@@ -127,13 +126,12 @@ class _Worker:
     def validate(self, request: ValidateRequest) -> Ended:
         """Computes the same as `daq validate`."""
         from model.machine_model.parameter_words import words_by_name
-        from model.reports.overlays import thinned_variation
-        from model.reports.result_data import ValidationData, of_validation
+        from model.reports.result_data import ValidationData, of_validation, thinned_variation
         from model.reports.validation_report import validation_report
         from model.simulation.prepared import Options
-        from model.validation.conventions import in_convention
+        from model.validation.criterion import in_convention
+        from model.validation.expected_deviation import names_to_validate
         from model.validation.fidelity import validate_by_distortion
-        from model.validation.names import names_to_validate
         from model.validation.time_domain import vary_in_time
         from server.jobs.results import ValidationJobResult
 
@@ -167,11 +165,10 @@ class _Worker:
 
     def compare(self, request: CompareRequest) -> Ended:
         """Computes the same as `daq compare`, also for a single model."""
-        from model.comparison.difference import differences
+        from model.comparison.agreement import differences
         from model.machine_model.parameter_words import words_by_name
         from model.reports.comparison_report import comparison_report
-        from model.reports.overlays import overlays
-        from model.reports.result_data import ComparisonData, of_comparison
+        from model.reports.result_data import ComparisonData, of_comparison, overlays
         from server.jobs.results import ComparisonJobResult
 
         models = [self._model(number) for number in request.models]
@@ -197,7 +194,7 @@ class _Worker:
         from model.discrepancy.options import DiagnosisOptions
         from model.discrepancy.workflow import diagnose
         from model.reports.diagnosis_data import leading, told
-        from model.reports.saved_report import saved_report
+        from model.reports.page import saved_report
         from server.jobs.next_experiment import experiment_chooser
         from server.jobs.results import DiagnosisJobResult
 

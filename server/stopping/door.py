@@ -7,14 +7,12 @@ import logging
 import socket
 import threading
 from collections.abc import Callable, Mapping
-from datetime import UTC, datetime, timedelta
 
 from daq.child import Child
 from daq.contracts.errors import ReachError
 from daq.transport import Terminal
 from server.access.caller import Caller
-from server.access.cookies import STOPS_FOR
-from server.stopping.messages import NEWS, Begin, Joined, Known, Left, Owned, Ready, Stopped
+from server.stopping.messages import NEWS, Begin, Known, Owned, Ready, Stopped
 
 READY_WITHIN = 30.0
 """Time (s) for the process to start on a busy computer."""
@@ -40,8 +38,6 @@ class StopDoor:
         self._begin_again_after = begin_again_after
         self._lock = threading.Lock()
         self._owned: dict[str, Owned] = {}
-        self._joined: dict[str, Caller] = {}
-        """Sessions that have begun since the service read the tokens, for a restarted process."""
         self._ready = threading.Event()
         self._closing = threading.Event()
         self._process = self._start()
@@ -73,25 +69,6 @@ class StopDoor:
             self._begin = self._begin.model_copy(update={"tokens": tokens})
             self._process.send(Known(tokens=tokens))
 
-    def add(self, caller: Caller) -> None:
-        """Passes on a session that has just begun, so that its person can stop the robot whatever the state of the
-        database."""
-        assert caller.token is not None
-        with self._lock:
-            self._joined = {digest: one for digest, one in self._joined.items() if not _stops_nothing(one)}
-            self._joined[caller.token] = caller
-            self._process.send(_joined(caller))
-
-    def remove(self, caller: Caller) -> None:
-        """Reports a session that was ended by signing out: neither this process nor a later one accepts its stops."""
-        assert caller.token is not None
-        with self._lock:
-            self._joined.pop(caller.token, None)
-            if (known := self._begin.tokens) is not None:
-                left = {digest: who for digest, who in known.items() if digest != caller.token}
-                self._begin = self._begin.model_copy(update={"tokens": left})
-            self._process.send(Left(digest=caller.token))
-
     def close(self) -> None:
         """Ends the process after it has answered the requests in progress."""
         self._closing.set()
@@ -107,8 +84,6 @@ class StopDoor:
         process.send(self._begin.model_copy(update={"descriptor": descriptor}))
         for owned in self._owned.values():
             process.send(owned)
-        for caller in self._joined.values():
-            process.send(_joined(caller))
         return process
 
     def _listen(self) -> None:
@@ -152,13 +127,3 @@ class StopDoor:
                         self.stopped(news)
                 except Exception:  # an incomplete line of a killed process, or a listener's error
                     log.exception("stop listener: %.200r", line)
-
-
-def _joined(caller: Caller) -> Joined:
-    assert caller.token is not None
-    return Joined(digest=caller.token, name=caller.name, role=caller.role)
-
-
-def _stops_nothing(caller: Caller) -> bool:
-    """Whether a session ended so long ago that it may not even stop the robot."""
-    return caller.expires is not None and caller.expires + timedelta(seconds=STOPS_FOR) < datetime.now(UTC)

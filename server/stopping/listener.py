@@ -261,11 +261,7 @@ class _Handler(BaseHTTPRequestHandler):
         }
         origin = self.headers.get("Origin")
         if origin is not None and self.server.gate.is_from_here(self._headers()):
-            headers |= {
-                "Access-Control-Allow-Origin": origin,
-                "Access-Control-Allow-Credentials": "true",  # the page sends the cookie of its session
-                "Vary": "Origin",
-            }
+            headers |= {"Access-Control-Allow-Origin": origin, "Vary": "Origin"}
         self.send_response(status)
         for name, value in headers.items():
             self.send_header(name, value)

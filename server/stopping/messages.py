@@ -21,12 +21,8 @@ class Begin(FrozenRecord):
     service_port: int
     open_on_loopback: bool
     names: tuple[str, ...]
-    cookie: str
-    """Name of the cookie of signed-in people."""
     urls: dict[str, str]
-    database_url: str
-    sqlite: Path | None
-    """The database's file, if it is a SQLite database."""
+    database: Path
     tokens: dict[str, tuple[str, Role]] | None = None
     """Name and role of each valid token, by its digest; None while the service has not read them."""
 
@@ -36,22 +32,6 @@ class Known(FrozenRecord):
 
     kind: Literal["known"] = "known"
     tokens: dict[str, tuple[str, Role]]
-
-
-class Joined(FrozenRecord):
-    """A session that has just begun, by the digest of its secret."""
-
-    kind: Literal["joined"] = "joined"
-    digest: str
-    name: str
-    role: Role
-
-
-class Left(FrozenRecord):
-    """A session that was ended by signing out, by the digest of its secret: it stops nothing any more."""
-
-    kind: Literal["left"] = "left"
-    digest: str
 
 
 class Owned(FrozenRecord):
@@ -89,7 +69,7 @@ class Stopped(FrozenRecord):
     at: AwareDatetime
 
 
-Order = Begin | Known | Joined | Left | Owned
+Order = Begin | Known | Owned
 ORDER: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="kind")], config=WHEN_USED)
 NEWS: TypeAdapter[Ready | Stopped] = TypeAdapter(
     Annotated[Ready | Stopped, Field(discriminator="kind")], config=WHEN_USED

@@ -25,7 +25,7 @@ from server.access.stop_gate import StopGate
 from server.steady import keep_steady
 from server.stopping.arm import Reach, stop_arm
 from server.stopping.listener import Asked, StopListener
-from server.stopping.messages import ORDER, Begin, Joined, Known, Left, Owned, Ready, Stopped
+from server.stopping.messages import ORDER, Begin, Known, Owned, Ready, Stopped
 from server.stopping.tokens import Callers, StopTokens, reader_of
 
 MOST_WAITING = 10_000
@@ -124,8 +124,8 @@ def main() -> int:
     begin = ORDER.validate_json(first)
     assert isinstance(begin, Begin)
     robots = Robots(begin.urls)
-    tokens = StopTokens(reader_of(begin.database_url, begin.sqlite), _callers(begin.tokens))
-    gate = StopGate(tokens, begin.open_on_loopback, begin.names, begin.service_port, begin.cookie)
+    tokens = StopTokens(reader_of(begin.database), _callers(begin.tokens))
+    gate = StopGate(tokens, begin.open_on_loopback, begin.names, begin.service_port)
     teller = Teller(sys.stdout.fileno())
 
     def told(robot: str, result: StopResult, asked: Asked) -> None:
@@ -154,10 +154,6 @@ def main() -> int:
             robots.set_owner(order)
         elif isinstance(order, Known):
             tokens.update(_callers(order.tokens) or {})
-        elif isinstance(order, Joined):
-            tokens.add(order.digest, Caller(order.name, order.role, order.digest))
-        elif isinstance(order, Left):
-            tokens.remove(order.digest)
     listener.close()
     teller.close(TOLD_WITHIN)
     tokens.close()

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
-import sqlite3
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from contextlib import closing
-from datetime import UTC, datetime, timedelta
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 from daq.contracts.service.queue import role_of
 from server.access.caller import Caller
-from server.access.cookies import STOPS_FOR
 from server.access.digest import digest_of
 from server.access.stop_gate import TokensCannotBeReadError
 from server.database_errors import open_to_read
@@ -33,11 +28,6 @@ BUSY_WITHIN = 0.4
 log = logging.getLogger("server.stop")
 
 TOKENS = "SELECT digest, name, role FROM tokens WHERE revoked IS NULL"
-SESSIONS = "SELECT digest, name, role FROM sessions WHERE expires > :ended"
-"""Sessions that may stop the robot, including recently ended ones. They are read separately, so that an error in their
-table, or a database without one, invalidates no token."""
-
-NO_SESSIONS = "sessions cannot be read; those read last stay valid: %s"
 
 Callers = dict[str, Caller]
 """The caller of each valid token, by the token's digest."""
@@ -84,18 +74,6 @@ class StopTokens:
         """Uses the service's tokens if none have been read yet; tokens read from the database are at least as new."""
         with self._changed:
             self._callers = self._callers or callers
-
-    def add(self, digest: str, caller: Caller) -> None:
-        """Adds a session that has just begun. It is in the database, so the next read includes it."""
-        with self._changed:
-            self._callers = {**(self._callers or {}), digest: caller}
-
-    def remove(self, digest: str) -> None:
-        """Removes a session after signing out. It is no longer in the database, so the next read does not include it
-        either."""
-        with self._changed:
-            if self._callers is not None:
-                self._callers = {one: caller for one, caller in self._callers.items() if one != digest}
 
     def remembered(self, token: str) -> tuple[bool, Caller | None]:
         """Returns whether a token's caller is known without a read, and the caller (None for an unknown token)."""
@@ -144,48 +122,13 @@ class StopTokens:
                 self._changed.notify_all()
 
 
-def reader_of(database_url: str, sqlite: Path | None) -> Callable[[], Callers]:
-    """Returns a function that reads all tokens: from a SQLite file by the standard library, from other databases by
-    their plug-in."""
-    read_both = partial(_of_file, sqlite) if sqlite is not None else _of_database(database_url)
-    last: Callers = {}
+def reader_of(file: Path) -> Callable[[], Callers]:
+    """Returns a function that reads all tokens from the database's file, by the standard library. A suspended service
+    that holds the write lock does not block readers (WAL)."""
 
     def read() -> Callers:
-        nonlocal last
-        tokens, sessions = read_both()
-        last = last if sessions is None else sessions  # like tokens, the last known sessions stay valid
-        return tokens | last
+        with closing(open_to_read(file, BUSY_WITHIN)) as connection:
+            rows = connection.execute(TOKENS).fetchall()
+        return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
 
-    return read
-
-
-def ended() -> datetime:
-    """Returns the end (UTC, without zone, as in the table) of the oldest session that still stops the robot."""
-    return datetime.now(UTC).replace(tzinfo=None) - timedelta(seconds=STOPS_FOR)
-
-
-def _of_file(file: Path) -> tuple[Callers, Callers | None]:
-    """Reads tokens and sessions (None if unreadable) over a new connection. A suspended service that holds the write
-    lock does not block readers (WAL)."""
-    with closing(open_to_read(file, BUSY_WITHIN)) as connection:
-        tokens = callers_of(connection.execute(TOKENS).fetchall())
-        try:
-            sessions = connection.execute(SESSIONS, {"ended": ended().isoformat(" ", "microseconds")}).fetchall()
-        except sqlite3.Error as error:
-            log.warning(NO_SESSIONS, error)
-            return tokens, None
-    return tokens, callers_of(sessions)
-
-
-def callers_of(rows: Iterable[Sequence[Any]]) -> Callers:
-    """Returns the callers in rows of digest, name and role."""
-    return {digest: Caller(name, role_of(role), digest) for digest, name, role in rows}
-
-
-def _of_database(url: str) -> Callable[[], tuple[Callers, Callers | None]]:
-    from server.store.databases import database_of
-
-    read: Callable[[], tuple[Callers, Callers | None]] = database_of(url.partition(":")[0].partition("+")[0]).reader(
-        url
-    )
     return read

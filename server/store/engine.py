@@ -16,55 +16,47 @@ from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import ValidationError
-from sqlalchemy import URL, Connection, Engine, event, select, text
+from sqlalchemy import URL, Connection, Engine, create_engine, event, select, text
 from sqlalchemy.exc import DatabaseError, OperationalError
 from sqlalchemy.orm import Session, sessionmaker
 
 from daq.contracts.errors import SpecError
 from daq.contracts.service.experiments import ExperimentState
 from server.database_errors import BRING_BACK, DamagedError, advice_of, line_of, one_line, table_of
-from server.store.address import masked, open_engine, parse_address
-from server.store.databases import database_of
 from server.store.schema import difference, expected_schema, schema_of, upgrade
 from server.store.tables import ExperimentRow, JobRow
 
 
-def require_sound(engine: Engine, place: str) -> None:
+def require_sound(engine: Engine, file: Path) -> None:
     """Raises DamagedError if the file is damaged, a table or other object differs from what the migrations make, or a
-    row has an unknown state.
-
-    `place`: the database's address without its password.
-    """
+    row has an unknown state."""
     try:
         with engine.connect() as connection:
-            if engine.dialect.name == "sqlite":
-                _require_whole(connection, place)
-                _require_schema(connection, place)
-            else:
-                database_of(engine.dialect.name).require_columns(connection, place)
+            _require_whole(connection, file)
+            _require_schema(connection, file)
             for rows in (ExperimentRow, JobRow):
-                _require_known_states(connection, rows, place)
+                _require_known_states(connection, rows, file)
     except DatabaseError as error:
-        raise DamagedError(f"database {place}: {line_of(error)}; {advice_of(error)}") from error
+        raise DamagedError(f"database {file}: {line_of(error)}; {advice_of(error)}") from error
 
 
-def _require_whole(connection: Connection, place: str) -> None:
+def _require_whole(connection: Connection, file: Path) -> None:
     told = connection.execute(text("PRAGMA quick_check(1)")).scalar()
     if told != "ok":
-        raise DamagedError(f"database {place}: is damaged: {one_line(told)}; {BRING_BACK}")
+        raise DamagedError(f"database {file}: is damaged: {one_line(told)}; {BRING_BACK}")
 
 
-def _require_schema(connection: Connection, place: str) -> None:
+def _require_schema(connection: Connection, file: Path) -> None:
     wrong = difference(schema_of(connection.exec_driver_sql), expected_schema())
     if wrong is not None:
-        raise DamagedError(f"database {place}: {wrong}; {BRING_BACK}")
+        raise DamagedError(f"database {file}: {wrong}; {BRING_BACK}")
 
 
-def _require_known_states(connection: Connection, rows: type[ExperimentRow | JobRow], place: str) -> None:
+def _require_known_states(connection: Connection, rows: type[ExperimentRow | JobRow], file: Path) -> None:
     known = get_args(ExperimentState)  # states of jobs are the same
     unknown = connection.execute(select(rows.id, rows.state).where(rows.state.not_in(known)).limit(1)).first()
     if unknown is not None:
-        line = f"database {place}: table {rows.__tablename__}: {unknown[0]} has the state {unknown[1]!r:.40}"
+        line = f"database {file}: table {rows.__tablename__}: {unknown[0]} has the state {unknown[1]!r:.40}"
         raise DamagedError(f"{line}, which is none of {', '.join(known)}; {BRING_BACK}")
 
 
@@ -83,25 +75,20 @@ def _require_not_emptied(file: Path) -> None:
 class Store:
     """One database. Any thread may open sessions; one session writes at a time."""
 
-    def __init__(self, url: str | URL) -> None:
+    def __init__(self, file: Path) -> None:
         """Raises SpecError."""
-        parsed = parse_address(url)
-        if parsed.get_backend_name() == "sqlite" and parsed.database:
-            try:
-                Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise SpecError(f"database {parsed.database}: its folder cannot be made: {error.strerror}") from error
-            _require_not_emptied(Path(parsed.database))
-            with suppress(OSError):  # SQLite's own error, later, has more details
-                # Other users must not read hashes of tokens. SQLite gives its files beside this one the same mode.
-                os.close(os.open(parsed.database, os.O_CREAT | os.O_RDWR, 0o600))
-        self.url = url
-        self.place = masked(parsed)
-        """The address without the password, for messages."""
-        self.engine: Engine = open_engine(url)
-        if parsed.get_backend_name() == "sqlite":
-            event.listen(self.engine, "connect", _safe_and_shared)
-            event.listen(self.engine, "begin", _begin)
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise SpecError(f"database {file}: its folder cannot be made: {error.strerror}") from error
+        _require_not_emptied(file)
+        with suppress(OSError):  # SQLite's own error, later, has more details
+            # Other users must not read hashes of tokens. SQLite gives its files beside this one the same mode.
+            os.close(os.open(file, os.O_CREAT | os.O_RDWR, 0o600))
+        self.file = file
+        self.engine: Engine = create_engine(URL.create("sqlite", database=str(file)))
+        event.listen(self.engine, "connect", _safe_and_shared)
+        event.listen(self.engine, "begin", _begin)
         self._readers = sessionmaker(self.engine, expire_on_commit=False)
         self._writers = sessionmaker(self.engine.execution_options(writing=True), expire_on_commit=False)
         self._writing = threading.RLock()
@@ -118,12 +105,12 @@ class Store:
                 upgrade(connection)
                 connection.commit()
         except OperationalError as error:
-            line = f"database {self.place}: cannot be opened: {line_of(error)}"
+            line = f"database {self.file}: cannot be opened: {line_of(error)}"
             raise SpecError(f"{line}; {advice_of(error)}") from error
         except DatabaseError as error:
-            raise SpecError(f"database {self.place}: {line_of(error)}; {advice_of(error)}") from error
+            raise SpecError(f"database {self.file}: {line_of(error)}; {advice_of(error)}") from error
         except Exception as error:
-            line = f"database {self.place}: its tables cannot be brought up to date: {one_line(error)}"
+            line = f"database {self.file}: its tables cannot be brought up to date: {one_line(error)}"
             raise SpecError(f"{line}; {BRING_BACK}") from error
 
     @contextmanager
@@ -161,7 +148,7 @@ class Store:
 
     def require_sound(self) -> None:
         """Raises DamagedError if tables, columns or states differ from those that this program writes."""
-        require_sound(self.engine, self.place)
+        require_sound(self.engine, self.file)
 
     def require_writable(self) -> None:
         """Raises OperationalError if the database is not writable: takes the write lock, and releases it."""

@@ -42,14 +42,14 @@ class ExperimentStore:
         self._pages: KeptPages[Experiment] = KeptPages(store)
 
     @contextmanager
-    def _changing(self, *robots: str) -> Iterator[Session]:
-        """A session that may change these robots' numbers of waiting experiments, which are cached afterwards."""
+    def _changing(self, robot: str) -> Iterator[Session]:
+        """A session that may change a robot's number of waiting experiments, which is cached afterwards."""
         with self._counting:
             with self._store.writing() as session:
                 yield session
                 session.flush()
-                waiting = {robot: _count_waiting(session, robot) for robot in robots}
-            self._waiting |= waiting
+                waiting = _count_waiting(session, robot)
+            self._waiting[robot] = waiting
 
     def made_before(self, robot: str, request: ExperimentRequest, key: str | None) -> Experiment | None:
         """Returns the experiment made earlier with this key. Raises a 409 if the key was used for another request."""
@@ -81,14 +81,6 @@ class ExperimentStore:
                 also(session, row)
                 session.flush()
             return as_experiment(row), new
-
-    def submit_to_each(
-        self, robots: Sequence[str], request: ExperimentRequest, now: datetime, by: str, key: str | None = None
-    ) -> list[tuple[Experiment, bool]]:
-        """Queues an experiment for several robots in one transaction: if one raises, no robot gets it."""
-        with self._changing(*robots) as session:
-            made = [_submit(session, robot, request, now, by, key) for robot in robots]
-            return [(as_experiment(row), new) for row, new in made]
 
     def get(self, robot: str, identity: str) -> Experiment:
         """Returns an experiment. Raises a 404."""

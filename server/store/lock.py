@@ -6,37 +6,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sqlalchemy import URL
-
 from daq.contracts.errors import ReachError
 from daq.contracts.file_lock import take_lock
-from server.store.address import parse_address
-from server.store.databases import database_of
-
-
-def sqlite_file(url: str | URL) -> Path | None:
-    """Returns the file of a SQLite database; None for any other, and for one in memory. Raises SpecError."""
-    parsed = parse_address(url)
-    return Path(parsed.database) if parsed.get_backend_name() == "sqlite" and parsed.database else None
 
 
 @contextmanager
-def sole_use(url: str | URL) -> Iterator[None]:
-    """Keeps other services and restores from using this database within the block. Raises ReachError, and SpecError if
-    a database server cannot be reached."""
-    file = sqlite_file(url)
-    if file is not None:
-        with _locked_file(file):
-            yield
-    elif (kind := parse_address(url).get_backend_name()) == "sqlite":  # in memory
-        yield
-    else:
-        with database_of(kind).sole_use(url):
-            yield
-
-
-@contextmanager
-def _locked_file(file: Path) -> Iterator[None]:
+def sole_use(file: Path) -> Iterator[None]:
+    """Keeps other services and restores from using this database within the block. Raises ReachError."""
     path = file.with_name(f"{file.name}.lock")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

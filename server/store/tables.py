@@ -238,18 +238,6 @@ class EventRow(Table):
     experiment: Mapped[str | None] = mapped_column(String(12))
 
 
-class SessionRow(Table):
-    """A session of a signed-in person: the hash of its secret, the person's name and role, and its end."""
-
-    __tablename__ = "sessions"
-
-    digest: Mapped[str] = mapped_column(String(64), primary_key=True)
-    name: Mapped[str] = mapped_column(String(64), index=True)
-    role: Mapped[str] = mapped_column(String(16))
-    created: Mapped[datetime]
-    expires: Mapped[datetime] = mapped_column(index=True)
-
-
 class TokenRow(Table):
     """A token's hash; the token itself is shown only once, when it is made."""
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Protocol
 
 from sqlalchemy import Select, delete, select, update
 from sqlalchemy.orm import Session
@@ -42,26 +41,11 @@ class TraceSearch:
     effect: str | None = None
 
 
-class ArchiveIndex(Protocol):
-    """Which traces the archive has. Set by the archive plug-in, if one is installed; queried within the same
-    transaction."""
-
-    def among(self, session: Session, traces: Collection[str]) -> set[str]:
-        """Returns those of these traces that the archive has."""
-        ...
-
-    def delete_later(self, session: Session, trace: str) -> None:
-        """Queues the archived object of a trace for deletion."""
-        ...
-
-
 class TraceStore:
     """Traces of all robots."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
-        self.archive_index: ArchiveIndex | None = None
-        """None if there is no archive."""
         self._pages: KeptPages[CatalogueEntry] = KeptPages(store)
 
     def insert(
@@ -118,28 +102,11 @@ class TraceStore:
         with self._store.reading() as session:
             return row_of(session, TraceRow, robot, identity).file
 
-    def files_of(self, robot: str, identities: Iterable[str]) -> dict[str, str]:
-        """Returns the names of the files of traces, those that are in the table."""
-        query = select(TraceRow.id, TraceRow.file).where(TraceRow.robot == robot, TraceRow.id.in_(list(identities)))
-        with self._store.reading() as session:
-            return {row.id: row.file for row in session.execute(query)}
-
     def get(self, robot: str, identity: str) -> CatalogueEntry:
         """Returns a trace's entry. Raises a 404."""
         with self._store.reading() as session:
             row = row_of(session, TraceRow, robot, identity)
-            return self._entry(session, row, _tags(session, [row.id]).get(row.id, ()))
-
-    def is_archived(self, identity: str) -> bool:
-        """Whether the archive has a trace."""
-        return identity in self.archived_of([identity])
-
-    def archived_of(self, identities: Iterable[str]) -> set[str]:
-        """Returns those of these traces that the archive has."""
-        if self.archive_index is None:
-            return set()
-        with self._store.reading() as session:
-            return self.archive_index.among(session, list(identities))
+            return _entry(row, _tags(session, [row.id]).get(row.id, ()))
 
     def page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
         """Returns a page of the list, newest first."""
@@ -147,17 +114,13 @@ class TraceStore:
         return self._pages.page(asked, lambda: self._read_page(robot, search, cursor, limit))
 
     def _read_page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
-        # PostgreSQL rejects NUL in text; nothing can match
-        if any("\0" in one for one in (search.text, search.tag, search.kind) if one):
-            return Page(items=())
         with self._store.reading() as session:
             rows = list(session.scalars(_query(robot, search, cursor).limit(limit + 1)))
             tags = _tags(session, [row.id for row in rows])
-            archived = self._archived(session, [row.id for row in rows])
         return page_of(
             rows,
             limit,
-            lambda row: _entry(row, tags.get(row.id, ()), archived=row.id in archived),
+            lambda row: _entry(row, tags.get(row.id, ())),
             lambda row: Cursor(row.created.timestamp(), row.id),
         )
 
@@ -174,7 +137,7 @@ class TraceStore:
             session.flush()
             tags = _tags(session, [row.id]).get(row.id, ())
             row.searched = _searched(row, tags)
-            return self._entry(session, row, tags)
+            return _entry(row, tags)
 
     def remove(self, robot: str, identity: str, also: Callable[[], None] = lambda: None) -> None:
         """Deletes the row. Raises a 404, and a 409 if a model or a job uses the trace.
@@ -188,17 +151,9 @@ class TraceStore:
             if users:
                 line = f"{label_of_row(row)} is used by {', '.join(user_label(session, user) for user in users)}"
                 raise conflict("trace-in-use", line, "delete those first")
-            if self.archive_index is not None:
-                self.archive_index.delete_later(session, identity)
             session.delete(row)
             session.flush()
             also()
-
-    def _archived(self, session: Session, identities: list[str]) -> set[str]:
-        return set() if self.archive_index is None else self.archive_index.among(session, identities)
-
-    def _entry(self, session: Session, row: TraceRow, tags: tuple[str, ...]) -> CatalogueEntry:
-        return _entry(row, tags, archived=bool(self._archived(session, [row.id])))
 
 
 def _tags(session: Session, identities: list[str]) -> dict[str, tuple[str, ...]]:
@@ -246,13 +201,5 @@ def _searched(row: TraceRow, tags: Iterable[str]) -> str:
     return "\n".join(part for part in parts if part).lower()
 
 
-def _entry(row: TraceRow, tags: tuple[str, ...], *, archived: bool) -> CatalogueEntry:
-    return like(
-        CatalogueEntry,
-        row,
-        tags=tags,
-        moved=tuple(map(int, row.moved.split())),
-        missing=row.missing and not archived,
-        archived=archived,
-        local=not row.missing,
-    )
+def _entry(row: TraceRow, tags: tuple[str, ...]) -> CatalogueEntry:
+    return like(CatalogueEntry, row, tags=tags, moved=tuple(map(int, row.moved.split())))

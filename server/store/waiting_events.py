@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from sqlalchemy import select
-from sqlalchemy.exc import DatabaseError, IntegrityError, SQLAlchemyError
+from sqlalchemy.exc import DataError, IntegrityError, SQLAlchemyError
 
 from daq.contracts.frozen import like
 from daq.contracts.service.base import Page
 from daq.contracts.service.events import ServiceEvent
-from server.database_errors import is_value, one_line
+from server.database_errors import one_line
 from server.store.engine import Store
 from server.store.pages import newest_first
 from server.store.tables import EventRow
@@ -156,6 +156,6 @@ class WaitingEvents:
 def _may_pass(error: Exception) -> bool:
     """Whether the database may accept the same row later, for example after a lock, or when the disk has space
     again."""
-    if isinstance(error, DatabaseError) and (is_value(error) or isinstance(error, IntegrityError)):
+    if isinstance(error, DataError | IntegrityError):
         return False
     return isinstance(error, SQLAlchemyError | OSError)

@@ -149,25 +149,6 @@ def test_more_arms_than_a_trial_can_have_are_refused(daq: CommandLine) -> None:
 
 
 @pytest.mark.parametrize(
-    ("database", "expected"),
-    [
-        ("nonsense", ("server.database 'nonsense'", "write sqlite:///")),
-        ("", ()),
-        ("oracle9://db", ("is not the address of a database",)),
-        ("sqlite:////proc/nothing/service.sqlite", ("/proc/nothing", "cannot be made")),
-    ],
-)
-def test_a_database_that_cannot_be_used_is_refused(daq: CommandLine, database: str, expected: tuple[str, ...]) -> None:
-    Path("daq.toml").write_text(f'[server]\ndatabase = "{database}"\n')
-    said = daq("token", "ls")
-    if not database:
-        assert said.code == 0  # as if it were not said
-        return
-    said.complains(2, *expected)
-    assert "secret" not in said.err
-
-
-@pytest.mark.parametrize(
     "text",
     [
         "",

@@ -23,7 +23,7 @@ WITHOUT = {"serve", "mock", "demo", "docs", "mcp", "view"} | {
         "gains": "set",
         "io": "set gripper",
         "queue": "pause resume approve withdraw unschedule",
-        "token": "add revoke sign-out",
+        "token": "add revoke",
         "teach": "jog step program lead",
         "teach programs": "keep fetch delete",
         "machine": "tidy",

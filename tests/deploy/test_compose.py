@@ -1,109 +1,85 @@
-"""deploy/compose.yaml is what the service needs: its commands run as processes, and an experiment goes all the way."""
+"""The files of deploy/: container, first process, board and alerts fit the service, and others' tools accept them."""
 
 import json
 import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import httpx
-import psycopg
 import pytest
 import yaml
 from grafana_foundation_sdk.cog.encoder import JSONEncoder
 from grafana_foundation_sdk.cog.plugins import register_default_plugins
 from grafana_foundation_sdk.models.dashboard import Dashboard
 
+from daq.config.settings import Settings
 from daq.traces.reader import read_trace
-from tests.deploy.composition import OWN_IMAGE, RAMP, SECRETS, Composition, composition, ended, image
 from tests.deploy.expressions import OF_PROMETHEUS, Scraped, wrong
 from tests.repository.tracked import ROOT
-from tests.server.polling import reset, until
+from tests.server.polling import reset
+from tests.server.service import DAQ, Service, running_service
 
-SERVICES: dict[str, dict[str, Any]] = composition(SECRETS)["services"]
-
-
-@pytest.mark.timeout(400)
-def test_an_experiment_is_recorded_archived_and_fitted(running: Composition, api: httpx.Client) -> None:
-    made = ended(api, f"/experiments/{api.post('/experiments', json={'spec': RAMP}).json()['id']}")
-    assert made["state"] == "done", made
-    until(api, f"/traces/{made['trace']}/archive", lambda kept: kept["archived"], process=running.processes["service"])
-    bucket = running.services["service"]["environment"]["DAQ_ARCHIVE__BUCKET"]
-    stored = running.stores["objects"].objects(bucket)
-    file = running.folder / "data" / "traces" / api.get(f"/traces/{made['trace']}").json()["entry"]["file"]
-    assert file.read_bytes() in stored.values()
-
-    request = {"kind": "fit", "traces": [made["trace"]], "parameters": ["joint2.*viscous*"]}
-    job = ended(api, f"/jobs/{api.post('/jobs', json=request).json()['id']}")
-    assert job["state"] == "done", job
-
-    with psycopg.connect(
-        host=running.address("database"), dbname="ma2000", user="ma2000", password=SECRETS["DATABASE_PASSWORD"]
-    ) as database:
-        rows = database.execute("SELECT state FROM experiments WHERE id = %s", (made["id"],)).fetchall()
-    assert rows == [("done",)]
+DEPLOY = ROOT / "deploy"
+CONTAINERFILE = (DEPLOY / "Containerfile").read_text("utf-8")
+SERVICE: dict[str, Any] = yaml.safe_load((DEPLOY / "compose.yaml").read_text("utf-8"))["services"]["service"]
+FIRST = [sys.executable, str(DEPLOY / "first_process.py")]
+"""What the image starts its command with."""
+RAMP = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.4}, "joints": [2], "settle": 0.2, "hold": 0.2}
+LONG = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 60.0}, "joints": [2]}
 
 
-def test_who_has_no_token_is_refused_and_the_stop_listener_answers(running: Composition, api: httpx.Client) -> None:
-    host = running.address("service")
-    assert httpx.get(f"http://{host}:8300/healthz").status_code == 200
-    assert httpx.get(f"http://{host}:8300/api/v1/robots/ma2000").status_code == 401
-    stop = f"http://{host}:8301/api/v1/robots/ma2000/stop"
-    assert httpx.post(stop).status_code == 401
-    assert httpx.post(stop, headers=api.headers).json()["confirmed"]
-    # The listener answers before the service knows of its stop.
-    until(api, str(api.base_url).rstrip("/"), lambda status: status["arm"] == "stopped")
-    assert reset(api).is_success
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """The service as the image starts it, after its first process."""
+    with running_service(tmp_path_factory.mktemp("deploy"), program=[*FIRST, *DAQ]) as service:
+        service.until_connected()
+        reset(service.robot).raise_for_status()
+        yield service
 
 
-@pytest.mark.parametrize("name", SERVICES)
-def test_each_container_may_do_no_more_than_it_needs(name: str) -> None:
-    service = SERVICES[name]
-    assert service["read_only"] is True
-    assert service["cap_drop"] == ["ALL"]
-    assert service["security_opt"] == ["no-new-privileges:true"]
-    assert re.fullmatch(r"[1-9]\d*:[1-9]\d*", service["user"])
-    assert "healthcheck" in service or service["restart"] == "no"
-    assert "privileged" not in service
+def test_the_container_may_do_no_more_than_it_needs_and_is_reached_from_this_computer_alone() -> None:
+    assert SERVICE["read_only"] is True
+    assert SERVICE["cap_drop"] == ["ALL"]
+    assert SERVICE["security_opt"] == ["no-new-privileges:true"]
+    assert re.fullmatch(r"[1-9]\d*:[1-9]\d*", SERVICE["user"])
+    assert "privileged" not in SERVICE
+    assert all(port.startswith("127.0.0.1:") for port in SERVICE["ports"])
 
 
-def test_only_the_service_is_reached_from_outside_and_only_from_this_computer() -> None:
-    assert {name for name, one in SERVICES.items() if "ports" in one} == {"service"}
-    assert all(port.startswith("127.0.0.1:") for port in SERVICES["service"]["ports"])
-    assert {name for name, one in SERVICES.items() if "outside" in one.get("networks", ())} == {"service"}
-    assert composition(SECRETS)["networks"]["inside"]["internal"] is True
-
-
-@pytest.mark.parametrize("name", [name for name, one in SERVICES.items() if one["image"] == OWN_IMAGE])
-def test_what_is_written_lies_in_a_volume_or_in_memory(name: str) -> None:
-    service = SERVICES[name]
-    writable = [one.partition(":")[2] for one in service.get("volumes", ())]
-    writable += [one.partition(":")[0] for one in service["tmpfs"]]
-    told = {**image()["environment"], **service.get("environment", {})}
-    paths = [value for key, value in told.items() if str(value).startswith("/") and key != "PATH"]
-    words = [word for word in service.get("command", ()) if word.startswith("/")]
-    if not any(one.startswith("data:") for one in service.get("volumes", ())):
-        paths.remove(image()["environment"]["NUMBA_CACHE_DIR"])  # it computes nothing
-    needed = {*paths, *words}
-    assert [path for path in needed if not any(Path(path).is_relative_to(one) for one in writable)] == []
+def test_the_environment_is_settings_and_what_is_written_lies_in_a_volume_or_in_memory(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (words,) = re.findall(r"^ENV ((?:.*\\\n)*.*)$", CONTAINERFILE, re.MULTILINE)
+    environment = dict(word.split("=", 1) for word in words.replace("\\\n", " ").split())
+    for name, value in SERVICE["environment"].items():
+        monkeypatch.setenv(name, value)
+    settings = Settings()
+    assert (settings.server.host, settings.server.tokens) == ("0.0.0.0", "always")
+    paths = [settings.server.folder, settings.traces.folder]
+    paths += [Path(value) for key, value in environment.items() if value.startswith("/") and key != "PATH"]
+    writable = [one.partition(":")[2] for one in SERVICE["volumes"]]
+    writable += [one.partition(":")[0] for one in SERVICE["tmpfs"]]
+    assert [path for path in paths if not any(path.is_relative_to(one) for one in writable)] == []
 
 
 def test_each_image_is_pinned_to_a_version() -> None:
-    base = re.findall(r"^ARG BASE=(\S+)$", (ROOT / "deploy" / "Containerfile").read_text("utf-8"), re.MULTILINE)
-    images = {*base, *(one["image"] for one in SERVICES.values())}
+    images = {*re.findall(r"^ARG BASE=(\S+)$", CONTAINERFILE, re.MULTILINE), SERVICE["image"]}
     pinned = re.compile(r"[a-z.]+/[a-z0-9/-]+:v?\d+\.\d+(\.\d+)?(-[a-z]+)?(@sha256:[0-9a-f]{64})?")
     assert [one for one in images if not pinned.fullmatch(one)] == []
 
 
 def test_the_image_has_the_version_of_the_package() -> None:
     version = re.findall(r'^version = "(.*)"$', (ROOT / "pyproject.toml").read_text("utf-8"), re.MULTILINE)
-    assert OWN_IMAGE.endswith(f":{version[0]}")
+    assert SERVICE["image"].endswith(f":{version[0]}")
 
 
 def test_linters_of_others_find_nothing() -> None:
@@ -121,15 +97,12 @@ def test_linters_of_others_find_nothing() -> None:
 
 def test_the_image_is_built_from_every_folder_of_the_wheel_and_from_no_more() -> None:
     wheel = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["hatch"]["build"]["targets"]["wheel"]
-    copied = re.findall(r"^COPY (\w+) \1$", (ROOT / "deploy" / "Containerfile").read_text("utf-8"), re.MULTILINE)
+    copied = re.findall(r"^COPY (\w+) \1$", CONTAINERFILE, re.MULTILINE)
     let_in = re.findall(r"^!/(\w+)$", (ROOT / ".dockerignore").read_text("utf-8"), re.MULTILINE)
     assert {*wheel["packages"], *wheel["force-include"]} == set(copied) <= set(let_in)
 
 
-# ---- A container that is killed or ended leaves whole traces. These tests end the service that the other files use.
-
-FIRST = [sys.executable, str(ROOT / "deploy" / "first_process.py")]
-LONG = {"trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 60.0}, "joints": [2]}
+# ---- A container that is killed or ended leaves whole traces.
 
 
 @pytest.mark.parametrize(("end", "code"), [("exit 4", 4), ("kill -KILL $$", 128 + signal.SIGKILL)])
@@ -157,33 +130,31 @@ def test_the_first_process_passes_signals_on() -> None:
 
 # ---- Board and alert rules name what a running service has, and Prometheus, promtool and Grafana's types accept them.
 
-DEPLOY = ROOT / "deploy"
 RULES = DEPLOY / "prometheus-rules.yaml"
 BOARD: dict[str, Any] = json.loads((DEPLOY / "grafana-board.json").read_text("utf-8"))
 ALERTS: list[dict[str, Any]] = yaml.safe_load(RULES.read_text("utf-8"))["groups"][0]["rules"]
 PANELS = [(panel["title"], target) for panel in BOARD["panels"] for target in panel["targets"]]
 
 
-@pytest.fixture
-def scraped(running: Composition, api: httpx.Client) -> Scraped:
-    """What the service of the composition says at /metrics once something of each kind has happened: it has an
-    archive and workers."""
-    made = ended(api, f"/experiments/{api.post('/experiments', json={'spec': RAMP}).json()['id']}")
+@pytest.fixture(scope="module")
+def scraped(running: Service) -> Scraped:
+    """What the service says at /metrics once something of each kind has happened."""
+    made = running.end_of(running.robot.post("/experiments", json={"spec": RAMP}).json()["id"])
     assert made["state"] == "done", made
-    job = api.post("/jobs", json={"kind": "compare", "traces": [made["trace"]], "models": ["machine"]}).json()
-    assert ended(api, f"/jobs/{job['id']}")["state"] == "done"
-    until(api, f"/traces/{made['trace']}/archive", lambda kept: kept["archived"], process=running.processes["service"])
-    assert api.post("/stop").is_success
-    assert httpx.get(str(api.base_url), headers={"Authorization": "Bearer nobody-knows-this"}).status_code == 401
-    while not (found := _metrics(running, api)).labels.get("daq_stops_total"):
-        assert running.processes["service"].poll() is None  # a stop is counted once it has been answered
+    job = running.robot.post("/jobs", json={"kind": "compare", "traces": [made["trace"]], "models": ["machine"]})
+    assert running.end_of(job.json()["id"], "jobs")["state"] == "done"
+    assert running.robot.post("/stop").is_success
+    unknown = {"Authorization": "Bearer nobody-knows-this"}
+    assert httpx.get(f"{running.url}/api/v1/me", headers=unknown).status_code == 401
+    while not (found := Scraped.of(_metrics(running))).labels.get("daq_stops_total"):
+        assert running.process.poll() is None  # a stop is counted once it has been answered
     return found
 
 
-def _metrics(running: Composition, api: httpx.Client) -> Scraped:
-    answer = httpx.get(f"http://{running.address('service')}:8300/metrics", headers=api.headers)
+def _metrics(running: Service) -> str:
+    answer = httpx.get(f"{running.url}/metrics")
     assert answer.status_code == 200, answer.text
-    return Scraped.of(answer.text)
+    return answer.text
 
 
 def test_rules_and_board_name_only_what_a_running_service_has(scraped: Scraped) -> None:
@@ -290,13 +261,14 @@ def _configuration(folder: Path, target: str, token: str) -> Path:
 
 
 def test_a_real_prometheus_reads_the_service_and_evaluates_everything(
-    running: Composition, scraped: Scraped, token: str, tmp_path: Path
+    running: Service, scraped: Scraped, tmp_path: Path
 ) -> None:
     program = shutil.which("prometheus")
     if program is None:
         pytest.skip("needs Prometheus: apt install prometheus")
-    address = f"{running.network}.250:19090"
-    file = _configuration(tmp_path, f"{running.address('service')}:8300", token)
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    file = _configuration(tmp_path, urlsplit(running.url).netloc, "t")
     words = [f"--config.file={file}", f"--storage.tsdb.path={tmp_path / 'data'}", f"--web.listen-address={address}"]
     with subprocess.Popen([program, *words], stderr=subprocess.DEVNULL) as process:
         try:
@@ -326,27 +298,18 @@ def _rules(client: httpx.Client) -> list[dict[str, Any]]:
     return [rule for group in client.get("/rules").json()["data"]["groups"] for rule in group["rules"]]
 
 
-@pytest.mark.timeout(240)
-def test_a_killed_service_leaves_a_whole_trace_before_its_container_ends(
-    running: Composition, api: httpx.Client
-) -> None:
-    """The last test of the file: it ends the service that all share."""
-    made = api.post("/experiments", json={"spec": LONG}).json()["id"]
-    service = running.processes["service"]
-    until(api, f"/experiments/{made}", lambda one: " of " in one["progress_text"], {"wait": 0.2}, service)
-    first = running.processes.pop("service")
-    children = Path(f"/proc/{first.pid}/task/{first.pid}/children").read_text("utf-8").split()
-    (serving,) = (int(child) for child in children if b"serve" in Path(f"/proc/{child}/cmdline").read_bytes())
-    os.kill(serving, signal.SIGKILL)
-    assert first.wait(30) == 128 + signal.SIGKILL
-    traces = running.folder / "data" / "traces"
+def test_a_killed_service_leaves_a_whole_trace_before_its_container_ends(tmp_path: Path) -> None:
+    with running_service(tmp_path, program=[*FIRST, *DAQ]) as service:
+        service.until_connected()
+        service.robot.post("/queue/resume", json={}).raise_for_status()
+        made = service.robot.post("/experiments", json={"spec": LONG}).json()["id"]
+        service.until_recording(made)
+        first = service.process.pid
+        children = Path(f"/proc/{first}/task/{first}/children").read_text("utf-8").split()
+        (serving,) = (int(child) for child in children if b"serve" in Path(f"/proc/{child}/cmdline").read_bytes())
+        os.kill(serving, signal.SIGKILL)
+        assert service.process.wait(30) == 128 + signal.SIGKILL
+    traces = tmp_path / "traces"
     assert list(traces.rglob("*.part")) == []
-
-    running.start("service")  # as `restart: unless-stopped` does
-    running.until_healthy("service")
-    interrupted = api.get(f"/experiments/{made}").json()
-    assert interrupted["state"] == "interrupted"
-    file = traces / api.get(f"/traces/{interrupted['trace']}").json()["entry"]["file"]
+    (file,) = traces.rglob("*.mcap")
     assert len(read_trace(file).position) > 0
-    assert api.get("/queue").json()["paused"]
-    assert running.end("service") == 0

@@ -6,9 +6,8 @@ from firmware_protocol.commands import PROTOCOL_VERSION, Hello, ReadStatus, Rele
 from firmware_protocol.dialect import IDLE_MARK, FramedDialect
 from firmware_protocol.framing import FrameDecoder, encode_frame
 from mock_controller.device import Device, build_device
-from mock_controller.lock_step import LockStepPace
 from mock_controller.options import Options
-from mock_controller.real_time import RealTimePace
+from mock_controller.pace import LockStepPace, RealTimePace
 
 
 def make_device(**options: Any) -> Device:

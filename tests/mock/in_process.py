@@ -4,7 +4,7 @@ from typing import Any
 
 from mock_controller.bridge.bridge import Bridge
 from mock_controller.bridge.link import Link as BridgeLink
-from mock_controller.lock_step import LockStepPace
+from mock_controller.pace import LockStepPace
 from mock_controller.timeline import Timeline
 from tests.mock.host import make_device
 

@@ -25,7 +25,7 @@ from tests.repository.without_extras import packages_beyond, run_without
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 EXTRAS = {name: [Requirement(line) for line in lines] for name, lines in PROJECT["optional-dependencies"].items()}
 OTHER_NAMES = {"serial": "pyserial", "pydantic_settings": "pydantic-settings", "prometheus_client": "prometheus-client"}
-OTHER_NAMES |= {"google": "protobuf", "markdown_it": "markdown-it-py", "rerun": "rerun-sdk", "foxglove": "foxglove-sdk"}
+OTHER_NAMES |= {"google": "protobuf", "markdown_it": "markdown-it-py"}
 OTHER_NAMES["PIL"] = "pillow"
 
 NO_TRACE: Any = Trace.__new__(Trace)
@@ -81,7 +81,7 @@ def test_the_table_of_packages_and_extras_is_that_of_the_package() -> None:
 
 def test_all_is_everything_and_a_client_needs_little() -> None:
     (line,) = EXTRAS["all"]
-    found = {*line.extras, "rerun", "webrtc"}  # 500 MB, and parts under the GPL: they are asked for by name
+    found = {*line.extras, "webrtc"}  # with parts under the GPL: it is asked for by name
     found |= {inner for extra in found for inner in CONTAINS.get(extra, ())}
     assert found | {"all", "client"} == set(EXTRAS)
     assert set(get_args(Extra)) == found

@@ -32,7 +32,6 @@ WORDS = {
     "follow": "run ramp --model ma2000 --dry-run",
     "hide": "",
     "profile": "ma2000 {trace} --parameter load.mass",
-    "sensitivity": "ma2000 {trace}",
     "simulate": "ma2000 {trace}",
     "thesis": "",
     "validate": "ma2000 {trace}",

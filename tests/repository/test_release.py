@@ -85,7 +85,7 @@ EXTRAS = [
     for line in extra
     if not line.startswith("ma2000-daq[")
 ]
-NOT_IN_ALL = {"rerun-sdk", "aiortc"}
+NOT_IN_ALL = {"aiortc"}
 FOR_USE = [
     *PYPROJECT["project"]["dependencies"],
     *(line for line in EXTRAS if Requirement(line).name not in NOT_IN_ALL),

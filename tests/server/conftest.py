@@ -67,12 +67,6 @@ def here(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest
 
 
 @pytest.fixture
-def sqlite_store(tmp_path: Path) -> Iterator[Store]:
+def store(tmp_path: Path) -> Iterator[Store]:
     with closing(migrated_store(tmp_path / "service.sqlite")) as made:
         yield made
-
-
-@pytest.fixture
-def store(sqlite_store: Store) -> Store:
-    """The same; plug-ins have other kinds (tests/extras/lab/postgresql)."""
-    return sqlite_store

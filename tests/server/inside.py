@@ -59,7 +59,6 @@ def service_inside(
     folder: Path,
     clock: SystemClock,
     monkeypatch: pytest.MonkeyPatch,
-    database: str | None = None,
     sections: Mapping[str, Section] = MappingProxyType({}),
     **robot: Any,
 ) -> Iterator[httpx.Client]:
@@ -69,11 +68,10 @@ def service_inside(
     settings = settings_type()(
         robot=RobotSettings(**{"port": MOCK} | robot),
         traces=TraceSettings(folder=folder / "traces"),
-        server=ServiceSettings(folder=folder / "service", database=database, connect_at_start=False),
+        server=ServiceSettings(folder=folder / "service", connect_at_start=False),
         **sections,
     )
-    if database is None:
-        place_database(folder / "service" / "service.sqlite")
+    place_database(folder / "service" / "service.sqlite")
     services = Services(settings, clock)
     gate = Gate(KnownTokens(services.tokens, clock), services.tickets, open_on_loopback=True, parts=services.parts)
     server = _Server(uvicorn.Config(make_app(services, gate), log_config=None, lifespan="on"))

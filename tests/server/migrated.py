@@ -12,7 +12,7 @@ from server.store.engine import Store
 def migrated_store(file: Path) -> Store:
     """Returns a store in a new database."""
     place_database(file)
-    return Store(f"sqlite:///{file}")
+    return Store(file)
 
 
 def place_database(file: Path) -> None:
@@ -27,6 +27,6 @@ def place_database(file: Path) -> None:
 def _new_database() -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "service.sqlite"
-        with closing(Store(f"sqlite:///{file}")) as store:
+        with closing(Store(file)) as store:
             store.migrate()
         return file.read_bytes()

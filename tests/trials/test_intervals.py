@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from model.effects.library import library
-from trials.intervals import SIZES, covered
+from trials.judge import SIZES, covered
 
 
 def truth(name: str, law: int, case: str = "single", **sizes: float) -> dict[str, Any]:

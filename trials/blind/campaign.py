@@ -27,11 +27,17 @@ from model.machine_model.model import base_model
 from model.trial.score import Score, score, score_of_failure
 from model.trial.table import TrialTable, trial_table
 from model.trial.truth import Detectability, parse_truth
-from trials.blind.experiments import machine_with_load, trial_experiment, write_set_points
 from trials.blind.folder import STAGES, Stage, TrialFolder
-from trials.blind.mock_side import TrialStageError, detect, reveal
-from trials.blind.recording import Recorded, record
-from trials.blind.sealed import DIAGNOSER, DiagnosisFailedError, SealedAnswer, diagnose_sealed
+from trials.blind.recording import Recorded, machine_with_load, record, trial_experiment, write_set_points
+from trials.blind.sealed import (
+    DIAGNOSER,
+    DiagnosisFailedError,
+    SealedAnswer,
+    TrialStageError,
+    detect,
+    diagnose_sealed,
+    reveal,
+)
 
 ROBOT_TIME = 60.0
 """Robot time in s that a trial may spend on further experiments."""

@@ -13,15 +13,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
 from daq.child import last_words
+from daq.contracts.errors import DaqError
 from firmware_protocol.invalid import first_invalid
 from model.discrepancy.diagnosis import Diagnosis
 from model.machine_model.model import Model
 from model.machine_model.model_file import save_model
-from trials.blind.mock_side import TrialStageError
 
 MODEL, ANSWER, HELD_OUT = "model.json", "answer.json", "held-out.mcap"
 ASKING = "asking.json"
@@ -31,6 +32,41 @@ TIME_LIMIT = 1800.0
 _KEPT_VARIABLES = ("PATH", "HOME", "LANG", "LC_ALL", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE", "VIRTUAL_ENV")
 _KEPT_BEGINNINGS = ("NUMBA_", "OMP_", "OPENBLAS_", "MKL_")
 DIAGNOSER = (sys.executable, "-m", "trials.blind.diagnoser")
+
+
+# --- The mock's side of a trial, in separate processes: how detectable an arm's effects are, and what they are
+
+
+class TrialStageError(DaqError):
+    """A stage of a trial has failed; the text is one line."""
+
+
+def detect(seed: int, set_points: Path, cache: Path) -> dict[str, Any]:
+    """Returns detectability d′ of the arm's effects, one by one and together. Raises TrialStageError."""
+    return _line("mock_controller.detectability", str(seed), "--experiment", str(set_points), "--cache", str(cache))
+
+
+def reveal(seed: int) -> dict[str, Any]:
+    """Returns the effects that the arm hides. Raises TrialStageError."""
+    return _line("mock_controller.reveal", str(seed))
+
+
+def _line(module: str, *arguments: str) -> dict[str, Any]:
+    done = subprocess.run(
+        [sys.executable, "-m", module, *arguments],
+        env={"OPENBLAS_NUM_THREADS": "1"}
+        | os.environ,  # threads would wait for each other in products of thin matrices
+        capture_output=True,
+        text=True,
+        check=False,
+        start_new_session=True,
+    )
+    try:
+        line: dict[str, Any] = json.loads(done.stdout)
+    except json.JSONDecodeError:
+        told = f"{module} ended with code {done.returncode}: {last_words(done.stderr)}"
+        raise TrialStageError(told) from None
+    return line
 
 
 class DiagnosisFailedError(TrialStageError):

@@ -10,7 +10,6 @@ from daq.contracts.service.base import Wire
 
 Outcome = Literal["done", "refused", "failed"]
 """`refused`: nothing was changed, and the sender was told why. `failed`: the service could not carry it out."""
-Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
 class AuditNote(Wire):
@@ -42,10 +41,6 @@ class AuditNote(Wire):
 
 
 class AuditEntry(AuditNote):
-    """One row of the log. `number` grows by 1 with each row."""
+    """One row of the log. `number` grows with each row."""
 
     number: int
-    previous: Digest
-    """The digest of the previous row."""
-    digest: Digest
-    """SHA-256 of the row with `previous`, so that a change of any row changes all later digests."""

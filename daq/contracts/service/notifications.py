@@ -17,7 +17,6 @@ Topic = Literal[
     "queue.paused",
     "queue.held",
     "storage.warning",
-    "archive.away",
     "test",
 ]
 KINDS: tuple[NotificationKind, ...] = get_args(NotificationKind)
@@ -49,14 +48,10 @@ class DestinationStatus(Wire):
     about: tuple[NotificationKind, ...]
     waiting: int
     sent: int
-    failed: int
-    """Number of attempts that failed."""
     given_up: int
     """Number of messages that were given up, or dropped because too many waited."""
-    last_sent: AwareDatetime | None = None
     problem: str = ""
     """Why the last attempt failed; empty if it succeeded."""
-    next_attempt: AwareDatetime | None = None
 
 
 class NotificationStatus(Wire):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import AwareDatetime
-
 from daq.contracts.service.base import Wire
 from daq.contracts.service.queue import Role
 
@@ -31,29 +29,8 @@ class Me(Wire):
     owner_of: tuple[str, ...] = ()
     """Robots that the caller owns. An owner may change and cancel all experiments of the robot."""
     is_known: bool = True
-    """Whether a token or session identifies the caller. A local user without one cannot approve experiments, since this
+    """Whether a token identifies the caller. A local user without one cannot approve experiments, since this
     user might have submitted them."""
-    session_until: AwareDatetime | None = None
-    """When the caller must sign in again; None for a token, and for a local user."""
-
-
-class OpenIdWay(Wire):
-    """A provider of OpenID Connect. `start`: the path on this service that a browser opens to sign in."""
-
-    label: str
-    start: str
-
-
-class LoginWays(Wire):
-    """Ways to sign in besides a token. `openid` is None if no provider is configured."""
-
-    openid: OpenIdWay | None = None
-
-
-class SignedOut(Wire):
-    """The session has ended. `provider`: the address that ends the provider's own session, if there is one."""
-
-    provider: str | None = None
 
 
 class StorageStatus(Wire):
@@ -67,7 +44,6 @@ class StorageStatus(Wire):
     """Size of the disk of the traces (bytes)."""
     traces: int
     """Number of traces in the catalogue."""
-    database: str
     database_size: int | None
 
 
@@ -79,7 +55,7 @@ class SystemStatus(Wire):
     """Time (s) since the service started."""
     storage: StorageStatus
     warnings: tuple[str, ...] = ()
-    """Things that will soon need a person, one line each: a disk that fills, an archive that cannot be reached."""
+    """Things that will soon need a person, one line each: a disk that fills."""
     live_clients: int
     live_dropped: int
     jobs_at_once: int

@@ -38,11 +38,7 @@ class CatalogueEntry(Wire):
     tags: tuple[str, ...] = ()
     notes: str = ""
     missing: bool = False
-    """Whether its file is gone from both the folder and the archive."""
-    archived: bool = False
-    """Whether the archive has it."""
-    local: bool = True
-    """Whether the folder has it; if not, it is fetched from the archive when it is opened."""
+    """Whether its file is gone from the folder."""
 
 
 class TraceDetails(Wire):

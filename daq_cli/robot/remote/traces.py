@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from daq.contracts.errors import TraceError
 from daq.contracts.frozen import like
-from daq.contracts.service.archive import Transfer
 from daq.contracts.service.traces import CatalogueEntry
 from daq.traces.catalogue import TraceSummary
 from daq_cli.app.context import Invocation, console
-from daq_cli.app.progress import shown_progress
 from daq_cli.robot.remote.connection import remote_robot
 
 
@@ -27,29 +23,9 @@ def fetched_trace(call: Invocation, folder: Path, wanted: str) -> Path:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise TraceError(f"{folder}: cannot be made: {error.strerror}") from error
-        with fetch_progress(entry.file) as progress:
-            path = robot.traces.download(entry.id, target, progress)
+        path = robot.traces.download(entry.id, target)
     console().print(f"fetched {path}")
     return path
-
-
-@contextmanager
-def fetch_progress(file: str) -> Iterator[Callable[[Transfer], None]]:
-    """Shows the progress while the service fetches a trace from its archive; nothing before that."""
-    with ExitStack() as shown:
-        bars: list[Callable[[float, str], None]] = []
-
-        def tell(transfer: Transfer) -> None:
-            if not bars:
-                bars.append(shown.enter_context(shown_progress(f"fetching {file} from the archive")))
-            bars[0](transfer.done / max(1, transfer.total), transfer_words(transfer))
-
-        yield tell
-
-
-def transfer_words(transfer: Transfer) -> str:
-    """Returns the progress of a transfer, or what it waits for."""
-    return transfer.problem or f"{transfer.done / 1e6:.1f} of {transfer.total / 1e6:.1f} MB"
 
 
 def summary(entry: CatalogueEntry) -> TraceSummary:

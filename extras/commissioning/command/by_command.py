@@ -197,8 +197,7 @@ def _diagnosed(bench: Bench, begin: Model, trace: Trace) -> dict[str, Any]:
     from model.discrepancy.options import DiagnosisOptions
     from model.discrepancy.workflow import diagnose
     from model.reports.diagnosis_data import told
-    from model.reports.page import write_page
-    from model.reports.saved_report import saved_report
+    from model.reports.page import saved_report, write_page
     from server.jobs.next_experiment import experiment_chooser
 
     bench.operator.show(

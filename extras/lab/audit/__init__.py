@@ -1,4 +1,4 @@
-"""The audit log: rows that nobody can change through the service, each chained to the previous one."""
+"""The audit log: rows that nobody can change through the service."""
 
 from daq.plugins import Command, Plugin
 
@@ -6,7 +6,7 @@ PLUGIN = Plugin(
     commands=(
         Command(
             "audit",
-            "Show who requested what from the service; check the log of it.",
+            "Show who requested what from the service.",
             "extras.lab.audit.command",
             about="service",
             needs="server",

@@ -1,4 +1,4 @@
-"""`daq audit`: shows who requested what from the service, and checks that nobody has changed the log of it."""
+"""`daq audit`: shows who requested what from the service."""
 
 from __future__ import annotations
 
@@ -7,20 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from daq.contracts import exit_codes
-from daq.contracts.documents import shown
-from daq.contracts.errors import SpecError
-from daq_cli.app.context import JsonOption, console, invocation, print_json, printable
+from daq_cli.app.context import JsonOption, invocation, print_json, printable
 from daq_cli.app.database import service_database
 
 if TYPE_CHECKING:
     from daq.contracts.service.audit import AuditEntry
-    from extras.lab.audit.chain import Head
 
-app = typer.Typer(add_completion=False, help="Show who requested what from the service; check the log of it.")
+app = typer.Typer(add_completion=False, help="Show who requested what from the service.")
 
 
-@app.callback(invoke_without_command=True)
+@app.command()
 def audit(
     context: typer.Context,
     number: Annotated[int, typer.Option("-n", "--number", min=1, max=1_000_000, help="Number of rows.")] = 50,
@@ -34,8 +30,6 @@ def audit(
     json: JsonOption = False,
 ) -> None:
     """Show the newest rows of the audit log, the newest last."""
-    if context.invoked_subcommand is not None:
-        return
     from extras.lab.audit.log import AuditLog, AuditSearch
 
     search = AuditSearch(actor, robot, action, outcome=outcome, since=None if since is None else since.astimezone())
@@ -54,48 +48,9 @@ def audit(
         print(printable(_line(entry)))
 
 
-@app.command()
-def verify(
-    context: typer.Context,
-    head: Annotated[
-        str | None,
-        typer.Option(help="A last row that was written down earlier, NUMBER:DIGEST: it must be in the log."),
-    ] = None,
-    json: JsonOption = False,
-) -> None:
-    """Check every row of the audit log. Names the first row that differs from the one that was written; exit code 5,
-    then.
-    """
-    from extras.lab.audit.log import AuditLog
-
-    known = None if head is None else _parse_head(head)
-    store = service_database(invocation(context))
-    store.require_sound()  # a log can be valid and yet be a view, or have lost its protecting triggers
-    last, misfit = AuditLog(store).first_misfit(known)
-    if json:
-        wrong = None if misfit is None else {"number": misfit.number, "why": misfit.why}
-        print_json({"rows": last.number, "head": str(last), "misfit": wrong})
-    elif misfit is None:
-        print(f"{last.number} rows, each as it was written; the last one: {last}")
-    else:
-        print(f"row {misfit.number} does not fit: {misfit.why}")
-        console().print(f"the rows before it fit; the last of them: {last}")
-    if misfit is not None:
-        raise typer.Exit(exit_codes.FAULT)
-
-
 def _line(entry: AuditEntry) -> str:
     who = f"{entry.actor or 'unknown'} ({entry.origin})"
     parts = [entry.robot, entry.subject, f"{entry.count} times" if entry.count > 1 else None, entry.detail]
     what = "  ".join(part for part in parts if part)
     at = entry.at.astimezone()
     return f"{entry.number:6} {at:%Y-%m-%d %H:%M:%S}  {entry.outcome:7}  {entry.action:22} {who}  {what}".rstrip()
-
-
-def _parse_head(text: str) -> Head:
-    from extras.lab.audit.chain import Head
-
-    number, _, digest = text.partition(":")
-    if not (number.isascii() and number.isdecimal() and len(digest) == 64 and set(digest) <= set("0123456789abcdef")):
-        raise SpecError(f"--head {shown(text)}: write NUMBER:DIGEST, as `daq audit verify` prints it")
-    return Head(int(number), digest)

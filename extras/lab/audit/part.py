@@ -32,7 +32,6 @@ from server.parts import Part
 from server.problems import PROBLEMS
 from server.routes import Router
 from server.services import Services
-from server.store.address import address_of, masked
 
 STARTED = "start_service"
 
@@ -65,9 +64,6 @@ def _digests(settings: Settings) -> dict[str, str]:
             said: Any = value.digested()
         else:
             said = value.model_dump(mode="json") if isinstance(value, BaseModel) else value
-        if name == "server":
-            # Without its password, which somebody could guess and verify by the digest.
-            said |= {"database": masked(address_of(settings.server))}
         text = json.dumps(said, sort_keys=True, default=_plain)
         found[name] = hashlib.sha256(text.encode()).hexdigest()[:16]
     return found
@@ -77,19 +73,13 @@ def _plain(value: object) -> object:
     return value.model_dump(mode="json") if isinstance(value, BaseModel) else str(value)
 
 
-KEPT = "audit-waiting.jsonl"
-"""File of the rows that could not be written before the service ended."""
-KEEPING = 0.6
-"""Share of the time for shutdown that is reserved for saving unwritten rows to that file."""
-
-
 class AuditPart(Part, Collector):
     """Writes rows, and reports the number of waiting ones to Prometheus."""
 
     def __init__(self, services: Services) -> None:
         self._services = services
         self.log = AuditLog(services.store)
-        self.writer = AuditWriter(self.log, services.folder / KEPT)
+        self.writer = AuditWriter(self.log)
 
     def robots_made(self, robots: Sequence[Any]) -> None:
         """Notes the start, and changes of the configuration."""
@@ -110,7 +100,7 @@ class AuditPart(Part, Collector):
 
     def close(self, seconds: float) -> None:
         """Writes the last rows."""
-        self.writer.close(seconds * (1 - KEEPING))
+        self.writer.close(seconds)
 
     def describe(self) -> Iterable[Metric]:
         """Returns nothing: values are computed when Prometheus requests them."""
@@ -149,7 +139,7 @@ def list_audit(
 ) -> Page[AuditEntry]:
     """Lists who requested which change, from where, and its outcome, the newest first. Needs the role operator.
 
-    Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
+    Nothing changes or deletes a row.
     """
     audit.writer.flush(FLUSHED_WITHIN)
     search = AuditSearch(actor, robot, action, subject, outcome, since, until)

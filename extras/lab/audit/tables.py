@@ -17,7 +17,7 @@ class AuditTable(DeclarativeBase):
 
 
 class AuditRow(AuditTable):
-    """One row of the audit log. Triggers forbid changing or deleting it, and inserting one anywhere but at the end."""
+    """One row of the audit log. Triggers forbid changing or deleting it."""
 
     __tablename__ = "audit"
     __table_args__ = (
@@ -25,7 +25,7 @@ class AuditRow(AuditTable):
         Index("audit_by_robot", "robot", "sequence"),
     )
 
-    sequence: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    sequence: Mapped[int] = mapped_column(primary_key=True)
     at: Mapped[datetime]
     actor: Mapped[str | None]
     role: Mapped[str | None] = mapped_column(String(16))
@@ -40,5 +40,3 @@ class AuditRow(AuditTable):
     content: Mapped[str | None] = mapped_column(Text)
     request_id: Mapped[str | None] = mapped_column(String(16))
     count: Mapped[int]
-    previous: Mapped[str] = mapped_column(String(64))
-    digest: Mapped[str] = mapped_column(String(64))

@@ -7,22 +7,16 @@ requests.
 from __future__ import annotations
 
 import logging
-import os
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
-
-from pydantic import ValidationError
-from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.service.audit import AuditNote
 from extras.lab.audit.log import AuditLog
-from server.database_errors import is_value, one_line
+from server.database_errors import one_line
 
 COUNTED_FOR = 60.0
 """Time (s) for which repeated requests are counted before a row states their number."""
@@ -98,12 +92,11 @@ log = logging.getLogger("server.audit")
 class AuditWriter:
     """Accepts notes from any thread, without making it wait, except after the writer's end.
 
-    Notes that cannot be written wait in memory. If they still wait when the service ends, they are saved in the file
-    `kept`, and written after the next start.
+    Notes that cannot be written wait in memory. If they still wait when the service ends, they are only in its log.
     """
 
     def __init__(
-        self, audit: AuditLog, kept: Path, clock: Callable[[], float] = time.monotonic, again_after: float = AGAIN_AFTER
+        self, audit: AuditLog, clock: Callable[[], float] = time.monotonic, again_after: float = AGAIN_AFTER
     ) -> None:
         self.waiting = 0
         """Number of notes that are not yet in the database, without those that are counted."""
@@ -112,7 +105,6 @@ class AuditWriter:
         self.trouble = ""
         """Why rows could not be written at the last attempt; empty if they were."""
         self._audit = audit
-        self._kept = kept
         self._clock = clock
         self._again_after = again_after
         self._changed = threading.Condition()
@@ -120,7 +112,6 @@ class AuditWriter:
         self._repeats = Repeats()
         self._left_out = 0
         self._closing = self._closed = False
-        self._take_in()
         self._thread: threading.Thread | None = None
         """Started with the first note, so that a service that fails to start leaves no thread."""
 
@@ -129,7 +120,7 @@ class AuditWriter:
         written: Future[None] = Future()
         with self._changed:
             if self._closed:
-                self._keep([note.model_dump_json()], "a")
+                _only_here(note)
             else:
                 self._put(note, written)
                 self._changed.notify()
@@ -149,7 +140,7 @@ class AuditWriter:
             return self._changed.wait_for(lambda: not self.waiting, within)
 
     def close(self, within: float) -> None:
-        """Writes the remaining notes, within this time (s), and saves the rest in a file."""
+        """Writes the remaining notes, within this time (s)."""
         with self._changed:
             self._closing = True
             for note in self._repeats.rest():
@@ -157,7 +148,10 @@ class AuditWriter:
             self._changed.notify()
         if self._thread is not None:
             self._thread.join(within)
-        self._keep_rest()
+        with self._changed:
+            self._closed = True
+            for waiting, _written in self._notes:
+                _only_here(waiting)
 
     def _put(self, note: AuditNote, written: Future[None] | None) -> None:
         if len(self._notes) >= MOST_WAITING:
@@ -190,8 +184,6 @@ class AuditWriter:
                 for _ in some:
                     self._notes.popleft()
                 self.waiting = len(self._notes)
-                if self._taken_in and not self.waiting:
-                    self._forget_kept()
                 self._changed.notify_all()
             for _, written in some:
                 if written is not None and written.set_running_or_notify_cancel():
@@ -204,72 +196,23 @@ class AuditWriter:
             line = f"{left_out} rows are only in the service's log: too many waited for the database"
             many.append(notes[-1].model_copy(update=_OF_SERVICE | {"action": "rows_left_out", "detail": line}))
         try:
-            self._append(many)
+            self._audit.append(many)
         except Exception as error:
             if (line := one_line(error)) != self.trouble:
                 log.exception("audit: %s rows are not written yet", len(notes))
             self.trouble = line
             return False
+        self.written += len(many)
         self._left_out -= left_out
         self.trouble = ""
         return True
 
-    def _append(self, notes: Sequence[AuditNote]) -> None:
-        try:
-            head = self._audit.append(notes)
-        except DatabaseError as error:
-            if not is_value(error):
-                raise
-            # One of them has content that this database cannot hold. It must not block the others.
-            for note in notes:
-                log.warning("audit: a row without its words: %s", note.model_dump_json(exclude_none=True))
-            head = self._audit.append([note.model_copy(update=_WITHOUT_WORDS) for note in notes])
-        self.written += len(notes)
-        log.debug("audit: %s", head)
 
-    def _take_in(self) -> None:
-        """Reads the notes that the service could not write before it ended."""
-        with suppress(FileNotFoundError):
-            for line in self._kept.read_text("utf-8").splitlines():
-                try:
-                    self._notes.append((AuditNote.model_validate_json(line), None))
-                except ValidationError:  # the power failed while the line was written
-                    log.warning("audit: %s: a line cannot be read: %.200s", self._kept, line)
-        self._taken_in = bool(self._notes)
-        if self._notes and self._write([note for note, _ in self._notes]):
-            self._notes.clear()
-            self._forget_kept()
-        self.waiting = len(self._notes)
-
-    def _forget_kept(self) -> None:
-        """Removes the file, since its notes have rows now. If that fails, the next start writes them again."""
-        self._taken_in = False
-        with suppress(OSError):
-            self._kept.unlink(missing_ok=True)
-
-    def _keep_rest(self) -> None:
-        with self._changed:
-            self._closed = True  # from now on, the stop listener's last stops go to the file as well
-            if self._notes:
-                self._keep([note.model_dump_json() for note, _ in self._notes], "w")
-
-    def _keep(self, lines: Sequence[str], mode: str) -> None:
-        try:
-            self._kept.parent.mkdir(parents=True, exist_ok=True)
-            with self._kept.open(mode, encoding="utf-8") as stream:
-                stream.writelines(f"{line}\n" for line in lines)
-                stream.flush()
-                os.fsync(stream.fileno())
-        except OSError as error:
-            for line in lines:
-                log.error("audit: %s: only here: %s", error.strerror, line)  # noqa: TRY400 - the line says it all
+def _only_here(note: AuditNote) -> None:
+    log.error("audit: the service ends: only here: %s", note.model_dump_json(exclude_none=True))
 
 
 _OF_SERVICE: dict[str, object] = {
     **dict.fromkeys(("actor", "role", "robot", "subject", "content", "request_id", "status")),
     **{"origin": "service", "request": "", "outcome": "failed", "count": 1},
-}
-_WITHOUT_WORDS: dict[str, object] = {
-    **dict.fromkeys(("actor", "role", "robot", "subject", "content", "request_id")),
-    **{"origin": "unknown", "request": "", "detail": "its words could not be written: the service's log has them"},
 }

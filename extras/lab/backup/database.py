@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Container
-from contextlib import closing, suppress
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,9 +11,8 @@ from sqlalchemy.exc import DatabaseError
 
 from daq.contracts.errors import SpecError
 from daq_cli.app.database import computers_user
-from server.access.sessions import note_command
+from server.access.tokens import note_command
 from server.database_errors import line_of, one_line, open_to_read
-from server.store.address import file_address
 from server.store.engine import BUSY_TIMEOUT_MS, Store
 from server.store.schema import (
     VERSION,
@@ -98,63 +96,20 @@ def hold_queue(database: Path, robot: str, reason: str, now: datetime) -> None:
 
 _NOT_APPROVED = "approved_content = NULL, approved_by = NULL, approved_as_owner = NULL, approved = NULL"
 _FORGOTTEN = (
-    "DELETE FROM sessions",
     f"UPDATE experiments SET {_NOT_APPROVED} WHERE state = 'queued'",
     f"UPDATE schedules SET {_NOT_APPROVED}",
 )
-_GIVEN_UP = "state = 'given-up', ended = :now, problem = 'a backup was restored'"
-_NOT_SENT = f"UPDATE notifications SET {_GIVEN_UP} WHERE state = 'waiting'"
-"""Tables and rows that a restore ends."""
+"""What a restore ends."""
 
 
-def forget_what_may_have_ended(database: Path, now: datetime) -> None:
-    """Ends sessions, approvals of waiting experiments, and waiting notifications: they may have been ended after the
-    backup. Raises SpecError."""
-    words = {"now": now.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S.%f")}
+def forget_what_may_have_ended(database: Path) -> None:
+    """Ends approvals of waiting experiments: they may have been ended after the backup. Raises SpecError."""
     try:
         with closing(sqlite3.connect(database)) as connection, connection:
-            for line in (*_FORGOTTEN, *((_NOT_SENT,) if _has_table(connection, "notifications") else ())):
-                connection.execute(line, words)
+            for line in _FORGOTTEN:
+                connection.execute(line)
     except sqlite3.Error as error:
-        raise SpecError(f"database {database.name}: its sessions cannot be ended: {error}") from error
-
-
-def note_dropped(source: Path, target: Path, packed: Container[str]) -> None:
-    """Notes in the copy `target` which local traces without a file in `packed` the archive has by now, according to
-    `source`. Raises SpecError."""
-    try:
-        with closing(sqlite3.connect(target, timeout=BUSY_TIMEOUT_MS / 1e3)) as connection:
-            if not _has_table(connection, "archived_traces"):
-                return
-            connection.execute("ATTACH ? AS live", (str(source),))
-            local = connection.execute("SELECT id, file FROM traces WHERE NOT missing").fetchall()
-            gone = [(trace,) for trace, file in local if file not in packed]
-            of_archive = "FROM live.archived_traces WHERE trace = ? AND NOT deleting"
-            with connection:
-                connection.executemany(f"INSERT OR REPLACE INTO main.archived_traces SELECT * {of_archive}", gone)
-                is_gone = f"id IN (SELECT trace {of_archive})"
-                connection.executemany(f"UPDATE main.traces SET missing = 1 WHERE {is_gone}", gone)
-    except sqlite3.Error as error:
-        raise SpecError(f"database {source}: what the archive has cannot be copied: {error}") from error
-
-
-def robots_of_traces(database: Path) -> dict[str, str]:
-    """Returns the robot of each trace. Raises SpecError."""
-    try:
-        with closing(open_to_read(database)) as connection:
-            found = connection.execute("SELECT id, robot FROM traces") if _has_table(connection, "traces") else ()
-            return dict(found)
-    except sqlite3.Error as error:
-        raise SpecError(f"database {database.name}: is damaged: {error}") from error
-
-
-def head_of_audit(database: Path) -> str:
-    """Returns the last row of a database's audit log, `NUMBER:DIGEST`; `nothing` if it has none, or is damaged."""
-    with suppress(sqlite3.Error), closing(open_to_read(database)) as connection:
-        row = connection.execute("SELECT sequence, digest FROM audit ORDER BY sequence DESC LIMIT 1").fetchone()
-        if row is not None:
-            return f"{row[0]}:{row[1]}"
-    return "nothing"
+        raise SpecError(f"database {database.name}: its approvals cannot be ended: {error}") from error
 
 
 def note_restored(database: Path, at: datetime, command: str, archive: str, detail: str) -> None:
@@ -163,7 +118,7 @@ def note_restored(database: Path, at: datetime, command: str, archive: str, deta
     with closing(sqlite3.connect(database)) as connection:
         if not _has_table(connection, "audit"):
             return
-    store = Store(file_address(database))
+    store = Store(database)
     try:
         with store.writing() as session:
             note_command(session, at, computers_user(), "restore", command, archive, detail)

@@ -37,8 +37,8 @@ class Entry(FrozenRecord):
 
 
 class Manifest(BaseModel):
-    """The list of a backup's files. `revision` is that of the database's tables; the files `left_out` were deleted, or
-    dropped after they had been archived, while the backup was made."""
+    """The list of a backup's files. `revision` is that of the database's tables; the files `left_out` were deleted
+    while the backup was made."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 

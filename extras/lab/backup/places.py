@@ -7,13 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from sqlalchemy import URL
-
 from daq.config.settings import Settings
 from daq.contracts.errors import SpecError
 from daq.traces.layout import SUFFIX
-from server.store.address import address_of, file_address
-from server.store.lock import sqlite_file
 
 DATABASE = "database/service.sqlite"
 NAMES = re.compile(
@@ -36,11 +32,6 @@ class Places:
     database: Path
     traces: dict[str, Path]
     service: Path
-
-    @property
-    def url(self) -> URL:
-        """The database's URL."""
-        return file_address(self.database)
 
     @property
     def robot(self) -> str:
@@ -86,12 +77,6 @@ class Places:
 
 
 def places_of(settings: Settings) -> Places:
-    """Returns the paths of a configuration. Raises SpecError if its database is not a file."""
-    address = address_of(settings.server)
-    database = sqlite_file(address)
-    if database is None:
-        raise SpecError(
-            f"database {address.drivername}: is not a file; back it up with its own tools, and copy the folders"
-        )
+    """Returns the paths of a configuration."""
     traces = {own.robot.name: own.traces.folder.absolute() for own in settings.each_robot()}
-    return Places(database, traces, settings.server.folder.absolute())
+    return Places(settings.server.database, traces, settings.server.folder.absolute())

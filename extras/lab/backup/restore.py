@@ -22,13 +22,11 @@ from daq.traces import disk
 from daq.traces.layout import PART_SUFFIX, SUFFIX
 from extras.lab.backup.database import (
     forget_what_may_have_ended,
-    head_of_audit,
     hold_queue,
     keep_own_objects,
     note_restored,
     require_known,
     revision_of,
-    robots_of_traces,
 )
 from extras.lab.backup.manifest import Entry, Manifest, Progress, check, opened, pieces, verify
 from extras.lab.backup.places import DATABASE, Places, is_trace
@@ -78,7 +76,7 @@ def restore(
         line = f"{archive}: is of robot {manifest.robot!r}; this configuration is for {places.robot!r}"
         raise SpecError(f"{line}; nothing was changed")
     require_known(manifest.revision)
-    with sole_use(places.url):
+    with sole_use(places.database):
         there = occupied(places)
         if there and not overwrite:
             names = ", ".join(str(path) for path in there[:3]) + (", …" if len(there) > 3 else "")
@@ -118,8 +116,6 @@ class _Staged:
         self._folders = {folder / STAGING for folder in places.folders}
         self._traces: dict[str, Path] = {}
         """Path of each trace, by the name of its file, which is unique over all robots."""
-        self._robots: dict[str, str] = {}
-        """Robot of each trace, by its ID, including those that only the archive has."""
         self.removed: tuple[str, ...] = ()
 
     def write(self, manifest: Manifest, progress: Progress) -> None:
@@ -136,8 +132,6 @@ class _Staged:
             for entry in sorted(manifest.files, key=lambda one: one.name != DATABASE):
                 progress(done / max(1, manifest.size), entry.name)
                 self._extract(pack, entry)
-                if entry.name == DATABASE:
-                    self._robots = robots_of_traces(self._staged(DATABASE))
                 done += entry.size
         if revision_of(self._staged(DATABASE)) != manifest.revision:
             raise SpecError(f"{self._archive}: its database is not the one that its list names")
@@ -146,13 +140,12 @@ class _Staged:
             line = "restored from a backup: look at the arm, then resume the queue"
             for robot in self._places.traces:
                 hold_queue(self._staged(DATABASE), robot, line, self._now)
-            forget_what_may_have_ended(self._staged(DATABASE), self._now)
+            forget_what_may_have_ended(self._staged(DATABASE))
 
     def note_in_audit_log(self, manifest: Manifest) -> None:
-        """Notes in the restored audit log which log it replaces: rows that the backup lacks are in the database that
-        was moved aside."""
-        ended = head_of_audit(self._places.database)
-        detail = f"a backup of {manifest.created:%Y-%m-%d %H:%M:%S %Z} takes the place of a log that ended with {ended}"
+        """Notes the restore in the restored audit log; rows that the backup lacks are in the database that was moved
+        aside."""
+        detail = f"a backup of {manifest.created:%Y-%m-%d %H:%M:%S %Z}"
         command = f"daq restore {self._archive.name}"
         note_restored(self._staged(DATABASE), self._now, command, self._archive.name, detail)
 
@@ -197,18 +190,12 @@ class _Staged:
         except ValidationError:
             return
         models = self._places.service / "models"
-        task.traces = {number: self._place_of(number, file.name) for number, file in task.traces.items()}
+        task.traces = {number: self._traces.get(file.name, file) for number, file in task.traces.items()}
         task.models = {number: models / file.name for number, file in task.models.items()}
         with request.open("w", encoding="utf-8") as stream:
             stream.write(task.model_dump_json())
             stream.flush()
             os.fsync(stream.fileno())
-
-    def _place_of(self, number: str, name: str) -> Path:
-        """Returns the path of a trace; if the backup lacks it, the path to which it is fetched."""
-        folders = self._places.traces
-        folder = folders.get(self._robots.get(number, ""), next(iter(folders.values())))
-        return self._traces.get(name, folder / name)
 
     def _require_room(self, manifest: Manifest) -> None:
         for folder in self._folders:

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from daq.contracts.errors import SpecError
 from daq.contracts.whole_file import sync_folder
-from extras.lab.backup.database import copy_database, note_dropped, revision_of
+from extras.lab.backup.database import copy_database, revision_of
 from extras.lab.backup.manifest import FORMAT, MANIFEST, Entry, Manifest, Progress, pieces
-from extras.lab.backup.places import DATABASE, Places, is_trace
+from extras.lab.backup.places import DATABASE, Places
 
 RESERVE = 20_000_000
 """Number of bytes that must stay free on the disk beside a backup."""
@@ -25,8 +25,7 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
     """Writes a backup to `target`, completely or not at all. Other users cannot read it: it contains hashes of tokens.
 
     The database is copied first, in a consistent state: every file that it names exists by then, and is copied
-    afterwards. Files deleted meanwhile are left out, and the manifest lists them; those that the archive took over are
-    noted as archived. Raises SpecError.
+    afterwards. Files deleted meanwhile are left out, and the manifest lists them. Raises SpecError.
     """
     if target.exists():
         raise SpecError(f"{target}: already exists; a backup is never overwritten")
@@ -39,9 +38,6 @@ def back_up(places: Places, target: Path, now: datetime, progress: Progress, *, 
             _require_room(target.absolute().parent, [(DATABASE, database), *files], reserve)
             part = Path(folder) / "backup.zip"
             entries, left_out = _pack(part, files, progress)
-            # The archive may have deleted local traces since the copy (it does so when the disk is full). Each of those
-            # is now either packed or has a row in the live database: copy these rows, so the service need not pause.
-            note_dropped(places.database, database, {Path(one.name).name for one in entries if is_trace(one.name)})
             with zipfile.ZipFile(part, "a") as pack:
                 entries.insert(0, _put(pack, DATABASE, database))
             manifest = Manifest(

@@ -1,7 +1,4 @@
-"""Batches: the same study of many traces, with a table as its result, on many cores or computers.
-
-Another program can continue an interrupted batch.
-"""
+"""Batches: the same study of many traces, with a table as its result, on many cores."""
 
 from daq.plugins import Command, Name, Plugin
 

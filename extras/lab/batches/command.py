@@ -1,6 +1,6 @@
 """`daq batch`: the same fit, validation, simulation or diagnosis of many traces, with a table as result.
 
-It runs a batch on this computer or on the workers of a URL, and shows its progress.
+It runs a batch on this computer's cores, and shows its progress.
 """
 
 from __future__ import annotations
@@ -41,7 +41,6 @@ from daq_cli.models.model_input import (
 from daq_cli.models.record_doubts import DespiteDoubtsOption
 from daq_cli.robot.access import robot_of
 from daq_cli.robot.operations import RobotAccess
-from extras.lab.batches.executors import LOCAL
 
 if TYPE_CHECKING:
     from daq.traces.query import TraceQuery
@@ -60,7 +59,7 @@ class Asked:
 
     traces: str
     out: Path
-    executor: str
+    workers: int | None
     model: str | None
     effect_files: Sequence[Path]
     as_json: bool
@@ -68,21 +67,18 @@ class Asked:
 
 def run(robot: RobotAccess, asked: Asked, study: Study) -> bool:
     """Runs a batch and prints its results. Returns whether every trace is done."""
+    from daq.executors import LocalWorkers, cores
     from daq.executors.workers import ending
-    from extras.lab.batches.executors import LOCAL, open_workers, parse_address
     from extras.lab.batches.folder import asked_of, opened
     from extras.lab.batches.run import run_batch
 
-    parse_address(asked.executor)
     common, chosen = _common(robot, asked, study), _chosen(robot, asked.traces)
     with opened(asked.out, asked_of(common)) as folder:
         if all(folder.is_done(one.job.key) for one in chosen):
             folder.write_tables()
             _print_end(asked, len(chosen), 0, 0.0)
             return True
-        if not asked.executor.startswith(LOCAL):
-            console().print(f"waiting for workers of {asked.executor}")
-        with ending(open_workers(asked.executor)) as workers, shown(study.kind) as tell:
+        with ending(LocalWorkers(asked.workers or cores())) as workers, shown(study.kind) as tell:
             ended = run_batch(folder, common, chosen, workers, tell)
     _print_end(asked, ended.before + ended.done, ended.failed, ended.seconds)
     return not ended.failed
@@ -201,9 +197,8 @@ TracesOf = Annotated[
         "since:, until:.",
     ),
 ]
-ExecutorOption = Annotated[
-    str,
-    typer.Option("--executor", help="Where to compute: local://4 (processes), or dask://host:8786."),
+WorkersOption = Annotated[
+    int | None, typer.Option("--workers", min=1, max=1024, help="Number of processes (default: one per core).")
 ]
 OutOption = Annotated[
     Path, typer.Option("--out", "-o", help="Folder of the result; an unfinished batch in it is continued.")
@@ -218,7 +213,7 @@ def fit(
     context: typer.Context,
     traces: TracesOf,
     out: OutOption,
-    executor: ExecutorOption = LOCAL,
+    workers: WorkersOption = None,
     model: ModelOption = None,
     effects: Annotated[
         str | None,
@@ -255,7 +250,7 @@ def fit(
         loop="open" if open_loop else None,
         consistent_inertias=consistent_inertias,
     )
-    _run(context, Asked(traces, out, executor, model, effect_file or (), json), study)
+    _run(context, Asked(traces, out, workers, model, effect_file or (), json), study)
 
 
 @app.command()
@@ -263,7 +258,7 @@ def validate(
     context: typer.Context,
     traces: TracesOf,
     out: OutOption,
-    executor: ExecutorOption = LOCAL,
+    workers: WorkersOption = None,
     model: ModelOption = None,
     effect_file: EffectFileOption = None,
     parameters: Annotated[
@@ -283,7 +278,7 @@ def validate(
 
     joints = None if output is None else tuple(output)
     study = ValidateStudy(parameters=patterns(parameters), joints=joints, damping_ratio=damping_ratio)
-    _run(context, Asked(traces, out, executor, model, effect_file or (), json), study)
+    _run(context, Asked(traces, out, workers, model, effect_file or (), json), study)
 
 
 @app.command()
@@ -291,7 +286,7 @@ def simulate(
     context: typer.Context,
     traces: TracesOf,
     out: OutOption,
-    executor: ExecutorOption = LOCAL,
+    workers: WorkersOption = None,
     model: ModelOption = None,
     effect_file: EffectFileOption = None,
     open_loop: OpenLoopOption = False,
@@ -302,7 +297,7 @@ def simulate(
     from extras.lab.batches.study import SimulateStudy
 
     study = SimulateStudy(loop="open" if open_loop else "closed", quantise=not no_rounding)
-    _run(context, Asked(traces, out, executor, model, effect_file or (), json), study)
+    _run(context, Asked(traces, out, workers, model, effect_file or (), json), study)
 
 
 @app.command()
@@ -310,7 +305,7 @@ def diagnose(
     context: typer.Context,
     traces: TracesOf,
     out: OutOption,
-    executor: ExecutorOption = LOCAL,
+    workers: WorkersOption = None,
     model: ModelOption = None,
     effect_file: EffectFileOption = None,
     effects: CandidatesOption = None,
@@ -334,7 +329,7 @@ def diagnose(
         method=None if method is None else method.value,
         despite_doubts=despite_doubts,
     )
-    _run(context, Asked(traces, out, executor, model, effect_file or (), json), study)
+    _run(context, Asked(traces, out, workers, model, effect_file or (), json), study)
 
 
 def _run(context: typer.Context, asked: Asked, study: Study) -> None:

@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,6 @@ from daq.contracts.file_lock import take_lock
 from daq.contracts.frozen import FrozenRecord, like
 from daq.contracts.whole_file import replacing
 from extras.lab.batches.columns import Columns
-from extras.lab.batches.program import program_here
 from extras.lab.batches.study import Answer, Common, Study
 from firmware_protocol.invalid import first_invalid
 
@@ -140,7 +140,7 @@ class BatchFolder:
 def asked_of(common: Common) -> Asked:
     """Returns the request of a batch."""
     return Asked(
-        software=str(program_here()),
+        software=f"ma2000-daq {version('ma2000-daq')}",
         study=common.study,
         model=None if common.model is None else _digest(common.model),
         machine=_digest(common.machine.model_dump_json()) if common.model is None else None,

@@ -12,10 +12,10 @@ from pydantic import TypeAdapter, ValidationError
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import Machine, load_machine
 from daq.contracts.progress import Cancel
+from daq.executors import LocalWorkers, cores
 from daq.executors.workers import ending
 from daq.traces.catalogue import list_traces
 from daq.traces.query import parse_query
-from extras.lab.batches.executors import open_workers
 from extras.lab.batches.folder import asked_of, opened
 from extras.lab.batches.run import chosen_traces, require_any, run_batch
 from extras.lab.batches.study import Common, Study
@@ -44,7 +44,7 @@ def batch(
     traces: Path | str,
     folder: Path | str,
     *,
-    executor: str = "local://",
+    workers: int | None = None,
     query: str = "",
     model: Model | None = None,
     machine: Machine | None = None,
@@ -57,12 +57,11 @@ def batch(
 
     Args:
         traces: folder of traces; `query` selects some, as `ramp since:2026-11-01`.
-        executor: where to compute (docs/batches.md). A script that lets Dask start processes on this computer must
-            guard its code with `if __name__ == "__main__":`.
+        workers: number of processes; None for one per core.
         model: of all traces; None for the machine of each, or for `machine` if a trace names none.
         options: of the study, as the service's `FitStudy`, `ValidateStudy`, `SimulateStudy`, `DiagnoseStudy`.
 
-    A trace that fails does not stop the others. Raises SpecError, TraceError, ReachError, OtherVersionError;
+    A trace that fails does not stop the others. Raises SpecError, TraceError, ReachError;
     CancelledError when cancelled.
     """
     common = Common(
@@ -76,13 +75,13 @@ def batch(
     with (
         told(progress, kind) as tell,
         opened(Path(folder), asked_of(common)) as kept,
-        ending(open_workers(executor)) as workers,
+        ending(LocalWorkers(workers or cores())) as pool,
     ):
         run_batch(
             kept,
             common,
             chosen,
-            workers,
+            pool,
             lambda standing, _row: tell(1 - standing.left / standing.total, str(standing)),
             cancel,
         )

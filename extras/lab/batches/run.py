@@ -6,13 +6,11 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import BrokenExecutor, Future
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from daq.contracts.errors import SpecError
 from daq.contracts.extras import require_extra
 from daq.contracts.progress import Cancel
 from daq.executors import Workers, done_in_any_order
-from daq.executors.local import LocalWorkers
 from daq.traces.catalogue import TraceSummary
 from daq.traces.query import TraceQuery
 from extras.lab.batches.columns import Columns
@@ -101,8 +99,7 @@ def run_batch(
     The tables are written at the end, also when the batch is interrupted. Raises CancelledError; SpecError if the
     folder cannot be written; MissingExtraError; as `done_in_any_order` does.
     """
-    if isinstance(workers, LocalWorkers):
-        require_extra("model", "a batch on this computer", "numba")
+    require_extra("model", "a batch", "numba")
     left = [one for one in chosen if not folder.is_done(one.job.key)]
     about = {one.job.key: one.about for one in left}
     count = _Count(len(chosen), len(chosen) - len(left))
@@ -170,7 +167,7 @@ def chosen_of(summary: TraceSummary) -> Chosen:
     problem = summary.problem or ""
     if summary.state == "unfinished":
         problem = "a crash left it without an end; `daq traces salvage` completes it"
-    key = summary.trace_id if summary.trace_id and summary.state == "finished" else _key_of(summary.path)
+    key = summary.trace_id if summary.trace_id and summary.state == "finished" else summary.path.name
     about: Columns = {
         "file": summary.path.name,
         "recorded": summary.created.isoformat() if summary.created else None,
@@ -179,8 +176,3 @@ def chosen_of(summary: TraceSummary) -> Chosen:
         "outcome": summary.outcome,
     }
     return Chosen(OneTrace(key=key, file=summary.path.absolute()), about, problem)
-
-
-def _key_of(path: Path) -> str:
-    """Returns the key of a file whose trace has no readable ID."""
-    return path.name

@@ -97,7 +97,7 @@ class Studying:
 def _common(text: str) -> Common:
     common = Common.model_validate_json(text)
     if common.effect_files:
-        from model.effects.effect_files import load_effect_file
+        from model.effects.library import load_effect_file
 
         for file in common.effect_files:
             load_effect_file(file)
@@ -142,8 +142,8 @@ def _fitted(study: FitStudy, model: Model, trace: Trace) -> tuple[Columns, str]:
 
 def _validated(study: ValidateStudy, model: Model, trace: Trace) -> tuple[Columns, str]:
     from model.simulation.prepared import Options
+    from model.validation.expected_deviation import names_to_validate
     from model.validation.fidelity import validate_by_distortion
-    from model.validation.names import names_to_validate
 
     found = validate_by_distortion(
         model,

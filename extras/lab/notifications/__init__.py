@@ -14,7 +14,6 @@ PLUGIN = Plugin(
         ),
     ),
     settings={"notifications": "extras.lab.notifications.settings:NotificationSettings"},
-    migrations={"notifications": "extras.lab.notifications.versions"},
     parts=("extras.lab.notifications.part:Notifications",),
     routes=("extras.lab.notifications.part:router",),
 )

@@ -32,9 +32,7 @@ def try_all(
     from time import perf_counter
 
     from daq.contracts.service.notifications import Notification
-    from extras.lab.notifications.delivery import problem_of
-    from extras.lab.notifications.destinations import destinations_of
-    from extras.lab.notifications.service import message_of
+    from extras.lab.notifications.senders import destinations_of, message_of, problem_of
     from extras.lab.notifications.settings import NotificationSettings
     from server.clock import SystemClock
 
@@ -50,7 +48,7 @@ def try_all(
     for one in chosen:
         begun, problem, answer = perf_counter(), "", ""
         try:
-            answer = one.sender.send(message_of(told))
+            answer = one.send(message_of(told))
         except Exception as error:  # noqa: BLE001 - whatever fails for one, the others are told
             failed, problem = True, problem_of(error)
         seconds = perf_counter() - begun

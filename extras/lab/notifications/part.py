@@ -5,71 +5,46 @@ Events are ends, faults, and conditions that need a person. Recipients are set o
 
 from __future__ import annotations
 
-import logging
 import threading
 from collections.abc import Iterable
-from contextlib import suppress
 from datetime import datetime
 from typing import Annotated, cast
 
 from prometheus_client import Counter
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
-from sqlalchemy.exc import SQLAlchemyError
 
 from daq.contracts.service.experiments import ENDS, ExperimentState
 from daq.contracts.service.jobs import Job
 from daq.contracts.service.notifications import Notification, NotificationKind, NotificationStatus, Topic
 from daq.owner.messages import ArmReport, Report
-from extras.lab.notifications.destinations import destinations_of
-from extras.lab.notifications.outbox import Outbox
-from extras.lab.notifications.service import Notifier
+from extras.lab.notifications.notifier import Notifier
+from extras.lab.notifications.senders import destinations_of
 from extras.lab.notifications.settings import NotificationSettings
 from server.api.dependencies import Viewer, part
-from server.database_errors import DamagedError
 from server.parts import Part
 from server.problems import PROBLEMS
 from server.routes import Router
 from server.services import Services
 
 
-def kind_of_end(state: ExperimentState) -> NotificationKind:
-    """Returns the kind of an end: a fault, unless the experiment was done or cancelled by somebody."""
-    return "done" if state in ("done", "cancelled") else "fault"
-
-
 def of_experiment(robot: str, identity: str, state: ExperimentState, reason: str, at: datetime) -> Notification:
     """Returns the notification of the end of an experiment."""
     text = f"{robot}: experiment {identity} is {state}{f': {reason}' if reason else ''}"
-    return Notification(
-        topic="experiment.ended",
-        kind=kind_of_end(state),
-        at=at,
-        text=text,
-        robot=robot,
-        experiment=identity,
-        state=state,
-    )
+    return _of_end("experiment.ended", state, at, text, robot=robot, experiment=identity)
 
 
 def of_job(job: Job, at: datetime) -> Notification:
     """Returns the notification of the end of a job."""
     why = job.reason or job.headline
-    return Notification(
-        topic="job.ended",
-        kind=kind_of_end(job.state),
-        at=at,
-        text=f"{job.robot}: {job.request.kind} {job.id} is {job.state}{f': {why}' if why else ''}",
-        robot=job.robot,
-        job=job.id,
-        state=job.state,
-    )
+    text = f"{job.robot}: {job.request.kind} {job.id} is {job.state}{f': {why}' if why else ''}"
+    return _of_end("job.ended", job.state, at, text, robot=job.robot, job=job.id)
 
 
-def of_pause(robot: str, reason: str, at: datetime) -> Notification:
-    """Returns the notification that a queue is paused until somebody has looked."""
-    text = f"{robot}: the queue is paused: {reason}"
-    return Notification(topic="queue.paused", kind="attention", at=at, text=text, robot=robot)
+def _of_end(topic: Topic, state: ExperimentState, at: datetime, text: str, **about: str) -> Notification:
+    """An end is a fault, unless it was done or cancelled by somebody."""
+    kind: NotificationKind = "done" if state in ("done", "cancelled") else "fault"
+    return Notification(topic=topic, kind=kind, at=at, text=text, state=state, **about)
 
 
 class Faults:
@@ -95,9 +70,6 @@ class Faults:
         return Notification(topic="arm.fault", kind="fault", at=at, text=text, robot=robot)
 
 
-log = logging.getLogger("server.notifications")
-
-
 class Notifications(Part, Collector):
     """Notifies people elsewhere, and reports the number of waiting messages to Prometheus."""
 
@@ -106,27 +78,25 @@ class Notifications(Part, Collector):
         told = "Notifications sent, attempts that failed, and messages given up, by destination."
         self._told = counter = Counter("daq_notifications", told, ("destination", "result"), registry=None)
         self._services, self._clock, self._faults = services, services.clock, Faults()
-        self.notifier = Notifier(
-            destinations_of(settings),
-            Outbox(services.store),
-            services.clock,
-            attempts=settings.attempts,
-            look=self._look,
-            given_up=lambda line: log.error("notifications: %s", line),
-            count=lambda destination, result: counter.labels(destination, result).inc(),
-        )
+        self.notifier = Notifier(destinations_of(settings), self._look, lambda *result: counter.labels(*result).inc())
 
     def start(self) -> None:
         """Begins to deliver."""
         self.notifier.start()
 
     def close(self, seconds: float) -> None:
-        """Stops, and writes pending notifications."""
+        """Stops; what waits is only in the log."""
         self.notifier.close(seconds)
 
     def checks(self) -> dict[str, str]:
         """Returns the problems of a destination."""
-        return {"notifications": "; ".join(self.notifier.warnings())}
+        wrong = []
+        for one in self.notifier.status().destinations:
+            if one.problem:
+                wrong.append(f"{one.name}: {one.problem}")
+            if one.given_up:
+                wrong.append(f"{one.name}: {one.given_up} were given up since the service started")
+        return {"notifications": "; ".join(wrong)}
 
     def arm_reported(self, robot: str, report: Report) -> None:
         """Notifies of a new fault of an arm."""
@@ -139,7 +109,9 @@ class Notifications(Part, Collector):
 
     def queue_paused(self, robot: str, reason: str) -> None:
         """Notifies that a queue is paused."""
-        self.notifier.tell(of_pause(robot, reason, self._clock.utc()))
+        text = f"{robot}: the queue is paused: {reason}"
+        at = self._clock.utc()
+        self.notifier.tell(Notification(topic="queue.paused", kind="attention", at=at, text=text, robot=robot))
 
     def job_changed(self, job: Job) -> None:
         """Notifies of the end of a job."""
@@ -150,9 +122,8 @@ class Notifications(Part, Collector):
         """Returns the number of waiting messages."""
         yield from self._told.collect()
         waiting = GaugeMetricFamily("daq_notifications_waiting", "Notifications that wait.", labels=("destination",))
-        with suppress(SQLAlchemyError, DamagedError):  # no metrics while the database cannot be read
-            for destination, count in self.notifier.waiting().items():
-                waiting.add_metric((destination,), count)
+        for one in self.notifier.status().destinations:
+            waiting.add_metric((f"{one.channel} {one.name}",), one.waiting)
         yield waiting
 
     def describe(self) -> Iterable[Metric]:

@@ -25,7 +25,7 @@ class WebhookSettings(FrozenRecord):
 
     url: SecretStr
     """URL, `https://…`. It is not shown, since with many services its path is a secret."""
-    secret: Path
+    secret: Path | None = None
     """File with the secret that signs the messages (`whsec_` and base64), as in Standard Webhooks."""
     about: tuple[NotificationKind, ...] = KINDS
     """Kinds of notification: `done`, `fault`, `attention`."""
@@ -41,14 +41,12 @@ class WebhookSettings(FrozenRecord):
             raise ValueError("is not a URL; write https://host/path") from None
         if parts.scheme not in ("https", "http") or not parts.hostname or parts.fragment or port == 0:
             raise ValueError("is not a URL; write https://host/path")
-        if parts.username is not None or parts.password is not None:
-            raise ValueError("has a user name or password in it; messages are signed instead")
         return url
 
     @field_validator("secret")
     @classmethod
-    def _expanded(cls, file: Path) -> Path:
-        return file.expanduser()
+    def _expanded(cls, file: Path | None) -> Path | None:
+        return None if file is None else file.expanduser()
 
     @property
     def host(self) -> str:
@@ -111,7 +109,7 @@ class SmtpSettings(FrozenRecord):
 class NotificationSettings(Section):
     """Section `[notifications]`. Without a webhook or an e-mail table nobody is notified."""
 
-    SHOWN = frozenset(["about", "attempts", "host", "port", "sender", "tls", "to", "user"])
+    SHOWN = frozenset(["about", "host", "port", "sender", "tls", "to", "user"])
 
     webhooks: Annotated[dict[DestinationName, WebhookSettings], Field(max_length=MOST_DESTINATIONS)] = {}
     """Webhooks, by name."""
@@ -119,21 +117,12 @@ class NotificationSettings(Section):
     """People with e-mail, by name."""
     smtp: SmtpSettings | None = None
     """The mail server; needed for e-mail."""
-    private_hosts: tuple[Host, ...] = ()
-    """Hosts of webhooks that may have private addresses (10.…, 192.168.…, this computer), and plain `http`. All others
-    must be public, and are rejected if their name resolves to a private address."""
-    attempts: Annotated[int, Field(ge=1, le=12)] = 10
-    """Number of attempts after which a message is given up: 10 take two days."""
 
     @model_validator(mode="after")
     def _is_complete(self) -> NotificationSettings:
-        """Raises ValueError for e-mail without a server, and for plain `http` to a host that is not listed."""
+        """Raises ValueError for e-mail without a server."""
         if self.email and self.smtp is None:
             raise ValueError("email needs the mail server: give [notifications.smtp] host and sender")
-        for name, webhook in self.webhooks.items():
-            plain = urlsplit(webhook.url.get_secret_value()).scheme == "http"
-            if plain and webhook.host not in {host.lower() for host in self.private_hosts}:
-                raise ValueError(f"webhooks.{name}.url: http is allowed to private_hosts only; write https")
         return self
 
     def digested(self) -> dict[str, Any]:

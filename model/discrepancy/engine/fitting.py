@@ -18,9 +18,9 @@ from model.arrays import Floats
 from model.discrepancy.diagnosis import FoundValue
 from model.discrepancy.engine.priors import prior_cost, prior_rows
 from model.discrepancy.engine.residual import Residual, Signals, Values
-from model.fitting.bounded_step import bounded_step
 from model.fitting.covariance import sandwich
 from model.fitting.fit import INTERVAL
+from model.fitting.least_squares import bounded_step
 from model.fitting.unknowns import Unknown
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter

@@ -28,7 +28,7 @@ def test_the_guides_configuration_can_be_said_and_says_everything() -> None:
     settings, _ = load_settings()
     limits = settings.robot.limits
     assert limits is not None
-    assert settings.model_fields_set == set(Settings.model_fields) - {"server", "archive", "notifications", "robots"}
+    assert settings.model_fields_set == set(Settings.model_fields) - {"server", "notifications", "robots"}
     assert settings.robot.model_fields_set == set(type(settings.robot).model_fields)
     assert limits.model_fields_set == set(Limits.model_fields)
     assert settings.machine().limits.joints[0] == JointLimits(low=-1.0, high=1.0, speed=0.8)

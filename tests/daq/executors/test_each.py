@@ -5,9 +5,8 @@ from typing import Any
 
 import pytest
 
-from daq.contracts.errors import ReachError
 from daq.executors.each import AHEAD, done_in_any_order
-from daq.executors.workers import BlamedError, OtherVersionError, ending
+from daq.executors.workers import ending
 from tests.daq.executors.by_hand import WorkersByHand, square
 
 
@@ -51,46 +50,3 @@ def test_no_more_is_given_than_can_begin_and_workers_are_given_up_when_the_block
     with pytest.raises(KeyboardInterrupt), ending(workers):
         raise KeyboardInterrupt
     assert workers.ended == "abandoned"
-
-
-class Refusing(WorkersByHand):
-    def __init__(self, error: Exception) -> None:
-        super().__init__()
-        self._error = error
-
-    def submit(self, function: Any, /, *args: Any, **named: Any) -> Future[Any]:
-        self.given.append(args[0])
-        future: Future[Any] = Future()
-        future.set_exception(self._error)
-        return future
-
-
-@pytest.mark.parametrize("error", [ReachError("the scheduler is gone"), OtherVersionError("worker a: has 0.0.9")])
-def test_what_concerns_all_tasks_ends_them(error: Exception) -> None:
-    with pytest.raises(type(error), match=str(error)):
-        list(done_in_any_order(Refusing(error), square, range(9)))
-
-
-class Blaming(WorkersByHand):
-    """Blames every job that it has in the company of 7, as Dask does, whose workers take several."""
-
-    def __init__(self) -> None:
-        super().__init__(count=1)
-        self._held: list[tuple[int, Future[Any]]] = []
-
-    def submit(self, function: Any, /, *args: Any, **named: Any) -> Future[Any]:
-        self.given.append(args[0])
-        future: Future[Any] = Future()
-        self._held.append((args[0], future))
-        if len(self._held) == AHEAD or self.given.count(args[0]) > 1:
-            held, self._held = self._held, []
-            dies = any(task == 7 for task, _future in held)
-            for task, given in held:
-                given.set_exception(BlamedError("killed four workers")) if dies else given.set_result(task**2)
-        return future
-
-
-def test_only_a_task_that_was_computed_alone_is_blamed() -> None:
-    workers = Blaming()
-    assert answers(workers, range(8)) == {n: n**2 for n in range(7)} | {7: BlamedError}
-    assert sorted(workers.given) == [*range(6), 6, 6, 7, 7]

@@ -20,7 +20,7 @@ from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
 from firmware_protocol.dynamixel.control_table import HardwareError, Table
 from mock_controller.servos.bench import Options
-from mock_controller.servos.secret import Secret, draw_secret
+from mock_controller.servos.plant import Secret, draw_secret
 from model.arrays import Floats
 from model.discrepancy.options import DiagnosisOptions
 from model.discrepancy.workflow import diagnose

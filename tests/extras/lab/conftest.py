@@ -1,6 +1,5 @@
-"""The service of the tests of what a laboratory adds, one of their own; databases of both kinds."""
+"""The service and the database of the tests of what a laboratory adds."""
 
-from tests.extras.lab.postgresql.databases import postgresql, sqlite_store, store
-from tests.server.conftest import service, shared_service
+from tests.server.conftest import service, shared_service, store
 
-__all__ = ["postgresql", "service", "shared_service", "sqlite_store", "store"]
+__all__ = ["service", "shared_service", "store"]

@@ -11,7 +11,7 @@ from firmware_protocol.framing import Frame, encode_frame
 from firmware_protocol.units import counts_to_posture
 from mock_controller.board.parameters import default_board_text
 from mock_controller.bridge.bridge import WAIT_LIMIT_PERIODS, Bridge
-from mock_controller.real_time import LATE_US
+from mock_controller.pace import LATE_US
 from mock_controller.timeline import Timeline
 from tests.mock.host import LockStepHost, RealTimeHost
 

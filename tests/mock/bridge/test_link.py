@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from firmware_protocol import commands as c
 from firmware_protocol.dialect import IDLE_MARK
-from mock_controller.bridge.line import Line
-from mock_controller.bridge.pieces import LONGEST, PieceSplitter
-from mock_controller.lock_step import HOST_PATIENCE_US
+from mock_controller.bridge.pieces import LONGEST, Line, PieceSplitter
+from mock_controller.pace import HOST_PATIENCE_US
 from tests.mock.host import LockStepHost, RealTimeHost
 
 STREAMS = st.lists(st.sampled_from([b"\0", b"a", b"bc", b"\0\0", b"\x01" * 29]), max_size=20).map(b"".join)

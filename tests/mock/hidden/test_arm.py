@@ -13,8 +13,7 @@ from mock_controller.board import default_board
 from mock_controller.hidden.arm import LOAD_KG, HiddenArm, Kind, Load, SecretError, compose_seed, draw_arm
 from mock_controller.hidden.sizes import LATER_SIZES, OPEN_SIZES, SHARED_SIZES, SizeRange, draw_values
 from mock_controller.hidden.tolerances import tolerances
-from mock_controller.modifications.library import OPEN_SET, SHARED
-from mock_controller.modifications.registry import build_modification
+from mock_controller.modifications.registry import OPEN_SET, SHARED, build_modification
 from mock_controller.plant import Plant, default_plant
 from tests.mock.host import make_device
 

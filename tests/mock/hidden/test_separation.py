@@ -12,8 +12,15 @@ from mock_controller import detectability
 from mock_controller.board import default_board
 from mock_controller.hidden import separation as hidden_separation
 from mock_controller.hidden.arm import Kind, Load, compose_seed, draw_arm
-from mock_controller.hidden.closed_loop import LoopParts, reading_deviation, readings
-from mock_controller.hidden.experiment import BUILT_IN, Experiment, ExperimentError, read_experiment
+from mock_controller.hidden.experiment import (
+    BUILT_IN,
+    Experiment,
+    ExperimentError,
+    LoopParts,
+    read_experiment,
+    reading_deviation,
+    readings,
+)
 from mock_controller.hidden.separation import Tangents, project, separation, tangents
 from mock_controller.hidden.tolerances import deviating_plant, tolerances
 from mock_controller.modifications import build_modifications

@@ -27,7 +27,7 @@ from mock_controller.hidden.tolerances import (
     harmonic_deviation,
     tolerances,
 )
-from mock_controller.modifications.library import LIBRARY
+from mock_controller.modifications.registry import LIBRARY
 from mock_controller.options import OptionsError, read_options
 from mock_controller.plant import default_plant
 from tests.mock.host import LockStepHost, make_device

@@ -8,7 +8,7 @@ import mujoco
 
 from mock_controller.modification import Modification
 from mock_controller.modifications import build_modifications
-from mock_controller.modifications.changes import change_joint
+from mock_controller.modifications.parameter import change_joint
 from mock_controller.plant import Plant, PlantParameters, default_plant
 from mock_controller.plant.rigid_body import build_model
 

@@ -8,8 +8,7 @@ import pytest
 
 from mock_controller.modifications.registry import build_modifications
 from mock_controller.plant import default_plant
-from mock_controller.plant.drive_train import DriveTrain
-from mock_controller.plant.friction import CoulombLevel
+from mock_controller.plant.drive_train import CoulombLevel, DriveTrain
 from tests.mock.modifications.steady import (
     STEP_S,
     STRETCHED,

@@ -10,9 +10,8 @@ from daq.contracts.effects import effect_names
 from firmware_protocol.memory_map import default_memory_map
 from mock_controller.board import Board, default_board
 from mock_controller.modification import Modification
-from mock_controller.modifications.library import LIBRARY, OPEN_SET, SHARED
 from mock_controller.modifications.parameter import fields_of
-from mock_controller.modifications.registry import build_modifications, is_null, table
+from mock_controller.modifications.registry import LIBRARY, OPEN_SET, SHARED, build_modifications, is_null, table
 from mock_controller.plant import Plant, default_plant
 from tests.mock.modifications.steady import STRETCHED, changed, effect, plant_with, weights, without_friction
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mock_controller.plant import Plant, PlantError, PlantParameters, default_plant
-from mock_controller.plant.friction import CoulombLevel, deflect
+from mock_controller.plant.drive_train import CoulombLevel, deflect
 
 UP = (math.pi, math.pi / 2, 0.0, 0.0, 0.0, 0.0)
 

@@ -11,8 +11,7 @@ from firmware_protocol.dynamixel.control_table import HardwareError
 from mock_controller.reveal import main as reveal
 from mock_controller.servos.__main__ import main as start
 from mock_controller.servos.bench import Bench, Options
-from mock_controller.servos.plant import Head, Motor, PanTilt
-from mock_controller.servos.secret import NONE, Secret, draw_secret
+from mock_controller.servos.plant import NONE, Head, Motor, PanTilt, Secret, draw_secret
 from tests.mock.servos.makers_client import MemoryPort, client
 
 OK = (0, 0)

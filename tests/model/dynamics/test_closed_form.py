@@ -7,13 +7,14 @@ import numba
 import numpy as np
 import pytest
 
-from model.dynamics import effective_inertia, recursive, three_joint, three_joint_motion
+from model.dynamics import effective_inertia, recursive, three_joint
 from model.dynamics.dual import DUAL_STEP
 from model.dynamics.effective_inertia import effective_parameters, has_closed_form
 from model.dynamics.linear_solve import solve_symmetric
 from model.dynamics.rod_arm import PUBLISHED_INERTIA, SIZE, RodArm, effective_from_rods
 from model.generation.printing import source_hash, text_hash
 from model.kinematics.chain import Chain, ChainError, FloatArray, Joint
+from model.simulation.dynamics_of_run import accelerations as closed_form_accelerations
 from tests.model.dynamics.chains import OFFSET_ARM, TABLE_7_9, dual, random_chain, random_link, random_state
 
 UPPER = np.triu_indices(3)
@@ -46,7 +47,7 @@ def torques(q: FloatArray, v: FloatArray, p: FloatArray):  # type: ignore[no-unt
 def accelerations(q: FloatArray, v: FloatArray, torque: FloatArray, p: FloatArray):  # type: ignore[no-untyped-def]
     tilted = three_joint.horizontal_gravity_torques(q[0], q[1], q[2], p)
     t1, t2, t3 = torque[0] - tilted[0], torque[1] - tilted[1], torque[2] - tilted[2]
-    return three_joint_motion.accelerations(q[1], q[2], v[0], v[1], v[2], t1, t2, t3, p)
+    return closed_form_accelerations(q[1], q[2], v[0], v[1], v[2], t1, t2, t3, p)
 
 
 @pytest.mark.parametrize("chain", [TABLE_7_9.chain(), OFFSET_ARM.chain(), *map(general_arm, range(5))])

@@ -13,8 +13,7 @@ from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
 from model import layout as at
 from model.effects.effect import Effect
-from model.effects.effect_files import load_effect_file
-from model.effects.library import library, own_effects, remove_own
+from model.effects.library import library, load_effect_file, own_effects, remove_own
 from model.inverse_dynamics.fit import fit_torques
 from model.machine_model.model import Model, base_model
 from model.machine_model.model_file import load_model, model_of, save_model

@@ -14,9 +14,16 @@ from daq.contracts.machine import parse_machine
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.fitting.choice import chosen_unknowns
-from model.fitting.consistent_bodies import ConsistentBodies, coordinates_of
+from model.fitting.consistent_bodies import (
+    ENTRIES,
+    ConsistentBodies,
+    body_of,
+    coordinates_of,
+    log_cholesky,
+    matrix_of,
+    second_moments,
+)
 from model.fitting.fit import fit
-from model.fitting.log_cholesky import ENTRIES, body_of, log_cholesky, matrix_of, second_moments
 from model.fitting.options import FitOptions
 from model.fitting.profile import profile
 from model.machine_model.model import Model, base_model

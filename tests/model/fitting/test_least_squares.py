@@ -8,10 +8,9 @@ from scipy.signal import lfilter
 
 from daq.contracts.progress import Never
 from model.arrays import Floats
-from model.fitting.bounded_step import bounded_step
-from model.fitting.directions import sparse_basis, torque_scale, undetermined
 from model.fitting.fit import _settled
-from model.fitting.least_squares import Search, solve
+from model.fitting.identifiability import sparse_basis, torque_scale, undetermined
+from model.fitting.least_squares import Search, bounded_step, solve
 from model.fitting.whitening import Whitener, autocovariance, fitted_whitener, white
 from tests.model.fitting.problems import Formula, free
 

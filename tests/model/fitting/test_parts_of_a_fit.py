@@ -12,11 +12,10 @@ from model.arrays import Floats
 from model.fitting.covariance import sandwich
 from model.fitting.fit import fit_problem, fitted_parameter
 from model.fitting.identifiability import judged
-from model.fitting.least_squares import Search, solve
+from model.fitting.least_squares import Search, huber, influence, solve
 from model.fitting.nelder_mead import climb
 from model.fitting.options import FitOptions
 from model.fitting.problem import Evaluation, whitened
-from model.fitting.robust import huber, influence
 from model.fitting.unknowns import Unknown, prior_precision, scales
 from model.fitting.whitening import fitted_whitener, white
 from model.machine_model.parameter import Kind, Parameter

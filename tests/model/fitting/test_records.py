@@ -11,11 +11,10 @@ import pytest
 from daq.contracts.errors import TraceError
 from daq.contracts.trace import Trace
 from model.fitting.fit import fit_problem
-from model.fitting.fitted import FittedParameter, JointError
+from model.fitting.fitted import FittedParameter, JointError, doubt_of, html_of, known_of, text_of
 from model.fitting.identifiability import Combination, IdentifiabilityReport
 from model.fitting.options import FitOptions
 from model.fitting.records import noise_floor, records_of
-from model.fitting.shown import doubt_of, html_of, known_of, text_of
 from model.fitting.simulated import SimulatedProblem
 from model.machine_model.model import base_model
 from model.record_check.check import check_records

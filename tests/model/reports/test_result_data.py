@@ -6,8 +6,7 @@ import pytest
 from model.comparison.compare import TraceSignals
 from model.discrepancy.diagnosis import Where
 from model.reports.diagnosis_data import diagnosis_data
-from model.reports.overlays import LEAST_POINTS, overlay, overlays
-from model.reports.result_data import DiagnosisData, of_comparison
+from model.reports.result_data import LEAST_POINTS, DiagnosisData, of_comparison, overlay, overlays
 from tests.model.discrepancy.answers import an_answer
 
 NOWHERE = Where(joint=None, phase=None, summary="", cells=(), dependences=())

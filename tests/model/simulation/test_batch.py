@@ -23,9 +23,8 @@ from model.simulation import batch, kernel
 from model.simulation.batch import BatchRun, available_cores
 from model.simulation.period import OUTPUTS
 from model.simulation.prepared import Options, prepare
-from model.simulation.run_arrays import RecordArrays, RunArrays
+from model.simulation.run_arrays import AnyChain, ClosedForm, Flexible, RecordArrays, RunArrays, uncompiled
 from model.simulation.simulate import SIGNALS, simulate, simulate_many
-from model.simulation.specialised import AnyChain, ClosedForm, Flexible, uncompiled
 from tests.model.simulation.records import ramp_inputs
 
 ARM = base_model(load_machine("ma2000"))

@@ -11,10 +11,9 @@ from daq.contracts.machine import Machine, NoController, load_machine
 from daq.contracts.trace import Trace
 from model.arrays import Floats
 from model.machine_model.model import base_model
-from model.simulation.inputs import RunInputs, inputs_of, readings_on_grid
+from model.simulation.inputs import RunInputs, inputs_of, readings_on_grid, speed_at_start
 from model.simulation.prepared import Options, prepare
 from model.simulation.simulate import at_rows, simulate
-from model.simulation.start_speed import speed_at_start
 from tests.model.fitting import imagined
 from tests.model.imported import imported
 from tests.model.simulation.records import ramp_inputs

@@ -16,8 +16,7 @@ from daq.contracts.machine import load_machine
 from model import layout as at
 from model.arrays import Floats
 from model.dynamics.dual import DUAL_STEP
-from model.effects.effect_files import load_effect_file
-from model.effects.library import own_effects, remove_own
+from model.effects.library import load_effect_file, own_effects, remove_own
 from model.machine_model.model import Model, base_model
 from model.simulation import joint_torques, period
 from model.simulation.own_table import own_table

@@ -9,8 +9,7 @@ import pytest
 from daq.contracts.effects import effect_names
 from daq.contracts.machine import load_machine
 from mock_controller.board import default_board
-from mock_controller.hidden.closed_loop import LoopParts, readings
-from mock_controller.hidden.experiment import Experiment
+from mock_controller.hidden.experiment import Experiment, LoopParts, readings
 from mock_controller.modifications import build_modifications
 from mock_controller.plant import default_plant
 from model.machine_model.model import Model, base_model

@@ -7,13 +7,19 @@ import pytest
 from daq.contracts.errors import SpecError
 from mock_controller.hidden.arm import Kind, Load, compose_seed, draw_arm
 from model.discrepancy.diagnosis import Diagnosis
-from model.trial.arms import KINDS, LOADS, arms, compose, drawn_arms, parse_choice, parse_numbers, sample_arms
-from model.trial.cases import as_csv
-from model.trial.markdown import as_markdown
-from model.trial.rates import rate
-from model.trial.registration import parse_registration
+from model.trial.registration import (
+    KINDS,
+    LOADS,
+    arms,
+    compose,
+    drawn_arms,
+    parse_choice,
+    parse_numbers,
+    parse_registration,
+    sample_arms,
+)
 from model.trial.score import Score, score
-from model.trial.table import TrialTable, quantiles, trial_table
+from model.trial.table import TrialTable, as_csv, as_markdown, quantiles, rate, trial_table
 from model.trial.truth import Truth
 from tests.model.trial.answers import MACHINE, answer, seen, step, truth
 

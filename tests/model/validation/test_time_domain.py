@@ -13,8 +13,7 @@ from model.simulation.simulate import simulate
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.fidelity import validate_by_distortion
 from model.validation.measured_motion import smooth
-from model.validation.noise_floor import noise_floor
-from model.validation.time_domain import vary_in_time
+from model.validation.time_domain import noise_floor, vary_in_time
 from tests.model.fitting.imagined import arm
 from tests.model.validation.synthetic import multisine_trace, ramp_trace, swinging_trace
 

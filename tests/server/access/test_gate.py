@@ -1,16 +1,12 @@
 """What the gate lets through of a request before anybody has looked at it: how much of its body, and how often."""
 
 import asyncio
-import threading
 from dataclasses import dataclass, field
-from datetime import datetime
-from pathlib import Path
 
 import pytest
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive, Scope, Send
 
-from server.access.caller import Caller
 from server.access.gate import Gate
 from server.access.limits import LARGEST_BODY, Buckets
 from server.access.tickets import Tickets
@@ -127,38 +123,3 @@ def test_no_limit_holds_up_a_stop_and_nothing_else_is_one(tokens: KnownTokens) -
     others = [("GET", f"{ROBOT}/traces/stop"), ("GET", f"{ROBOT}/stop"), ("POST", "/stop"), ("PATCH", f"{ROBOT}/stop")]
     assert [Request(*other).through(gate).status for other in others] == [429] * 4
     assert Request("POST", f"{ROBOT}/stop").through(gate).status == 200
-
-
-class _Hanging(TokenStore):
-    """A database that answers when it is let."""
-
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
-        self.let = threading.Event()
-
-    def callers(self, now: datetime) -> dict[str, Caller]:
-        """Returns them at last."""
-        self.let.wait()
-        return super().callers(now)
-
-
-def test_an_old_cookie_delays_no_stop_that_needs_no_token(store: Store) -> None:
-    tokens = _Hanging(store)
-    gate = _gate(KnownTokens(tokens, HandClock()))
-    asked = Request("POST", f"{ROBOT}/stop", headers={"cookie": "daq-session=old", "origin": "http://127.0.0.1:8300"})
-
-    async def answered_while_it_hangs() -> None:
-        await asked.send_through(gate)
-        assert not tokens.let.is_set()
-        tokens.let.set()  # or the loop's end would wait for the thread for ever
-
-    asyncio.run(answered_while_it_hangs())
-    assert asked.status == 200
-
-
-def test_an_old_cookie_refuses_no_stop_while_the_database_cannot_be_read(tmp_path: Path) -> None:
-    store = Store(f"sqlite:///{tmp_path / 'service.sqlite'}")  # without tables
-    gate = _gate(KnownTokens(TokenStore(store), HandClock()))
-    headers = {"cookie": "daq-session=old", "origin": "http://127.0.0.1:8300"}
-    assert Request("POST", f"{ROBOT}/stop", headers=headers).through(gate).status == 200
-    store.close()

@@ -44,7 +44,7 @@ def _put(
 
 def test_a_program_is_there_after_a_restart(programs: ProgramStore, store: Store, clock: HandClock) -> None:
     _put(programs, clock, _program())
-    with closing(Store(store.url)) as again:
+    with closing(Store(store.file)) as again:
         assert ProgramStore(again).get(ROBOT, "pick").program == _program()
 
 

@@ -1,6 +1,11 @@
 """Several robots in one service: each has its own queue, stop, lease, traces and stream."""
 
+import re
+import shlex
+import subprocess
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +14,7 @@ from daq.client import Client
 from daq.contracts.errors import SpecError
 from daq.traces.reader import read_trace
 from tests.server.fleet_service import FleetService, two_arms
+from tests.server.other_user import other_users_command_line
 from tests.server.polling import reset, until
 
 pytestmark = pytest.mark.slow
@@ -39,9 +45,7 @@ def by_name(fleet: FleetService) -> dict[str, Any]:
 
 
 def test_the_same_experiment_runs_on_both_and_each_trace_names_its_robot(fleet: FleetService) -> None:
-    made = fleet.post("fleet/experiments", {"request": RAMP})["experiments"]
-    assert [one["robot"] for one in made] == ["left", "right"]
-    for one in made:
+    for one in [fleet.post(f"robots/{name}/experiments", RAMP) for name in ("left", "right")]:
         ended = fleet.end_of(one["robot"], one["id"])
         assert ended["state"] == "done", ended
         files = list((fleet.folder / "traces" / one["robot"]).glob("*.mcap"))
@@ -98,3 +102,37 @@ def test_a_client_that_names_no_robot_is_told_the_names(fleet: FleetService) -> 
         with pytest.raises(SpecError, match="left, right"):
             client.robot()
         assert client.robot("right").status().robot == "right"
+
+
+# ---- docs/fleet.md
+
+
+PAGE = Path(__file__).parents[3].joinpath("docs", "fleet.md").read_text("utf-8")
+URL = "http://127.0.0.1:8300"
+LINES = [
+    line
+    for block in re.findall(r"^```console\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    for line in block.splitlines()
+]
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_command_of_the_page_works(
+    line: str, fleet: FleetService, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = shlex.split(line.removeprefix("$ ").replace(URL, fleet.url))
+    assert words[0] == "daq"
+    with other_users_command_line(tmp_path, capsys, monkeypatch) as daq:
+        Path("daq.toml").write_text(
+            '[robots.left]\nport = "mock://?lock_step=1"\n[robots.right]\nport = "mock://?lock_step=1&seed=2"\n'
+        )
+        said = daq(*words[1:])
+    assert said.code == 0, said
+
+
+def test_the_program_of_the_page_runs_the_same_experiment_on_both(fleet: FleetService, tmp_path: Path) -> None:
+    (program,) = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    words = [sys.executable, "-c", program.replace(URL, fleet.url)]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=100, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-2:] == ["done", "done"]

@@ -1,21 +1,17 @@
 """The service of jobs with an executor that tests hold by hand: what meets in one moment, and what goes wrong once."""
 
-import errno
 import threading
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Future
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Any
 
 import pytest
-from sqlalchemy.event import listen
 from sqlalchemy.exc import OperationalError
-from sqlalchemy.orm import Session
 
 from daq.contracts.errors import SpecError
 from daq.contracts.machine import load_machine
-from daq.contracts.service.archive import Transfer
 from daq.contracts.service.jobs import CompareRequest, DiagnoseRequest, FitRequest, Job, JobRequest
 from daq.contracts.trace_limits import TraceLimits
 from daq.executors import Workers
@@ -27,7 +23,7 @@ from server.experiments.states import Event
 from server.jobs.lanes import lane_of
 from server.jobs.mailbox import CANCEL, MODEL, Mailbox
 from server.jobs.models import Models
-from server.jobs.service import LOOK_EVERY, JobContext, JobService
+from server.jobs.service import JobContext, JobService
 from server.jobs.shared_workers import SharedWorkers
 from server.jobs.work import Ended, carry_out
 from server.problems import ProblemError
@@ -180,130 +176,6 @@ def test_a_job_that_begins_while_it_is_being_cancelled_is_told_to_end(bench: Ben
     bench.jobs.before("change", lambda: bench.jobs.change("ma2000", job.id, Event.TAKEN, bench.clock.utc()))
     assert bench.service.cancel(job.id, "anna").state == "running"
     assert (bench.folder / job.id / CANCEL).exists()
-
-
-class HandArchive:
-    """An archive behind the folder, which fetches when the test says so."""
-
-    def __init__(self, bench: Bench) -> None:
-        self.problem = ""
-        self.asked: list[str] = []
-        self.since: list[float] = []
-        self._bench = bench
-        self._file = bench.catalogue.folder / "1.mcap"
-        self.has = {TRACE}
-        bench.kept_traces.archive_index = self
-        self._file.unlink()
-        bench.catalogue.archive = self
-
-    def among(self, _session: Session, traces: Collection[str]) -> set[str]:
-        return self.has & set(traces)
-
-    def delete_later(self, _session: Session, trace: str) -> None:
-        """Is not asked by jobs."""
-        raise AssertionError(trace)
-
-    def send(self, trace: str) -> None:
-        """Sends nothing."""
-
-    def deleted(self) -> None:
-        """Deletes nothing."""
-
-    def fetch(self, trace: str) -> ProblemError:
-        """Is not asked by jobs."""
-        raise AssertionError(trace)
-
-    def bring(self, traces: Iterable[str], since: float) -> Transfer:
-        """Tells how far it is."""
-        self.asked += traces
-        self.since.append(since)
-        state: Literal["failed", "moving"] = "failed" if self.problem else "moving"
-        return Transfer(direction="fetch", state=state, done=1_000_000, total=4_000_000, problem=self.problem)
-
-    def ends(self) -> None:
-        self._file.touch()
-        self._bench.clock.turn(LOOK_EVERY)
-        self._bench.service.look()
-
-
-def test_a_folder_that_cannot_be_looked_into_keeps_neither_places_nor_turns_from_other_robots(tmp_path: Path) -> None:
-    shared = SharedWorkers(1, lambda _count: HandExecutor(lambda _folder: Ended()))
-    bench, told = Bench(tmp_path, shared), threading.Event()
-    HandArchive(bench).ends()
-    assert shared.take_place("long", lambda: None)
-
-    def the_disk_goes() -> None:
-        assert not shared.take_place("long", told.set)  # behind this robot's fit
-        raise OSError(errno.EIO, "the disk is away")
-
-    bench.traces.before("files_of", the_disk_goes)
-    _asked(bench, FitRequest(traces=(TRACE,)))
-    compare = _asked(bench, COMPARE)
-    bench.service.start()
-    assert told.wait(60)
-    shared.give_place_back("long")
-    assert shared.take_place("long", told.set)
-    assert bench.end_of(compare).state == "done"  # in the only place of its lane
-    bench.service.close(10)
-    bench.store.close()
-
-
-@pytest.mark.parametrize("cancelled", [False, True])
-def test_a_job_waits_until_its_trace_is_fetched_from_the_archive_says_so_and_can_be_cancelled(
-    bench: Bench, cancelled: bool
-) -> None:
-    archive = HandArchive(bench)
-    job = _submitted(bench)
-    bench.service.start()
-    _until(bench, lambda: any(one.progress_text for one in bench.told))
-    assert bench.state_of(job) == "queued"
-    said = bench.service.with_progress(job).progress_text
-    assert said == "fetching its traces from the archive: 1.0 of 4.0 MB"
-    assert bench.executor.given == []
-    if cancelled:
-        assert bench.service.cancel(job.id, "anna").state == "cancelled"
-    archive.ends()
-    assert bench.end_of(job).state == ("cancelled" if cancelled else "done")
-    assert bench.executor.given == ([] if cancelled else [job.id])
-    assert set(archive.asked) == {TRACE}
-
-
-def test_a_job_looks_at_its_traces_twice_a_second_however_often_one_is_fetched(bench: Bench) -> None:
-    archive = HandArchive(bench)
-    job = _submitted(bench)
-    begun = bench.clock.now
-    for _ in range(5):
-        bench.service._begin()  # as its thread does for every trace that has been fetched
-    assert archive.asked == [TRACE]
-    bench.clock.turn(LOOK_EVERY)
-    bench.service._begin()
-    assert archive.asked == [TRACE, TRACE]
-    assert archive.since == [begun, begun]
-    assert bench.state_of(job) == "queued"
-
-
-def test_many_traces_are_looked_up_together(bench: Bench) -> None:
-    archive = HandArchive(bench)
-    names = [f"{number:012x}" for number in range(2, 40)]
-    for number in range(2, 40):
-        bench.traces.insert("ma2000", new_trace(number))
-    archive.has.update(names)
-    asked: list[str] = []
-    listen(bench.store.engine, "before_cursor_execute", lambda *told: asked.append(told[2]))
-    assert bench.catalogue.bring(names, 0.0) is not None
-    assert archive.asked == names
-    assert len([line for line in asked if line.startswith("SELECT")]) == 1
-
-
-def test_a_job_whose_trace_the_archive_cannot_give_fails_with_one_line_and_the_next_begins(bench: Bench) -> None:
-    archive = HandArchive(bench)
-    archive.problem = "archive traces at http://s3.lab: one is not what was sent (SHA-256)"
-    job = _submitted(bench)
-    bench.service.start()
-    ended = bench.end_of(job)
-    assert (ended.state, ended.reason, ended.failure) == ("failed", archive.problem, "refused")
-    archive.ends()
-    assert bench.end_of(_submitted(bench)).state == "done"
 
 
 def test_a_worker_that_cannot_be_had_ends_its_job_and_no_other(bench: Bench) -> None:

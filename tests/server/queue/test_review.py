@@ -291,8 +291,7 @@ def test_what_was_changed_in_the_database_does_not_begin(people: dict[str, Perso
     anna, bert = people["anna"], people["bert"]
     identity = anna.submit(at=None)
     bert.ask("PUT", f"/experiments/{identity}/approval", {"content": _content(bert, identity)})
-    address = f"sqlite:///{tmp_path / 'service' / 'service.sqlite'}"
-    with closing(Store(address)) as store, store.writing() as session:
+    with closing(Store(tmp_path / "service" / "service.sqlite")) as store, store.writing() as session:
         session.execute(text("UPDATE experiments SET spec = json_set(spec, '$.trajectory.duration', 0.3)"))
     assert anna.ask("POST", "/connect").status_code == 200
     anna.ask("POST", "/queue/resume", {"moves_real_arm": True})

@@ -11,7 +11,6 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -29,7 +28,6 @@ from daq.owner.stop_socket import FOLDER_VARIABLE
 from server.access.caller import LOCAL, Caller
 from server.access.digest import digest_of
 from server.access.origin import beside
-from server.access.sessions import SessionStore
 from server.access.stop_gate import StopGate, TokensCannotBeReadError
 from server.access.tokens import KnownTokens, TokenStore
 from server.problems import ProblemError
@@ -179,7 +177,7 @@ def _beside(service: Service) -> str:
 def listener_of(folder: Path, stops: dict[str, Stop], told: OnStop) -> Iterator[Any]:
     """A listener without a service, of robots that are stopped so. Its address."""
     with (
-        closing(Store(f"sqlite:///{folder / 'service.sqlite'}")) as store,
+        closing(Store(folder / "service.sqlite")) as store,
         socket.create_server(("127.0.0.1", 0)) as door,
         closing(StopListener(door, StopGate(KnownTokens(TokenStore(store), HandClock()), True, (), 8300), stops, told)),
     ):
@@ -307,7 +305,7 @@ def test_tokens_are_read_while_a_writer_holds_the_database_and_count_on_when_it_
     with closing(migrated_store(file)) as store:
         tokens = TokenStore(store)
         anna, bert = tokens.add("anna", "viewer", clock.utc()), tokens.add("bert", "operator", clock.utc())
-        found = StopTokens(reader_of(store.url, file), clock=clock.monotonic)
+        found = StopTokens(reader_of(file), clock=clock.monotonic)
         with store.writing() as writing:  # as a service that was put aside in the middle of it
             writing.execute(text("UPDATE tokens SET role = 'operator'"))
             assert found.look_up(anna) == Caller("anna", "viewer")
@@ -326,22 +324,8 @@ def test_tokens_are_read_while_a_writer_holds_the_database_and_count_on_when_it_
     found.look_up("daq_wrong")
     assert found.look_up(anna) == Caller("anna", "operator")
     found.close()
-    with closing(StopTokens(reader_of(store.url, file))) as never, pytest.raises(TokensCannotBeReadError):
+    with closing(StopTokens(reader_of(file))) as never, pytest.raises(TokensCannotBeReadError):
         never.look_up(anna)
-
-
-def test_a_fault_in_the_sessions_takes_nobody_s_token(tmp_path: Path) -> None:
-    file = tmp_path / "service.sqlite"
-    with closing(migrated_store(file)) as store:
-        token = TokenStore(store).add("anna", "viewer", HandClock().utc())
-        _, bert = SessionStore(store).begin(lambda _session: "bert", "viewer", datetime.now(UTC), timedelta(hours=1))
-        known, unread = (reader_of(store.url, file) for _ in range(2))
-        everybody = {digest_of(token): Caller("anna", "viewer"), bert.token: bert}
-        assert known() == everybody
-        with store.writing() as session:
-            session.execute(text("DROP TABLE sessions"))
-    assert known() == everybody, "who was known stays so"
-    assert unread() == {digest_of(token): Caller("anna", "viewer")}
 
 
 def test_no_stop_with_a_known_token_waits_for_a_database_that_does_not_answer() -> None:
@@ -367,14 +351,6 @@ def test_no_stop_with_a_known_token_waits_for_a_database_that_does_not_answer() 
     never.close()
 
 
-def test_an_old_cookie_refuses_no_stop_that_needs_no_token(tmp_path: Path) -> None:
-    stale = {"host": "127.0.0.1:8301", "cookie": "daq-session=old", "origin": "http://127.0.0.1:8300"}
-    with closing(StopTokens(reader_of("sqlite://", tmp_path / "none.sqlite"))) as unread:
-        assert StopGate(unread, True, (), 8300).admit(stale) == LOCAL
-        with pytest.raises(TokensCannotBeReadError):
-            StopGate(unread, False, (), 8300).admit(stale)
-
-
 @contextmanager
 def _door(
     folder: Path, monkeypatch: pytest.MonkeyPatch, *times: float
@@ -386,10 +362,8 @@ def _door(
         service_port=8300,
         open_on_loopback=True,
         names=(),
-        cookie="daq-session",
         urls={"ma2000": "mock://"},
-        database_url="sqlite://",
-        sqlite=folder / "none.sqlite",
+        database=folder / "none.sqlite",
     )
     with socket.create_server(("127.0.0.1", 0)) as listener, closing(StopDoor(listener, begin, *times)) as door:
         address = f"http://127.0.0.1:{listener.getsockname()[1]}/api/v1/robots/ma2000/stop"

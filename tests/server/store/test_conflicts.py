@@ -21,10 +21,10 @@ TRACE = new_trace(0, created=NOW, name="loose belt")
 
 
 @pytest.fixture
-def store(sqlite_store: Store) -> Store:
+def store(store: Store) -> Store:
     """A new database with one trace."""
-    TraceStore(sqlite_store).insert(ROBOT, TRACE)
-    return sqlite_store
+    TraceStore(store).insert(ROBOT, TRACE)
+    return store
 
 
 def test_a_trace_in_use_names_itself_and_its_users(store: Store) -> None:

@@ -15,11 +15,9 @@ from daq.contracts.service.jobs import DiagnoseRequest
 from daq.contracts.service.traces import TraceChange
 from server.experiments.states import Event
 from server.stopping.tokens import reader_of
-from server.store.address import address_of
 from server.store.engine import Store
 from server.store.experiments import ExperimentStore
 from server.store.jobs import JobStore
-from server.store.lock import sqlite_file
 from server.store.models import ModelStore
 from server.store.tables import ModelRow
 from server.store.traces import TraceSearch, TraceStore
@@ -32,8 +30,8 @@ def _found(traces: TraceStore, **search: object) -> list[int]:
     return [int(one.id, 16) for one in page.items]
 
 
-def test_nobody_else_may_read_the_database(sqlite_store: Store, tmp_path: Path) -> None:
-    with sqlite_store.engine.begin() as connection:
+def test_nobody_else_may_read_the_database(store: Store, tmp_path: Path) -> None:
+    with store.engine.begin() as connection:
         connection.execute(text("CREATE TABLE written (x INTEGER)"))
         files = [path for path in tmp_path.iterdir() if path.name.startswith("service.sqlite")]
         assert files
@@ -43,12 +41,11 @@ def test_nobody_else_may_read_the_database(sqlite_store: Store, tmp_path: Path) 
 @pytest.mark.parametrize("name", ["why?", "a%41b", "50%", "a#b", "x?mode=memory&y", "ü :@"])
 def test_a_folders_name_is_no_syntax_of_an_address(tmp_path: Path, name: str) -> None:
     folder = tmp_path / name / "service"
-    address = address_of(ServiceSettings(folder=folder))
-    assert sqlite_file(address) == sqlite_file(address.render_as_string()) == folder / "service.sqlite"
-    with closing(Store(address)) as store:
+    file = ServiceSettings(folder=folder).database
+    with closing(Store(file)) as store:
         store.migrate()
     assert [path.name for path in tmp_path.iterdir()] == [name]
-    assert reader_of(str(address), folder / "service.sqlite")() == {}
+    assert reader_of(file)() == {}
 
 
 def test_a_database_of_another_version_is_refused(store: Store) -> None:
@@ -58,8 +55,8 @@ def test_a_database_of_another_version_is_refused(store: Store) -> None:
         store.migrate()
 
 
-def test_what_is_committed_survives_a_power_cut(sqlite_store: Store) -> None:
-    with sqlite_store.engine.connect() as connection:
+def test_what_is_committed_survives_a_power_cut(store: Store) -> None:
+    with store.engine.connect() as connection:
         assert connection.execute(text("PRAGMA journal_mode")).scalar() == "wal"
         assert connection.execute(text("PRAGMA synchronous")).scalar() == 2  # FULL
 

@@ -20,17 +20,15 @@ from daq.executors.workers import ending
 from daq.traces.reader import read_trace
 from model.discrepancy.diagnosis import Diagnosis
 from model.machine_model.model import base_model
-from model.trial.arms import compose
+from model.trial.registration import compose
 from tests.daq.executors.by_hand import WorkersByHand, WorkersInThreads
 from tests.daq_cli.invoke import CommandLine
 from trials.blind import sealed
 from trials.blind.campaign import Campaign
-from trials.blind.experiments import machine_with_load, trial_experiment, write_set_points
 from trials.blind.folder import TrialFolder
-from trials.blind.mock_side import TrialStageError
-from trials.blind.recording import Recorded
+from trials.blind.recording import Recorded, machine_with_load, trial_experiment, write_set_points
 from trials.blind.registered import REGISTERED, library_versions, source_tree, to_register, tree_hashes
-from trials.blind.sealed import diagnose_sealed
+from trials.blind.sealed import TrialStageError, diagnose_sealed
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_diagnoser.py")))
 MACHINE = load_machine("ma2000")
@@ -322,7 +320,7 @@ def test_nothing_that_a_stage_imports_is_left_out_of_a_registration() -> None:
     graph = grimp.build_graph(*every, exclude_type_checking_imports=True, cache_dir=None)
     begun = {name for name in graph.modules if any(f"{name}.".startswith(f"{stage}.") for stage in STAGE_MODULES)}
     used = begun.union(*(graph.find_upstream_modules(name) for name in begun))
-    assert {"model.discrepancy.workflow", "daq.link.link", "model.fitting.directions"} <= used
+    assert {"model.discrepancy.workflow", "daq.link.link", "model.fitting.identifiability"} <= used
     registered = [path.removesuffix(".py").replace("/", ".") for path in REGISTERED]
     packages = {"daq", "model", "server", "server.jobs"}  # of which only the registered parts are used
     left = [name for name in used - packages if not any(f"{name}.".startswith(f"{p}.") for p in (*registered, *AROUND))]

@@ -15,14 +15,13 @@ from model.discrepancy.diagnosis import Acquired, Diagnosis, NextExperiment
 from model.discrepancy.options import DiagnosisOptions
 from model.machine_model.model import base_model
 from model.machine_model.model_file import save_model
-from model.trial.arms import compose
+from model.trial.registration import compose
 from tests.daq.executors.by_hand import WorkersByHand
 from tests.model.discrepancy.steps import answer_of
 from trials.blind import diagnoser
 from trials.blind.campaign import ROBOT_TIME, Campaign
-from trials.blind.experiments import trial_experiment
 from trials.blind.folder import TrialFolder
-from trials.blind.recording import record
+from trials.blind.recording import record, trial_experiment
 
 MACHINE = load_machine("ma2000")
 SOUND = compose(7654321, "clean", "nominal")

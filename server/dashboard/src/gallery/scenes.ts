@@ -49,7 +49,6 @@ export function begin(scene: Scene): void {
     name: 'local',
     role: 'owner',
     owner_of: ['ma2000'],
-    session_until: null,
   } as unknown as typeof live.me;
   live.robot = { ...ROBOT, ...CHANGES[scene] };
   live.queue = {

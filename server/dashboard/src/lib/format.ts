@@ -99,3 +99,6 @@ export function sentence(text: string): string {
   const first = capital(whole);
   return /[.!?]$/.test(first) ? first : `${first}.`;
 }
+
+/** The time zone of this browser, by which times of day are shown and entered. */
+export const ZONE = Intl.DateTimeFormat().resolvedOptions().timeZone;

@@ -13,8 +13,8 @@ from daq.contracts.trace import Trace, TraceRecord
 from extras.formats.robot_files.bodies_of_model import outgoing_arm
 from extras.formats.robot_files.machine_of_arm import machine_from_urdf
 from extras.formats.robot_files.mjcf_writer import mjcf_text
-from model.fitting.log_cholesky import ENTRIES as PLACES
-from model.fitting.log_cholesky import second_moments
+from model.fitting.consistent_bodies import ENTRIES as PLACES
+from model.fitting.consistent_bodies import second_moments
 from model.fitting.options import FitOptions, Prior
 from model.inverse_dynamics.fit import TorqueFit, fit_torques, torque_curves
 from model.machine_model.model import Model, base_model

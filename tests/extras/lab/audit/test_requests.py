@@ -136,14 +136,10 @@ def test_the_log_is_restored_with_a_backup_which_is_in_it(
         robot.post("queue/pause")
     daq("backup", "arm.zip")
     daq("token", "add", "anna", "--role", "operator")
-    replaced = json.loads(daq("audit", "verify", "--json").out)
     assert daq("restore", "arm.zip", "--overwrite").code == 0
     rows = json.loads(daq("audit", "--json").out)
     assert [row["action"] for row in rows] == ["start_service", "pause_queue", "restore"]
-    assert rows[-1]["detail"].endswith(replaced["head"])
-    assert "3 rows, each as it was written" in daq("audit", "verify").out
-    against = daq("audit", "verify", "--head", replaced["head"])
-    assert (against.code, against.out.startswith("row 3 does not fit: its digest was")) == (5, True)
+    assert rows[-1]["detail"].startswith("a backup of 20")
 
 
 def test_a_stop_is_answered_while_the_log_cannot_be_written_and_its_row_comes_later(
@@ -169,7 +165,7 @@ def test_the_commands_of_the_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     lines = [line.strip() for line in PAGE.read_text("utf-8").splitlines() if line.startswith("$ daq ")]
-    assert len(lines) == 5
+    assert len(lines) == 3
     with service_inside(tmp_path, SystemClock(), monkeypatch) as robot:
         robot.post("stop")
     monkeypatch.chdir(tmp_path)
@@ -182,4 +178,3 @@ def test_the_commands_of_the_page(
     assert [line.split()[4] for line in shown] == ["start_service", "stop_robot", "add_token"]
     assert "local (127.0.0.1)" in shown[1]
     assert "(command line)" in shown[2]
-    daq("audit", "verify", "--head", "3").complains(2, "--head '3': write NUMBER:DIGEST")

@@ -22,8 +22,8 @@ def rows(store: Store) -> list[AuditEntry]:
 
 
 @contextmanager
-def writing(store: Store, folder: Path) -> Iterator[AuditWriter]:
-    writer = AuditWriter(AuditLog(store), folder / "waiting.jsonl", again_after=0.01)
+def writing(store: Store) -> Iterator[AuditWriter]:
+    writer = AuditWriter(AuditLog(store), again_after=0.01)
     yield writer
     writer.close(WITHIN)
 
@@ -38,59 +38,42 @@ def away(store: Store) -> Iterator[None]:
         session.execute(text("ALTER TABLE audit_away RENAME TO audit"))
 
 
-def test_while_the_database_is_away_nobody_waits_and_the_rows_come_later(sqlite_store: Store, tmp_path: Path) -> None:
-    with writing(sqlite_store, tmp_path) as writer:
-        with away(sqlite_store):
+def test_while_the_database_is_away_nobody_waits_and_the_rows_come_later(store: Store, tmp_path: Path) -> None:
+    with writing(store) as writer:
+        with away(store):
             noted = [writer.note(made_note(n)) for n in range(3)]
             assert not writer.flush(0.05)
             assert writer.waiting == 3
         for one in noted:
             one.result(WITHIN)
         assert not writer.trouble
-        assert [row.subject for row in rows(sqlite_store)] == [f"{n:012x}" for n in range(3)]
-    assert AuditLog(sqlite_store).first_misfit()[1] is None
+        assert [row.subject for row in rows(store)] == [f"{n:012x}" for n in range(3)]
 
 
-def test_what_could_not_be_written_before_the_end_is_written_after_the_next_start(
-    sqlite_store: Store, tmp_path: Path
+def test_what_could_not_be_written_before_the_end_is_in_the_services_log(
+    store: Store, caplog: pytest.LogCaptureFixture
 ) -> None:
-    with away(sqlite_store):
-        with writing(sqlite_store, tmp_path) as writer:
+    with away(store):
+        with writing(store) as writer:
             writer.note(made_note(1))
         assert writer.trouble
-        late = made_note(2, action="stop_robot")
-        writer.note(late)  # of the stop listener, which ends last
-    with (tmp_path / "waiting.jsonl").open("a", encoding="utf-8") as stream:
-        stream.write('{"half a li')  # the power failed
-    with writing(sqlite_store, tmp_path):
-        pass
-    assert [row.action for row in rows(sqlite_store)] == ["submit_experiment", "stop_robot"]
-    assert not (tmp_path / "waiting.jsonl").exists()
+        writer.note(made_note(2, action="stop_robot"))  # of the stop listener, which ends last
+    for words in ("only here", f"{1:012x}", "stop_robot"):
+        assert words in caplog.text
 
 
 def test_rows_that_find_no_room_in_memory_are_in_the_log_and_counted(
-    sqlite_store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("extras.lab.audit.writer.MOST_WAITING", 2)
-    with writing(sqlite_store, tmp_path) as writer, caplog.at_level(logging.ERROR, "server.audit"):
-        with away(sqlite_store):
+    with writing(store) as writer, caplog.at_level(logging.ERROR, "server.audit"):
+        with away(store):
             for n in range(5):
                 writer.note(made_note(n))
         assert writer.flush(WITHIN)
-    assert [row.action for row in rows(sqlite_store)] == ["submit_experiment"] * 2 + ["rows_left_out"]
-    assert rows(sqlite_store)[-1].detail.startswith("3 rows are only in the service's log")
+    assert [row.action for row in rows(store)] == ["submit_experiment"] * 2 + ["rows_left_out"]
+    assert rows(store)[-1].detail.startswith("3 rows are only in the service's log")
     assert sum("too many rows wait: only here" in record.message for record in caplog.records) == 3
-
-
-def test_a_note_has_a_row_when_its_future_ends_and_one_that_the_database_cannot_hold_keeps_no_other_out(
-    store: Store, tmp_path: Path
-) -> None:
-    with writing(store, tmp_path) as writer:
-        writer.note(made_note(1, detail="a \x00 character")).result(WITHIN)
-        assert [row.number for row in rows(store)] == [1]
-        writer.note(made_note(2)).result(WITHIN)
-        assert [row.number for row in rows(store)] == [1, 2]
-    assert AuditLog(store).first_misfit()[1] is None
 
 
 def test_repeats_are_counted_for_a_minute_and_forgotten_when_they_end() -> None:

@@ -23,7 +23,7 @@ from model.discrepancy.explanation.notes import note_words
 from model.machine_model.model import Model
 from tests.model.discrepancy.readings.cases import case_of, fitted, searched
 from tests.model.fitting import imagined
-from trials.blind.experiments import trial_experiment
+from trials.blind.recording import trial_experiment
 
 EXPERIMENTS = {e.name: e for e in offered_experiments()}
 FRICTION = ("coulomb_friction", "gravity_torque_friction")

@@ -1337,70 +1337,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/robots/{robot}/archive": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Archive
-         * @description Returns whether the archive answers, and the traces that wait for it.
-         */
-        get: operations["get_archive"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/robots/{robot}/traces/{trace}/archive": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Trace Archive
-         * @description Returns where a trace is, and the progress of its transfer.
-         */
-        get: operations["get_trace_archive"];
-        put?: never;
-        /**
-         * Archive Trace
-         * @description Sends a trace to the archive now; with `drop`, its local copy is deleted afterwards.
-         */
-        post: operations["archive_trace"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/robots/{robot}/traces/{trace}/fetch": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Fetch Trace
-         * @description Fetches a trace that only the archive has, as opening it does; returns the progress.
-         */
-        post: operations["fetch_trace"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/v1/audit": {
         parameters: {
             query?: never;
@@ -1412,7 +1348,7 @@ export interface paths {
          * List Audit
          * @description Lists who requested which change, from where, and its outcome, the newest first. Needs the role operator.
          *
-         *     Nothing changes or deletes a row. `daq audit verify` checks the chain of their digests.
+         *     Nothing changes or deletes a row.
          */
         get: operations["list_audit"];
         put?: never;
@@ -1653,49 +1589,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/fleet/experiments": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Submit Fleet Experiment
-         * @description Puts the same experiment into the queue of several robots. If one of them cannot run it, none gets it.
-         *
-         *     It begins when its robot's queue allows it: a paused queue stays paused. With the same Idempotency-Key each robot
-         *     gets it once.
-         */
-        post: operations["submit_fleet_experiment"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/fleet/comparison": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Compare Fleet
-         * @description Compares the robots' fits to the same experiment over time, and reports values that have changed.
-         */
-        get: operations["compare_fleet"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/v1/me/layouts": {
         parameters: {
             query?: never;
@@ -1736,46 +1629,6 @@ export interface paths {
         get: operations["get_notifications"];
         put?: never;
         post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/login": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get Login Ways
-         * @description Returns the ways to sign in: always by token, and by OpenID Connect if it is configured. Needs no token.
-         */
-        get: operations["get_login_ways"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/v1/logout": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Log Out
-         * @description Ends the caller's session; a token stays valid. Returns the URL that ends the provider's own session.
-         */
-        post: operations["log_out"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1950,90 +1803,8 @@ export interface components {
             content: string;
         };
         /**
-         * ArchiveOrder
-         * @description Requests that a trace is archived now. `drop`: then delete the local copy, whatever the policy is.
-         */
-        ArchiveOrder: {
-            /**
-             * Drop
-             * @default false
-             */
-            drop?: boolean;
-        };
-        /**
-         * ArchiveStatus
-         * @description State of the archive.
-         */
-        ArchiveStatus: {
-            /** Place */
-            place: string;
-            /**
-             * State
-             * @enum {string}
-             */
-            state: "ok" | "away" | "refused";
-            /** Problem */
-            problem: string;
-            /** Since */
-            since: string | null;
-            /** Next Try */
-            next_try: number | null;
-            /** Archived */
-            archived: number;
-            /** Waiting */
-            waiting: number;
-            /** Fetching */
-            fetching: number;
-            /** Local Bytes */
-            local_bytes: number;
-            /** Local Limit */
-            local_limit: number | null;
-        };
-        /**
-         * ArmComparison
-         * @description A robot's fits to one experiment, the oldest first, and the changes from `reference` to the newest.
-         *
-         *     `reference`: the newest fit that is older than the last one by the requested time; None if there is none.
-         */
-        ArmComparison: {
-            /** Robot */
-            robot: string;
-            /** Fits */
-            fits: components["schemas"]["ArmFit"][];
-            /** Reference */
-            reference?: string | null;
-            /**
-             * Changes
-             * @default []
-             */
-            changes?: components["schemas"]["NumberChange"][];
-        };
-        /**
-         * ArmFit
-         * @description One fit of one robot. `at`: when the newest of its traces was recorded.
-         */
-        ArmFit: {
-            /** Job */
-            job: string;
-            /**
-             * At
-             * Format: date-time
-             */
-            at: string;
-            /** Traces */
-            traces: string[];
-            /** Converged */
-            converged: boolean;
-            /** Whitened Mean Square */
-            whitened_mean_square: number;
-            /** Residuals */
-            residuals: components["schemas"]["daq__contracts__service__fleet__JointResidual"][];
-            /** Numbers */
-            numbers: components["schemas"]["FittedNumber"][];
-        };
-        /**
          * AuditEntry
-         * @description One row of the log. `number` grows by 1 with each row.
+         * @description One row of the log. `number` grows with each row.
          */
         AuditEntry: {
             /**
@@ -2081,10 +1852,6 @@ export interface components {
             count?: number;
             /** Number */
             number: number;
-            /** Previous */
-            previous: string;
-            /** Digest */
-            digest: string;
         };
         /**
          * AwaitInput
@@ -2242,16 +2009,6 @@ export interface components {
              * @default false
              */
             missing?: boolean;
-            /**
-             * Archived
-             * @default false
-             */
-            archived?: boolean;
-            /**
-             * Local
-             * @default true
-             */
-            local?: boolean;
         };
         /**
          * Combination
@@ -2577,19 +2334,13 @@ export interface components {
             waiting: number;
             /** Sent */
             sent: number;
-            /** Failed */
-            failed: number;
             /** Given Up */
             given_up: number;
-            /** Last Sent */
-            last_sent?: string | null;
             /**
              * Problem
              * @default
              */
             problem?: string;
-            /** Next Attempt */
-            next_attempt?: string | null;
         };
         /**
          * DiagnoseRequest
@@ -3484,24 +3235,6 @@ export interface components {
             name?: string | null;
         };
         /**
-         * FittedNumber
-         * @description A parameter estimated by a fit, with its 95 % interval.
-         */
-        FittedNumber: {
-            /** Name */
-            name: string;
-            /** Unit */
-            unit: string;
-            /** Value */
-            value: number;
-            /** Deviation */
-            deviation: number;
-            /** Low */
-            low: number;
-            /** High */
-            high: number;
-        };
-        /**
          * FittedParameter
          * @description One parameter after a fit.
          *
@@ -3538,41 +3271,6 @@ export interface components {
             expected_deviation: number | null;
             /** At Bound */
             at_bound: ("low" | "high") | null;
-        };
-        /**
-         * FleetComparison
-         * @description The robots' fits to the same experiment, over time.
-         */
-        FleetComparison: {
-            /** Experiments */
-            experiments: string[];
-            /** Experiment */
-            experiment: string | null;
-            /** Days */
-            days: number;
-            /** Robots */
-            robots: components["schemas"]["ArmComparison"][];
-            /** Words */
-            words?: {
-                [key: string]: components["schemas"]["ParameterWords"];
-            };
-        };
-        /**
-         * FleetExperimentRequest
-         * @description An experiment for several robots; None for all of them. It is added to the queue of each.
-         */
-        FleetExperimentRequest: {
-            request: components["schemas"]["ExperimentRequest"];
-            /** Robots */
-            robots?: string[] | null;
-        };
-        /**
-         * FleetExperiments
-         * @description The queued experiments, one per robot.
-         */
-        FleetExperiments: {
-            /** Experiments */
-            experiments: components["schemas"]["Experiment"][];
         };
         /**
          * FleetRobot
@@ -4270,6 +3968,24 @@ export interface components {
             speed?: number | null;
         };
         /**
+         * JointResidual
+         * @description Measured − expected acceleration of a joint (rad/s²; None where it does not move) and its correlations.
+         *
+         *     `noise` is its noise floor: the root mean square residual of records that the model itself makes.
+         */
+        JointResidual: {
+            /** Joint */
+            joint: number;
+            /** Values */
+            values: (number | null)[];
+            /** Noise */
+            noise: number;
+            /** Rms */
+            rms: number;
+            /** Against */
+            against: components["schemas"]["Correlation"][];
+        };
+        /**
          * KeptLayouts
          * @description All layouts of one person. `text`: as the page writes them; empty if none are kept.
          */
@@ -4449,13 +4165,6 @@ export interface components {
             messages: (components["schemas"]["SampleMessage"] | components["schemas"]["HistoryMessage"] | components["schemas"]["RecordEventMessage"] | components["schemas"]["RobotMessage"] | components["schemas"]["LinkMessage"] | components["schemas"]["QueueMessage"] | components["schemas"]["ProgressMessage"] | components["schemas"]["JobMessage"] | components["schemas"]["EventMessage"] | components["schemas"]["TeachingMessage"] | components["schemas"]["ThinnedMessage"] | components["schemas"]["RefusedMessage"])[];
         };
         /**
-         * LoginWays
-         * @description Ways to sign in besides a token. `openid` is None if no provider is configured.
-         */
-        LoginWays: {
-            openid?: components["schemas"]["OpenIdWay"] | null;
-        };
-        /**
          * Machine
          * @description A machine file. `modelled_joints`: the joints (from 1) whose motion the model describes. The others are held
          *     still, and their mass is part of `load`, a point mass at the end of the last modelled link.
@@ -4611,8 +4320,6 @@ export interface components {
              * @default true
              */
             is_known?: boolean;
-            /** Session Until */
-            session_until?: string | null;
         };
         /**
          * MeasuredGain
@@ -5012,38 +4719,6 @@ export interface components {
             destinations: components["schemas"]["DestinationStatus"][];
         };
         /**
-         * NumberChange
-         * @description A parameter that two fits of one robot estimated. `low` to `high`: 95 % interval of the difference.
-         */
-        NumberChange: {
-            /** Name */
-            name: string;
-            /** Unit */
-            unit: string;
-            /** Before */
-            before: number;
-            /** After */
-            after: number;
-            /** Difference */
-            difference: number;
-            /** Low */
-            low: number;
-            /** High */
-            high: number;
-            /** Changed */
-            changed: boolean;
-        };
-        /**
-         * OpenIdWay
-         * @description A provider of OpenID Connect. `start`: the path on this service that a browser opens to sign in.
-         */
-        OpenIdWay: {
-            /** Label */
-            label: string;
-            /** Start */
-            start: string;
-        };
-        /**
          * OpenedSecret
          * @description The hidden effect, and how the answer compares. `python -m mock_controller.reveal SEED` prints the secret of
          *     `seed` in one line. The SHA-256 of that line is the seal that was shown before.
@@ -5063,7 +4738,7 @@ export interface components {
              * Outcome
              * @enum {string}
              */
-            outcome: "named" | "among" | "joint" | "missed" | "wrong";
+            outcome: "named" | "among" | "joint" | "missed" | "wrong" | "cancelled";
         };
         /**
          * OutputRequest
@@ -6406,14 +6081,6 @@ export interface components {
             floor: number;
         };
         /**
-         * SignedOut
-         * @description The session has ended. `provider`: the address that ends the provider's own session, if there is one.
-         */
-        SignedOut: {
-            /** Provider */
-            provider?: string | null;
-        };
-        /**
          * Sine
          * @description `cycles` of a sine about the start posture. Each joint lags `phase` rad behind the one before it.
          */
@@ -6587,8 +6254,6 @@ export interface components {
             traces_size: number;
             /** Traces */
             traces: number;
-            /** Database */
-            database: string;
             /** Database Size */
             database_size: number | null;
         };
@@ -6768,7 +6433,7 @@ export interface components {
             /** Time */
             time: number[];
             /** Joints */
-            joints: components["schemas"]["model__validation__variation__JointResidual"][];
+            joints: components["schemas"]["JointResidual"][];
             /** Parameters */
             parameters: components["schemas"]["Variation"][];
             /**
@@ -6804,25 +6469,6 @@ export interface components {
             samples: number;
             /** Joints */
             joints: components["schemas"]["JointAgreement"][];
-        };
-        /**
-         * TraceArchive
-         * @description Where a trace is stored, and its transfer if there is one.
-         */
-        TraceArchive: {
-            /** Id */
-            id: string;
-            /** Local */
-            local: boolean;
-            /** Archived */
-            archived: string | null;
-            /** Checked */
-            checked: string | null;
-            /** Size */
-            size: number | null;
-            /** Sha256 */
-            sha256: string | null;
-            transfer: components["schemas"]["Transfer"] | null;
         };
         /**
          * TraceChange
@@ -7006,31 +6652,6 @@ export interface components {
             rms: number;
             /** Largest */
             largest: number;
-        };
-        /**
-         * Transfer
-         * @description A transfer of a trace between this computer and the archive.
-         */
-        Transfer: {
-            /**
-             * Direction
-             * @enum {string}
-             */
-            direction: "send" | "fetch";
-            /**
-             * State
-             * @enum {string}
-             */
-            state: "waiting" | "moving" | "failed";
-            /** Done */
-            done: number;
-            /** Total */
-            total: number;
-            /**
-             * Problem
-             * @default
-             */
-            problem?: string;
         };
         /**
          * TriedEffect
@@ -7258,38 +6879,6 @@ export interface components {
         WrittenLine: {
             /** Line */
             line: string;
-        };
-        /**
-         * JointResidual
-         * @description Residual of a fit at one joint: root mean square of simulated − measured, and of the measurement noise.
-         */
-        daq__contracts__service__fleet__JointResidual: {
-            /** Joint */
-            joint: number;
-            /** Unit */
-            unit: string;
-            /** After */
-            after: number;
-            /** Floor */
-            floor: number;
-        };
-        /**
-         * JointResidual
-         * @description Measured − expected acceleration of a joint (rad/s²; None where it does not move) and its correlations.
-         *
-         *     `noise` is its noise floor: the root mean square residual of records that the model itself makes.
-         */
-        model__validation__variation__JointResidual: {
-            /** Joint */
-            joint: number;
-            /** Values */
-            values: (number | null)[];
-            /** Noise */
-            noise: number;
-            /** Rms */
-            rms: number;
-            /** Against */
-            against: components["schemas"]["Correlation"][];
         };
     };
     responses: never;
@@ -9445,105 +9034,6 @@ export interface operations {
             };
         };
     };
-    get_archive: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ArchiveStatus"];
-                };
-            };
-        };
-    };
-    get_trace_archive: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                trace: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["TraceArchive"];
-                };
-            };
-        };
-    };
-    archive_trace: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                trace: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: {
-            content: {
-                "application/json": components["schemas"]["ArchiveOrder"];
-            };
-        };
-        responses: {
-            /** @description Successful Response */
-            202: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["TraceArchive"];
-                };
-            };
-        };
-    };
-    fetch_trace: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                trace: string;
-                /** @description Name of the robot. */
-                robot: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            202: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["TraceArchive"];
-                };
-            };
-        };
-    };
     list_audit: {
         parameters: {
             query?: {
@@ -9923,58 +9413,6 @@ export interface operations {
             };
         };
     };
-    submit_fleet_experiment: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description A request sent again with the same key is carried out once. */
-                "idempotency-key"?: string | null;
-            };
-            path?: never;
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["FleetExperimentRequest"];
-            };
-        };
-        responses: {
-            /** @description Successful Response */
-            201: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["FleetExperiments"];
-                };
-            };
-        };
-    };
-    compare_fleet: {
-        parameters: {
-            query?: {
-                /** @description Its name; else the most fitted one. */
-                experiment?: string | null;
-                /** @description Least time between the compared fits, in days. */
-                days?: number;
-            };
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["FleetComparison"];
-                };
-            };
-        };
-    };
     get_layouts: {
         parameters: {
             query?: never;
@@ -10035,46 +9473,6 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["NotificationStatus"];
-                };
-            };
-        };
-    };
-    get_login_ways: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["LoginWays"];
-                };
-            };
-        };
-    };
-    log_out: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["SignedOut"];
                 };
             };
         };

@@ -52,7 +52,7 @@ class FakeSocket implements Socket {
   sent: string[] = [];
   closed = false;
 
-  constructor(readonly ticket: string) {}
+  listen(): void {}
   send(text: string): void {
     this.sent.push(text);
   }
@@ -74,24 +74,18 @@ let clock: HandClock;
 let sockets: FakeSocket[];
 let states: SocketState[];
 let frames: LiveFrame[];
-let tickets: number;
-let ticketProblem: Error | null;
+let refusal: Error | null;
 let live: LiveSocket;
 
 beforeEach(async () => {
   clock = new HandClock();
-  [sockets, states, frames, tickets, ticketProblem] = [[], [], [], 0, null];
+  [sockets, states, frames, refusal] = [[], [], [], null];
   live = new LiveSocket({
-    ticket: async () => {
-      if (ticketProblem !== null) throw ticketProblem;
-      return `ticket-${(tickets += 1)}`;
+    open: async () => {
+      if (refusal !== null) throw refusal;
+      sockets.push(new FakeSocket());
+      return newest();
     },
-    open: (ticket) => {
-      const socket = new FakeSocket(ticket);
-      sockets.push(socket);
-      return socket;
-    },
-    wanted: () => ({ subscribe: ['samples'], history: 60 }),
     frame: (frame) => frames.push(frame),
     state: (state) => states.push(state),
     now: () => clock.now,
@@ -105,11 +99,9 @@ const newest = (): FakeSocket => sockets.at(-1) as FakeSocket;
 const phase = (): string => states.at(-1)?.phase ?? '';
 
 describe('the live socket', () => {
-  it('asks for a ticket, opens with it and says what it wants', () => {
-    expect(newest().ticket).toBe('ticket-1');
+  it('opens', () => {
     newest().opens();
     expect(phase()).toBe('open');
-    expect(JSON.parse(newest().sent[0] ?? '')).toEqual({ subscribe: ['samples'], history: 60 });
   });
 
   it('hands frames on', () => {
@@ -118,20 +110,19 @@ describe('the live socket', () => {
     expect(frames).toEqual([{ now: 5, messages: [] }]);
   });
 
-  it('comes back by itself with a new ticket, and asks again for what it wants', async () => {
+  it('comes back by itself', async () => {
     newest().opens();
     newest().breaks('the service ends');
     expect(states.at(-1)).toMatchObject({ phase: 'lost', why: 'the service ends' });
     await clock.pass(backOff(1));
-    expect(newest().ticket).toBe('ticket-2');
+    expect(sockets).toHaveLength(2);
     expect(states).toContainEqual({ phase: 'open', again: false });
     newest().opens();
     expect(states.at(-1)).toEqual({ phase: 'open', again: true });
-    expect(newest().sent).toHaveLength(1);
   });
 
   it('waits longer from attempt to attempt, up to a limit, and begins anew after a success', async () => {
-    ticketProblem = new Error('the service does not answer');
+    refusal = new Error('the service does not answer');
     newest().breaks();
     const waits: number[] = [];
     for (let attempt = 0; attempt < 7; attempt += 1) {
@@ -141,7 +132,7 @@ describe('the live socket', () => {
       await clock.pass(state.retryAt - clock.now);
     }
     expect(waits.map((wait) => Math.round(wait * 100) / 100)).toEqual([0.25, 0.5, 1, 2, 3, 3, 3]);
-    ticketProblem = null;
+    refusal = null;
     await clock.pass(3);
     newest().opens();
     newest().breaks();

@@ -1,7 +1,7 @@
 /**
- * The live WebSocket: asks for a ticket, opens, says what it wants, and comes back by itself when it is lost.
+ * The live WebSocket: opens, and comes back by itself when it is lost.
  *
- * Knows nothing about a browser: what opens sockets, asks for tickets and tells the time is handed in.
+ * Knows nothing about a browser: what opens sockets and tells the time is handed in.
  */
 
 import type { LiveFrame, LiveRequest } from './types';
@@ -28,13 +28,12 @@ export interface Socket {
   onmessage: ((event: MessageEvent<string>) => void) | null;
   send(text: string): void;
   close(): void;
+  /** Calls back from now on, first with what has happened already. */
+  listen(): void;
 }
 
 export interface SocketParts {
-  ticket(): Promise<string>;
-  open(ticket: string): Socket;
-  /** What is asked for whenever the socket has opened. */
-  wanted(): LiveRequest;
+  open(): Promise<Socket>;
   frame(frame: LiveFrame, at: number): void;
   state(state: SocketState): void;
   /** s, of a clock that only goes forward. */
@@ -98,15 +97,14 @@ export class LiveSocket {
     this.attempt += 1;
     this.parts.state({ phase: 'connecting', attempt: this.attempt });
     this.timer(OPEN_WITHIN, () => this.lost('the service does not answer'));
-    let ticket: string;
+    let socket: Socket;
     try {
-      ticket = await this.parts.ticket();
+      socket = await this.parts.open();
     } catch (error) {
       if (turn === this.turn) this.lost(error instanceof Error ? error.message : String(error));
       return;
     }
-    if (turn !== this.turn) return;
-    const socket = this.parts.open(ticket);
+    if (turn !== this.turn) return socket.close();
     this.socket = socket;
     socket.onopen = () => {
       if (turn !== this.turn) return;
@@ -115,17 +113,18 @@ export class LiveSocket {
       this.heard = this.parts.now();
       this.parts.state({ phase: 'open', again: this.wasOpen });
       this.wasOpen = true;
-      this.send(this.parts.wanted());
       this.listen();
     };
     socket.onmessage = (event) => {
       if (turn !== this.turn) return;
       this.heard = this.parts.now();
-      this.parts.frame(JSON.parse(event.data) as LiveFrame, this.heard);
+      // When it came, which may be long before it can be heard: ages are told from it.
+      this.parts.frame(JSON.parse(event.data) as LiveFrame, event.timeStamp / 1000);
     };
     socket.onclose = (event) => {
       if (turn === this.turn) this.lost(event.reason || 'the connection was closed');
     };
+    socket.listen();
   }
 
   /** A connection can be dead without being closed: after some silence the service is asked for something small. */

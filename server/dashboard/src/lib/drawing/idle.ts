@@ -8,3 +8,13 @@ export function whenIdle(call: () => void, latest: number): () => void {
   const asked = requestIdleCallback(call, { timeout: latest });
   return () => cancelIdleCallback(asked);
 }
+
+/** Calls once the next picture of the page is on the screen. Returns what calls it off. */
+export function afterPaint(call: () => void): () => void {
+  let timer: ReturnType<typeof setTimeout>;
+  const frame = requestAnimationFrame(() => (timer = setTimeout(call)));
+  return () => {
+    cancelAnimationFrame(frame);
+    clearTimeout(timer);
+  };
+}

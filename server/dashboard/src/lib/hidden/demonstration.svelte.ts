@@ -50,7 +50,7 @@ export class Demonstration {
     }
   }
 
-  /** Ends the search; the demonstration then ends without an answer. Throws a Problem. */
+  /** Ends the search; the secret is then opened without an answer. Throws a Problem. */
   async cancel(job: string): Promise<void> {
     await ask(api.POST('/api/v1/robots/{robot}/jobs/{job}/cancel', { params: { path: { ...here(), job } } }));
   }
@@ -75,7 +75,8 @@ export class Demonstration {
     }
     const { hidden } = this;
     const isAwaited =
-      hidden !== null && (this.isGoingOn(hidden) || (hidden.state === 'opened' && !this.found));
+      hidden !== null &&
+      (this.isGoingOn(hidden) || (hidden.secret && hidden.secret.outcome !== 'cancelled' && !this.found));
     if (isAwaited && !this.closed) this.timer = setTimeout(() => void this.look(), LOOK_EVERY);
   }
 

@@ -49,7 +49,7 @@ it('candidates that compete are those with something to say for them, the best f
 
 it('the two numbers stand in one unit, angles in degrees', () => {
   const number = { called: 'gap', unit: 'rad', hidden: 0.01, found: null, low: null, high: null };
-  expect(bothNumbers(number)).toEqual({ hidden: '0.573 °', found: 'not given', range: '' });
+  expect(bothNumbers(number)).toEqual({ hidden: '0.573 °', found: 'not in the answer', range: '' });
   expect(bothNumbers({ ...number, unit: 'N·m', found: 0.02, low: 0.01, high: 0.03 }).range).toBe(
     '95 %: 0.0100 to 0.0300 N·m',
   );

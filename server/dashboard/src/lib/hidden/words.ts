@@ -28,6 +28,11 @@ export const OUTCOMES: Record<Outcome, { tone: Tone; title: string; text: string
     title: 'Wrong',
     text: 'The diagnosis named something else. It happens, and here it is.',
   },
+  cancelled: {
+    tone: 'quiet',
+    title: 'Cancelled',
+    text: 'The search was ended before it had an answer. The candidates are those that led then.',
+  },
 };
 
 /** The two numbers of a row, in the unit in which people read them; one of the mock's own has no unit, and no match. */
@@ -38,7 +43,7 @@ export function bothNumbers(one: HiddenNumber): { hidden: string; found: string;
   const isBounded = one.low !== null && one.high !== null;
   return {
     hidden: written(one.hidden),
-    found: written(one.found) || (one.unit === '' ? 'not comparable' : 'not given'),
+    found: written(one.found) || (one.unit === '' ? 'not comparable' : 'not in the answer'),
     range: isBounded ? `95 %: ${significant(one.low! * factor)} to ${written(one.high)}` : '',
   };
 }

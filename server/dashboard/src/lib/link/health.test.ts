@@ -43,8 +43,16 @@ describe('the verdict on the link', () => {
   it('is one over ten seconds: neither one repeat nor a moment in order changes it', () => {
     expect(new Set(follow(0.3, 60, 60))).toEqual(new Set(['healthy']));
     const said = follow(2, 20, 60);
-    expect(said.slice(1, 20 + OVER)).toEqual(Array(19 + OVER).fill('degraded'));
+    expect(said.slice(3, 20 + OVER)).toEqual(Array(17 + OVER).fill('degraded'));
     expect(said.slice(20 + 2 * OVER)).toEqual(Array(40 - 2 * OVER).fill('healthy'));
+  });
+
+  it('is not made by the moment in which a browser starts', () => {
+    expect(new Set(follow(4, 1, 60))).toEqual(new Set(['healthy']));
+    const health = new LinkHealth();
+    health.heard(told({ requests: 0 }), 0);
+    // Each repeat follows a time-out: three replies were lost, not six.
+    expect(health.heard(told({ requests: 350, timeouts: 3, retries: 3 }), 7).text).toBe('healthy');
   });
 
   it('says what is wrong and what to do', () => {

@@ -1,9 +1,10 @@
 /**
- * What has to be known before anything is shown, asked for all at once. `main.ts` asks before the program of the page is
- * loaded, so that the service answers while the browser reads it.
+ * What has to be known before anything is shown, asked for all at once, and the live socket. `main.ts` asks before the
+ * program of the page is loaded, so that the service answers while the browser reads it.
  */
 
-import { api, ask, here, showRobot } from '../api/client';
+import { api, ask, here, root, showRobot } from '../api/client';
+import { EarlySocket } from '../api/early_socket';
 import { Problem } from '../api/problem';
 import type { Machine, Me, SystemStatus } from '../api/types';
 
@@ -13,8 +14,8 @@ export interface Asked {
   readonly machine: Promise<Machine>;
   readonly me: Promise<Me>;
   readonly system: Promise<SystemStatus>;
-  /** Opens one socket. */
-  readonly ticket: Promise<string>;
+  /** Subscribed to everything. */
+  readonly socket: Promise<EarlySocket>;
 }
 
 let early: Asked | null = null;
@@ -35,8 +36,12 @@ export async function askSystem(): Promise<SystemStatus> {
   return ask(api.GET('/api/v1/system'));
 }
 
-export async function newTicket(): Promise<string> {
-  return (await ask(api.POST('/api/v1/tickets'))).ticket;
+/** The live socket of the robot. */
+export async function newSocket(robot: string | Promise<string>): Promise<EarlySocket> {
+  const [{ ticket }, name] = await Promise.all([ask(api.POST('/api/v1/tickets')), robot]);
+  const path = `/api/v1/robots/${encodeURIComponent(name)}/live?ticket=${ticket}`;
+  const first = { subscribe: ['samples', 'robot', 'link', 'queue', 'jobs', 'events', 'teaching'] } as const;
+  return new EarlySocket(new WebSocket(root.replace(/^http/, 'ws') + path), JSON.stringify(first));
 }
 
 function askAll(): Asked {
@@ -47,7 +52,7 @@ function askAll(): Asked {
     machine: robot.then(() => ask(api.GET('/api/v1/robots/{robot}/machine', { params: { path: here() } }))),
     me: ask(api.GET('/api/v1/me')),
     system,
-    ticket: newTicket(),
+    socket: newSocket(robot),
   };
   // A refusal is told to whoever waits for the answer; until then nobody has missed it.
   for (const answer of Object.values(found) as Promise<unknown>[]) answer.catch(() => {});

@@ -5,10 +5,10 @@
  * what is shown as numbers (`live.sample`) follows ten times a second. Charts draw in `onFrame`.
  */
 
-import { api, ask, here, isFleet, root } from '../api/client';
+import { api, ask, here, isFleet } from '../api/client';
 import { asProblem, type Problem } from '../api/problem';
 import { spoken } from '../format';
-import { isMissing, LiveSocket, SILENT_AFTER, type SocketState } from '../api/socket';
+import { isMissing, LiveSocket, SILENT_AFTER, type Socket, type SocketState } from '../api/socket';
 import type {
   Job,
   LiveFrame,
@@ -28,7 +28,7 @@ import { armNow } from '../stop/standing';
 import { fleet } from '../fleet/fleet.svelte';
 import { stop } from '../stop/stop.svelte';
 import { ServiceClock, STALE_AFTER } from './age';
-import { asked, askSystem, newTicket } from './asked';
+import { asked, askSystem, newSocket } from './asked';
 import { newestEvents, withPauser, withStopper } from './events';
 import { SampleRate } from './rate';
 import { Recording } from './recording';
@@ -37,6 +37,8 @@ const SHOWN_EVERY = 100;
 /** s of samples that are kept, and s that are asked for at the start. */
 const KEPT = 300;
 const AT_START = 60;
+/** ms: the past is much to send and to read, and the newest sample must not wait for it. */
+const PAST_AFTER = 100;
 const POINTS = 1200;
 const EVENTS_KEPT = 100;
 const EVENTS_ASKED = 30;
@@ -124,14 +126,12 @@ class Live {
   private lateness: number[] = [];
   private readonly received = new SampleRate();
   private readonly health = new LinkHealth();
-  /** What was said before it was known what the robot is, and when. */
-  private unheard: [LiveFrame, number][] = [];
   private connection: LiveSocket | null = null;
 
-  /** Asks who and what there is, then listens for as long as the page lives. */
-  start(): void {
+  /** Asks who and what there is, then listens for as long as the page lives. Returns once it is known. */
+  async start(): Promise<void> {
     setInterval(() => this.tick(), SHOWN_EVERY);
-    void this.begin();
+    await this.begin();
   }
 
   /** Tries at once to reach the service. */
@@ -172,22 +172,21 @@ class Live {
   }
 
   private async begin(): Promise<void> {
-    const { robot, machine, me, system, ticket } = asked();
+    const { robot, machine, me, system, socket } = asked();
     try {
       await robot;
       this.isOfSeveral = isFleet();
       if (this.isOfSeveral) fleet.start();
-      this.connection = this.connect(ticket);
-      this.connection.start();
       const [known, caller] = await Promise.all([machine, me]);
       this.me = caller;
       void this.learn(system);
       this.problem = null;
-      this.know(known);
+      this.recording = new Recording(jointsOf(known.joints.length), PERIOD, KEPT);
+      this.machine = known;
+      this.connection = this.connect(socket);
+      this.connection.start();
     } catch (error) {
-      this.connection?.end();
-      this.connection = null;
-      this.unheard = [];
+      socket.then((one) => one.close()).catch(() => {});
       this.problem = asProblem(error);
       if (this.problem.status === 0 || this.problem.status >= 500) setTimeout(() => this.retryNow(), 2000);
     }
@@ -214,39 +213,25 @@ class Live {
     if (before !== null) this.events = newestEvents(this.events, before.items, EVENTS_KEPT);
   }
 
-  /** From now on what the service says can be kept: also what it has said already. */
-  private know(machine: Machine): void {
-    this.recording = new Recording(jointsOf(machine.joints.length), PERIOD, KEPT);
-    this.machine = machine;
-    const unheard = this.unheard;
-    this.unheard = [];
-    for (const [frame, at] of unheard) this.hear(frame, at);
-  }
-
-  /** `first`: the ticket of the first connection. */
-  private connect(first: Promise<string>): LiveSocket {
-    let given: Promise<string> | null = first;
-    const path = `/api/v1/robots/${encodeURIComponent(here().robot)}/live`;
+  /** `first`: the first connection. */
+  private connect(first: Promise<Socket>): LiveSocket {
+    let given: Promise<Socket> | null = first;
     return new LiveSocket({
-      ticket: () => {
-        const ticket = given ?? newTicket();
+      open: () => {
+        const socket = given ?? newSocket(here().robot);
         given = null;
-        return ticket.then(
-          (known) => this.admitted(known),
+        return socket.then(
+          (opened) => this.admitted(opened),
           (error: unknown) => this.notAdmitted(error),
         );
       },
-      open: (ticket) => new WebSocket(`${root.replace(/^http/, 'ws')}${path}?ticket=${ticket}`),
-      wanted: () => ({
-        subscribe: ['samples', 'robot', 'link', 'queue', 'jobs', 'events', 'teaching'],
-        history: this.missing(),
-        points: POINTS,
-      }),
       frame: (frame, at) => this.hear(frame, at),
       state: (state) => {
         this.socket = state;
         if (state.phase !== 'open') return;
         if (state.again) this.healed += 1;
+        const missing = this.missing();
+        setTimeout(() => this.send({ history: missing, points: POINTS }), PAST_AFTER);
         void this.learnEvents();
       },
       now: seconds,
@@ -257,12 +242,12 @@ class Live {
     });
   }
 
-  private admitted(ticket: string): string {
+  private admitted(socket: Socket): Socket {
     if (this.problem?.status === 401) this.problem = null;
-    return ticket;
+    return socket;
   }
 
-  /** A session that has ended, or a token that was revoked, leads to the sign-in. */
+  /** A token that was revoked leads to the sign-in. */
   private notAdmitted(error: unknown): never {
     const problem = asProblem(error);
     if (problem.status === 401) this.problem = problem;
@@ -277,10 +262,6 @@ class Live {
   }
 
   private hear(frame: LiveFrame, at: number): void {
-    if (this.recording === null) {
-      this.unheard.push([frame, at]);
-      return;
-    }
     if (this.clock.wentBack(frame.now, CLOCK_SLACK)) this.beginAnew();
     this.clock.heard(frame.now, frame.utc, at);
     for (const message of frame.messages) {
@@ -345,7 +326,7 @@ class Live {
     this.recording?.addSample(sample);
     this.lateness.push(sample.lateness);
     this.received.heard(sample.host_time);
-    if (isFirst) this.tick();
+    if (isFirst) queueMicrotask(() => this.tick()); // the newest of those that were kept meanwhile
   }
 
   /** A stop or fault is an event of the record while an experiment runs; at all other times it is marked here. */

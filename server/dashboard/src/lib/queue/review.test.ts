@@ -5,7 +5,7 @@ import { reviewText, whyNotApprove } from './review';
 const APPROVAL = { by: 'bert', at: '2026-03-02T12:00:00Z', as_owner: false };
 
 function person(name: string, more: Partial<Me> = {}): Me {
-  return { name, role: 'operator', owner_of: [], is_known: true, session_until: null, ...more };
+  return { name, role: 'operator', owner_of: [], is_known: true, ...more };
 }
 
 describe('the review of an experiment', () => {

@@ -100,7 +100,7 @@ async function sendToListener(port: number, path: string): Promise<StopResult> {
   const token = currentToken();
   const headers: HeadersInit = token === null ? {} : { Authorization: `Bearer ${token}` };
   const address = `${location.protocol}//${location.hostname}:${port}/api/v1${path}`;
-  const answer = await fetch(address, { method: 'POST', headers, credentials: 'include' });
+  const answer = await fetch(address, { method: 'POST', headers });
   if (!answer.ok) throw new Error(`the stop listener answered ${answer.status}`);
   return (await answer.json()) as StopResult;
 }

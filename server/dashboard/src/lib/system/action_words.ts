@@ -8,7 +8,6 @@ const WORDS: Readonly<Record<string, string>> = {
   submit_job: 'begin a computation',
   jog_robot: 'jog',
   upload_trace: 'take in a trace',
-  submit_fleet_experiment: 'add an experiment for several arms',
   create_schedule: 'plan',
   change_schedule: 'switch in the plan',
   delete_schedule: 'delete from the plan',
@@ -22,8 +21,6 @@ const WORDS: Readonly<Record<string, string>> = {
   hide_effect: 'hide something in the mock',
   change_trace: 'note on a trace',
   give_control_back: 'release control',
-  log_out: 'sign out',
-  finish_login: 'sign in',
   rows_left_out: 'rows left out',
   start_service: 'the service began',
 };

@@ -19,7 +19,7 @@ export async function figuresBefore(details: TraceDetails): Promise<TraceDetails
   };
   const page = await ask(api.GET('/api/v1/robots/{robot}/traces', { params: { path: here(), query } }));
   const candidates = page.items.filter(
-    (one) => one.id !== entry.id && one.name === entry.name && one.local && !one.missing,
+    (one) => one.id !== entry.id && one.name === entry.name && !one.missing,
   );
   const found: TraceDetails['figures'][] = [];
   for (const { id } of candidates.slice(0, 2 * COMPARED)) {

@@ -48,7 +48,6 @@ export class Comparison {
       const before = this.traces;
       if (ids.join() === before.map((trace) => trace.id).join()) return;
       this.traces = ids.map((id) => before.find((trace) => trace.id === id) ?? this.opened(id));
-      for (const trace of before) trace.isClosed = !this.traces.includes(trace);
       if (!before.some((trace) => ids.includes(trace.id))) this.range = null;
     });
   }

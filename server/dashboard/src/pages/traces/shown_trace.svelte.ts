@@ -4,8 +4,6 @@ import { api, ask, asProblem, here, type Problem, type TraceDetails, type TraceS
 import { dayAndSecond } from '../../lib/format';
 import { traceName } from '../../lib/traces/label';
 import { counted, isThinned, motionBegin, refined, type Range, type Signals } from '../../lib/traces/columns';
-import { router } from '../../lib/router.svelte';
-import { fromArchive } from '../../lib/traces/from_archive';
 import { serves, toAsk } from '../../lib/traces/zoom';
 import { Simulating } from './simulating.svelte';
 import { SIMULATING_REQUESTS } from './simulating_requests';
@@ -18,10 +16,6 @@ export const EXACT = 20_000;
 export class ShownTrace {
   details = $state.raw<TraceDetails | null>(null);
   problem = $state.raw<Problem | null>(null);
-  /** How far the service is with fetching it from the archive; empty where it need not. */
-  fetching = $state('');
-  /** Set when nobody shows it any longer. */
-  isClosed = false;
   readonly simulating: Simulating;
   /** As it was recorded, thinned to what a picture shows. */
   whole = $state.raw<Signals | null>(null);
@@ -56,11 +50,7 @@ export class ShownTrace {
     this.problem = null;
     try {
       const params = { path: { ...here(), trace: this.id } };
-      const details = await fromArchive(
-        () => ask(api.GET('/api/v1/robots/{robot}/traces/{trace}', { params })),
-        (text) => (this.fetching = text),
-        () => !this.isClosed && router.route.page === 'traces',
-      );
+      const details = await ask(api.GET('/api/v1/robots/{robot}/traces/{trace}', { params }));
       const signals = await this.ask(POINTS);
       this.details = details;
       this.whole = signals;

@@ -1,1 +1,0 @@
-"""Sensitivity analysis: which parameter changes which joint's motion, and when."""
