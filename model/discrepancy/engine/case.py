@@ -157,6 +157,10 @@ class Case(ABC):
         again = self.from_expected(ended.compared, ended.unknowns, expected_values(ended), ended.memory, goal)
         return min(ended, again, key=lambda one: one.cost)
 
+    def or_across(self, ended: Fit, goal: float = math.inf) -> Fit:  # noqa: ARG002 (none, if not said)
+        """The fit, or a better one from across a ridge of its cost, where the case knows of one."""
+        return ended
+
     def held(self, now: Fit) -> Signals:
         """What a fitted model leaves of the held-out records; empty where there are none."""
         if self.held_out is None:

@@ -241,6 +241,7 @@ class _Search:
                     now = self.case.or_from_expected(last, goal)
                 if now is last or is_strained(now):
                     now = fit(now.compared, now.unknowns, now.values, now.memory, rounds=LONG, goal=goal)
+                now = self.case.or_across(now, goal)
                 one = replace(one, fit=now, ended=True)  # noqa: PLW2901
             refined.append(one)
         return [*refined, *found[REFINED:]]

@@ -52,7 +52,7 @@ NEARER = (0.0, 0.5)
 NOISE_ROUNDS = 2
 """Fits with the noise that the one before has left."""
 SHORT_DISTANCE = 0.3
-"""Share of the expected distance over which friction builds up, below which a fit is tried with sudden friction too."""
+"""Share of the expected distance over which friction builds up, below which a fit is tried with its other form too."""
 REPLICAS, SEED = 6, 1991
 NUMBERS = {
     "link_mass": ("mass",),
@@ -101,20 +101,20 @@ class ReadingCase(Case):
         if not finite:
             raise SpecError("the simulation does not stay finite: the control loop is unstable")
         nearest = min(finite, key=lambda one: one.cost)
-        return self._with_sudden_friction(fit(self.compared, unknowns, nearest.values, ones, rounds=LONG))
+        return self.or_across(fit(self.compared, unknowns, nearest.values, ones, rounds=LONG))
 
-    def _with_sudden_friction(self, fitted: Fit) -> Fit:
-        """The fit, or a better one that begins where friction is there at once, on joints where it builds up over a
-        short distance: there the cost has valleys, in which a search may end."""
-        sudden = {
-            u.name: u.low
-            for u in fitted.unknowns
-            if u.kind is Kind.PRESLIDING and u.low < fitted.values[u.name] < SHORT_DISTANCE * u.expected
+    def or_across(self, ended: Fit, goal: float = math.inf) -> Fit:
+        """The fit, or a better one of the other form of friction on joints where it builds up over a short distance or
+        at once: between the two the cost has a ridge, and at once it has no slope."""
+        across = {
+            u.name: u.low if u.low < ended.values[u.name] else u.expected
+            for u in ended.unknowns
+            if u.kind is Kind.PRESLIDING and ended.values[u.name] < SHORT_DISTANCE * u.expected
         }
-        if not sudden:
-            return fitted
-        tried = fit(self.compared, fitted.unknowns, {**fitted.values, **sudden}, fitted.memory, fitted.known)
-        return tried if tried.cost < fitted.cost else fitted
+        if not across:
+            return ended
+        values = {**ended.values, **across}
+        return min(ended, fit(ended.compared, ended.unknowns, values, ended.memory, goal=goal), key=lambda f: f.cost)
 
     def kept(self, now: Fit, wider: Model) -> Iterable[Unknown]:  # noqa: ARG002 (an effect replaces none)
         """The unknowns of a fit that a model with a further effect has as well."""
