@@ -3,6 +3,7 @@
 import { api, ask, here, addressOf, asProblem } from '../api';
 import { currentToken } from '../api/token';
 import type { CameraStatus } from '../api/types';
+import { SampleRate } from '../live/rate';
 import { isOld, whyOld } from './age';
 
 /** s between two questions for a picture, while pictures come, and while there is none. */
@@ -24,6 +25,9 @@ export class Camera {
   private askedAt: number | null = null;
   private isClosed = false;
   age = $state<number | null>(null);
+  /** Pictures a second that are shown; null while too few have come. */
+  rate = $state<number | null>(null);
+  private readonly received = new SampleRate();
   isStale: boolean = $derived(this.age === null || isOld(this.age));
   /** Why the picture is old; empty while it is live. */
   why = $state('');
@@ -62,6 +66,7 @@ export class Camera {
 
   private grow(): void {
     const now = performance.now() / 1000;
+    this.rate = this.received.rate(now);
     this.age = Number.isFinite(this.takenAt) ? now - this.takenAt : null;
     this.why = this.isStale ? whyOld(this.problem, this.askedAt === null ? 0 : now - this.askedAt) : '';
   }
@@ -74,6 +79,7 @@ export class Camera {
     if (answer.status !== 200) return false;
     const age = Number(answer.headers.get('Camera-Age') ?? 0);
     this.takenAt = performance.now() / 1000 - age;
+    this.received.heard(this.takenAt);
     this.number = Number(answer.headers.get('Camera-Picture') ?? 0);
     const picture = await createImageBitmap(await answer.blob());
     this.picture?.close();
