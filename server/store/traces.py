@@ -114,6 +114,9 @@ class TraceStore:
         return self._pages.page(asked, lambda: self._read_page(robot, search, cursor, limit))
 
     def _read_page(self, robot: str, search: TraceSearch, cursor: str | None, limit: int) -> Page[CatalogueEntry]:
+        # SQLite ends a pattern at NUL, and would find everything; nothing can match.
+        if any("\0" in one for one in (search.text, search.tag, search.kind) if one):
+            return Page(items=())
         with self._store.reading() as session:
             rows = list(session.scalars(_query(robot, search, cursor).limit(limit + 1)))
             tags = _tags(session, [row.id for row in rows])

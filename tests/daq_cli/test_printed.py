@@ -17,7 +17,7 @@ from tests.daq.traces.samples import write
 from tests.daq_cli.invoke import CommandLine
 from tests.daq_cli.test_documentation import COMMANDS
 
-WITHOUT = {"serve", "mock", "demo", "docs", "mcp", "view"} | {
+WITHOUT = {"serve", "mock", "demo", "docs", "mcp"} | {
     f"{group} {command}"
     for group, commands in {
         "gains": "set",

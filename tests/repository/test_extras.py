@@ -29,7 +29,7 @@ OTHER_NAMES |= {"google": "protobuf", "markdown_it": "markdown-it-py"}
 OTHER_NAMES["PIL"] = "pillow"
 
 NO_TRACE: Any = Trace.__new__(Trace)
-PULLED = {"starlette": "fastapi", "dask": "distributed"}
+PULLED = {"starlette": "fastapi"}
 """Packages that come with another one."""
 
 NAMES = """

@@ -174,7 +174,7 @@ class StateMetrics(Collector):
             with suppress(ProblemError):  # no metric for a missing folder
                 free.add_metric((name,), room_in(folder.absolute()).free)
         yield free
-        warnings = "Number of warnings about disk and archive, which GET /api/v1/system describes."
+        warnings = "Number of warnings about the disk, which GET /api/v1/system describes."
         yield GaugeMetricFamily("daq_storage_warnings", warnings, value=len(self._services.warnings()))
         reserve = "Free space on the disk of traces below which no experiment is accepted."
         yield GaugeMetricFamily("daq_disk_reserve_bytes", reserve, value=RESERVE)

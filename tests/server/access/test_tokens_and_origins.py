@@ -1,7 +1,6 @@
 """Who gets in, and what browsers may not do behind a person's back."""
 
 import asyncio
-from datetime import datetime
 from pathlib import Path
 
 import httpx
@@ -215,10 +214,10 @@ class _Damaged(TokenStore):
 
     damaged = True
 
-    def callers(self, now: datetime) -> dict[str, Caller]:
+    def callers(self) -> dict[str, Caller]:
         if self.damaged:
             raise DamagedError("table tokens: a row cannot be read")
-        return super().callers(now)
+        return super().callers()
 
 
 def test_tokens_that_are_damaged_keep_out_nobody_who_was_known(clock: HandClock, store: Store) -> None:
@@ -270,7 +269,7 @@ def test_a_ticket_of_a_revoked_token_and_who_watches_with_one_are_sent_away(
 
     async def watches(_scope: Scope, _receive: Receive, send: Send) -> None:
         await send({"type": "websocket.accept"})
-        caller = (await asyncio.to_thread(tokens.callers, clock.utc()))[digest_of(token)]
+        caller = (await asyncio.to_thread(tokens.callers))[digest_of(token)]
         tickets.give(caller)
         await asyncio.to_thread(tokens.revoke, "anna", clock.utc())
         clock.turn(REMEMBERED_FOR)
