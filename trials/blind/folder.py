@@ -87,18 +87,18 @@ class TrialFolder:
         return self.path / f"{stage}.jsonl"
 
     def reload(self) -> None:
-        """Reads the lines, including those of an older version with several processes."""
+        """Reads the lines."""
         for stage in STAGES:
             self._rows[stage] = {}
-            for file in sorted(self.path.glob(f"{stage}*.jsonl")):
-                for line in read_text(file, str(file)).splitlines():
-                    try:
-                        row = parse_json(line, str(file))
-                    except SpecError:
-                        continue  # a crash cut this line short: its case is done again
-                    if not isinstance(row, dict) or not isinstance(row.get("seed"), int):
-                        raise SpecError(f"{file}: a line is not a case of a trial: {shown(row)}")
-                    self._rows[stage][row["seed"]] = row
+            file = self._file(stage)
+            for line in read_text(file, str(file)).splitlines() if file.exists() else ():
+                try:
+                    row = parse_json(line, str(file))
+                except SpecError:
+                    continue  # a crash cut this line short: its case is done again
+                if not isinstance(row, dict) or not isinstance(row.get("seed"), int):
+                    raise SpecError(f"{file}: a line is not a case of a trial: {shown(row)}")
+                self._rows[stage][row["seed"]] = row
 
     def of_case(self, seed: int) -> TrialFolder:
         """Returns the folder with the results of one case alone, for the process that runs its next stage."""

@@ -30,7 +30,6 @@ REGISTERED = (
     "model/kinematics",
     "model/design",
     "model/validation",
-    "model/analysis",
     "model/trial",
     "model/units.py",
     "mock_controller",

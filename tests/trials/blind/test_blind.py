@@ -247,12 +247,6 @@ def test_a_stage_whose_line_was_cut_short_is_repeated(tmp_path: Path) -> None:
     assert [row["seed"] for row in trial(tmp_path).folder.rows("detect")] == [110, 120]
 
 
-def test_lines_that_several_processes_of_an_older_version_wrote_are_read(tmp_path: Path) -> None:
-    trial(tmp_path).folder.add("detect", {"seed": 110})
-    (tmp_path / "detect-2of2.jsonl").write_text('{"seed": 120}\n', "utf-8")
-    assert {row["seed"] for row in trial(tmp_path).folder.rows("detect")} == {110, 120}
-
-
 def test_a_case_whose_process_is_killed_is_not_done_and_the_others_are(done: Campaign, tmp_path: Path) -> None:
     copy = trial(tmp_path, until="record")
     for seed in SECRETS:
