@@ -28,7 +28,6 @@ class Asked(FrozenRecord):
 
     format: Literal[1] = 1
     experiment: Literal["diagnostic", "ramp"]
-    acquire: bool
     registration: dict[str, str] | None
     """File name and SHA-256 of the registration, its run, and the commit that the seeds are drawn from."""
     key: str
@@ -47,7 +46,6 @@ class TrialFolder:
         cls,
         path: Path,
         experiment: Literal["diagnostic", "ramp"],
-        acquire: bool,
         registration: dict[str, str] | None,
     ) -> TrialFolder:
         """Opens the folder, and creates a new one. Raises SpecError if it holds another trial."""
@@ -56,7 +54,7 @@ class TrialFolder:
                 (path / part).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise SpecError(f"{path}: cannot be made: {error.strerror}") from error
-        asked = Asked(experiment=experiment, acquire=acquire, registration=registration, key=secrets.token_hex(16))
+        asked = Asked(experiment=experiment, registration=registration, key=secrets.token_hex(16))
         file = path / _CAMPAIGN
         # Of commands that begin at once, only one writes it.
         aside = path / f".{_CAMPAIGN}.{os.getpid()}"
