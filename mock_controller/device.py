@@ -14,8 +14,8 @@ from mock_controller.board.board import Board
 from mock_controller.board.parameters import BoardParameters, default_board, parse_board
 from mock_controller.bridge.bridge import Bridge
 from mock_controller.bridge.link import Link
+from mock_controller.faults.fault import FaultyParts
 from mock_controller.faults.fault_set import FaultSet
-from mock_controller.faulty_board import FaultyBoard
 from mock_controller.modification import Modification
 from mock_controller.modifications import ModificationError, build_modifications
 from mock_controller.options import Options, OptionsError
@@ -63,7 +63,7 @@ def build_device(options: Options, disconnect: Callable[[float], None]) -> Devic
         pairs = zip(parameters.calibrations, options.start, strict=True)
         plant = Plant(plant_parameters, modifications, [scale.posture_to_rad(posture) for scale, posture in pairs])
     board = _board(options, parameters, plant, modifications, arm_seed)
-    faults = FaultSet(FaultyBoard(board, disconnect), options.seed)
+    faults = FaultSet(FaultyParts(board, disconnect), options.seed)
     bridge = Bridge(
         Timeline(board, faults),
         sees_period=options.sample,

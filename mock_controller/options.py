@@ -1,9 +1,8 @@
-"""Options of the mock, from the command line, or under the same names from a TOML file."""
+"""Options of the mock, from the command line."""
 
 from __future__ import annotations
 
 import argparse
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -51,7 +50,7 @@ class Options(BaseModel):
 
 
 def read_options(arguments: list[str], *, listens: bool = True) -> Options:
-    """Returns options from command-line arguments and the file of `--config`; arguments win, lists are joined.
+    """Returns options from command-line arguments.
 
     Options for a mock that `listens` need an address.
 
@@ -68,16 +67,8 @@ def read_options(arguments: list[str], *, listens: bool = True) -> Options:
 
         print(modifications_table())
         raise SystemExit(0)
-    config: Path | None = given.pop("config")
-    chosen = {} if config is None else _read_file(config)
-    for key, value in given.items():
-        if value is None:
-            continue
-        if key in ("modify", "fault"):
-            value = [*chosen.get(key, ()), *value]  # noqa: PLW2901
-        chosen[key] = value
     try:
-        options = Options.model_validate(chosen)
+        options = Options.model_validate({key: value for key, value in given.items() if value is not None})
     except ValidationError as error:
         first = first_invalid(error)
         where = " ".join(map(str, first.place)).replace("_", "-")
@@ -96,17 +87,6 @@ def read_options(arguments: list[str], *, listens: bool = True) -> Options:
 def _shown(value: object) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _read_file(path: Path) -> dict[str, Any]:
-    try:
-        return {key.replace("-", "_"): value for key, value in tomllib.loads(path.read_text("utf-8-sig")).items()}
-    except OSError as error:
-        raise OptionsError(f"config: {path}: {error.strerror}") from None
-    except ValueError as error:  # also for text that is not UTF-8
-        raise OptionsError(f"config: {path}: not TOML: {error}") from None
-    except RecursionError:
-        raise OptionsError(f"config: {path}: is nested too deeply") from None
 
 
 def _numbers(text: str) -> list[str]:
@@ -208,5 +188,4 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--fault", action="append", metavar="NAME:KEY=VALUE,…", help="a fault; may be repeated")
     parser.add_argument("--help-faults", action="store_true", help="list faults and their parameters, and exit")
     parser.add_argument("--help-modifications", action="store_true", help="list hidden effects likewise, and exit")
-    parser.add_argument("--config", type=Path, metavar="FILE", help="the same options in a TOML file")
     return parser

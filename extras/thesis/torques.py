@@ -12,7 +12,7 @@ from model.arrays import Floats
 from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
-from model.simulation.bodies import chain_of
+from model.simulation.chain_of_model import chain_of
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate
 

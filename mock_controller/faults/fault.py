@@ -5,11 +5,17 @@ from __future__ import annotations
 import dataclasses
 import math
 import random
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol
+from typing import Any, ClassVar, Literal, NamedTuple
+
+from mock_controller.board.board import Board
 
 Direction = Literal["to_controller", "to_host"]
+
+
+Count = Callable[[], None]
+"""Counts one injection."""
 
 
 class FaultError(ValueError):
@@ -64,45 +70,12 @@ class WireFault(Fault):
         raise NotImplementedError
 
 
-class FaultyParts(Protocol):
-    """Actions on board, arm and connection for faults other than those of the line."""
+@dataclass(frozen=True)
+class FaultyParts:
+    """What faults other than those of the line act on. `disconnect` cuts the line for so many s of the host's clock."""
 
-    @property
-    def time_us(self) -> int:
-        """Board time."""
-        ...
-
-    def hold_memory_at_fetch(self) -> None:
-        """Keeps the shared memory busy, on the host's side, at the controller's next fetch."""
-        ...
-
-    def brown_out(self) -> None:
-        """Interrupts the board's supply for a moment; the board restarts, the arm does not move."""
-        ...
-
-    def stall_joint(self, joint: int) -> None:
-        """Jams a joint at its present angle."""
-        ...
-
-    def free_joint(self, joint: int) -> None:
-        """Frees a jammed joint."""
-        ...
-
-    def stick_potentiometer(self, joint: int) -> None:
-        """Holds a joint's reading at its present value."""
-        ...
-
-    def crackle_potentiometer(self, joint: int, counts: float) -> None:
-        """Adds noise of `counts` ADC counts rms to a joint's reading."""
-        ...
-
-    def repair_potentiometer(self, joint: int) -> None:
-        """Restores a joint's reading."""
-        ...
-
-    def disconnect(self, seconds: float) -> None:
-        """Cuts the line for `seconds` of the host's clock."""
-        ...
+    board: Board
+    disconnect: Callable[[float], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,12 +90,6 @@ class PartFault(Fault):
 
     def end(self, parts: FaultyParts) -> None:
         """Ends the fault."""
-
-
-class Count(Protocol):
-    """Counts one injection."""
-
-    def __call__(self) -> None: ...
 
 
 def fields_of(kind: type[Fault]) -> dict[str, dataclasses.Field[Any]]:

@@ -44,7 +44,7 @@ class FaultSet:
     def switch_on(self, text: str) -> ActiveFault:
         """Adds the fault of `name:parameter=value,…`, from now on. Raises FaultError."""
         fault = parse_fault(text)
-        now = self.parts.time_us
+        now = self.parts.board.time_us
         label = self._free_label(fault.name)
         seed = fault.seed if fault.seed >= 0 else (self.seed << 32) + zlib.crc32(label.encode())
         begin = now + round(1e6 * fault.start)
@@ -66,7 +66,7 @@ class FaultSet:
 
     def listing(self) -> list[dict[str, Any]]:
         """Returns the active faults, as JSON data."""
-        now = self.parts.time_us
+        now = self.parts.board.time_us
         return [{"label": entry.label, "acting": entry.covers(now), **describe(entry.fault)} for entry in self.active]
 
     def counts(self) -> dict[str, dict[str, int]]:
@@ -109,7 +109,7 @@ class FaultSet:
         chunks = [Chunk(data)]
         if not self.active:
             return chunks
-        now = self.parts.time_us
+        now = self.parts.board.time_us
         for entry in self.active:
             if not entry.covers(now):
                 continue

@@ -8,6 +8,9 @@ from typing import ClassVar
 
 from mock_controller.faults.fault import Count, Fault, FaultyParts, PartFault, parameter
 
+_HELD_US = 10
+"""Time (µs) for which the memory is held around a fetch."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class BusyMemory(PartFault):
@@ -19,7 +22,7 @@ class BusyMemory(PartFault):
     def each_period(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:
         if dice.random() < self.rate:
             count()
-            parts.hold_memory_at_fetch()
+            parts.board.hold_memory(_HELD_US)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,13 +33,13 @@ class StuckPotentiometer(PartFault):
     joint: int = parameter("1 to 6", 1, 1, 6)
 
     def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
-        parts.stick_potentiometer(self.joint)
+        parts.board.sensors.stick(self.joint)
 
     def each_period(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
         count()
 
     def end(self, parts: FaultyParts) -> None:
-        parts.repair_potentiometer(self.joint)
+        parts.board.sensors.repair(self.joint)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,13 +51,13 @@ class NoisyPotentiometer(PartFault):
     counts: float = parameter("ADC counts rms", 20.0, 0.0, 4095.0)
 
     def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
-        parts.crackle_potentiometer(self.joint, self.counts)
+        parts.board.sensors.crackle(self.joint, self.counts)
 
     def each_period(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
         count()
 
     def end(self, parts: FaultyParts) -> None:
-        parts.repair_potentiometer(self.joint)
+        parts.board.sensors.repair(self.joint)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,10 +69,10 @@ class StalledJoint(PartFault):
 
     def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
         count()
-        parts.stall_joint(self.joint)
+        parts.board.plant.stall(self.joint)
 
     def end(self, parts: FaultyParts) -> None:
-        parts.free_joint(self.joint)
+        parts.board.plant.release(self.joint)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +84,7 @@ class BrownOut(PartFault):
 
     def begin(self, parts: FaultyParts, dice: random.Random, count: Count) -> None:  # noqa: ARG002
         count()
-        parts.brown_out()
+        parts.board.brown_out()
 
 
 # --- Faults of the connection as a whole

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +20,6 @@ from mock_controller.plant import STEP_US, Plant, PlantParameters
 
 Gains = tuple[int, int, int]
 _COLUMNS = [f"set_point_{joint}" for joint in range(1, JOINTS + 1)]
-_REST = (500, 333, 500, 500, 500, 500)
 
 
 class ExperimentError(ValueError):
@@ -56,7 +54,7 @@ class Experiment:
         return [scale.posture_to_rad(posture) for scale, posture in pairs]
 
 
-def read_experiment(path: Path, gains: Gains = (2, 0, 0)) -> Experiment:
+def read_experiment(path: Path) -> Experiment:
     """Reads an experiment from CSV: one line per period, columns set_point_1 … set_point_6 (posture units).
 
     Raises ExperimentError with one clear line.
@@ -74,73 +72,7 @@ def read_experiment(path: Path, gains: Gains = (2, 0, 0)) -> Experiment:
         if isinstance(error, ExperimentError):
             raise
         raise ExperimentError(f"{path}: not whole posture units: {error}") from None
-    return Experiment(rows, gains)
-
-
-class _Path:
-    """Builds set points of joints 1 to 3 from moves, in 20 ms periods."""
-
-    def __init__(self) -> None:
-        self.rows: list[list[float]] = []
-        self._now = [float(value) for value in _REST[:3]]
-
-    def hold(self, seconds: float) -> None:
-        self.rows += [list(self._now)] * round(seconds * 50)
-
-    def move(self, by: tuple[float, float, float], seconds: float) -> None:
-        """Adds a straight ramp by so many posture units."""
-        periods = max(round(seconds * 50), 1)
-        start = list(self._now)
-        for k in range(1, periods + 1):
-            self._now = [a + b * k / periods for a, b in zip(start, by, strict=True)]
-            self.rows.append(list(self._now))
-
-    def finished(self) -> Experiment:
-        return Experiment(tuple((*(math.floor(v + 0.5) for v in row), *_REST[3:]) for row in self.rows))
-
-
-def ramp_step() -> Experiment:
-    """Returns 8 s: the source's ramp (80 posture units in 0.65 s, joints 1 to 3 together), held, and back."""
-    path = _Path()
-    path.hold(0.5)
-    path.move((80, 80, 80), 0.65)
-    path.hold(3.0)
-    path.move((-80, -80, -80), 0.65)
-    path.hold(3.2)
-    return path.finished()
-
-
-def reference_set() -> Experiment:
-    """Returns 55 s: one joint at a time, slow reversals, a staircase, fast moves of many sizes, and a second
-    posture."""
-    path = _Path()
-    path.hold(0.5)
-    for joint in range(3):  # one at a time, there and back
-        for way in (1, -1):
-            path.move((80.0 * way * (joint == 0), 80.0 * way * (joint == 1), 80.0 * way * (joint == 2)), 0.65)
-            path.hold(0.75)
-    for ratio in ((1.0, 0.6, -0.8), (-0.7, 1.0, 0.9)):  # slow reversals, 2 to 5 °/s
-        for way, units, seconds in ((1, 40, 2.0), (-1, 55, 3.5)):
-            a, b, c = (way * units * share for share in ratio)
-            path.move((a, b, c), seconds)
-            path.move((-0.5 * a, -0.5 * b, -0.5 * c), 0.5 * seconds)
-    for units in (1, 2, 4, 8, 11, -1, -3, -6, -10, -5):  # staircase of 0.3° to 3°
-        path.move((units, units, -units), 0.02)
-        path.hold(0.8)
-    for units, seconds in ((30, 0.12), (-60, 0.2), (110, 0.5), (-90, 0.4), (15, 0.06), (-35, 0.15), (70, 0.35)):
-        path.move((units, 0.8 * units, -units), seconds)
-        path.hold(0.7)
-    path.move((60, -110, 90), 2.0)  # a second posture
-    for way in (1, -1):
-        path.move((80 * way, 70 * way, -80 * way), 0.65)
-        path.hold(1.0)
-        for back in (1, -1):
-            path.move((35 * back, 30 * back, 40 * back), 2.2)
-    path.hold(0.5)
-    return path.finished()
-
-
-BUILT_IN = {"ramp-step": ramp_step, "reference-set": reference_set}
+    return Experiment(rows)
 
 
 # --- The control loop without rounding: an arm's readings as real numbers

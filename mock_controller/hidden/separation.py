@@ -14,13 +14,9 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 from hashlib import sha256
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +37,6 @@ from mock_controller.modifications.controller import InputDelay
 from mock_controller.plant import STEP_US, PlantParameters
 from mock_controller.plant.extension_points import ChangesTransmission
 
-Priors = Literal["stated", "drawn"]
 MODELLED = 3
 """Number of joints whose readings are compared; the others are held."""
 _COARSE_STEP_US = 2000
@@ -125,24 +120,16 @@ def tangents(
     plant: PlantParameters,
     board: BoardParameters,
     experiment: Experiment,
-    priors: Priors = "stated",
-    processes: int = 1,
     cache: Path | None = None,
 ) -> Tangents:
     """Returns tangents at the arm of the data files; with `cache`, a folder, read from there if present."""
-    kept = None if cache is None else cache / f"tangents-{_key(plant, board, experiment, priors)}.npz"
+    kept = None if cache is None else cache / f"tangents-{_key(plant, board, experiment)}.npz"
     if kept is not None and kept.exists():
         with np.load(kept) as stored:
             return Tangents(tuple(str(name) for name in stored["names"]), stored["matrix"], stored["deviations"])
-    directions = _directions(plant, board, priors)
+    directions = _directions(plant, board)
     base = LoopParts(plant, replace(board, linearity=0.0), (), 0)
-    run = partial(_row, experiment)
-    every = [base, *(direction.parts for direction in directions)]
-    if processes > 1:
-        with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-            rows = list(pool.map(run, every, chunksize=2))
-    else:
-        rows = [run(parts) for parts in every]
+    rows = [_row(experiment, parts) for parts in (base, *(direction.parts for direction in directions))]
     one = reading_deviation(board)
     columns = [direction.steps * (row - rows[0]) / one for direction, row in zip(directions, rows[1:], strict=True)]
     found = Tangents(
@@ -309,11 +296,11 @@ def _row(experiment: Experiment, parts: LoopParts) -> NDArray[np.float64]:
     return readings(parts, experiment, step_us=_TANGENT_STEP_US)[:, :MODELLED].ravel()
 
 
-def _directions(plant: PlantParameters, board: BoardParameters, priors: Priors) -> list[_Direction]:
+def _directions(plant: PlantParameters, board: BoardParameters) -> list[_Direction]:
     flat = replace(board, linearity=0.0)
     found = []
     for tolerance in tolerances():
-        deviation = tolerance.stated if priors == "stated" else tolerance.drawn
+        deviation = tolerance.stated
         step = _DELAY_STEP_S if tolerance.is_time else min(deviation, _LARGEST_STEP)
         moved = {tolerance.name: step}
         parts = LoopParts(deviating_plant(plant, moved), deviating_board(flat, moved), (), 0)
@@ -328,6 +315,6 @@ def _directions(plant: PlantParameters, board: BoardParameters, priors: Priors) 
     return found
 
 
-def _key(plant: PlantParameters, board: BoardParameters, experiment: Experiment, priors: Priors) -> str:
-    told = repr((plant, board, experiment, priors, tolerances()))
+def _key(plant: PlantParameters, board: BoardParameters, experiment: Experiment) -> str:
+    told = repr((plant, board, experiment, tolerances()))
     return sha256(told.encode()).hexdigest()[:16]

@@ -27,7 +27,7 @@ from model.base_parameters.standard import (
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
 from model.record_check.check import as_used
-from model.simulation.bodies import chain_of
+from model.simulation.chain_of_model import chain_of
 
 POSTURES_PER_PARAMETER = 3
 """Random postures for each standard parameter: each gives as many rows as there are joints."""

@@ -22,7 +22,7 @@ from model.inverse_dynamics.recorded_motion import RecordedMotion, recorded_moti
 from model.inverse_dynamics.torque_balance import TorqueBalance
 from model.machine_model.model import Model
 from model.machine_model.nominal import joint_scale
-from model.simulation.bodies import chain_of
+from model.simulation.chain_of_model import chain_of
 
 TOLD = 0.1
 """Largest deviation of a base parameter that counts as determined, as a share of its size. The size is the largest

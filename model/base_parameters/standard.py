@@ -19,7 +19,7 @@ from model.arrays import Floats
 from model.dynamics.recursive import inverse_dynamics_along
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
-from model.simulation.bodies import chain_of
+from model.simulation.chain_of_model import chain_of
 
 OF_LINK = ("m", "MX", "MY", "MZ", "XX", "XY", "XZ", "YY", "YZ", "ZZ")
 """Mass, first moments and moments of inertia of a link, in the order of `ChainArrays.inertial`."""

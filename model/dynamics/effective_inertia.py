@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model.dynamics.compilation import inlined
-from model.kinematics.chain import Chain, ChainError, FloatArray, JointKind
 
 WAIST = 0
 """Inertia about the waist that no posture changes: I*1yy + I*2xx + I*3xx + 2 B2 s3z + m3 B2² + n1² J1, kg·m²."""
@@ -111,63 +110,3 @@ def lump(links: NDArray[Any], length_2: Any, offset_2: Any, rotor: NDArray[Any],
     p[S1_X] = links[0, 1]
     p[S1_Z] = links[0, 3] + links[1, 3] + s3z + m3 * offset_2
     return p
-
-
-def effective_parameters(chain: Chain) -> FloatArray:
-    """Effective parameter vector of a chain that has the geometry of the closed form, (22,).
-
-    The closed form takes D-H angles: joint variables plus the joints' theta offsets.
-
-    Raises:
-        ChainError: if the chain is not three revolute joints with α1 = π/2, α2 = 0 and a1 = 0.
-    """
-    _check_geometry(chain)
-    arrays = chain.arrays()
-    links = np.array([_about_joint(arrays.geometry[i], arrays.inertial[i], i == 0) for i in range(3)])
-    shoulder = chain.joints[1]
-    return np.asarray(lump(links, shoulder.a, shoulder.d, arrays.rotor_inertia, arrays.gravity))
-
-
-def has_closed_form(chain: Chain) -> bool:
-    """Whether the generated closed form describes this chain."""
-    joints = chain.joints
-    if len(joints) != 3 or any(j.kind is not JointKind.REVOLUTE for j in joints):
-        return False
-    return (
-        abs(joints[0].alpha - np.pi / 2) < _ANGLE_TOLERANCE
-        and abs(joints[1].alpha) < _ANGLE_TOLERANCE
-        and joints[0].a == 0.0
-    )
-
-
-_ANGLE_TOLERANCE = 1e-12
-
-
-def _check_geometry(chain: Chain) -> None:
-    if not has_closed_form(chain):
-        described = ", ".join(f"{j.kind.value} α={j.alpha:.6g} a={j.a:.6g}" for j in chain.joints)
-        raise ChainError(
-            f"the closed form needs three revolute joints with α1 = π/2, α2 = 0, a1 = 0; this chain has {described}"
-        )
-
-
-def _about_joint(geometry: FloatArray, inertial: FloatArray, waist: bool) -> FloatArray:
-    """A link's ten parameters about the joint that carries it, x along the link, z along the joint's axis.
-
-    Link 1 is wanted in the axes of its own frame instead (y along the waist), where α has already been applied.
-    """
-    _, d, a, alpha = geometry
-    mass, first = inertial[0], inertial[1:4]
-    tensor = np.zeros((3, 3))
-    tensor[np.triu_indices(3)] = inertial[4:]
-    tensor = tensor + np.triu(tensor, 1).T
-    untwist = np.array([[1, 0, 0], [0, np.cos(alpha), -np.sin(alpha)], [0, np.sin(alpha), np.cos(alpha)]])
-    if waist:
-        # the crossing of waist and shoulder axes is the origin of frame 1 itself
-        return np.concatenate(([mass], first, tensor[np.triu_indices(3)]))
-    first, tensor = untwist @ first, untwist @ tensor @ untwist.T
-    # joint 2's offset B2 = d2 stays with the link (c̄ is measured from the joint); so does −B3 = d3
-    shift = np.array([a, 0.0, d])
-    tensor = tensor + 2 * float(first @ shift) * np.eye(3) - np.outer(first, shift) - np.outer(shift, first)
-    tensor = tensor + mass * (float(shift @ shift) * np.eye(3) - np.outer(shift, shift))
-    return np.concatenate(([mass], first + mass * shift, tensor[np.triu_indices(3)]))

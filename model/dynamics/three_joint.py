@@ -16,9 +16,6 @@ from numpy.typing import NDArray
 from model.dynamics.compilation import inlined
 from model.dynamics.dual import sin_cos
 
-SOURCE_HASH = "d86126eb7f0ec59a"
-TEXT_HASH = "797dba5308c6034e"
-
 
 @inlined
 def mass_matrix_and_bias(
@@ -85,91 +82,6 @@ def mass_matrix_and_bias(
     b2 = -c2 * gravity_z * s2_x + gravity_z * s2 * s2_y - t11 * t18 + t16 * t17 + t19
     b3 = t19
     return d11, d12, d13, d22, d23, d33, b1, b2, b3
-
-
-@inlined
-def mass_matrix(
-    theta_2: complex,
-    theta_3: complex,
-    p: NDArray[Any],
-) -> Any:
-    """D, symmetric.
-
-    Returns d11, d12, d13, d22, d23, d33.
-    """
-    waist = p[0]
-    i2_yy_xx = p[1]
-    i2_xy = p[2]
-    i2_xz = p[3]
-    i2_yz = p[4]
-    i2_zz = p[5]
-    i3_yy_xx = p[8]
-    i3_xy = p[9]
-    i3_xz = p[10]
-    i3_yz = p[11]
-    i3_zz = p[12]
-    s3_x = p[13]
-    s3_y = p[14]
-    rotor_3 = p[15]
-    length_2 = p[16]
-    theta_23 = theta_2 + theta_3
-    s2, c2 = sin_cos(theta_2)
-    s23, c23 = sin_cos(theta_23)
-    t0 = c2 * length_2 * (c23 * s3_x - s23 * s3_y)
-    t1 = 2.0 * t0
-    t2 = c23 * i3_yz + i3_xz * s23
-    t3 = length_2 * s2 * (c23 * s3_y + s23 * s3_x)
-    d11 = (c2 * c2) * i2_yy_xx + 2.0 * c2 * i2_xy * s2 + (c23 * c23) * i3_yy_xx + 2.0 * c23 * i3_xy * s23 + t1 + waist
-    d12 = c2 * i2_yz + i2_xz * s2 + t2
-    d13 = t2
-    d22 = i2_zz + i3_zz + t1 + 2.0 * t3
-    d23 = i3_zz + t0 + t3
-    d33 = i3_zz + rotor_3
-    return d11, d12, d13, d22, d23, d33
-
-
-@inlined
-def velocity_torques(
-    theta_2: complex,
-    theta_3: complex,
-    rate_1: complex,
-    rate_2: complex,
-    rate_3: complex,
-    p: NDArray[Any],
-) -> Any:
-    """H, Coriolis and centrifugal torques.
-
-    Returns b1, b2, b3.
-    """
-    i2_yy_xx = p[1]
-    i2_xy = p[2]
-    i2_xz = p[3]
-    i2_yz = p[4]
-    i3_yy_xx = p[8]
-    i3_xy = p[9]
-    i3_xz = p[10]
-    i3_yz = p[11]
-    s3_x = p[13]
-    s3_y = p[14]
-    length_2 = p[16]
-    theta_23 = theta_2 + theta_3
-    rate_23 = rate_2 + rate_3
-    s2, c2 = sin_cos(theta_2)
-    s23, c23 = sin_cos(theta_23)
-    t0 = rate_2 * rate_2
-    t1 = rate_23 * rate_23
-    t2 = c2 * (c23 * s3_y + s23 * s3_x)
-    t3 = -(c23 * c23) * i3_xy + c23 * i3_yy_xx * s23 + i3_xy * (s23 * s23) + length_2 * t2
-    t4 = 2.0 * rate_1
-    t5 = s2 * (c23 * s3_x - s23 * s3_y)
-    t6 = -(c2 * c2) * i2_xy + c2 * i2_yy_xx * s2 + i2_xy * (s2 * s2) + length_2 * t5
-    t7 = rate_1 * rate_1
-    t8 = length_2 * (t2 - t5)
-    t9 = t0 * t8 + t3 * t7
-    b1 = -rate_2 * t4 * t6 - rate_23 * t3 * t4 + t0 * (c2 * i2_xz - i2_yz * s2) + t1 * (c23 * i3_xz - i3_yz * s23)
-    b2 = -t1 * t8 + t6 * t7 + t9
-    b3 = t9
-    return b1, b2, b3
 
 
 @inlined

@@ -69,13 +69,6 @@ def routines(dynamics: Dynamics) -> tuple[Routine, ...]:
             (names[1:] + rates, arm, INERTIA_NAMES + BIAS_NAMES),
             inertia + bias,
         ),
-        _routine("mass_matrix", "D, symmetric.", (names[1:], arm, INERTIA_NAMES), inertia),
-        _routine(
-            "velocity_torques",
-            "H, Coriolis and centrifugal torques.",
-            (names[1:] + rates, arm, BIAS_NAMES),
-            velocity,
-        ),
         _routine("gravity_torques", "G for gravity of any direction.", (names, whole, BIAS_NAMES), everything),
         _routine(
             "horizontal_gravity_torques",

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import subprocess
 import sys
-from pathlib import Path
 
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
@@ -13,22 +11,6 @@ from sympy.printing.pycode import PythonCodePrinter
 from model.dynamics import effective_inertia
 from model.generation.derivation import ANGLES
 from model.generation.expressions import ANGLE_23, RATE_23, Routine
-
-_SOURCES = (*sorted(Path(__file__).parent.glob("*.py")), Path(effective_inertia.__file__))
-
-
-def source_hash() -> str:
-    """Hash of the sources that the generated files are made from, as 16 hexadecimal digits."""
-    digest = hashlib.sha256()
-    for path in _SOURCES:
-        digest.update(path.name.encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def text_hash(text: str) -> str:
-    """Hash of a generated file's text below its hash lines, as 16 hexadecimal digits."""
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 class _PythonPrinter(PythonCodePrinter):  # type: ignore[misc]
@@ -67,8 +49,7 @@ from model.dynamics.dual import sin_cos
 def python_module(routines: tuple[Routine, ...]) -> str:
     """Text of `model/dynamics/three_joint.py`."""
     body = _formatted("\n\n".join(_python_function(r) for r in routines))
-    hashes = f'SOURCE_HASH = "{source_hash()}"\nTEXT_HASH = "{text_hash(body)}"\n'
-    return f"{_PYTHON_HEADER}\n{hashes}\n\n{body}"
+    return f"{_PYTHON_HEADER}\n\n{body}"
 
 
 def _formatted(source: str) -> str:

@@ -21,7 +21,7 @@ from model.arrays import Floats, Mask
 from model.dynamics.recursive import mass_matrix
 from model.machine_model.model import Model
 from model.record_check.readings import is_bridged
-from model.simulation.bodies import chain_of
+from model.simulation.chain_of_model import chain_of
 
 CUTOFFS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)
 """Cutoffs that `choose_cutoff` tries, Hz."""

@@ -20,9 +20,9 @@ from model.inverse_dynamics import supplied_torque as kernel
 from model.inverse_dynamics.drive_timing import samples_late
 from model.inverse_dynamics.friction_at_rest import RestingFriction, friction_at_rest, subtract_held
 from model.inverse_dynamics.link_motion import SENSOR_COLUMNS, LinkMotion, link_motion
+from model.inverse_dynamics.needed_torque import NeededTorque
 from model.inverse_dynamics.readings import derivative
 from model.inverse_dynamics.recorded_motion import RecordedMotion, holds_drive_between_samples
-from model.inverse_dynamics.supplied_torque import NeededTorque
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model
 from model.machine_model.nominal import is_rod_arm, nominal_vector

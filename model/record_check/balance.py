@@ -20,7 +20,7 @@ from model.dynamics.recursive import gravity_along, inverse_dynamics_along
 from model.machine_model.model import Model
 from model.record_check.law import DEGREE
 from model.record_check.readings import noise_of
-from model.simulation.bodies import chain_of
+from model.simulation.chain_of_model import chain_of
 
 ORDER = 3
 """Degree of the polynomials that smooth a motion."""

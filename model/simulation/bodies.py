@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from model import layout as at
-from model.arrays import Floats
-from model.dynamics import recursive, rod_arm
+from model.dynamics import rod_arm
 from model.dynamics.compilation import compiled, internal
 from model.dynamics.dual import sin_cos
 from model.dynamics.effective_inertia import SIZE
 from model.kinematics.chain import ChainArrays
-from model.machine_model.model import Model
 
 
 @internal
@@ -111,18 +109,3 @@ def _fill_link(inertial: NDArray[Any], joint: NDArray[Any]) -> None:
     inertial[4], inertial[5], inertial[6] = xx + mass * (y * y + z * z), xy - mass * x * y, xz - mass * x * z
     inertial[7], inertial[8] = yy + mass * (x * x + z * z), yz - mass * y * z
     inertial[9] = zz + mass * (x * x + y * y)
-
-
-# --- Converts a model's bodies to a general chain, and computes gravity torques along a motion
-
-
-def chain_of(model: Model, vector: NDArray[Any] | None = None) -> ChainArrays:
-    """Returns the model's bodies as a general chain, load and payload included, always with exact inertias."""
-    numbers = model.vector if vector is None else vector
-    joints = np.ascontiguousarray(numbers[at.SHARED :].reshape(model.joint_count, at.PER_JOINT))
-    return chain_body(np.ascontiguousarray(numbers[: at.SHARED]), joints, np.zeros(model.joint_count, dtype=np.int64))
-
-
-def gravity_loads(model: Model, position: Floats) -> Floats:
-    """Returns gravity torques (k, n), N·m or N, at joint positions (k, n)."""
-    return np.asarray(recursive.gravity_along(chain_of(model), np.ascontiguousarray(position)))

@@ -14,7 +14,7 @@ from model.arrays import Floats, Mask
 from model.machine_model.model import Model
 from model.record_check.check import as_used
 from model.record_check.replicas import SEED, made_by
-from model.simulation.bodies import gravity_loads
+from model.simulation.chain_of_model import gravity_loads
 from model.validation.acceleration_model import expected_accelerations
 from model.validation.expected_deviation import expected_deviation
 from model.validation.measured_motion import SmoothedTrace, smooth, smooth_motion

@@ -15,7 +15,7 @@ from daq.contracts.machine import load_machine, parse_machine
 from daq.traces.csv_table import import_csv
 from model.dynamics import recursive
 from model.machine_model.model import base_model
-from model.simulation.bodies import chain_of
+from model.simulation.chain_of_model import chain_of
 from trials import judge
 from trials.judge import score
 from trials.rigs.bodies import mjcf

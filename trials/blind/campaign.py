@@ -20,9 +20,6 @@ from daq.contracts.file_lock import take_lock
 from daq.contracts.machine import Machine
 from daq.executors import Workers, done_in_any_order
 from daq.executors.each import growing
-from daq.traces.reader import read_trace
-from daq_cli.models.stopping_rule import as_run, next_to_run, time_left
-from model.discrepancy.diagnosis import Acquired, NextExperiment
 from model.machine_model.model import base_model
 from model.trial.score import Score, score, score_of_failure
 from model.trial.table import TrialTable, trial_table
@@ -39,8 +36,6 @@ from trials.blind.sealed import (
     reveal,
 )
 
-ROBOT_TIME = 60.0
-"""Robot time in s that a trial may spend on further experiments."""
 Progress = Callable[[int, str], None]
 
 
@@ -92,7 +87,7 @@ class Campaign:
         Returns how many cases are not done because one of their processes failed; they are tried again next time.
         """
         end = math.inf if seconds is None else time.monotonic() + seconds
-        write_set_points(self.experiment(self._seen_by), self.machine, self._set_points)
+        write_set_points(self.experiment(self.folder.asked.experiment), self.machine, self._set_points)
         ended, failed = 0, 0
         left = deque[CaseStage]()
 
@@ -120,13 +115,9 @@ class Campaign:
         return failed
 
     @property
-    def _seen_by(self) -> str:
-        return "diagnostic" if self.folder.asked.acquire else self.folder.asked.experiment
-
-    @property
     def _set_points(self) -> Path:
         """Returns the file of the set points for which effects must be detectable."""
-        return self.folder.path / f"{self._seen_by}.csv"
+        return self.folder.path / f"{self.folder.asked.experiment}.csv"
 
     def _next_stage(self, seed: int) -> Stage | None:
         """Returns the first remaining stage of a case; None without one, or if the case ended before it."""
@@ -189,45 +180,17 @@ class Campaign:
         return self.recorder(seed, name, self.experiment(name), self._machine(seed), self.folder.path / "traces")
 
     def _diagnose(self, seed: int) -> dict[str, Any]:
-        """Diagnoses a case; returns its last answer, sealed: its file and hash are written before the truth is
-        revealed."""
-        recorded, case = self._row("record", seed), self.folder.name_of(seed)
-        traces = [self.folder.path / "traces" / recorded["trace"]]
+        """Diagnoses a case; returns its answer, sealed: its file and hash are written before the truth is revealed."""
+        recorded, case, traces = self._row("record", seed), self.folder.name_of(seed), self.folder.path / "traces"
         row: dict[str, Any] = {"seed": seed, "case": case}
-        budget, runs, answers = ROBOT_TIME if self.folder.asked.acquire else 0.0, list[Acquired](), list[SealedAnswer]()
+        fitted, held_out, model = traces / recorded["trace"], traces / recorded["held_out"], self._machine(seed)
         try:
-            answers.append(self._answer(seed, traces, recorded["held_out"], runs))
-            while (asked := next_to_run(answers[-1].read(), runs, budget)) is not None:
-                runs.append(self._further(seed, asked, len(runs) + 1))
-                if runs[-1].outcome == "complete":
-                    traces.append(Path(runs[-1].file))
-                    answers.append(self._answer(seed, traces, recorded["held_out"], runs))
+            answer = diagnose_sealed([fitted], held_out, base_model(model), self.diagnoser)
         except DiagnosisFailedError as error:
-            return {**row, "failure": str(error), "seconds": sum(given.seconds for given in answers)}
+            return {**row, "failure": str(error), "seconds": 0.0}
         file = self.folder.path / "answers" / f"{case}.json"
-        file.write_bytes(answers[-1].text)
-        return {
-            **row,
-            "answer": file.name,
-            "sha256": answers[-1].digest,
-            "seconds": sum(given.seconds for given in answers),
-            "robot_seconds": recorded["robot_seconds"] + budget - time_left(runs, budget),
-            "traces": [trace.name for trace in traces],
-            "further": [
-                {"experiment": r.experiment, "trace": Path(r.file).name, "outcome": r.outcome, "duration": r.duration}
-                for r in runs
-            ],
-        }
-
-    def _answer(self, seed: int, traces: list[Path], held_out: str, runs: Sequence[Acquired]) -> SealedAnswer:
-        left = time_left(runs, ROBOT_TIME) if self.folder.asked.acquire else None
-        model = base_model(self._machine(seed))
-        return diagnose_sealed(traces, self.folder.path / "traces" / held_out, model, self.diagnoser, left)
-
-    def _further(self, seed: int, asked: NextExperiment, number: int) -> Acquired:
-        """Runs the experiment that an answer requests on the same arm."""
-        made = self.recorder(seed, f"further {number}", asked.spec, self._machine(seed), self.folder.path / "traces")
-        return as_run(asked, read_trace(made.file), made.file, made.outcome)
+        file.write_bytes(answer.text)
+        return {**row, "answer": file.name, "sha256": answer.digest, "seconds": answer.seconds}
 
     def _score(self, seed: int) -> dict[str, Any]:
         """Reveals the truth and scores the answer, which must be the one that was sealed."""

@@ -34,9 +34,6 @@ def blind(
     experiment: Annotated[
         Literal["diagnostic", "ramp"], typer.Option(help="The diagnostic set of 55 s, or the ramp step alone, 8 s.")
     ] = "diagnostic",
-    acquire: Annotated[
-        bool, typer.Option("--acquire", help="Let the diagnosis request further experiments, of up to 60 s.")
-    ] = False,
     registration: Annotated[
         Path | None,
         typer.Option(help="Run a registered trial: its cases and experiments, with seeds drawn from its commit."),
@@ -70,12 +67,12 @@ def blind(
     require_extra("model", "daq blind", "numba")
     if registration is not None:
         _refuse_beside_registration(context)
-        chosen, experiment, acquire, drawn = _registered(registration, run)
+        chosen, experiment, drawn = _registered(registration, run)
     elif seeds is None:
         raise SpecError("--seeds or --registration: one of them is needed")
     else:
         chosen, drawn = _chosen(seeds, kinds, loads, cases), None
-    kept = TrialFolder.open(folder.absolute(), experiment, acquire, drawn)
+    kept = TrialFolder.open(folder.absolute(), experiment, drawn)
     campaign = Campaign(kept, load_machine("ma2000"), until=until)
     count = len(set(chosen))
     with ending(LocalWorkers(workers)) as pool:
@@ -91,9 +88,7 @@ def _refuse_beside_registration(context: typer.Context) -> None:
     why = {
         "seeds": "name one of them; a registered trial draws its own",
         "cases": "a registered run has all cases that it registers",
-        **dict.fromkeys(
-            ("kinds", "loads", "experiment", "acquire"), "a registered run takes this from its registration"
-        ),
+        **dict.fromkeys(("kinds", "loads", "experiment"), "a registered run takes this from its registration"),
     }
     if own := [name for name in why if _asked_for(context, name)]:
         raise SpecError(f"--{own[0]} and --registration: {why[own[0]]}")
@@ -111,14 +106,16 @@ def _chosen(seeds: str, kinds: str, loads: str, cases: int | None) -> list[int]:
     return found if cases is None else sample_arms(found, cases)
 
 
-def _registered(path: Path, run: str) -> tuple[list[int], Literal["diagnostic", "ramp"], bool, dict[str, str]]:
-    """Returns the seeds, the experiment, whether the diagnosis may ask for more experiments, and the registration."""
+def _registered(path: Path, run: str) -> tuple[list[int], Literal["diagnostic", "ramp"], dict[str, str]]:
+    """Returns the seeds, the experiment, and the registration."""
     from trials.blind.registered import read_registration
 
     registration, commit = read_registration(path, run)
     chosen = registration.run(run)
+    if chosen.acquire:
+        raise SpecError(f"run {run}: its diagnosis asks for further experiments, which a trial no longer runs")
     origin = {"file": path.name, "sha256": sha256(path.read_bytes()).hexdigest(), "run": run, "commit": commit}
-    return registration.arms(run, commit), chosen.experiment, chosen.acquire, origin
+    return registration.arms(run, commit), chosen.experiment, origin
 
 
 def _show(campaign: Campaign, folder: Path, *, as_json: bool) -> None:

@@ -28,7 +28,6 @@ class Asked(FrozenRecord):
 
     format: Literal[1] = 1
     experiment: Literal["diagnostic", "ramp"]
-    acquire: bool
     registration: dict[str, str] | None
     """File name and SHA-256 of the registration, its run, and the commit that the seeds are drawn from."""
     key: str
@@ -47,7 +46,6 @@ class TrialFolder:
         cls,
         path: Path,
         experiment: Literal["diagnostic", "ramp"],
-        acquire: bool,
         registration: dict[str, str] | None,
     ) -> TrialFolder:
         """Opens the folder, and creates a new one. Raises SpecError if it holds another trial."""
@@ -56,7 +54,7 @@ class TrialFolder:
                 (path / part).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise SpecError(f"{path}: cannot be made: {error.strerror}") from error
-        asked = Asked(experiment=experiment, acquire=acquire, registration=registration, key=secrets.token_hex(16))
+        asked = Asked(experiment=experiment, registration=registration, key=secrets.token_hex(16))
         file = path / _CAMPAIGN
         # Of commands that begin at once, only one writes it.
         aside = path / f".{_CAMPAIGN}.{os.getpid()}"
@@ -87,18 +85,18 @@ class TrialFolder:
         return self.path / f"{stage}.jsonl"
 
     def reload(self) -> None:
-        """Reads the lines, including those of an older version with several processes."""
+        """Reads the lines."""
         for stage in STAGES:
             self._rows[stage] = {}
-            for file in sorted(self.path.glob(f"{stage}*.jsonl")):
-                for line in read_text(file, str(file)).splitlines():
-                    try:
-                        row = parse_json(line, str(file))
-                    except SpecError:
-                        continue  # a crash cut this line short: its case is done again
-                    if not isinstance(row, dict) or not isinstance(row.get("seed"), int):
-                        raise SpecError(f"{file}: a line is not a case of a trial: {shown(row)}")
-                    self._rows[stage][row["seed"]] = row
+            file = self._file(stage)
+            for line in read_text(file, str(file)).splitlines() if file.exists() else ():
+                try:
+                    row = parse_json(line, str(file))
+                except SpecError:
+                    continue  # a crash cut this line short: its case is done again
+                if not isinstance(row, dict) or not isinstance(row.get("seed"), int):
+                    raise SpecError(f"{file}: a line is not a case of a trial: {shown(row)}")
+                self._rows[stage][row["seed"]] = row
 
     def of_case(self, seed: int) -> TrialFolder:
         """Returns the folder with the results of one case alone, for the process that runs its next stage."""

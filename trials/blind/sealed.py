@@ -25,8 +25,6 @@ from model.machine_model.model import Model
 from model.machine_model.model_file import save_model
 
 MODEL, ANSWER, HELD_OUT = "model.json", "answer.json", "held-out.mcap"
-ASKING = "asking.json"
-"""File that exists if experiments may be requested: `budget` is the remaining robot time for them in s."""
 TIME_LIMIT = 1800.0
 """Time limit of a diagnosis in s: generous, because the computer may be busy."""
 _KEPT_VARIABLES = ("PATH", "HOME", "LANG", "LC_ALL", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE", "VIRTUAL_ENV")
@@ -100,12 +98,11 @@ def diagnose_sealed(
     holdout: Path | None,
     model: Model,
     diagnoser: Sequence[str] = DIAGNOSER,
-    budget: float | None = None,
 ) -> SealedAnswer:
     """Runs `diagnoser` in a new folder with copies of the traces and the model, and returns its answer.
 
-    It gets no other arguments; the environment is what any program needs to run. `budget`: robot time in s for its
-    requests; None: it may request nothing. Raises DiagnosisFailedError.
+    It gets no other arguments; the environment is what any program needs to run. Raises
+    DiagnosisFailedError.
     """
     with tempfile.TemporaryDirectory(prefix="diagnosis-") as name:
         place = Path(name)
@@ -114,8 +111,6 @@ def diagnose_sealed(
         if holdout is not None:
             shutil.copyfile(holdout, place / HELD_OUT)
         save_model(model, place / MODEL)
-        if budget is not None:
-            (place / ASKING).write_text(json.dumps({"budget": budget}) + "\n", "utf-8")
         begun = time.monotonic()
         try:
             done = subprocess.run(

@@ -30,7 +30,7 @@ from model.effects.library import effect, library
 from model.machine_model.effect_parameters import effect_parameters, suits_drive
 from model.machine_model.model import Model
 from model.machine_model.parameter import Parameter
-from model.simulation.bodies import gravity_loads
+from model.simulation.chain_of_model import gravity_loads
 
 TIMES: Mapping[str, tuple[float, ...]] = {
     "backlash": (0.15, 0.5, 1.5),

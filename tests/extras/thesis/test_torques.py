@@ -21,7 +21,8 @@ from extras.thesis.torques import TorqueAnalysis, largest, torques_along
 from model import layout as at
 from model.dynamics import recursive
 from model.machine_model.model import Model
-from model.simulation.bodies import chain_of, rod_arm_body
+from model.simulation.bodies import rod_arm_body
+from model.simulation.chain_of_model import chain_of
 from tests.model.fitting.imagined import arm
 
 K = 12

@@ -279,3 +279,26 @@ def test_time_asked_for_in_pieces_or_at_once_gives_the_same_bits() -> None:
 def test_faulty_board_file_is_refused_in_one_line(old: str, new: str, says: str) -> None:
     with pytest.raises(DataFileError, match=says):
         parse_board(default_board_text().replace(old, new, 1))
+
+
+def test_default_ramp_overshoots_on_joints_1_and_3_and_not_on_joint_2() -> None:
+    """21.6° in 0.65 s, then held: 80 posture units as the controller takes them."""
+    board = Board(default_board(), default_memory_map(), Plant(default_plant()), seed=1)
+    board.run_until(500_000)
+    start = board.memory.values("set_point")
+    rows: list[PeriodSnapshot] = []
+    for period in range(100):
+        done = min(period * 0.02 / 0.65, 1.0)
+        board.write_set_points({joint: start[joint - 1] + math.floor(80 * done + 0.5) for joint in (1, 2, 3)})
+        board.run_until(510_000 + period * 20_000)
+        snapshot = board.snapshots.newest()
+        assert snapshot is not None
+        rows.append(snapshot)
+    overshoot = [-min(row.errors[joint] for row in rows[30:]) for joint in range(3)]
+    assert overshoot[0] >= 3
+    assert overshoot[1] <= 1
+    assert overshoot[2] >= 3
+    assert max(abs(error) for row in rows for error in row.errors[:3]) < 127
+    assert max(abs(power) for row in rows for power in row.powers) < 127
+    assert max(abs(error) for error in rows[-1].errors) <= 4
+    assert board.counters.set_points_missed == 0

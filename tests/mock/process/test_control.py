@@ -11,7 +11,7 @@ from firmware_protocol.commands import Advance, SetGains, Stop, WriteSetPoints
 from mock_controller.__main__ import main
 from mock_controller.control import Control
 from mock_controller.device import build_device
-from mock_controller.options import Options, OptionsError, read_options
+from mock_controller.options import Options, read_options
 from tests.mock.host import LockStepHost
 
 
@@ -151,16 +151,12 @@ def test_what_cannot_be_done_is_answered_by_one_line(bench: Bench, line: bytes) 
     assert bench.process.asked == []
 
 
-# ---- Options from command line and file; what cannot be is one line
+# ---- Options; what cannot be is one line
 
 
-def test_arguments_win_over_the_file_and_both_over_defaults(tmp_path: Path) -> None:
+def test_arguments_win_over_defaults() -> None:
     options = read_options(["--tcp", "127.0.0.1:0", "--start", "1,2,3,4,5,6", "--gains", "3,1,0", "--no-sample"])
     assert options == Options(tcp="127.0.0.1:0", start=(1, 2, 3, 4, 5, 6), gains=(3, 1, 0), sample=False)
-    file = tmp_path / "mock.toml"
-    file.write_text('pty = true\nseed = 3\nlock-step = true\nbaud = 9600\nfault = ["drop:rate=0.1"]\n', "utf-8")
-    options = read_options(["--config", str(file), "--seed", "4", "--fault", "flip"])
-    assert options == Options(pty=True, seed=4, lock_step=True, baud=9600, fault=("drop:rate=0.1", "flip"))
 
 
 @pytest.mark.parametrize(
@@ -177,7 +173,6 @@ def test_arguments_win_over_the_file_and_both_over_defaults(tmp_path: Path) -> N
         (["--pty", "--gains", "2,0"], "gains 2: field required"),
         (["--pty", "--seed", "-1"], "seed: input should be greater than or equal to 0, is -1"),
         (["--pty", "--colour"], "unrecognized arguments: --colour"),
-        (["--config", "missing.toml"], "config: missing.toml: No such file or directory"),
         (["--tcp", "nonsense"], "tcp: 'nonsense': write HOST:PORT"),
         (["--tcp", "127.0.0.1:70000"], "tcp: '127.0.0.1:70000': write HOST:PORT"),
         (["--tcp", "127.0.0.1:0", "--control", "here"], "control: 'here': write HOST:PORT"),
@@ -204,14 +199,6 @@ def test_wrong_options_are_one_line_and_exit_code_2(
     assert said.out == ""
     assert said.err.startswith(f"mock_controller: {words}")
     assert said.err.count("\n") == 1
-
-
-@pytest.mark.parametrize("text", ["pty = ", "colour = 'red'\npty = true", "pty = 'perhaps'"])
-def test_a_wrong_file_is_refused(tmp_path: Path, text: str) -> None:
-    file = tmp_path / "mock.toml"
-    file.write_text(text, "utf-8")
-    with pytest.raises(OptionsError):
-        read_options(["--config", str(file)])
 
 
 def test_start_posture_gains_and_hidden_effects_reach_board_and_arm() -> None:

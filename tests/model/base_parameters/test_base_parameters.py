@@ -25,7 +25,7 @@ from model.fitting.options import FitOptions
 from model.inverse_dynamics.fit import fit_torques
 from model.kinematics.chain import Chain, Joint
 from model.machine_model.model import base_model
-from model.simulation.bodies import chain_of
+from model.simulation.chain_of_model import chain_of
 from tests.daq.servo_bench import recorded as recorded_on_bench
 from tests.model.dynamics.chains import random_chain, random_link
 from tests.model.inverse_dynamics.test_fit_torques import COULOMB, LENGTH, MASS, ROTOR, VISCOUS, rod, swinging

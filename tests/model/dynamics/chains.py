@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from model.dynamics.effective_inertia import lump
 from model.dynamics.rod_arm import RodArm
 from model.kinematics.chain import Chain, ChainArrays, FloatArray, Joint, JointKind, Link
 
@@ -78,3 +79,33 @@ def random_state(seed: int, joints: int) -> tuple[FloatArray, FloatArray, FloatA
 def dual(arrays: ChainArrays) -> ChainArrays:
     """The same chain in dual numbers with no derivative yet."""
     return ChainArrays(arrays.prismatic, *(a.astype(np.complex128) for a in arrays[1:]))
+
+
+def effective_parameters(chain: Chain) -> FloatArray:
+    """Effective parameters (22,) of a chain with the geometry of the closed form, from any links."""
+    arrays = chain.arrays()
+    links = np.array([_about_joint(arrays.geometry[i], arrays.inertial[i], i == 0) for i in range(3)])
+    shoulder = chain.joints[1]
+    return np.asarray(lump(links, shoulder.a, shoulder.d, arrays.rotor_inertia, arrays.gravity))
+
+
+def _about_joint(geometry: FloatArray, inertial: FloatArray, waist: bool) -> FloatArray:
+    """A link's ten parameters about the joint that carries it, x along the link, z along the joint's axis.
+
+    Link 1 is wanted in the axes of its own frame instead (y along the waist), where α has already been applied.
+    """
+    _, d, a, alpha = geometry
+    mass, first = inertial[0], inertial[1:4]
+    tensor = np.zeros((3, 3))
+    tensor[np.triu_indices(3)] = inertial[4:]
+    tensor = tensor + np.triu(tensor, 1).T
+    untwist = np.array([[1, 0, 0], [0, np.cos(alpha), -np.sin(alpha)], [0, np.sin(alpha), np.cos(alpha)]])
+    if waist:
+        # the crossing of waist and shoulder axes is the origin of frame 1 itself
+        return np.concatenate(([mass], first, tensor[np.triu_indices(3)]))
+    first, tensor = untwist @ first, untwist @ tensor @ untwist.T
+    # joint 2's offset B2 = d2 stays with the link (c̄ is measured from the joint); so does −B3 = d3
+    shift = np.array([a, 0.0, d])
+    tensor = tensor + 2 * float(first @ shift) * np.eye(3) - np.outer(first, shift) - np.outer(shift, first)
+    tensor = tensor + mass * (float(shift @ shift) * np.eye(3) - np.outer(shift, shift))
+    return np.concatenate(([mass], first + mass * shift, tensor[np.triu_indices(3)]))

@@ -15,7 +15,8 @@ from model.drives.sensor import reading
 from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import base_model
-from model.simulation.bodies import chain_body, chain_of, gravity_loads
+from model.simulation.bodies import chain_body
+from model.simulation.chain_of_model import chain_of, gravity_loads
 from model.simulation.dynamics_of_run import chain_levels
 from model.simulation.prepared import Options
 from model.simulation.simulate import simulate

@@ -44,8 +44,8 @@ def short(name: str) -> ExperimentSpec:
     )
 
 
-def trial(path: Path, acquire: bool = False, until: Any = "score") -> Campaign:
-    folder = TrialFolder.open(path, "ramp", acquire, None)
+def trial(path: Path, until: Any = "score") -> Campaign:
+    folder = TrialFolder.open(path, "ramp", None)
     return Campaign(folder, MACHINE, FAKE, until, experiment=short)
 
 
@@ -55,7 +55,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     path = tmp_path_factory.mktemp("trial")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("DAQ_RUNTIME_FOLDER", str(path / "run"))
-        made = trial(path, acquire=True)
+        made = trial(path)
         said: list[str] = []
         with ending(WorkersInThreads(2)) as workers:
             made.run(SECRETS, workers, lambda _number, line: said.append(line))
@@ -91,7 +91,7 @@ def test_every_stage_writes_one_line_for_each_case(done: Campaign) -> None:
 
 def test_the_diagnosis_is_given_traces_and_the_model_and_nothing_else(done: Campaign) -> None:
     told = given(done, SECRETS[0])
-    assert told["files"] == ["asking.json", "held-out.mcap", "model.json", "trace-1.mcap", "trace-2.mcap"]
+    assert told["files"] == ["held-out.mcap", "model.json", "trace-1.mcap"]
     assert told["arguments"] == []
     assert "DAQ_RUNTIME_FOLDER" not in told["environment"]
     everything = json.dumps(told)
@@ -137,20 +137,9 @@ def test_the_two_traces_of_an_arm_have_different_noise(done: Campaign) -> None:
     assert (first.position != second.position).any()
 
 
-def test_an_experiment_that_an_answer_asked_for_was_run_once_on_the_same_arm(done: Campaign) -> None:
-    assert len(rows(done, "diagnose")[SECRETS[1]]["traces"]) == 1
-    row = rows(done, "diagnose")[SECRETS[0]]
-    assert len(row["traces"]) == 2
-    assert row["robot_seconds"] == pytest.approx(rows(done, "record")[SECRETS[0]]["robot_seconds"] + 0.5, abs=0.1)
-    (further,) = row["further"]
-    assert (further["experiment"], further["trace"], further["outcome"]) == ("a pause", row["traces"][1], "complete")
-    assert given(done, SECRETS[1])["budget"] == 60.0
-    assert given(done, SECRETS[0])["budget"] == pytest.approx(60.0 - further["duration"])
-
-
-def resumed(path: Path, done: Campaign, acquire: bool) -> Campaign:
+def resumed(path: Path, done: Campaign) -> Campaign:
     """Another trial of the arm that carries much, recorded already."""
-    copy = trial(path, acquire=acquire)
+    copy = trial(path)
     for stage in ("detect", "record"):
         copy.folder.add(stage, rows(done, stage)[SECRETS[0]])
     for file in (done.folder.path / "traces").iterdir():
@@ -158,41 +147,9 @@ def resumed(path: Path, done: Campaign, acquire: bool) -> Campaign:
     return copy
 
 
-def test_an_incomplete_further_run_is_kept_but_not_used_and_is_the_last(done: Campaign, tmp_path: Path) -> None:
-    copy = resumed(tmp_path, done, acquire=True)
-    first = rows(done, "record")[SECRETS[0]]
-    broken = Recorded(tmp_path / "traces" / first["trace"], "stopped", "by hand", 8.0)
-    copy.recorder = lambda *_: broken
-    row = copy._diagnose(SECRETS[0])
-    assert [run["outcome"] for run in row["further"]] == ["stopped"]
-    assert row["traces"] == [first["trace"]]
-    assert row["robot_seconds"] == pytest.approx(first["robot_seconds"] + row["further"][0]["duration"])
-    assert row["further"][0]["duration"] > 0.1
-
-
-def test_a_further_experiment_that_cannot_be_recorded_does_not_count_as_a_wrong_answer(
-    done: Campaign, tmp_path: Path
-) -> None:
-    def nothing(*_: object) -> Recorded:
-        raise TrialStageError("nothing was recorded: no port")
-
-    copy = resumed(tmp_path, done, acquire=True)
-    copy.recorder = nothing
-    with pytest.raises(TrialStageError, match="nothing was recorded"):
-        copy._diagnose(SECRETS[0])
-
-
-def test_without_acquire_no_experiment_may_be_asked_for(done: Campaign, tmp_path: Path) -> None:
-    copy = resumed(tmp_path, done, acquire=False)
-    copy.folder.add("diagnose", copy._diagnose(SECRETS[0]))
-    told = given(copy, SECRETS[0])
-    assert told["budget"] is None
-    assert told["files"] == ["held-out.mcap", "model.json", "trace-1.mcap"]
-
-
 def test_a_resumed_trial_repeats_no_stage(done: Campaign) -> None:
     before = {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES}
-    again = trial(done.folder.path, acquire=True)
+    again = trial(done.folder.path)
     again.run(SECRETS, WorkersByHand(), lambda _number, _said: None)
     assert {stage: (done.folder.path / f"{stage}.jsonl").read_bytes() for stage in STAGES} == before
 
@@ -207,7 +164,7 @@ def test_nothing_is_begun_once_the_time_is_over(tmp_path: Path) -> None:
 def test_a_trial_can_be_resumed_from_its_lines_in_another_folder(done: Campaign, tmp_path: Path) -> None:
     for name in ("trial.json", *(f"{stage}.jsonl" for stage in STAGES)):
         (tmp_path / name).write_bytes((done.folder.path / name).read_bytes())
-    again = Campaign(TrialFolder.open(tmp_path, "ramp", True, None), MACHINE, ("/no/diagnoser",))
+    again = Campaign(TrialFolder.open(tmp_path, "ramp", None), MACHINE, ("/no/diagnoser",))
     assert again.run(SECRETS, WorkersByHand(), lambda _number, _said: None) == 0
     assert again.table() == done.table()
     assert not list((tmp_path / "traces").iterdir())
@@ -228,12 +185,12 @@ def test_the_order_of_cases_reveals_nothing(done: Campaign) -> None:
     order = done.folder.in_order(seeds)
     assert sorted(order) == sorted(seeds)
     assert order not in (seeds, sorted(seeds))
-    assert order == trial(done.folder.path, acquire=True).folder.in_order(seeds[::-1])
+    assert order == trial(done.folder.path).folder.in_order(seeds[::-1])
 
 
 def test_a_folder_of_another_trial_is_refused(done: Campaign) -> None:
     with pytest.raises(SpecError, match="holds a trial with other options"):
-        TrialFolder.open(done.folder.path, "diagnostic", False, None)
+        TrialFolder.open(done.folder.path, "diagnostic", None)
 
 
 def test_a_stage_whose_line_was_cut_short_is_repeated(tmp_path: Path) -> None:
@@ -245,12 +202,6 @@ def test_a_stage_whose_line_was_cut_short_is_repeated(tmp_path: Path) -> None:
     assert [row["seed"] for row in again.rows("detect")] == [110]
     again.add("detect", {"seed": 120})
     assert [row["seed"] for row in trial(tmp_path).folder.rows("detect")] == [110, 120]
-
-
-def test_lines_that_several_processes_of_an_older_version_wrote_are_read(tmp_path: Path) -> None:
-    trial(tmp_path).folder.add("detect", {"seed": 110})
-    (tmp_path / "detect-2of2.jsonl").write_text('{"seed": 120}\n', "utf-8")
-    assert {row["seed"] for row in trial(tmp_path).folder.rows("detect")} == {110, 120}
 
 
 def test_a_case_whose_process_is_killed_is_not_done_and_the_others_are(done: Campaign, tmp_path: Path) -> None:
@@ -271,7 +222,7 @@ def test_a_diagnosis_that_gives_no_answer_says_why(tmp_path: Path, done: Campaig
         diagnose_sealed(
             [], None, model, (sys.executable, "-c", "import sys; print('no idea', file=sys.stderr); sys.exit(3)")
         )
-    silent = resumed(tmp_path, done, acquire=False)
+    silent = resumed(tmp_path, done)
     silent.diagnoser = (sys.executable, "-c", "raise SystemExit(1)")
     row = silent._diagnose(SECRETS[0])
     assert row["failure"] == "the diagnosis ended with code 1: it said nothing"
@@ -310,19 +261,19 @@ def test_hashes_prints_the_tables_of_a_registration(daq: CommandLine) -> None:
     assert expected[thresholds] == sha256((source_tree() / thresholds).read_bytes()).hexdigest()
 
 
-STAGE_MODULES = ("trials.blind", "daq.owner", "server.jobs.next_experiment", "mock_controller")
+STAGE_MODULES = ("trials.blind", "daq.owner", "mock_controller")
 AROUND = ("daq_cli", "daq.client", "daq.config", "daq.executors")
 """What only the command line around a trial uses, which decides nothing."""
 
 
 def test_nothing_that_a_stage_imports_is_left_out_of_a_registration() -> None:
-    every = ("daq", "daq_cli", "model", "server", "mock_controller", "firmware_protocol", "trials")
+    every = ("daq", "daq_cli", "model", "mock_controller", "firmware_protocol", "trials")
     graph = grimp.build_graph(*every, exclude_type_checking_imports=True, cache_dir=None)
     begun = {name for name in graph.modules if any(f"{name}.".startswith(f"{stage}.") for stage in STAGE_MODULES)}
     used = begun.union(*(graph.find_upstream_modules(name) for name in begun))
     assert {"model.discrepancy.workflow", "daq.link.link", "model.fitting.identifiability"} <= used
     registered = [path.removesuffix(".py").replace("/", ".") for path in REGISTERED]
-    packages = {"daq", "model", "server", "server.jobs"}  # of which only the registered parts are used
+    packages = {"daq", "model"}  # of which only the registered parts are used
     left = [name for name in used - packages if not any(f"{name}.".startswith(f"{p}.") for p in (*registered, *AROUND))]
     assert left == []
 
@@ -350,7 +301,6 @@ def test_a_registered_trial_runs_only_committed_and_with_the_code_that_was_regis
     git(empty_folder, "commit", "-q", "-m", "registered")
     daq(*words, "--seeds", "1:2").complains(2, "--seeds and --registration")
     daq(*words, "--cases", "1").complains(2, "--cases and --registration")
-    daq(*words, "--acquire").complains(2, "--acquire and --registration")
     daq(*words, "--kinds", "clean").complains(2, "--kinds and --registration")
     daq(*words, "--run", "ramp").complains(2, "run 'ramp': the registration has diagnostic")
     kept = empty_folder / "registration-diagnostic.md"

@@ -14,7 +14,7 @@ from model.base_parameters.grouping import DEPENDENT, grouped, preferred_order
 from model.base_parameters.standard import Motion, inertial_regressor, link_parameters
 from model.dynamics import recursive
 from model.machine_model.model import base_model
-from model.simulation.bodies import chain_of
+from model.simulation.chain_of_model import chain_of
 from tests.extras.formats.robot_files.arms import ARMS, InMujoco, InPinocchio, PublishedArm
 
 AGREEMENT = 1e-9

@@ -20,7 +20,7 @@ from model.dynamics import recursive
 from model.kinematics.chain import ChainArrays
 from model.machine_model.model import Model, base_model
 from model.machine_model.nominal import nominal_vector
-from model.simulation.bodies import chain_of
+from model.simulation.chain_of_model import chain_of
 from tests.extras.formats.robot_files.arms import ARMS
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
