@@ -25,10 +25,7 @@ export function isEnded(job: Job): boolean {
   return job.state !== 'queued' && job.state !== 'running';
 }
 
-/** The word for a job's state. */
-export const stateWord = (job: Job): string => (job.state === 'queued' ? 'waiting' : job.state);
-
-/** A sign for a job's state. */
+/** A sign and a word for a job's state. */
 export function toneOf(job: Job): Tone {
   switch (job.state) {
     case 'done':

@@ -40,8 +40,6 @@ export class MacroDesk {
   /** What became of the last run, or of the last change. */
   done = $state('');
   busy = $state(false);
-  /** What it is busy with, of what can be asked of a macro. */
-  asked = $state<'check' | 'run' | ''>('');
   problem = $state.raw<Problem | null>(null);
   filled = $derived(valuesOf(this.fields, this.typed));
   isWrong = $derived(Object.keys(this.filled.problems).length > 0);
@@ -50,8 +48,6 @@ export class MacroDesk {
   /** How often values were filled in: a check is of those that it began with. */
   private changes = 0;
   sent = $state(0);
-  /** What was shown before it was edited. */
-  private former: readonly [Macro, number | null] | null = null;
   /** How many of them are planned to be repeated. */
   planned = $derived(this.orders.filter((one) => one.cron !== null).length);
   /** What adding them does. */
@@ -106,20 +102,11 @@ export class MacroDesk {
 
   /** Edits the macro shown, a copy of it, or a new one. */
   edit(macro: Macro = EMPTY, revision: number | null = null): void {
-    if (!this.isEdited) this.former = this.macro && [this.macro, this.revision];
     this.macro = macro;
     this.revision = revision;
     this.isEdited = true;
     this.problem = null;
     this.done = '';
-  }
-
-  /** Shows what was shown before, as it was. */
-  async cancel(): Promise<void> {
-    this.isEdited = false;
-    this.macro = null;
-    this.problem = null;
-    if (this.former) await this.show(...this.former);
   }
 
   /** Begins a macro with the line of an experiment that has ended. */
@@ -151,18 +138,16 @@ export class MacroDesk {
     const macro = this.macro?.name;
     if (macro === undefined) return;
     await this.during(async () => {
-      await ask(
-        api.DELETE('/api/v1/robots/{robot}/macros/{macro}', { params: { path: { ...here(), macro } } }),
-      );
+      const params = { path: { ...here(), macro } };
+      await ask(api.DELETE('/api/v1/robots/{robot}/macros/{macro}', { params }));
       this.macro = null;
       await this.load();
     });
   }
 
   /** Has every motion worked out; nothing is sent. Whether all of them are allowed. */
-  async check(asked: 'check' | 'run' = 'check'): Promise<boolean> {
+  async check(): Promise<boolean> {
     let isAllowed = false;
-    this.asked = asked;
     this.forget();
     const began = this.changes;
     await this.during(async () => {
@@ -186,9 +171,8 @@ export class MacroDesk {
 
   /** Checks all experiments, then adds them to the queue in their order. */
   async run(): Promise<void> {
-    if (!(await this.check('run'))) return;
+    if (!(await this.check())) return;
     this.done = '';
-    this.asked = 'run';
     await this.during(async () => {
       const { orders } = this;
       for (const [place, order] of orders.entries()) {
@@ -224,7 +208,6 @@ export class MacroDesk {
       this.problem = asProblem(error);
     }
     this.busy = false;
-    this.asked = '';
   }
 }
 

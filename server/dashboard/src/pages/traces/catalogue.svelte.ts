@@ -40,7 +40,6 @@ export class Catalogue {
   private readonly listing = new Listing<CatalogueEntry>();
   private readonly reload = new Reload({ load: () => void this.load(), after: afterSeconds });
   private turn = 0;
-  /** The turn of what is shown: answers to earlier ones come too late. */
   private shown = 0;
 
   /** Follows the service: a new trace appears by itself. */
