@@ -93,7 +93,7 @@ export class Catalogue {
         return ask(api.GET('/api/v1/robots/{robot}/traces', { params: { path: here(), query } }));
       });
       if (turn < this.shown) return;
-      this.shown = turn; // also while newer ones are asked for: a busy service would else never be shown
+      this.shown = turn; // newer ones may still be asked for: a busy service would else never be shown
       this.items = page.items;
       this.next = page.next;
       this.problem = null;
