@@ -133,6 +133,7 @@ class Demonstrations(Part):
         if number is None:
             raise HidingError("the recorded trace could not be taken in; the service's log says why")
         self._traces.change(rig.robot.name, number, TraceChange(tags=(TAG,)))
+        rig.record_event("trace", f"{Path(finished.trace).name} was recorded")
         return number, finished.samples * control_period(rig.robot.machine)
 
     def _hold(self, owner: OwnerOnDemand) -> None:

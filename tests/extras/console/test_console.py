@@ -84,9 +84,9 @@ def test_a_line_is_read_by_the_command_lines_own_parser() -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("rn ramp", "no such command; there are run, stop"),
+        ("rn ramp", "no such command; there are help, run, stop"),
         ("run", "run: needs one of ramp, step"),
-        ("run spec file.json", "run: needs one of ramp"),
+        ("run spec file.json", "not 'spec'"),
         ("mock --seed 3", "mock: not in the console; type it in a terminal"),
         ("run ramp --jonts 2", "run ramp: no such option: --jonts"),
         ("run ramp --yes", "no such option: --yes"),

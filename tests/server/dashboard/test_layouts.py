@@ -22,6 +22,7 @@ def _tile(page: Page, title: str) -> Locator:
 
 def _add(page: Page, title: str) -> None:
     page.get_by_role("combobox", name="Add a panel").select_option(label=title)
+    page.get_by_role("button", name="Add", exact=True).press("Enter")
 
 
 def _places(page: Page) -> dict[str, dict[str, float]]:
@@ -38,6 +39,7 @@ def test_a_layout_is_arranged_kept_shared_and_saved(dashboard: Dashboard, tmp_pa
     for title in ("Number", "Chart", "Notes", "Faults"):
         _add(page, title)
     expect(page.get_by_role("button", name=re.compile("^Faults: "))).to_be_focused()
+    expect(page.get_by_role("button", name=re.compile("^Faults: "))).to_be_in_viewport()
     _tile(page, "Number").get_by_role("combobox", name="Joint").select_option("J2")
     handle = page.get_by_role("button", name=re.compile("^Number: "))
     handle.focus()

@@ -33,7 +33,7 @@ const BYTES = ['B', 'kB', 'MB', 'GB', 'TB'] as const;
 export function bytes(value: number | null | undefined): string {
   if (value === null || value === undefined) return NOTHING;
   const power = Math.min(BYTES.length - 1, value < 1 ? 0 : Math.floor(Math.log10(value) / 3));
-  return `${significant(value / 1000 ** power, 3)} ${BYTES[power] ?? 'B'}`;
+  return `${shortest(value / 1000 ** power, 3)} ${BYTES[power] ?? 'B'}`;
 }
 
 /** A duration in s: 0.42 s, 12.3 s, 3 min 20 s, 2 h 05 min, 3 d 4 h. */

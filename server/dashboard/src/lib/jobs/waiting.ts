@@ -2,15 +2,7 @@
 
 import type { Job } from '../api/types';
 import { coarse } from '../format';
-import type { JobKind } from './jobs';
-
-/** What a job is, as a noun. */
-const NOUNS: Readonly<Record<JobKind, string>> = {
-  fit: 'fit',
-  validate: 'validation',
-  compare: 'simulation',
-  diagnose: 'diagnosis',
-};
+import { JOB_NAMES } from '../lineage/tree';
 
 /** Traces that are called by name; of more, how many. */
 const MOST_NAMED = 1;
@@ -26,7 +18,7 @@ export function waitingWords(job: Job, now: number, name: (trace: string) => str
   const { traces } = behind.request;
   const of = traces.length <= MOST_NAMED ? traces.map(name).join(', ') : `${traces.length} traces`;
   const more = behind.others === 0 ? '' : `, then ${behind.others} more`;
-  return `waits behind: ${NOUNS[behind.request.kind]} of ${of}${soFar(behind.started, now)}${more}`;
+  return `waits behind: ${JOB_NAMES[behind.request.kind].toLowerCase()} of ${of}${soFar(behind.started, now)}${more}`;
 }
 
 /** Traces whose names the words need. */

@@ -123,7 +123,7 @@ const EMPTY = { model: null, job: null, traces: [], held: [], children: [] } as 
 export const JOB_NAMES: Record<Job['request']['kind'], string> = {
   fit: 'Fit',
   validate: 'Validation',
-  compare: 'Comparison',
+  compare: 'Simulation',
   diagnose: 'Diagnosis',
 };
 

@@ -75,6 +75,12 @@ export function columnOf(
   return row === undefined ? null : row.map((value) => (value - begin) * scale);
 }
 
+/** Where a joint is told to be at first, or is. */
+export function startOf(signals: Signals, joint: number): number {
+  const place = signals.joints.indexOf(joint);
+  return signals.set_point?.[place]?.[0] ?? signals.position[place]?.[0] ?? 0;
+}
+
 /** From the first to the last moment of all of them; null where there is none. */
 export function wholeRange(all: readonly Signals[]): Range | null {
   const begins = all.flatMap((one) => one.time.slice(0, 1));

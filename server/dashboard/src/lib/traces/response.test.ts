@@ -7,11 +7,11 @@ const signals: Signals = {
   samples: 2,
   time: [0, 1],
   position: [
-    [0, Math.PI],
+    [0.5, 0.5 + Math.PI],
     [0, 0.002],
   ],
   set_point: [
-    [0, Math.PI / 2],
+    [0.5, 0.5 + Math.PI / 2],
     [0, 0],
   ],
   error: null,
@@ -19,7 +19,7 @@ const signals: Signals = {
 };
 
 describe('the response that is drawn', () => {
-  it('has position and set point of each joint that moved, in its unit', () => {
+  it('has the change of position and set point of each joint that moved, in its unit', () => {
     const found = responseOf(signals, [{ joint: 1, unit: '°' }], (joint) => `colour ${joint}`);
     expect(found?.data).toEqual([
       [0, 1],

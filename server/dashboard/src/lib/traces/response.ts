@@ -1,8 +1,8 @@
-/** Position and set point of the joints that moved, as columns of one chart. Pure. */
+/** How position and set point of the joints that moved have changed since the start, as columns of one chart. Pure. */
 
 import type { TraceDetails } from '../api';
 import type { ChartSeries } from '../chart';
-import { columnOf, type Signals } from './columns';
+import { columnOf, startOf, type Signals } from './columns';
 
 export interface Response {
   readonly joints: readonly number[];
@@ -27,7 +27,7 @@ export function responseOf(
   for (const joint of joints) {
     const colour = colourOf(joint);
     for (const name of ['position', 'set_point'] as const) {
-      const values = columnOf(signals, name, joint, SCALES[unit] ?? 1);
+      const values = columnOf(signals, name, joint, SCALES[unit] ?? 1, startOf(signals, joint));
       if (values === null) continue;
       const isPosition = name === 'position';
       series.push({

@@ -273,7 +273,7 @@ const ORDERS: Readonly<Record<string, Known>> = {
     carryOut: async () => {
       const params = { ...path(), query: { limit: SHOWN } };
       const { items } = await ask(api.GET('/api/v1/robots/{robot}/traces', { params }));
-      const told = items.map((one) => ({
+      const told = items.toReversed().map((one) => ({
         text: `${one.id}  ${dayAndTime(one.created)}  ${one.name ?? one.kind}  ${one.outcome ?? ''}`,
         href: linkTo('traces', one.id),
       }));

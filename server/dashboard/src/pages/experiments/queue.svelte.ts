@@ -10,9 +10,12 @@ const TOPICS = new Set(['queue', 'event', 'robot']);
 /** s in which several changes are taken together. */
 const TOGETHER = 0.15;
 const ENDED_SHOWN = 12;
-/** Where approvals are. */
-const EXPERIMENT = '/api/v1/robots/{robot}/experiments/{experiment}/approval';
-const SCHEDULE = '/api/v1/robots/{robot}/schedules/{schedule}/approval';
+const QUEUE = '/api/v1/robots/{robot}/queue';
+const ALL = '/api/v1/robots/{robot}/experiments';
+const ONE = '/api/v1/robots/{robot}/experiments/{experiment}';
+const EXPERIMENT = `${ONE}/approval` as const;
+const PLANNED = '/api/v1/robots/{robot}/schedules/{schedule}';
+const SCHEDULE = `${PLANNED}/approval` as const;
 
 export class QueueLists {
   waiting = $state.raw<readonly Experiment[]>([]);
@@ -50,15 +53,9 @@ export class QueueLists {
     const path = here();
     try {
       const [waiting, running, ended, schedules] = await Promise.all([
-        ask(api.GET('/api/v1/robots/{robot}/queue/experiments', { params: { path } })),
-        ask(
-          api.GET('/api/v1/robots/{robot}/experiments', { params: { path, query: { state: ['running'] } } }),
-        ),
-        ask(
-          api.GET('/api/v1/robots/{robot}/experiments', {
-            params: { path, query: { order: 'ended', limit: ENDED_SHOWN } },
-          }),
-        ),
+        ask(api.GET(`${QUEUE}/experiments`, { params: { path } })),
+        ask(api.GET(ALL, { params: { path, query: { state: ['running'] } } })),
+        ask(api.GET(ALL, { params: { path, query: { order: 'ended', limit: ENDED_SHOWN } } })),
         ask(api.GET('/api/v1/robots/{robot}/schedules', { params: { path } })),
       ]);
       if (turn !== this.asked) return;
@@ -91,18 +88,14 @@ export class QueueLists {
     await this.change(async () => {
       for (const { id, priority } of changes) {
         const params = { path: { ...here(), experiment: id } };
-        await ask(
-          api.PATCH('/api/v1/robots/{robot}/experiments/{experiment}', { params, body: { priority } }),
-        );
+        await ask(api.PATCH(ONE, { params, body: { priority } }));
       }
     });
   }
 
   async cancel(id: string): Promise<void> {
     const params = { path: { ...here(), experiment: id } };
-    await this.change(() =>
-      ask(api.POST('/api/v1/robots/{robot}/experiments/{experiment}/cancel', { params })),
-    );
+    await this.change(() => ask(api.POST(`${ONE}/cancel`, { params })));
   }
 
   /** Approves exactly what is shown: the service refuses it if it has changed meanwhile. */
@@ -118,35 +111,27 @@ export class QueueLists {
   }
 
   async pause(): Promise<void> {
-    await this.change(() =>
-      ask(api.POST('/api/v1/robots/{robot}/queue/pause', { params: { path: here() } })),
-    );
+    await this.change(() => ask(api.POST(`${QUEUE}/pause`, { params: { path: here() } })));
   }
 
   /** `movesRealArm`: the operator's word that the workspace of a real arm is clear. */
   async resume(movesRealArm: boolean): Promise<void> {
     const body = { moves_real_arm: movesRealArm };
-    await this.change(() =>
-      ask(api.POST('/api/v1/robots/{robot}/queue/resume', { params: { path: here() }, body })),
-    );
+    await this.change(() => ask(api.POST(`${QUEUE}/resume`, { params: { path: here() }, body })));
   }
 
   async attend(): Promise<void> {
-    await this.change(() =>
-      ask(api.POST('/api/v1/robots/{robot}/queue/attend', { params: { path: here() } })),
-    );
+    await this.change(() => ask(api.POST(`${QUEUE}/attend`, { params: { path: here() } })));
   }
 
   async switchSchedule(schedule: string, active: boolean): Promise<void> {
     const params = { path: { ...here(), schedule } };
-    await this.change(() =>
-      ask(api.PATCH('/api/v1/robots/{robot}/schedules/{schedule}', { params, body: { active } })),
-    );
+    await this.change(() => ask(api.PATCH(PLANNED, { params, body: { active } })));
   }
 
   async deleteSchedule(schedule: string): Promise<void> {
     const params = { path: { ...here(), schedule } };
-    await this.change(() => ask(api.DELETE('/api/v1/robots/{robot}/schedules/{schedule}', { params })));
+    await this.change(() => ask(api.DELETE(PLANNED, { params })));
   }
 
   private async change(order: () => Promise<unknown>): Promise<void> {

@@ -138,9 +138,8 @@ export class MacroDesk {
     const macro = this.macro?.name;
     if (macro === undefined) return;
     await this.during(async () => {
-      await ask(
-        api.DELETE('/api/v1/robots/{robot}/macros/{macro}', { params: { path: { ...here(), macro } } }),
-      );
+      const params = { path: { ...here(), macro } };
+      await ask(api.DELETE('/api/v1/robots/{robot}/macros/{macro}', { params }));
       this.macro = null;
       await this.load();
     });

@@ -40,6 +40,7 @@ export class Catalogue {
   private readonly listing = new Listing<CatalogueEntry>();
   private readonly reload = new Reload({ load: () => void this.load(), after: afterSeconds });
   private turn = 0;
+  private shown = 0;
 
   /** Follows the service: a new trace appears by itself. */
   follow(): () => void {
@@ -58,6 +59,7 @@ export class Catalogue {
     if (this.line.includes('effect:')) void untrack(() => this.learnEffects());
     this.problem = null; // it was of another line
     this.listing.beginAnew();
+    this.shown = this.turn + 1; // what was asked for before is not of this line
     this.reload.soon(untrack(() => this.loaded) ? QUIET : 0);
     return () => this.reload.leave();
   }
@@ -81,7 +83,7 @@ export class Catalogue {
 
   /** Loads it anew, as far as it is shown. */
   async load(): Promise<void> {
-    const turn = ++this.turn; // what was asked for before is not of this line
+    const turn = ++this.turn;
     this.busy = this.asked.problem === '';
     if (!this.busy) return; // the list waits for a line that can be searched
     const { search } = this.asked;
@@ -90,12 +92,13 @@ export class Catalogue {
         const query = { limit, ...search, ...(cursor === null ? {} : { cursor }) };
         return ask(api.GET('/api/v1/robots/{robot}/traces', { params: { path: here(), query } }));
       });
-      if (turn !== this.turn) return;
+      if (turn < this.shown) return;
+      this.shown = turn; // newer ones may still be asked for: a busy service would else never be shown
       this.items = page.items;
       this.next = page.next;
       this.problem = null;
     } catch (error) {
-      if (turn !== this.turn) return;
+      if (turn < this.shown) return;
       this.problem = asProblem(error);
     }
     this.loaded = true;

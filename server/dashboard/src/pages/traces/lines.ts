@@ -2,7 +2,7 @@
 
 import uPlot from 'uplot';
 import type { ChartSeries } from '../../lib/chart';
-import { columnOf, type Signals } from '../../lib/traces/columns';
+import { columnOf, startOf, type Signals } from '../../lib/traces/columns';
 import type { Simulation } from './simulating.svelte';
 
 const DEGREES = 180 / Math.PI;
@@ -108,9 +108,7 @@ function simulatedRow(
   return [[series, row.map((value) => (value - begin) * scale)]];
 }
 
-/** What is taken off positions: where the joint is told to be at first, or is; 0 where positions are drawn as they are. */
+/** What is taken off positions; 0 where they are drawn as they are. */
 export function beginOf({ fromStart, signals }: Drawn, joint: number): number {
-  if (!fromStart) return 0;
-  const place = signals.joints.indexOf(joint);
-  return signals.set_point?.[place]?.[0] ?? signals.position[place]?.[0] ?? 0;
+  return fromStart ? startOf(signals, joint) : 0;
 }
