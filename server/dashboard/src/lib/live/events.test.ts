@@ -23,14 +23,6 @@ it('one press is one row, however often it was sent', () => {
     { row: 'reset', times: 1 },
     { row: 'stop', times: 1 },
   ]);
-  const rows = [
-    ['stop', '2026-11-30T12:00:01Z'],
-    ['paused', NOON],
-    ['stop', NOON],
-    ['stop', '2026-11-30T11:59:00Z'],
-  ];
-  const at = ([kind, when]: string[]): string | null => (kind === 'stop' ? when! : null);
-  expect(together(rows, ([kind]) => kind!, at).map((one) => one.times)).toEqual([2, 1, 1]);
 });
 
 describe('who stopped the arm or paused the queue', () => {

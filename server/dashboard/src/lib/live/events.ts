@@ -18,25 +18,11 @@ export function newestEvents(
   return [...told.filter((event) => !known.has(event.number)), ...asked].slice(0, most);
 }
 
-/**
- * Rows that follow one another and say the same, as one. `stoppedAt`: when a row tells of a stop (ISO), null for the
- * others: a press of Stop is sent until it is answered, and other rows come meanwhile.
- */
-export function together<T>(
-  rows: readonly T[],
-  said: (row: T) => string,
-  stoppedAt: (row: T) => string | null = () => null,
-): { row: T; times: number }[] {
+/** Rows that follow one another and say the same, as one: a press of Stop is sent until it is answered. */
+export function together<T>(rows: readonly T[], said: (row: T) => string): { row: T; times: number }[] {
   const found: { row: T; times: number }[] = [];
   for (const row of rows) {
-    const at = stoppedAt(row);
-    const last =
-      found.findLast(
-        ({ row: one }) =>
-          at !== null &&
-          said(one) === said(row) &&
-          Date.parse(stoppedAt(one)!) < Date.parse(at) + CAUSED_WITHIN,
-      ) ?? found.at(-1);
+    const last = found.at(-1);
     if (last !== undefined && said(last.row) === said(row)) last.times += 1;
     else found.push({ row, times: 1 });
   }
