@@ -5,13 +5,16 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from datetime import datetime
+from datetime import datetime, timedelta
 
 from daq.contracts.service.events import ServiceEvent
 from daq.contracts.service.live import EventMessage
 from server.clock import Clock
 from server.live.hub import Hub
 from server.store.waiting_events import EventStore, NewEvent, WaitingEvents
+
+ONE_PRESS = timedelta(seconds=5)
+"""A page sends a press of Stop for 3 s."""
 
 log = logging.getLogger("server")
 
@@ -29,6 +32,7 @@ class EventLog:
         self._clock = clock
         self._waiting = WaitingEvents(store, self._publish)
         self._later = ThreadPoolExecutor(1, thread_name_prefix="notes")
+        self._stops: dict[str, tuple[str, str | None, datetime]] = {}
 
     def record(
         self,
@@ -52,8 +56,14 @@ class EventLog:
             hub.look()
 
     def record_later(self, robot: str, kind: str, text: str, *, actor: str | None = None) -> None:
-        """Does the same on a thread, for callers that must not wait for the disk."""
-        self._later.submit(self.record, robot, kind, text, actor=actor, at=self._clock.utc())
+        """Does the same on a thread, for callers that must not wait for the disk. A stop told twice within `ONE_PRESS`
+        is one event: until a press is answered it is sent to the service and to the stop listener."""
+        now = self._clock.utc()
+        if kind == "stop":
+            before, self._stops[robot] = self._stops.get(robot), (text, actor, now)
+            if before is not None and before[:2] == (text, actor) and now - before[2] < ONE_PRESS:
+                return
+        self._later.submit(self.record, robot, kind, text, actor=actor, at=now)
 
     def settle(self) -> None:
         """Accepts no more events to record later, and waits until the accepted ones are recorded."""

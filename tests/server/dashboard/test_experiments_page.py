@@ -302,7 +302,7 @@ def test_an_experiment_that_has_ended_is_run_again_by_way_of_the_form(dashboard:
     service = dashboard.service
     spec = {"name": "once-more", "trajectory": {"kind": "ramp", "amplitude": 0.05, "duration": 0.4}, "hold": 0.1}
     first = service.end_of(service.robot.post("/experiments", json={"spec": spec}).json()["id"])
-    form.get_by_role("button", name="Run again: once-more").first.click()
+    form.get_by_role("button", name="Edit and run again: once-more").first.click()
     expect(form.get_by_label("Name", exact=True)).to_have_value("once-more")
     assert service.robot.get("/queue/experiments").json() == []
     form.get_by_role("button", name="Add to the queue").click()

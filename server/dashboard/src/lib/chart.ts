@@ -66,6 +66,8 @@ export interface ChartDrawing {
 }
 
 const AXIS_FONT_SIZE = 12;
+/** px above a chart that has marks: their names stand there, and cover no curve. */
+const FLAGS = 20;
 /** px from the end of a line to its name: room for what joins them where the name had to move away. */
 const LEADER = 12;
 
@@ -104,10 +106,11 @@ export function optionsOf(drawing: ChartDrawing, width: number, height: number):
       values.map((value) => (value === null ? '' : write(value))),
   });
   const places = axes.splits;
+  const isMarked = drawing.sync !== undefined || drawing.markers().length > 0;
   return {
     width,
     height,
-    padding: [8, drawing.series.some((one) => one.end) ? LEADER + 26 : 10, 0, 0],
+    padding: [isMarked ? FLAGS : 8, drawing.series.some((one) => one.end) ? LEADER + 26 : 10, 0, 0],
     legend: { show: false },
     cursor: {
       drag: { x: drawing.zoomable, y: false, setScale: false },
@@ -226,10 +229,8 @@ function drawMarkers(plot: uPlot, drawing: ChartDrawing): void {
     width: (text: string) => ctx.measureText(text).width,
   };
   for (const { left, text, index } of placedFlags(marks, room)) {
-    ctx.fillStyle = drawing.colours.surface; // no curve runs through a name
-    ctx.fillRect(left - ratio, bbox.top + ratio, ctx.measureText(text).width + 2 * ratio, 13 * ratio);
     ctx.fillStyle = colours[marks[index]?.tone ?? 'plain'];
-    ctx.fillText(text, left, bbox.top + 2 * ratio);
+    ctx.fillText(text, left, bbox.top - 14 * ratio);
   }
   ctx.restore();
 }

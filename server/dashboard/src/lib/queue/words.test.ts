@@ -46,6 +46,8 @@ describe('the queue', () => {
       head: 'Paused:',
       text: 'the arm is stopped.',
     });
+    const failed = { ...paused, reason: 'ramp failed (blocked): look' };
+    expect(queueState(failed, true, [{ reason: 'blocked' }]).text).toBe('ramp failed: look.');
     expect(queueBadge(running, true)).toEqual({ tone: 'busy', text: 'running the last one' });
     expect(queueBadge(paused, true)).toEqual({ tone: 'warn', text: 'paused' });
   });

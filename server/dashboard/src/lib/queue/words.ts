@@ -56,11 +56,16 @@ export function homeOf(robot: Robot | null, queue: Queue | null): Home {
   return queue?.waiting_for ? { screen: 'waiting', title: 'Waiting' } : { screen: 'ready', title: 'Ready' };
 }
 
-/** Why the queue does what it does. `isConnected`: whether there is an arm to move. */
-export function queueState(queue: Queue, isConnected: boolean): { head: string; text: string } {
+/** Why the queue does what it does. `isConnected`: whether there is an arm to move. `ended`: runs whose reason stands beside it. */
+export function queueState(
+  queue: Queue,
+  isConnected: boolean,
+  ended: readonly { reason: string }[] = [],
+): { head: string; text: string } {
   if (queue.paused) {
     const goesOn = queue.running ? ' The experiment that is running goes on to its end.' : '';
-    return { head: 'Paused:', text: `${queue.reason}.${goesOn}` };
+    const reason = ended.reduce((left, one) => left.replace(` (${one.reason})`, ''), queue.reason);
+    return { head: 'Paused:', text: `${reason}.${goesOn}` };
   }
   if (queue.waiting_for) return { head: 'Waiting:', text: `${queue.waiting_for}.` };
   if (queue.running) return { head: '', text: 'One experiment is running.' };

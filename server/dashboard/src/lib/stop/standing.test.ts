@@ -15,7 +15,7 @@ describe('what is known of the arm', () => {
     [true, { connection: 'connected', arm: 'running' }, 'free'],
     [true, { connection: 'lost', arm: 'stopped' }, 'unknown'],
     [true, { connection: 'connected', arm: 'disconnected' }, 'unknown'],
-    [false, { connection: 'connected', arm: 'stopped' }, 'unknown'],
+    [false, { connection: 'connected', arm: 'stopped' }, 'unheard'],
     [true, null, 'unknown'],
   ] as const)('heard %s, %o: %s', (isHeard, robot, expected) => {
     expect(armNow(isHeard, robot)).toBe(expected);
@@ -51,6 +51,7 @@ describe('a stop that was not delivered', () => {
   it('is past once the connection is back and the arm is known, however it is', () => {
     const free: ArmNow[] = ['unknown', 'free', 'free'];
     expect(follow('not delivered', free, SURE_AFTER)).toEqual(['unknown', 'holds', 'past']);
+    expect(follow('not delivered', ['unheard', 'unknown'])).toEqual(['unknown', 'answered']);
     const stopped: ArmNow[] = ['unknown', 'stopped', 'stopped'];
     expect(follow('not delivered', stopped, SURE_AFTER)).toEqual(['unknown', 'holds', 'past']);
   });

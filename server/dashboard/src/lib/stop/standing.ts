@@ -6,16 +6,18 @@
 import type { RobotMessage } from '../api/types';
 import type { StopState } from './stop';
 
-/** What is known of the arm: `free` means that nothing stops it, whether it moves or not. */
-export type ArmNow = 'stopped' | 'free' | 'unknown';
-export type Standing = 'holds' | 'unknown' | 'past';
+/** What is known of the arm: `free`: nothing stops it, whether it moves or not; `unheard`: nor is the service heard of. */
+export type ArmNow = 'stopped' | 'free' | 'unknown' | 'unheard';
+/** `answered`: the service, which was not heard of, is again; what it did not take is urgent until the arm is known. */
+export type Standing = 'holds' | 'unknown' | 'answered' | 'past';
 
 /** s for which the arm must have been told to be as it is, where it was not told to be stopped first. */
 export const SURE_AFTER = 1;
 
 /** `isHeard`: whether the service is heard of now. */
 export function armNow(isHeard: boolean, robot: Pick<RobotMessage, 'connection' | 'arm'> | null): ArmNow {
-  if (!isHeard || robot?.connection !== 'connected' || robot.arm === 'disconnected') return 'unknown';
+  if (!isHeard) return 'unheard';
+  if (robot?.connection !== 'connected' || robot.arm === 'disconnected') return 'unknown';
   return robot.arm === 'stopped' || robot.arm === 'fault' ? 'stopped' : 'free';
 }
 
@@ -26,6 +28,7 @@ export class StopStanding {
   private since = 0;
   private wasStopped = false;
   private wasUnknown = false;
+  private wasUnheard = false;
 
   constructor(readonly kind: StopState['kind']) {}
 
@@ -33,10 +36,16 @@ export class StopStanding {
     if (arm !== this.arm) this.since = at;
     this.arm = arm;
     if (this.standing === 'past') return 'past';
-    this.standing = this.isPast(arm, at - this.since) ? 'past' : arm === 'unknown' ? 'unknown' : 'holds';
+    this.standing = this.isPast(arm, at - this.since) ? 'past' : this.standingWith(arm);
     this.wasStopped ||= arm === 'stopped';
-    this.wasUnknown ||= arm === 'unknown';
+    this.wasUnknown ||= arm === 'unknown' || arm === 'unheard';
+    this.wasUnheard ||= arm === 'unheard';
     return this.standing;
+  }
+
+  private standingWith(arm: ArmNow): Standing {
+    if (this.kind === 'not delivered' && this.wasUnheard && arm !== 'unheard') return 'answered';
+    return arm === 'unknown' || arm === 'unheard' ? 'unknown' : 'holds';
   }
 
   /**
@@ -44,7 +53,7 @@ export class StopStanding {
    * unknown meanwhile, or has been stopped after all, makes it past.
    */
   private isPast(arm: ArmNow, lasted: number): boolean {
-    if (arm === 'unknown') return false;
+    if (arm === 'unknown' || arm === 'unheard') return false;
     if (arm === 'free' && this.wasStopped) return true;
     if (lasted < SURE_AFTER) return false;
     if (this.kind === 'confirmed') return arm === 'free';

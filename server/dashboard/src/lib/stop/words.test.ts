@@ -27,6 +27,7 @@ describe('the message about a stop', () => {
       look: 'not-delivered',
       text: 'Nobody answers.',
     });
+    expect(wordsOf(lost, 'answered', 'unknown', '')?.look).toBe('not-delivered');
     expect(wordsOf(lost, 'past', 'free', '12:00:00')).toMatchObject({
       look: 'past',
       head: 'Past: the stop of 12:00:00 was NOT DELIVERED',

@@ -4,6 +4,8 @@ import { sentence } from '../format';
 import type { ArmNow, Standing } from './standing';
 import type { StopState } from './stop';
 
+const UNKNOWN = 'How the arm is now is not known.';
+
 export interface StopWords {
   /** Of which kind the message is: its colour and its sign follow from it. */
   look: 'sending' | 'confirmed' | 'delivered' | 'not-delivered' | 'past';
@@ -18,6 +20,10 @@ export function wordsOf(state: StopState, standing: Standing, arm: ArmNow, time:
   if (state.kind === 'sending') return { look: 'sending', sign: '◐', head: 'Stop is being sent', text: '' };
   if (standing === 'past') return pastOf(state.kind, arm, time);
   const text = sentence(state.text);
+  if (state.kind === 'not delivered' && standing === 'answered') {
+    const now = 'The service answers again: press Stop again, or use the emergency stop.';
+    return { look: 'not-delivered', sign: '✕', head: `The stop of ${time} was NOT DELIVERED`, text: now };
+  }
   if (state.kind === 'not delivered') {
     return { look: 'not-delivered', sign: '✕', head: 'Stop NOT DELIVERED', text };
   }
@@ -27,7 +33,7 @@ export function wordsOf(state: StopState, standing: Standing, arm: ArmNow, time:
   }
   if (standing === 'unknown') {
     const head = `Stopped at ${time}, confirmed by the board then`;
-    return { look: 'delivered', sign: '▲', head, text: 'How the arm is now is not known.' };
+    return { look: 'delivered', sign: '▲', head, text: UNKNOWN };
   }
   return { look: 'confirmed', sign: '✓', head: `Stopped at ${time}, confirmed by the board ${after}`, text };
 }
@@ -41,7 +47,8 @@ function pastOf(kind: 'confirmed' | 'delivered' | 'not delivered', arm: ArmNow, 
   const now = {
     stopped: 'The arm is stopped now.',
     free: 'The arm is not stopped now. Press Stop to stop it.',
-    unknown: 'How the arm is now is not known.',
+    unknown: UNKNOWN,
+    unheard: UNKNOWN,
   }[arm];
   return {
     look: 'past',
