@@ -21,7 +21,7 @@ def test_a_ramp_is_started_from_the_form_and_its_trace_appears(dashboard: Dashbo
     form.get_by_role("button", name="Add to the queue").click()
     own = form.locator("section", has=form.get_by_role("heading", name="Your run"))
     expect(own.get_by_text("done", exact=True)).to_be_visible()
-    expect(own.get_by_role("img", name=re.compile("Change of position and set point of joints 1, 2, 3"))).to_be_visible()
+    expect(own.get_by_role("img", name="Change of position and set point of joints 1, 2, 3")).to_be_visible()
     expect(own.get_by_role("columnheader", name="Overshoot")).to_be_visible()
     assert own.get_by_role("row").count() == 4  # its head, and the joints that moved
     expect(own.get_by_role("link", name="Diagnose a model with it")).to_be_visible()
