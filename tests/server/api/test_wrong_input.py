@@ -131,7 +131,7 @@ def test_health_and_system_tell_how_it_is(service: Service) -> None:
     checks = service.client.get(f"{base}/readyz").json()["checks"]
     assert checks.items() >= {"database": "", "disk space": "", "traces": "", "robot ma2000": ""}.items()
     assert not any(checks.values())
-    assert service.client.get("/system").json()["storage"]["database"] == "sqlite"
+    assert "database" not in service.client.get("/system").json()["storage"], "there is one kind"
 
 
 # ---- input that fits its type and yet nothing can be done with
