@@ -268,13 +268,16 @@ def test_a_real_prometheus_reads_the_service_and_evaluates_everything(
         pytest.skip("needs Prometheus: apt install prometheus")
     with socket.create_server(("127.0.0.1", 0)) as free:
         address = f"127.0.0.1:{free.getsockname()[1]}"
-    file = _configuration(tmp_path, urlsplit(running.url).netloc, "t")
+    command = [*DAQ, "token", "add", tmp_path.name]
+    made = subprocess.run(command, cwd=running.folder, check=True, capture_output=True)
+    file = _configuration(tmp_path, urlsplit(running.url).netloc, made.stdout.decode().split()[-1])
     words = [f"--config.file={file}", f"--storage.tsdb.path={tmp_path / 'data'}", f"--web.listen-address={address}"]
     with subprocess.Popen([program, *words], stderr=subprocess.DEVNULL) as process:
         try:
             with httpx.Client(base_url=f"http://{address}/api/v1", transport=httpx.HTTPTransport(retries=20)) as client:
                 while not _answer(client, 'up{job="ma2000-daq"} == 1'):
                     assert process.poll() is None
+                    assert not _answer(client, "count_over_time(up[1m]) > 20"), client.get("/targets").text
                 for _, target in PANELS:
                     _answer(client, re.sub(r"\$(service|robot)", ".*", target["expr"]))
                 assert _answer(client, 'daq_connected{robot="ma2000"}')
