@@ -41,8 +41,7 @@ three."""
 class FoundValue(FrozenRecord):
     """One parameter of an added effect: estimate and 95 % interval; no interval where the data do not bound it.
 
-    `part` says which number of the effect it is, `joints` to which joints it belongs (none: to the whole machine). Both
-    are empty in older answers.
+    `part` says which number of the effect it is, `joints` to which joints it belongs (none: to the whole machine).
     """
 
     value: float
@@ -100,8 +99,7 @@ class GapStage(FrozenRecord):
     traces fitted to and on held-out ones (empty without any); None where it is not finite.
 
     `kind`: the model as given; with `effect` on `joints` added to the stage before, and its numbers fitted within one
-    stated deviation of the machine file; with everything refitted. Without an effect: with its numbers `fitted`, which
-    in older answers comes before the effects, too.
+    stated deviation of the machine file; with everything refitted. Without an effect: with its numbers `fitted`.
     """
 
     kind: Literal["given", "fitted", "effect", "refitted"]
@@ -141,7 +139,7 @@ class Gap(FrozenRecord):
 
     `measure`: of the closed loop, simulated from set points and initial posture alone, or of the balance of torques.
     `units`, `noise` by joint: the noise is that of the readings, or what noise leaves of the balance. `without`: the
-    alternative to the effects; None where none was added, and in older answers.
+    alternative to the effects; None where none was added.
     """
 
     measure: Literal["closed-loop", "torques"]
@@ -354,16 +352,16 @@ class Diagnosis(FrozenRecord):
     verdict: Verdict
     summary: str
     significant: float | None = None
-    """Evidence from which a first effect is named; None in older answers."""
+    """Evidence from which a first effect is named."""
     steps: tuple[Step, ...]
     rmse_fit: tuple[SignalError, ...] = ()
     """Errors on the fitted traces, of the model as given and of the resulting model."""
     rmse_holdout: tuple[SignalError, ...] = ()
     """Errors on the held-out traces, likewise."""
     gap: Gap | None = None
-    """How the gap between simulation and measurement shrinks; None in older answers."""
+    """How the gap between simulation and measurement shrinks; None where nothing was computed."""
     where: Where | None = None
-    """What is left in the end: the map and dependences of the model that comes out; None in older answers."""
+    """What is left in the end: the map and dependences of the model that comes out; None where nothing was computed."""
     candidates: tuple[Candidate, ...] = ()
     """The ranking of the last step, where nothing was added in it: what was tried against what is left."""
     remaining: tuple[RemainingShape, ...] = ()
@@ -381,7 +379,7 @@ class Diagnosis(FrozenRecord):
     notes: tuple[str, ...] = ()
     """Assumptions and limits that a reader of this answer should know."""
     notes_data: tuple[Note, ...] = ()
-    """The data of `notes`, in the same order; empty in older answers."""
+    """The data of `notes`, in the same order."""
     method: Method = "output-error"
     suspicion: Suspicion | None = None
     """Where the verdict is `suspected`; by inverse dynamics alone."""

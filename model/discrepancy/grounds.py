@@ -5,8 +5,6 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Any, Literal
 
-from pydantic import ConfigDict
-
 from daq.contracts.frozen import FrozenRecord
 
 Method = Literal["output-error", "inverse-dynamics"]
@@ -58,9 +56,6 @@ Measurement = Literal[
 ]
 """A measurement beside the arm's own readings."""
 RefusalKind = Literal[
-    "diverges",
-    "error-grows",
-    "error-rises",
     "falls-too-little",
     "less-than-rest",
     "only-resembles",
@@ -74,8 +69,6 @@ class Reason(FrozenRecord):
     `removed`: by balancing torques, the share of the mean square that is gone on records not fitted to.
     """
 
-    model_config = ConfigDict(extra="ignore")
-    """Older answers have more."""
     removed: float | None = None
 
 

@@ -47,9 +47,9 @@ STEPS_APART = 4
 """Steps after which derivatives by all unknowns are computed anew, if corrected ones have led so far."""
 SETTLED = 0.3
 """Fall of −2 log posterior below which a fit has settled: one unit is one standard deviation of one parameter."""
-BENT = 0.4
-"""Share of a step that leads uphill at which it is tried whether a curved path leads down: along a valley of two
-numbers whose product counts, what a step misses tells how the valley bends (Transtrum and Sethna 2012)."""
+BENT = (0.4, 0.12)
+"""Shares of a step that leads uphill at which a curved path is tried: along a valley of two numbers whose product
+counts, what a step misses tells how the valley bends."""
 FORETOLD = 0.1
 """Share of the residual's change that derivatives may have missed and still hold."""
 FOLDS = 4
@@ -229,55 +229,101 @@ def descend(best: Fit, slopes: Slopes, rounds: int = ROUNDS, goal: float = math.
     return replace(best, known=dict(zip(names, J, strict=True)))
 
 
+@dataclass
+class _Linearised:
+    """A fit in scales of its unknowns, with derivatives that steps correct.
+
+    rows, aims: of the priors (c, p), (c,). A: weighted derivatives (p, N). J: (p, N) those of the residual, by the
+    unknowns themselves. seen: (p, p) A Aᵀ. low, high: (p,) room to the bounds.
+    """
+
+    now: Fit
+    J: Floats
+
+    def __post_init__(self) -> None:
+        now = self.now
+        scale, low, high = (np.array([getattr(u, side) for u in now.unknowns]) for side in ("scale", "low", "high"))
+        self.scale, self.at = scale, np.array([now.values[u.name] for u in now.unknowns])
+        rows, self.aims = prior_rows(now.unknowns, self.at)
+        self.rows, self.left = rows * scale, now.weighted(now.row)
+        self.A = now.weighted(self.J) * scale[:, None]
+        self.seen = self.A @ self.A.T
+        self.low, self.high = (low - self.at) / scale, (high - self.at) / scale
+
+    @property
+    def information(self) -> Floats:
+        """(p, p) of records and priors."""
+        return np.asarray(self.seen + self.rows.T @ self.rows)
+
+    @property
+    def descent(self) -> Floats:
+        """(p,) minus half the gradient of the cost."""
+        return np.asarray(self.rows.T @ self.aims - self.A @ self.left)
+
+    def damped(self, damping: float) -> Floats:
+        """The information with a share of its diagonal added."""
+        found = self.information
+        return np.asarray(found + np.diag(DAMPING**2 + (LEAST_DAMPING + damping) * np.diag(found)))
+
+    def moved_by(self, step: Floats) -> tuple[Fit, Floats, Floats]:
+        """The fit a step away, the step within the bounds, and (N,) the change that derivatives had not foretold."""
+        values = np.clip(self.at + step * self.scale, self.at + self.low * self.scale, self.at + self.high * self.scale)
+        named = {u.name: float(v) for u, v in zip(self.now.unknowns, values, strict=True)}
+        tried = evaluate(self.now.compared, self.now.unknowns, named, self.now.memory)
+        moved = (values - self.at) / self.scale
+        return tried, moved, tried.row - self.now.row - (moved * self.scale) @ self.J
+
+    def along_valley(self, whole: Floats) -> Fit | None:
+        """A better fit on a curved path, of which a whole step that leads uphill is the beginning; None without one.
+
+        x(t) = t v + (t/h)² b: the change that a short step h v had not foretold grows with t², and b is the step that
+        takes it back (Transtrum and Sethna 2012).
+        """
+        short, curvature = BENT[-1], self.damped(0.0)
+        tried, moved, missed = self.moved_by(short * whole)
+        if not math.isfinite(tried.cost):
+            return None
+        bend = bounded_step(curvature, -self.A @ self.now.weighted(missed), self.low - moved, self.high - moved)
+        for share in BENT:
+            tried, *_ = self.moved_by(share * whole + (share / short) ** 2 * bend)
+            if tried.cost < self.now.cost:
+                return tried
+        return None
+
+    def correct(self, moved: Floats, missed: Floats) -> None:
+        """Corrects the derivatives along a step, so that they foretell it (Broyden 1965)."""
+        metric = np.diag(self.information) * moved
+        if not (length := float(metric @ moved)) > 0.0:
+            return
+        metric, wrong = metric / length, self.now.weighted(missed)
+        crossed = np.outer(self.A @ wrong, metric)
+        self.seen = self.seen + crossed + crossed.T + float(wrong @ wrong) * np.outer(metric, metric)
+        self.A = self.A + np.outer(metric, wrong)
+        self.J = self.J + np.outer(metric / self.scale, missed)
+
+
 def _step(now: Fit, J: Floats) -> tuple[Fit, Floats, bool]:
     """A step that descends, or the same fit; derivatives (p, N) corrected by what was tried; and whether they had said
     where it leads."""
-    scale, low, high = (np.array([getattr(u, side) for u in now.unknowns]) for side in ("scale", "low", "high"))
-    at = np.array([now.values[u.name] for u in now.unknowns])
-    rows, aims = prior_rows(now.unknowns, at)
-    rows = rows * scale
-    left = now.weighted(now.row)
-    A = now.weighted(J) * scale[:, None]
-    seen = A @ A.T
-    low, high = (low - at) / scale, (high - at) / scale
-
-    def moved_by(step: Floats) -> tuple[Fit, Floats, Floats]:
-        values = np.clip(at + step * scale, at + low * scale, at + high * scale)
-        named = {u.name: float(v) for u, v in zip(now.unknowns, values, strict=True)}
-        tried, moved = evaluate(now.compared, now.unknowns, named, now.memory), (values - at) / scale
-        return tried, moved, tried.row - now.row - (moved * scale) @ J
-
+    here = _Linearised(now, J)
     for number, (share, damping) in enumerate(ATTEMPTS):
-        information = seen + rows.T @ rows
-        descent = rows.T @ aims - A @ left
-        curvature = information + np.diag(DAMPING**2 + (LEAST_DAMPING + damping) * np.diag(information))
-        step = share * bounded_step(curvature, descent, low, high)
+        descent = here.descent
+        step = share * bounded_step(here.damped(damping), descent, here.low, here.high)
         if float(descent @ step) < 0.5 * SETTLED:
             break
-        tried, moved, missed = moved_by(step)
+        tried, moved, missed = here.moved_by(step)
         if not math.isfinite(tried.cost):
             continue
-        wrong, whole = (now.weighted(part) for part in (missed, tried.row - now.row))
+        wrong, whole = now.weighted(missed), now.weighted(tried.row - now.row)
         foretold = float(wrong @ wrong) <= FORETOLD**2 * float(whole @ whole)
-        if foretold and tried.cost < now.cost:
-            return tried, J, True
-        if number == 0 and tried.cost >= now.cost:
-            part, there, bent = moved_by(BENT * moved)
-            if part.cost >= now.cost and math.isfinite(part.cost):
-                bend = bounded_step(curvature, -A @ now.weighted(bent), low - there, high - there)
-                part, *_ = moved_by(there + bend)
-            if part.cost < now.cost:
-                return part, J, False
-        metric = np.diag(information) * moved
-        if (length := float(metric @ moved)) > 0.0:
-            metric /= length
-            crossed = np.outer(A @ wrong, metric)
-            seen = seen + crossed + crossed.T + float(wrong @ wrong) * np.outer(metric, metric)
-            A = A + np.outer(metric, wrong)
-            J = J + np.outer(metric / scale, missed)
+        if tried.cost < now.cost and foretold:
+            return tried, here.J, True
+        if number == 0 and tried.cost >= now.cost and (better := here.along_valley(moved)) is not None:
+            return better, here.J, False
+        here.correct(moved, missed)
         if tried.cost < now.cost:
-            return tried, J, foretold
-    return now, J, False
+            return tried, here.J, foretold
+    return now, here.J, False
 
 
 def standard_deviations(now: Fit) -> dict[str, float]:

@@ -290,7 +290,7 @@ def not_a_finding(answer: Diagnosis, where: Where) -> str:
 
 
 def with_sentences(answer: Diagnosis) -> Diagnosis:
-    """The answer with its sentences. What has no data, as in older answers, keeps the text that it has."""
+    """The answer with its sentences."""
     asked, machine = answer.next_experiment, answer.model_before.machine
     written = answer.model_copy(
         update={
@@ -298,7 +298,7 @@ def with_sentences(answer: Diagnosis) -> Diagnosis:
             "gap": None if answer.gap is None else _gap_with_names(answer.gap),
             "where": None if answer.where is None else where_with_summary(answer.where),
             "next_experiment": None if asked is None else _experiment_with_reason(asked),
-            "notes": tuple(sentence(note_words(n)) for n in answer.notes_data) or answer.notes,
+            "notes": tuple(sentence(note_words(n)) for n in answer.notes_data),
         }
     )
     return written.model_copy(update={"summary": summary(written)})

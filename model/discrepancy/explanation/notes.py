@@ -106,8 +106,8 @@ def _torque_left(v: Values) -> Values:
     doubt = "; that is more than there is: see whether units (s, rad, m) and signs (drive, gravity) suit the file"
     return {
         "records": "held-out traces" if v["held_out"] else "the traces fitted to",
-        "given": f"{v['given']:.1%} of the recorded by the model as given, " if "given" in v else "",  # older answers
-        "doubt": doubt if v.get("doubted", v.get("given", 0.0) > 1.0) else "",
+        "given": f"{v['given']:.1%} of the recorded by the model as given, ",
+        "doubt": doubt if v["doubted"] else "",
     }
 
 

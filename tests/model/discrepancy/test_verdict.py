@@ -49,7 +49,8 @@ def test_a_name_beside_which_far_more_than_noise_is_left_is_a_part_of_the_answer
 def test_a_group_that_held_out_traces_refuse_is_no_answer() -> None:
     group = (Candidate(effect="backlash", joints=(2,), evidence=50.0),)
     close = step("backlash", (2,)).model_copy(update={"group": group})
-    refused = close.model_copy(update={"adopted": False, "refusal": Refusal(kind="error-rises")})
+    grows = Refusal(kind="falls-too-little", numbers={"share": -0.15})
+    refused = close.model_copy(update={"adopted": False, "refusal": grows})
     assert verdict([close], unexplained=False) == "ambiguous"
     assert verdict([refused], unexplained=False) == "nothing-significant"
     assert verdict([step("stiction", (3,)), refused], unexplained=False) == "named"
