@@ -41,6 +41,10 @@ HIGHEST = 8.0
 SHORTEST_WAVE = 4096 / 75
 """Shortest wave that is tried, in counts of the sensor: an assumption. On 12 bits over 270° it is a hundredth of a
 joint turn, which the fastest ramp of the presets, 20 counts a period, still samples more than twice."""
+PEAKS = 6
+"""Peaks of a spectrum that are probed."""
+AROUND = np.linspace(-1.0, 1.0, 9)
+"""Rates that are probed about the best, in distances of two that records can distinguish."""
 BLOCK = 4_000_000
 """Samples of tones in memory at a time: 64 MB."""
 
@@ -74,22 +78,31 @@ def rates_tried(observation: Observation, name: str, joint: int) -> Floats:
     machine = observation.machine
     column = machine.modelled_joints.index(joint)
     over = effect(name).tone
+    if over is None:
+        return np.zeros(0)
     high = next(p.high for p in effect_parameters(machine, name, (joint,), shared=False) if p.part == over)
+    alike = _alike(observation, over, column)
     if over is Tone.OVER_POSITION:
-        travel = max(float(np.ptp(r.measured[:, column])) for r in observation.records)
         sensor = machine.joint(joint).sensor
         if sensor is not None and sensor.count and sensor.measures == "position":
             high = min(high, 2 * np.pi / (SHORTEST_WAVE * sensor.count))
-        alike = 2 * np.pi / travel if travel > 0 else math.inf
         low, step = alike / 2, alike / 8
     else:
-        alike = 1 / max(len(r.inputs) * r.inputs.period for r in observation.records)
         high = min(high, HIGHEST, 0.4 / observation.records[0].inputs.period)
         low, step = 2 * alike, alike / 2
     if not low < high:
         return np.zeros(0)
     span = high - low
     return np.linspace(low, high, int(max(2.0, min(span / step, max(USUAL_TONES, math.ceil(span / alike) + 1)))))
+
+
+def _alike(observation: Observation, over: Tone, column: int) -> float:
+    """Distance of two rates that the records can just distinguish: one over the travel of a joint (index), or over the
+    duration. Infinite for a joint at rest."""
+    if over is Tone.OVER_TIME:
+        return 1 / max(len(r.inputs) * r.inputs.period for r in observation.records)
+    travel = max(float(np.ptp(r.measured[:, column])) for r in observation.records)
+    return 2 * np.pi / travel if travel > 0 else math.inf
 
 
 def _of_the_excitation(rates: Floats, observation: Observation) -> NDArray[np.bool_]:
@@ -195,28 +208,61 @@ def _passed(
 def _best_tone(
     clear: Projection, compared: ReadingResidual, name: str, over: Tone, joint: int, response: Floats
 ) -> Trial | None:
-    """The tone that explains most of what is left, once the tolerance parameters have moved too."""
+    """The tone that explains most of what is left, once the tolerance parameters have moved too.
+
+    A response that is right only on average lets waves of other rates look alike: the highest peaks of the spectrum are
+    probed in the simulation, and then rates around the best, closer than two that can be distinguished.
+    """
     now, observation = clear.now, compared.observation
     column = now.model.machine.modelled_joints.index(joint)
     rates = rates_tried(observation, name, joint)
     if over is Tone.OVER_TIME:
         rates = rates[~_of_the_excitation(rates, observation)]
-    columns = compared.samples.columns[column]
-    count = columns.stop - columns.start
-    best: tuple[float, float] | None = None
-    for own in np.array_split(rates, math.ceil(len(rates) * count / BLOCK)) if len(rates) else ():
-        waves = [_passed(now, observation, over, column, own, response, t) for t in range(len(observation.records))]
-        shown = np.concatenate(waves, axis=1)
-        sine, cosine = (now.weighted(-part, column) for part in (shown.imag, shown.real))
-        gains = _explained(clear, sine, cosine, columns)
-        k = int(np.argmax(gains))
-        if best is None or gains[k] > best[0]:
-            best = float(gains[k]), float(own[k])
-    if best is None:
+    if not len(rates):
         return None
-    places = max(USUAL_TONES, len(rates))
-    model = now.fitted_model
-    return tone_trial(model, name, joint, {over.value: best[1]}, float(rates[0]), places, observation)
+    columns = compared.samples.columns[column]
+    blocks = math.ceil(len(rates) * (columns.stop - columns.start) / BLOCK)
+    gains = np.concatenate(
+        [
+            _gains(clear, observation, over, column, columns, own, response)
+            for own in np.array_split(rates, max(1, blocks))
+        ]
+    )
+    places, model = max(USUAL_TONES, len(rates)), now.fitted_model
+
+    def trial(tried: Floats) -> Trial | None:
+        return tone_trial(model, name, joint, over, tried, float(rates[0]), places, observation)
+
+    alike = _alike(observation, over, column)
+    coarse = trial(rates[_peaks(gains)])
+    if coarse is None:
+        return None
+    best = clear.probe(coarse).start[f"joint{joint}.{name}.{over.value}"]
+    return trial(np.clip(best + alike * AROUND, rates[0], rates[-1]))
+
+
+def _gains(
+    clear: Projection,
+    observation: Observation,
+    over: Tone,
+    column: int,
+    columns: slice,
+    rates: Floats,
+    response: Floats,
+) -> Floats:
+    """How much tones of these rates take off the cost, (k,), by the spectrum."""
+    now = clear.now
+    waves = [_passed(now, observation, over, column, rates, response, t) for t in range(len(observation.records))]
+    shown = np.concatenate(waves, axis=1)
+    sine, cosine = (now.weighted(-part, column) for part in (shown.imag, shown.real))
+    return _explained(clear, sine, cosine, columns)
+
+
+def _peaks(gains: Floats) -> NDArray[np.int64]:
+    """Places of the highest peaks of a spectrum (k,), the highest first."""
+    padded = np.concatenate([[-np.inf], gains, [-np.inf]])
+    peaks = np.flatnonzero((gains >= padded[:-2]) & (gains >= padded[2:]))
+    return np.asarray(peaks[np.argsort(-gains[peaks])][:PEAKS])
 
 
 def _explained(clear: Projection, sine: Floats, cosine: Floats, columns: slice) -> Floats:

@@ -25,7 +25,7 @@ from model.discrepancy.engine.lifted import (
 from model.discrepancy.engine.probing import Start, Trial
 from model.discrepancy.options import TorqueOptions
 from model.discrepancy.readings.observation import Observation
-from model.effects.effect import JointScale
+from model.effects.effect import JointScale, Tone
 from model.effects.library import effect, library
 from model.machine_model.effect_parameters import effect_parameters, suits_drive
 from model.machine_model.model import Model
@@ -222,23 +222,25 @@ def tone_trial(
     model: Model,
     name: str,
     joint: int,
-    values: Mapping[str, float],
+    over: Tone,
+    rates: Floats,
     slowest: float,
     places: int,
     observation: Observation,
 ) -> Trial | None:
-    """A tone with a rate that a spectrum has proposed; None where the model has one there. values: by part.
+    """A tone with rates (k,) that a spectrum has proposed; None where the model has one there.
 
     slowest: the least rate that was looked at. A fit may not go below it: part of a slow wave repeats nothing, and is
     as good as a spring. places: rates that were looked at.
     """
-    over = effect(name).tone
-    if over is None or has_effect(model, name, (joint,)):
+    if has_effect(model, name, (joint,)):
         return None
     wider = model.with_effect(name, (joint,))
     added = [p for p in wider.parameters if p.name not in model.by_name]
     own = tuple(_within(p, {over.value: (slowest, np.inf)}) for p in _sized(wider, name, (joint,), added, observation))
-    start = {p.name: float(np.clip(values[p.part], p.low, p.high)) if p.part in values else p.value for p in own}
     amplitudes = tuple(p.name for p in own if p.null is not None)
-    sized = {**start, **{n: typical(p) for p in own for n in amplitudes if p.name == n}}
-    return Trial(name, (joint,), wider, own, amplitudes, (sized,), shares=(SMALL,), places=places)
+    starts = tuple(
+        {p.name: float(np.clip(rate, p.low, p.high)) if p.part == over else typical(p) for p in own}
+        for rate in rates
+    )
+    return Trial(name, (joint,), wider, own, amplitudes, starts, shares=(SMALL,), places=places)
