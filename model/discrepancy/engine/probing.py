@@ -120,9 +120,14 @@ class Projection:
 
     def probe(self, trial: Trial) -> Probe:
         """The best of a trial's starts."""
-        null, best = trial.null, Probe(trial, 0.0, trial.starts[0])
+        best = Probe(trial, 0.0, trial.starts[0])
         if trial.stated:
             best = Probe(trial, self._lift_priors(trial), dict(trial.origin))
+        return max((best, *self.probes(trial)), key=lambda p: p.gain)
+
+    def probes(self, trial: Trial) -> list[Probe]:
+        """A trial from every start and share that stays finite, as large as explains most."""
+        null, found = trial.null, []
         tried = [(start, share) for start in trial.starts for share in trial.shares]
         every = self.now.compared.of_model(trial.model).changes(
             {**self.now.values, **null},
@@ -138,11 +143,20 @@ class Projection:
             if not np.isfinite(rows).all():
                 continue
             gain, sizes = self._explained(self.now.weighted(rows) / share, trial, start)
-            if gain > best.gain:
-                sized = list(zip(trial.amplitudes, sizes, strict=True))
-                scaled = {n: null[n] + float(a) * (start[n] - null[n]) for n, a in sized}
-                best = Probe(trial, gain, {**start, **scaled}, sizes @ rows / share)
-        return best
+            sized = zip(trial.amplitudes, sizes, strict=True)
+            scaled = {n: null[n] + float(a) * (start[n] - null[n]) for n, a in sized}
+            found.append(Probe(trial, gain, {**start, **scaled}, sizes @ rows / share))
+        return found
+
+    def nearest(self, trial: Trial) -> Start:
+        """Of a trial's starts, as large as probes promise, the one that leaves least in the simulation itself: what
+        makes a joint stick and slip is not in proportion to its size."""
+        starts = [p.start for p in self.probes(trial)] or [trial.starts[0]]
+        wider, base = self.now.compared.of_model(trial.model), {**self.now.values, **trial.null}
+        changes = wider.changes(base, [{**self.now.values, **start} for start in starts])
+        left = self.left + self.now.weighted(np.nan_to_num(changes))
+        squares, _ = self.products(left)
+        return starts[int(np.argmin(np.where(np.isfinite(changes).all(axis=1), np.diag(squares), np.inf)))]
 
     def _lift_priors(self, trial: Trial) -> float:
         """What the trial gains by its priors alone, with its numbers where they are."""

@@ -23,6 +23,7 @@ from model.discrepancy.excitation import own_frequencies
 from model.discrepancy.readings.observation import DIFFERENCE, Observation
 from model.discrepancy.readings.residual import ReadingResidual
 from model.discrepancy.readings.trials import tone_trial
+from model.discrepancy.thresholds import THRESHOLDS
 from model.effects.effect import Tone
 from model.effects.library import effect, library
 from model.fitting.records import Record
@@ -233,12 +234,13 @@ def _best_tone(
     def trial(tried: Floats) -> Trial | None:
         return tone_trial(model, name, joint, over, tried, float(rates[0]), places, observation)
 
-    alike = _alike(observation, over, column)
-    coarse = trial(rates[_peaks(gains)])
-    if coarse is None:
-        return None
-    best = clear.probe(coarse).start[f"joint{joint}.{name}.{over.value}"]
-    return trial(np.clip(best + alike * AROUND, rates[0], rates[-1]))
+    proposed = trial(rates[_peaks(gains)])
+    if proposed is None or gains.max() < THRESHOLDS.interesting:
+        return proposed
+    rate = f"joint{joint}.{name}.{over.value}"
+    best = clear.nearest(proposed)[rate] + _alike(observation, over, column) * AROUND
+    around = trial(np.clip(best, rates[0], rates[-1]))
+    return None if around is None else replace(around, starts=(clear.nearest(around),))
 
 
 def _gains(

@@ -240,7 +240,6 @@ def tone_trial(
     own = tuple(_within(p, {over.value: (slowest, np.inf)}) for p in _sized(wider, name, (joint,), added, observation))
     amplitudes = tuple(p.name for p in own if p.null is not None)
     starts = tuple(
-        {p.name: float(np.clip(rate, p.low, p.high)) if p.part == over else typical(p) for p in own}
-        for rate in rates
+        {p.name: float(np.clip(rate, p.low, p.high)) if p.part == over else typical(p) for p in own} for rate in rates
     )
     return Trial(name, (joint,), wider, own, amplitudes, starts, shares=(SMALL,), places=places)
