@@ -3369,8 +3369,7 @@ export interface components {
          * FoundValue
          * @description One parameter of an added effect: estimate and 95 % interval; no interval where the data do not bound it.
          *
-         *     `part` says which number of the effect it is, `joints` to which joints it belongs (none: to the whole machine). Both
-         *     are empty in older answers.
+         *     `part` says which number of the effect it is, `joints` to which joints it belongs (none: to the whole machine).
          */
         FoundValue: {
             /** Value */
@@ -3410,7 +3409,7 @@ export interface components {
          *
          *     `measure`: of the closed loop, simulated from set points and initial posture alone, or of the balance of torques.
          *     `units`, `noise` by joint: the noise is that of the readings, or what noise leaves of the balance. `without`: the
-         *     alternative to the effects; None where none was added, and in older answers.
+         *     alternative to the effects; None where none was added.
          */
         Gap: {
             /**
@@ -3453,8 +3452,7 @@ export interface components {
          *     traces fitted to and on held-out ones (empty without any); None where it is not finite.
          *
          *     `kind`: the model as given; with `effect` on `joints` added to the stage before, and its numbers fitted within one
-         *     stated deviation of the machine file; with everything refitted. Without an effect: with its numbers `fitted`, which
-         *     in older answers comes before the effects, too.
+         *     stated deviation of the machine file; with everything refitted. Without an effect: with its numbers `fitted`.
          */
         GapStage: {
             /**
@@ -5506,7 +5504,7 @@ export interface components {
              * Kind
              * @enum {string}
              */
-            kind: "diverges" | "error-grows" | "error-rises" | "falls-too-little" | "less-than-rest" | "only-resembles" | "superfluous";
+            kind: "falls-too-little" | "less-than-rest" | "only-resembles" | "superfluous";
             /**
              * Numbers
              * @default {}
