@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from daq.contracts.progress import Cancel, Progress, stop_if
-from model.discrepancy.diagnosis import Candidate, Suspicion
+from model.discrepancy.diagnosis import Candidate, Step, Suspicion
 from model.discrepancy.engine import holdout
 from model.discrepancy.engine.candidate import Fitted
 from model.discrepancy.engine.case import Case
@@ -145,14 +145,30 @@ class Workflow:
         return replace(found, steps=tuple(steps))
 
     def _prune(self, latest: int) -> None:
-        """Takes out effects of earlier steps that the latest one has made superfluous."""
-        for step in self.found.steps[:latest]:
+        """Takes out effects of earlier steps, and single joints of theirs, that the latest one has made superfluous."""
+        for number, step in enumerate(self.found.steps[:latest]):
             if not step.adopted or step.effect is None:
                 continue
-            now, without = self.found.now, self.found.remove(step)
-            if evidence(without.now, now, len(step.parameters), 1) < 0:
+            if (without := self._if_superfluous(step, 0.0)) is not None:
                 gone = step.model_copy(update={"adopted": False, "refusal": Refusal(kind="superfluous")})
-                self.found = replace(without, steps=tuple(gone if s is step else s for s in self.found.steps))
+                self.found = replace(without, steps=_with(self.found.steps, number, gone))
+                continue
+            for joint in step.joints if len(step.joints) > 1 else ():
+                left = self.found.steps[number]
+                own = {name: value for name, value in left.parameters.items() if value.joints == (joint,)}
+                part = left.model_copy(update={"joints": (joint,), "parameters": own})
+                without = self._if_superfluous(part, self.case.options.least_margin) if own else None
+                if without is not None:
+                    others = {name: value for name, value in left.parameters.items() if name not in own}
+                    joints = tuple(j for j in left.joints if j != joint)
+                    fewer = left.model_copy(update={"joints": joints, "parameters": others})
+                    self.found = replace(without, steps=_with(self.found.steps, number, fewer))
+
+    def _if_superfluous(self, part: Step, needed: float) -> Standing | None:
+        """The standing without an effect, if all the others explain as much but for evidence that is less than
+        `needed`; else None."""
+        without = self.found.remove(part)
+        return without if evidence(without.now, self.found.now, len(part.parameters), 1) < needed else None
 
     def _withdraw_lesser_ones(self) -> None:
         """Takes back, the least first, effects that explain less than half of what stays unexplained beside them.
@@ -188,3 +204,8 @@ class Workflow:
 
     def _joints_left(self) -> tuple[int, ...]:
         return self.case.joints_left(self.found.now, self.found.first, named=bool(self.found.adopted))
+
+
+def _with(steps: Sequence[Step], number: int, step: Step) -> tuple[Step, ...]:
+    """The steps, of which one is another."""
+    return (*steps[:number], step, *steps[number + 1 :])
