@@ -4738,7 +4738,7 @@ export interface components {
              * Outcome
              * @enum {string}
              */
-            outcome: "named" | "among" | "joint" | "missed" | "wrong" | "cancelled";
+            outcome: "named" | "among" | "joint" | "missed" | "wrong" | "unanswered";
         };
         /**
          * OutputRequest
