@@ -181,7 +181,7 @@ export function examinedJoints(found: Pick<DiagnosisData, 'notes_data'>): readon
 /** A joint is red if it glows in more than this share of a record. */
 const OFTEN = 0.02;
 /** The answer explains a joint if no more than this share of its red stretches is left. */
-const HARDLY = 0.1;
+const HARDLY = 0.3;
 
 /**
  * Why joints are red that are not those of the answer; empty where none is. `before`, `after`: heat of each joint of the
@@ -215,7 +215,7 @@ export function besideAnswer(
     : '';
   return [
     gone.length > 0
-      ? `${called(gone)}: explained by the answer too. The joints push each other, so its torque moves them.`
+      ? `${called(gone)}: explained by the answer too, because the joints push each other.`
       : '',
     seen.length > 0
       ? `${called(seen)}: the answer explains it only in part, and nothing else was named.${torque}`
