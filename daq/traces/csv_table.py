@@ -7,7 +7,7 @@ import io
 import math
 import re
 from array import array
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC
 from decimal import Decimal
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from daq.contracts.documents import shown
-from daq.contracts.errors import TraceError
+from daq.contracts.errors import SpecError, TraceError
 from daq.contracts.import_choice import Choice
 from daq.contracts.machine import load_machine, shipped_machines
 from daq.contracts.tables import is_prismatic
@@ -46,13 +46,14 @@ _WITH_UNIT = re.compile(rf"((time|{'|'.join(SIGNALS)})(?:_[0-9]+)?) \[(.+)\]")
 
 def export_csv(trace: Trace, path: Path) -> Path:
     """Writes `time` and the trace's signals to a CSV file, each with its unit (`position_1 [rad]`), and a TOML file
-    beside it. Numbers can be read back exactly.
+    beside it. Readings, set points and drives that are whole counts of the trace's machine have two digits more than a
+    count; all other numbers can be read back exactly.
 
     The same trace gives the same bytes. Raises TraceError if a file cannot be written.
     """
     path = Path(path)
     header = ["time [s]"]
-    columns: list[Floats] = [trace.time]
+    columns: list[Iterable[str]] = [map(repr, trace.time.tolist())]
     drive_unit = trace.drive_unit if trace.drive_unit in known_units("drive") else None
     for index, joint in enumerate(trace.joints):
         length = "m" if is_prismatic(trace, joint) else "rad"
@@ -61,17 +62,39 @@ def export_csv(trace: Trace, path: Path) -> Path:
             signal = getattr(trace, name)
             if signal is not None:
                 header.append(f"{name}_{joint} [{units[name]}]" if units[name] else f"{name}_{joint}")
-                columns.append(signal[:, index])
+                columns.append(_texts(signal[:, index], _count_of(trace, joint, name)))
     try:
         with path.open("w", encoding="utf-8", newline="") as stream:
             stream.write(",".join(header) + "\n")
-            stream.writelines(
-                ",".join(map(repr, row)) + "\n" for row in zip(*(c.tolist() for c in columns), strict=True)
-            )
+            stream.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
         toml_path(path).write_text(_description_text(trace), encoding="utf-8")
     except OSError as error:
         raise TraceError(f"{path}: cannot be written: {disk.reason(error)}") from error
     return path
+
+
+def _count_of(trace: Trace, joint: int, signal: str) -> Callable[[Any], Any] | None:
+    """Returns the conversion of counts to a joint's signal; None if the machine does not say."""
+    machine = trace.record.machine
+    try:
+        if machine is None or signal == "velocity":
+            return None
+        if signal == "drive":
+            return machine.drive_scale(joint).counts_to_volts
+        scale = machine.calibration(joint)
+    except SpecError:
+        return None
+    return scale.counts_to_rad if signal == "position" else scale.posture_to_rad
+
+
+def _texts(values: Floats, of_counts: Callable[[Any], Any] | None) -> Iterable[str]:
+    """Returns numbers as text: with two digits more than a count if all are whole counts, else exactly."""
+    if of_counts is not None:
+        size = of_counts(1) - of_counts(0)
+        if np.array_equal(of_counts(np.round((values - of_counts(0)) / size)), values):
+            digits = max(0, 2 - math.floor(math.log10(abs(size))))
+            return (f"{value:.{digits}f}" for value in values.tolist())
+    return map(repr, values.tolist())
 
 
 def import_csv(path: Path, limits: TraceLimits = DEFAULT_TRACE_LIMITS, choice: Choice | None = None) -> Trace:

@@ -96,7 +96,7 @@ def record(
 
 
 def opened(sealed: Sealed, answer: Diagnosis | None, machine: Machine) -> OpenedSecret:
-    """Returns the secret beside an answer, scored as in blind trials; None if the search was cancelled."""
+    """Returns the secret beside an answer, scored as in blind trials; None if the search has none."""
     truth = parse_truth(_told("reveal", str(sealed.seed)))
     (hidden,) = truth.effects
     return OpenedSecret(
@@ -111,7 +111,7 @@ def opened(sealed: Sealed, answer: Diagnosis | None, machine: Machine) -> Opened
 
 def _outcome(truth: Truth, answer: Diagnosis | None, machine: Machine) -> Outcome:
     if answer is None:
-        return "cancelled"
+        return "unanswered"
     judged = score(truth, Detectability(seed=truth.seed, d_prime=0.0), answer, machine)
     place = judged.joint_right is not False
     if answer.verdict == "nothing-significant":

@@ -109,10 +109,18 @@ class Demonstrations(Part):
             seconds = (self._clock.utc() - hidden.began).total_seconds()
             self._keep(rig, hidden, state="opened", secret=secret, seconds=seconds)
         except (DaqError, ProblemError) as error:
-            self._keep(rig, self._latest[rig.robot.name], state="failed", problem=str(error))
+            self._failed(rig, sealed, str(error))
         except Exception as error:
             log.exception("demonstration")
-            self._keep(rig, self._latest[rig.robot.name], state="failed", problem=f"program fault: {error}")
+            self._failed(rig, sealed, f"program fault: {error}")
+
+    def _failed(self, rig: RobotServices, sealed: Sealed, problem: str) -> None:
+        """Keeps why a demonstration failed, and opens its secret if that is possible: a visitor may have guessed it."""
+        try:
+            secret = None if self._closing.is_set() else opened(sealed, None, rig.robot.machine)
+        except DaqError:
+            secret = None
+        self._keep(rig, self._latest[rig.robot.name], state="failed", problem=problem, secret=secret)
 
     def _recorded(self, rig: RobotServices, sealed: Sealed, hidden: Hidden, by: str) -> Hidden:
         """Records both experiments, enters their traces in the catalogue, and compares the first with the machine file

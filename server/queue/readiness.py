@@ -156,7 +156,7 @@ class Notices:
         if was:
             with self._lock:
                 self.connections, self._ended_at = self.connections + 1, self._now()
-            self.note(f"the connection to the robot has ended ({why}): {LOOK_FIRST}")
+            self.note(f"the connection to the robot has ended: {why}; {LOOK_FIRST}")
 
 
 def _counted(waiting: int) -> str:

@@ -411,7 +411,8 @@ class QueueService:
             ending = self._with_stop_reason(ending, self.running)
             state = advance("running", ending.event)
             reason = _joined(ending.reason, "its trace is not in the catalogue yet" if ending.left_out else "")
-            why = f"{_ended_as(experiment, state)} ({reason}): look at the arm, then resume the queue"
+            because = f"{reason}. " if reason else ""
+            why = f"{because}The run {_ended_as(experiment, state)}: look at the arm, then resume the queue"
             # first, so that clients that learn of the end find the queue paused
             paused = ending.pauses_queue and self._pause(why)
             self._ended = Ended(experiment.id, ending, context.clock.utc())

@@ -11,9 +11,10 @@ from daq.contracts.service.base import Wire
 from daq.contracts.service.jobs import EffectName
 
 HiddenState = Literal["recording", "diagnosing", "opened", "failed"]
-Outcome = Literal["named", "among", "joint", "missed", "wrong", "cancelled"]
+Outcome = Literal["named", "among", "joint", "missed", "wrong", "unanswered"]
 """`named`: the answer names the effect and no other; `among`: the answer gives a group that contains the effect;
-`joint`: only the joint is right; `missed`: nothing significant was found; `wrong`: anything else."""
+`joint`: only the joint is right; `missed`: nothing significant was found; `wrong`: anything else. `unanswered`: the
+search was cancelled or failed."""
 
 
 class HideRequest(Wire):

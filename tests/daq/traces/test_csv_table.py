@@ -55,6 +55,26 @@ def test_a_trace_comes_back_from_csv_to_the_bit(tmp_path_factory: pytest.TempPat
         assert getattr(back.record, name) == getattr(about, name), name
 
 
+def test_whole_counts_of_the_machine_have_two_digits_more_than_a_count(tmp_path: Path) -> None:
+    trace = read_trace(write(tmp_path / "a.mcap", 3))
+    assert trace.record.machine is not None
+    scale, volts = trace.record.machine.calibration(1), trace.record.machine.drive_scale(1)
+    counted = dataclasses.replace(
+        trace,
+        position=np.full_like(trace.position, scale.counts_to_rad(1000)),
+        set_point=np.full_like(trace.position, scale.posture_to_rad(244)),
+        drive=np.full_like(trace.position, volts.counts_to_volts(3)),
+    )
+    made = export_csv(counted, tmp_path / "a.csv")
+    _, *rows = made.read_text().splitlines()
+    assert [len(text.partition(".")[2]) for text in rows[1].split(",")[1:4]] == [5, 5, 3]
+    back = import_csv(made)
+    assert np.max(np.abs(back.position - counted.position)) < abs(scale.rad_per_count) / 100
+    # Readings that are no counts, such as those of a simulation, come back exactly
+    finer = dataclasses.replace(counted, position=counted.position + 1e-5)
+    np.testing.assert_array_equal(import_csv(export_csv(finer, tmp_path / "b.csv")).position, finer.position)
+
+
 def test_notes_keep_their_blanks(tmp_path: Path) -> None:
     trace = read_trace(write(tmp_path / "a.mcap", 3, notes=" \n\u00a0"))
     assert import_csv(export_csv(trace, tmp_path / "a.csv")).record.notes == " \n\u00a0"

@@ -116,8 +116,9 @@ def test_joints_can_have_amplitudes_starts_and_gains_of_their_own(dashboard: Das
     form.get_by_role("button", name="Add to the queue").press("Enter")  # also while the motion is still being checked
     expect(_waiting(form)).to_have_count(1)
     form.get_by_role("button", name="Motion of ramp").click()
-    expect(form.get_by_text("of ramp, which waits")).to_be_visible()
+    expect(form.get_by_text("of ramp-joints-1-2-4--3deg-start-gains, which waits")).to_be_visible()
     (sent,) = dashboard.service.robot.get("/queue/experiments").json()
+    assert sent["spec"]["name"] == "ramp-joints-1-2-4--3deg-start-gains"  # it says what differs from the preset
     degree = 0.017453292519943295
     assert sent["spec"]["trajectory"]["amplitude"] == pytest.approx({"1": 4 * degree, "2": -3 * degree})
     assert sent["spec"]["start"] == pytest.approx({"3": 30 * degree})

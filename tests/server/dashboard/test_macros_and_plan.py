@@ -88,6 +88,12 @@ def test_an_experiment_becomes_a_macro_whose_form_keeps_to_its_bounds(dashboard:
     assert faults_of(page) == []
     names = [one["spec"]["name"] for one in robot.get("/queue/experiments").json()]
     assert names == ["seed", "ramp"]
+    page.get_by_role("link", name="Console").click()
+    line = page.get_by_role("combobox", name="Line")
+    line.fill("macro run two-steps --amplitude 3")
+    page.get_by_role("button", name="Dry run").click()
+    expect(page.get_by_role("log").get_by_text("no limit is violated; nothing was sent")).to_be_visible()
+    page.get_by_role("link", name="Macros").click()
     page.get_by_role("button", name="Delete").click()
     page.get_by_role("button", name="Delete it for everybody").click()
     expect(page.get_by_text("No macro is kept yet")).to_be_visible()

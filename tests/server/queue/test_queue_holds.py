@@ -123,7 +123,7 @@ def test_a_connection_that_ends_and_the_word_for_the_arm_that_was_there(bench: B
     bench.queue.resume("anna", moves_real_arm=True)
     bench.queue.connection_ended("exit code 0")
     status = bench.queue.status()
-    assert (status.paused, status.reason) == (True, f"the connection to the robot has ended (exit code 0): {LOOK}")
+    assert (status.paused, status.reason) == (True, f"the connection to the robot has ended: exit code 0; {LOOK}")
     bench.queue.resume("anna", moves_real_arm=False)  # nothing was there to be asked about
     bench.submit()
     bench.queue.start()

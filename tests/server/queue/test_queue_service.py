@@ -141,7 +141,7 @@ def test_events_and_the_queue_call_an_end_as_the_experiment_does(bench: Bench, e
     assert (ended.state, ended.reason) == (state, "why")
     assert (bench.orders, bench.looked_for_traces) == ([], 1)
     how = state if state == "failed" else f"was {state}"
-    expected = f"{SPEC.name or SPEC.trajectory.kind} {how} (why): look at the arm, then resume the queue"
+    expected = f"why. The run {SPEC.name or SPEC.trajectory.kind} {how}: look at the arm, then resume the queue"
     assert bench.queue.status().reason == expected
 
 

@@ -56,7 +56,7 @@ def test_cancelling_the_one_that_runs_stops_the_arm_and_is_its_reason(bench: Ben
     bench.until(lambda event: event.startswith("queue: paused"))
     ended = bench.experiments.get("ma2000", identity)
     assert (ended.state, ended.reason) == ("cancelled", "cancelled by anna")
-    assert bench.queue.status().reason == f"pause was cancelled (cancelled by anna): {LOOK}"
+    assert bench.queue.status().reason == f"cancelled by anna. The run pause was cancelled: {LOOK}"
 
 
 def test_cancelling_one_that_waits_stops_nothing(bench: Bench) -> None:

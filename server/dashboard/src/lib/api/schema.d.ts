@@ -4736,7 +4736,7 @@ export interface components {
              * Outcome
              * @enum {string}
              */
-            outcome: "named" | "among" | "joint" | "missed" | "wrong" | "cancelled";
+            outcome: "named" | "among" | "joint" | "missed" | "wrong" | "unanswered";
         };
         /**
          * OutputRequest

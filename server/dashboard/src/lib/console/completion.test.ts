@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import type { ConsoleCommand } from '../api/types';
 import { completion, givenIn, helpOf } from './completion';
+import { macroAsked, macroCommands } from './macro_lines';
 
 const option = (name: string, choices: string[] = [], takes_value = true) => ({
   name,
@@ -64,5 +65,45 @@ describe('the values in a line', () => {
       ['amplitude', '-5.5'],
     ]);
     expect(line.slice(givenIn(line)[1]!.at)).toMatch(/^-5\.5/);
+  });
+});
+
+describe('a kept macro', () => {
+  const parameter = {
+    name: 'how_far',
+    type: 'number' as const,
+    default: 5,
+    title: '',
+    unit: '°',
+    choices: [],
+  };
+  const macro = {
+    name: 'two-steps',
+    description: '',
+    parameters: [parameter],
+    lines: ['run step', 'run step'],
+  };
+  const commands = [...COMMANDS, ...macroCommands([macro as never])];
+
+  it('is a command with its parameters as options', () => {
+    const texts = (line: string): string[] => completion(line, commands).offers.map((one) => one.text);
+    expect(texts('macro run ')).toEqual(['two-steps']);
+    expect(texts('macro run two-steps ')).toEqual(['--how-far', '--dry-run']);
+    expect(macroAsked('macro run two-steps --how-far=7 --dry-run'.split(' '), commands)).toEqual({
+      name: 'two-steps',
+      values: { how_far: '7' },
+      isDry: true,
+    });
+  });
+
+  it('says in one line what is wrong', () => {
+    const wrong =
+      (line: string, known = commands) =>
+      () =>
+        macroAsked(line.split(' '), known);
+    expect(wrong('macro run')).toThrow('one of two-steps');
+    expect(wrong('macro ls', COMMANDS)).toThrow('no macro is kept');
+    expect(wrong('macro run two-steps --fast 3')).toThrow('has no --fast');
+    expect(wrong('macro run two-steps --how-far')).toThrow('needs a value');
   });
 });

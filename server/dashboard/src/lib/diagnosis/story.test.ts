@@ -9,6 +9,7 @@ import {
   shrunkOf,
   toldOf,
   worstMoment,
+  type Scene,
 } from './story';
 
 const tried = (effect: string, evidence: number, misfit: number, refitted = true): TriedEffect =>
@@ -98,17 +99,27 @@ describe('where, once there is an answer for joint 3', () => {
     expect(answered).toEqual([3]);
     expect(worstMoment(scene, answered, 100)).toBeGreaterThan(6);
     expect(worstMoment(scene, [], 100)).toBeLessThan(5);
-    expect(besideAnswer(scene, answered, worstMoment(scene, answered, 100))).toBe('');
   });
 
-  it('says of another joint that glows whether the answer explains it', () => {
+  it('says of another joint that is red whether the answer explains it', () => {
+    const said = (scene: Scene, ...more: [number[], number[]?, number[]?]): string =>
+      besideAnswer(
+        scene,
+        more[0],
+        [0, 1].map((closed) => heatOverTime(scene, 120, closed)),
+        more[1],
+        more[2],
+      );
     const explained = sceneWith(before, [none, none]);
-    expect(besideAnswer(explained, answered, 3.5)).toContain('Joint 2: explained by the answer too');
+    expect(said(explained, answered)).toContain('Joint 2: explained by the answer too');
     const left = sceneWith(before, [before[0]!, none]);
-    expect(besideAnswer(left, answered, 3.5)).toBe('Joint 2: not explained by the answer at this moment.');
-    expect(besideAnswer(sceneWith(before), answered, 3.5)).toContain('Joint 2 may glow');
-    expect(besideAnswer(explained, [], 3.5)).toBe('');
-    expect(besideAnswer(explained, [], 3.5, [3])).toBe('Joint 2: not explained, and not examined.');
-    expect(besideAnswer(left, answered, 3.5, [3])).toBe('Joint 2: not explained, and not examined.');
+    const partly = 'Joint 2: the answer explains it only in part, and nothing else was named.';
+    expect(said(left, answered)).toBe(partly);
+    expect(said(left, answered, undefined, [2])).toBe(`${partly} “Unexplained torque” shows what is left.`);
+    expect(said(sceneWith(before), answered)).toContain('Joint 2 may be red');
+    expect(said(sceneWith([none, before[1]!], [none, none]), answered)).toBe('');
+    expect(said(explained, [])).toBe('');
+    expect(said(explained, [], [3])).toBe('Joint 2: not explained, and not examined.');
+    expect(said(left, answered, [3])).toBe('Joint 2: not explained, and not examined.');
   });
 });

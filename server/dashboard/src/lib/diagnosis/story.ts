@@ -178,37 +178,49 @@ export function examinedJoints(found: Pick<DiagnosisData, 'notes_data'>): readon
   return (note?.values?.joints ?? undefined) as readonly number[] | undefined;
 }
 
-/** Why joints glow that are not those of the answer, at a moment with the given model; empty where none does. */
+/** A joint is red if it glows in more than this share of a record. */
+const OFTEN = 0.02;
+/** The answer explains a joint if no more than this share of its red stretches is left. */
+const HARDLY = 0.3;
+
+/**
+ * Why joints are red that are not those of the answer; empty where none is. `before`, `after`: heat of each joint of the
+ * scene over time, with the given model and with the answer; `remaining`: joints with a torque that no known effect has.
+ */
 export function besideAnswer(
-  scene: Scene,
+  { drift }: Pick<Scene, 'drift'>,
   answered: readonly number[],
-  moment: number,
-  examined = scene.drift.joints,
+  [before, after]: readonly (readonly (readonly number[])[])[],
+  examined = drift.joints,
+  remaining: readonly number[] = [],
 ): string {
-  const { drift, noise } = scene;
-  const [before, after] = [0, 1].map((closed) => heatAt(drift, noise, moment, closed)) as [
-    number[],
-    number[],
-  ];
+  const red = (heats: readonly number[] | undefined): number =>
+    (heats ?? []).filter((heat) => heat > GLOWS).length / (heats?.length || 1);
   const places = drift.joints.flatMap((joint, place) =>
-    before[place]! > GLOWS && !answered.includes(joint) ? [place] : [],
+    red(before?.[place]) > OFTEN && !answered.includes(joint) ? [place] : [],
   );
   const unseen = places.filter((one) => !examined.includes(drift.joints[one]!));
   if (places.length === 0 || (answered.length === 0 && unseen.length === 0)) return '';
   const called = (some: readonly number[]): string =>
-    `Joint${some.length > 1 ? 's' : ''} ${some.map((place) => drift.joints[place]).join(', ')}`;
+    `Joint${some.length > 1 ? 's' : ''} ${some.map((place) => drift.joints[place]).join(' and ')}`;
   const notSeen = `${called(unseen)}: not explained, and not examined.`;
   if (answered.length === 0) return notSeen;
-  if (drift.gap.length < 2) return `${called(places)} may glow because the joints push each other.`;
-  const glowing = places.filter((place) => after[place]! > GLOWS);
-  const gone = places.filter((place) => !glowing.includes(place));
-  const left = glowing.filter((place) => !unseen.includes(place));
+  if (after === undefined || drift.gap.length < 2)
+    return `${called(places)} may be red because the joints push each other.`;
+  const left = places.filter((one) => red(after[one]) > Math.max(OFTEN, HARDLY * red(before?.[one])));
+  const gone = places.filter((place) => !left.includes(place));
+  const seen = left.filter((place) => !unseen.includes(place));
+  const torque = seen.some((place) => remaining.includes(drift.joints[place]!))
+    ? ' “Unexplained torque” shows what is left.'
+    : '';
   return [
     gone.length > 0
       ? `${called(gone)}: explained by the answer too, because the joints push each other.`
       : '',
-    left.length > 0 ? `${called(left)}: not explained by the answer at this moment.` : '',
-    glowing.length > left.length ? notSeen : '',
+    seen.length > 0
+      ? `${called(seen)}: the answer explains it only in part, and nothing else was named.${torque}`
+      : '',
+    left.length > seen.length ? notSeen : '',
   ]
     .filter((sentence) => sentence !== '')
     .join(' ');

@@ -76,7 +76,7 @@ export class Demonstration {
     const { hidden } = this;
     const isAwaited =
       hidden !== null &&
-      (this.isGoingOn(hidden) || (hidden.secret && hidden.secret.outcome !== 'cancelled' && !this.found));
+      (this.isGoingOn(hidden) || (hidden.secret && hidden.secret.outcome !== 'unanswered' && !this.found));
     if (isAwaited && !this.closed) this.timer = setTimeout(() => void this.look(), LOOK_EVERY);
   }
 

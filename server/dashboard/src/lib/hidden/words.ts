@@ -2,7 +2,7 @@
 
 import type { Hidden, HiddenNumber } from '../api/types';
 import type { Tone } from '../jobs/jobs';
-import { significant } from '../format';
+import { sentence, significant } from '../format';
 
 type Outcome = NonNullable<Hidden['secret']>['outcome'];
 
@@ -28,10 +28,10 @@ export const OUTCOMES: Record<Outcome, { tone: Tone; title: string; text: string
     title: 'Wrong',
     text: 'The diagnosis named something else. It happens, and here it is.',
   },
-  cancelled: {
+  unanswered: {
     tone: 'quiet',
-    title: 'Cancelled',
-    text: 'The search was ended before it had an answer. The candidates are those that led then.',
+    title: 'No answer',
+    text: 'The search ended before it had an answer. Candidates are those that led then.',
   },
 };
 
@@ -62,7 +62,7 @@ export function guessWords(
 /** What goes on now, in one line. */
 export function stageWords(hidden: Hidden | null, hasDrift: boolean): string {
   if (hidden === null) return '';
-  if (hidden.state === 'failed') return hidden.problem;
+  if (hidden.state === 'failed') return sentence(`The search failed: ${hidden.problem}`);
   if (hidden.state === 'opened') return 'The secret is open.';
   if (hidden.trace === null) return 'The mock moves: 55 s of motion, recorded in lock-step in a few seconds.';
   if (hidden.state === 'recording') return 'A second motion is recorded, which the search will not see.';

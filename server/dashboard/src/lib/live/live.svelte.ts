@@ -107,6 +107,10 @@ class Live {
   isMissing: boolean = $derived(isMissing(this.socket, this.silence !== null));
   /** Whether what is shown is not what is: no connection, or no samples although the robot is connected. */
   isStale: boolean = $derived(!this.isOpen || this.sampleAge === null || this.sampleAge > STALE_AFTER);
+  /** What the banner says of the arm: why it was stopped, or is at fault. */
+  private bannerCause = $derived(
+    this.robot?.arm === 'stopped' || this.robot?.arm === 'fault' ? this.robot.cause : '',
+  );
   isOperator: boolean = $derived(this.me !== null && this.me.role !== 'viewer');
   /** Whether the caller may change what others have submitted to this robot. */
   isOwner: boolean = $derived(this.me?.owner_of.includes(here().robot) ?? false);
@@ -330,6 +334,11 @@ class Live {
   }
 
   /** A stop or fault is an event of the record while an experiment runs; at all other times it is marked here. */
+  /** Whether the banner says why a run ended with this reason. */
+  isInBanner(reason: string): boolean {
+    return this.bannerCause !== '' && reason.includes(this.bannerCause);
+  }
+
   private markStop({ arm, cause }: RobotMessage): void {
     const at = this.clock.at(seconds());
     if (at === null || this.toldRobot === null || this.toldRobot.activity === 'experiment') return;

@@ -27,7 +27,14 @@ export async function addToQueue(
 /** Adds a schedule. */
 export async function addSchedule(
   spec: ExperimentSpec,
-  when: { cron?: string; every?: number; starts?: string | null; count?: number | null; priority?: number },
+  when: {
+    cron?: string;
+    zone?: string;
+    every?: number;
+    starts?: string | null;
+    count?: number | null;
+    priority?: number;
+  },
 ): Promise<Schedule> {
   const body = { spec, priority: 0, ...when };
   return ask(api.POST('/api/v1/robots/{robot}/schedules', { params: { path: here() }, body }));

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { homeOf, queueBadge, queueState, whatGoesOn } from './words';
+import { homeOf, pausedBy, queueBadge, queueState, whatGoesOn } from './words';
 
 const robot = { connection: 'connected', arm: 'idle', activity: 'none' } as const;
 const queue = { paused: false, reason: 'resumed by anna', running: null, waiting_for: '' };
@@ -46,8 +46,12 @@ describe('the queue', () => {
       head: 'Paused:',
       text: 'the arm is stopped.',
     });
-    const failed = { ...paused, reason: 'ramp failed (blocked): look' };
-    expect(queueState(failed, true, [{ reason: 'blocked' }]).text).toBe('ramp failed: look.');
+    const failed = { ...paused, reason: 'blocked. The run ramp failed: look' };
+    expect(queueState(failed, true).text).toBe('blocked. The run ramp failed: look.');
+    expect(queueState(failed, true, 'blocked').text).toBe('The run ramp failed: look.');
+    const runs = [{ reason: '' }, { reason: 'blocked' }];
+    expect(pausedBy(failed, runs)).toBe(runs[1]);
+    expect(pausedBy(paused, runs)).toBeNull();
     expect(queueBadge(running, true)).toEqual({ tone: 'busy', text: 'running the last one' });
     expect(queueBadge(paused, true)).toEqual({ tone: 'warn', text: 'paused' });
   });

@@ -56,15 +56,20 @@ export function homeOf(robot: Robot | null, queue: Queue | null): Home {
   return queue?.waiting_for ? { screen: 'waiting', title: 'Waiting' } : { screen: 'ready', title: 'Ready' };
 }
 
-/** Why the queue does what it does. `isConnected`: whether there is an arm to move. `ended`: runs whose reason stands beside it. */
-export function queueState(
-  queue: Queue,
-  isConnected: boolean,
-  ended: readonly { reason: string }[] = [],
-): { head: string; text: string } {
+/** The run after which the queue was paused: its reason is the first sentence of the queue's. */
+export function pausedBy<Run extends { reason: string }>(
+  queue: Queue | null,
+  ended: readonly Run[],
+): Run | null {
+  if (!queue?.paused) return null;
+  return ended.find((one) => one.reason !== '' && queue.reason.startsWith(`${one.reason}. `)) ?? null;
+}
+
+/** Why the queue does what it does. `isConnected`: whether there is an arm to move. `told`: a first sentence that stands elsewhere. */
+export function queueState(queue: Queue, isConnected: boolean, told = ''): { head: string; text: string } {
   if (queue.paused) {
     const goesOn = queue.running ? ' The experiment that is running goes on to its end.' : '';
-    const reason = ended.reduce((left, one) => left.replace(` (${one.reason})`, ''), queue.reason);
+    const reason = told === '' ? queue.reason : queue.reason.replace(`${told}. `, '');
     return { head: 'Paused:', text: `${reason}.${goesOn}` };
   }
   if (queue.waiting_for) return { head: 'Waiting:', text: `${queue.waiting_for}.` };

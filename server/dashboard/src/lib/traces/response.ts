@@ -2,6 +2,7 @@
 
 import type { TraceDetails } from '../api';
 import type { ChartSeries } from '../chart';
+import { dashesOf } from '../drawing/dashes';
 import { columnOf, startOf, type Signals } from './columns';
 
 export interface Response {
@@ -24,7 +25,7 @@ export function responseOf(
   const joints = moved.filter((one) => one.unit === unit).map((one) => one.joint);
   const series: ChartSeries[] = [];
   const data: [number[], ...number[][]] = [[...signals.time]];
-  for (const joint of joints) {
+  for (const [place, joint] of joints.entries()) {
     const colour = colourOf(joint);
     for (const name of ['position', 'set_point'] as const) {
       const values = columnOf(signals, name, joint, SCALES[unit] ?? 1, startOf(signals, joint));
@@ -33,7 +34,7 @@ export function responseOf(
       series.push({
         label: `J${joint} ${isPosition ? 'position' : 'set point'}`,
         colour,
-        ...(isPosition ? { end: `J${joint}` } : { dash: [4, 4], width: 1.25 }),
+        ...(isPosition ? { end: `J${joint}` } : { dash: dashesOf(place, joints.length), width: 1.25 }),
       });
       data.push(values);
     }

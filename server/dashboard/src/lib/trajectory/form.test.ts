@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import type { Schema } from './fields';
-import { formField, formOf, rulesOf, specOf, unitOfField, withKind, type Spec } from './form';
+import { formField, formOf, nameOfChanged, rulesOf, specOf, unitOfField, withKind, type Spec } from './form';
 
 const number = (more: Schema): Schema => ({ type: 'number', ...more });
 const amplitude: Schema = {
@@ -216,4 +216,16 @@ describe('joints that slide', () => {
     expect(specOf(form, RULES, first).spec!.trajectory['amplitude']).toBeCloseTo(0.0216);
     expect(withKind(form, RULES.kinds[1]!, [], first).values['amplitude']).toBe('');
   });
+});
+
+it('a form that has changed is named after what differs', () => {
+  const before = formOf(RAMP, RULES);
+  const named = (more: Partial<Spec>): string =>
+    nameOfChanged('ramp', formOf({ ...RAMP, ...more }, RULES), before);
+  expect(named({})).toBe('ramp');
+  expect(named({ joints: [2] })).toBe('ramp-joint-2');
+  const trajectory = { kind: 'ramp', amplitude: { 1: 0.1 * Math.PI, 3: -0.05 * Math.PI }, duration: 1.5 };
+  expect(named({ joints: [1, 3], trajectory, gains: { 2: [1, 2, 3] } })).toBe(
+    'ramp-joints-1-3-18--9deg-1.5s-gains',
+  );
 });

@@ -68,6 +68,7 @@ export interface FormResult {
   readonly problems: Readonly<Record<string, string>>;
 }
 
+const LONGEST_NAME = 64;
 const NAME = /^[A-Za-z0-9][A-Za-z0-9_.-]{0,63}$/;
 const GAIN: NumberRule = { bounds: { low: 0, high: 20, above: false }, unit: '', scale: 1, integer: true };
 const ANGLE: NumberRule = {
@@ -249,6 +250,48 @@ export function formField(field: string): string {
   if (parts[0] === 'spec') parts.shift();
   if (parts[0] === 'trajectory' && parts.length > 2) parts.splice(1, 1);
   return parts.join('.');
+}
+
+/** The name of a form that has changed since it was `before`: with what differs, as `ramp-joint-2-10deg`. */
+export function nameOfChanged(
+  name: string,
+  form: SpecForm,
+  before: SpecForm,
+  slides: Slides = NONE_SLIDES,
+): string {
+  const earlier = new Map(piecesOf(before, slides).map(([part, content]) => [part, content]));
+  const pieces = piecesOf(form, slides).filter(([part, content]) => earlier.get(part) !== content);
+  return [name, ...pieces.map(([, content, word]) => word ?? content)]
+    .join('-')
+    .replaceAll(',', '.')
+    .replaceAll(/[^A-Za-z0-9_.-]+/g, '-')
+    .slice(0, LONGEST_NAME);
+}
+
+/** What a form asks for, by part: its content, and the word for it where that is another. */
+function piecesOf(
+  form: SpecForm,
+  slides: Slides,
+): (readonly [part: string, content: string, word?: string])[] {
+  const joints = [...form.joints].sort((one, other) => one - other);
+  const { amplitude, ...values } = form.values;
+  const sizes = form.perJoint
+    ? joints.map((joint) => form.amplitudes[joint] ?? '').join('-')
+    : (amplitude ?? '');
+  return [
+    ['joints', `joint${joints.length === 1 ? '' : 's'}-${joints.join('-')}`],
+    ['amplitude', `${sizes}${isLength(joints, slides) ? 'mm' : 'deg'}`],
+    ...Object.entries(values).map(
+      ([field, text]) => [field, field === 'duration' ? `${text}s` : `${field}-${text}`] as const,
+    ),
+    ...(['settle', 'hold', 'repeats'] as const).map((field) => [field, `${field}-${form[field]}`] as const),
+    ['start', JSON.stringify(Object.entries(form.start).filter(([, text]) => text.trim() !== '')), 'start'],
+    [
+      'gains',
+      JSON.stringify(Object.entries(form.gains).filter(([, gain]) => gain.some((one) => one.trim() !== ''))),
+      'gains',
+    ],
+  ];
 }
 
 type ReadNumber = (field: string, text: string, rule: NumberRule) => number;

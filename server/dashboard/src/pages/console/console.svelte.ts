@@ -4,6 +4,7 @@
 import { api, ask, asProblem, here, newKey, type ConsoleCommand, type ConsoleOrder } from '../../lib/api';
 import type { ExperimentSpec } from '../../lib/api';
 import { helpOf } from '../../lib/console/completion';
+import { macroAsked, macroCommands, type AskedMacro } from '../../lib/console/macro_lines';
 import { dayAndTime, fixed, sentence } from '../../lib/format';
 import { live } from '../../lib/live/live.svelte';
 import { previewOf, submit, toldMotion } from '../../lib/queue/submit';
@@ -49,9 +50,12 @@ class Console {
 
   /** Asks for the commands. Throws a Problem. */
   async load(): Promise<void> {
-    this.commands = await ask(
-      api.GET('/api/v1/robots/{robot}/console/commands', { params: { path: here() } }),
-    );
+    const params = { path: here() };
+    const [commands, { kept }] = await Promise.all([
+      ask(api.GET('/api/v1/robots/{robot}/console/commands', { params })),
+      ask(api.GET('/api/v1/robots/{robot}/macros', { params })),
+    ]);
+    this.commands = [...commands, ...macroCommands(kept.map((one) => one.macro))];
   }
 
   get lines(): string[] {
@@ -71,6 +75,11 @@ class Console {
       return;
     }
     await this.during(line, async () => {
+      if (words[0] === 'macro') {
+        // One may have been kept since.
+        await this.load();
+        return carryOutMacro(macroAsked(words, this.commands), isDry);
+      }
       const body = { line };
       const order = await ask(
         api.POST('/api/v1/robots/{robot}/console/read', { params: { path: here() }, body }),
@@ -122,26 +131,41 @@ function refusal(error: unknown): Told[] {
 }
 
 async function carryOut(order: ConsoleOrder, isDry: boolean): Promise<Answer> {
-  if (order.words[0] === 'run') return run(order, isDry);
+  if (order.words[0] === 'run') return run([order], isDry);
   const known = ORDERS[order.words.join(' ')];
   if (known === undefined) return { told: [say('not on this page; type it in a terminal', 'bad')] };
   if (isDry && !known.isLook) return { told: [say(`would ${known.does}; nothing was done`)] };
   return known.carryOut(order);
 }
 
-async function run(order: ConsoleOrder, isDry: boolean): Promise<Answer> {
-  const motion = await previewOf(order.spec as unknown as ExperimentSpec);
-  const { lines, violations } = toldMotion(order, motion, live.machine, live.wall);
-  const told = [...lines.map((one) => say(one)), ...violations.map((one) => say(one, 'bad'))];
-  if (violations.length > 0) return { told: [...told, say('refused; nothing was sent', 'bad')] };
+async function carryOutMacro({ name, values, isDry }: AskedMacro, isDryRun: boolean): Promise<Answer> {
+  const params = { path: { ...here(), macro: name } };
+  const body = { values };
+  const { orders } = await ask(api.POST('/api/v1/robots/{robot}/macros/{macro}/read', { params, body }));
+  return run(orders, isDry || isDryRun);
+}
+
+/** Shows the motion of each order; all are sent, or none. */
+async function run(orders: readonly ConsoleOrder[], isDry: boolean): Promise<Answer> {
+  const told: Told[] = [];
+  let isRefused = false;
+  for (const order of orders) {
+    const motion = await previewOf(order.spec as unknown as ExperimentSpec);
+    const { lines, violations } = toldMotion(order, motion, live.machine, live.wall);
+    told.push(...lines.map((one) => say(one)), ...violations.map((one) => say(one, 'bad')));
+    isRefused ||= violations.length > 0;
+  }
+  if (isRefused) return { told: [...told, say('refused; nothing was sent', 'bad')] };
   if (isDry) return { told: [...told, say('no limit is violated; nothing was sent', 'good')] };
-  const key = newKey();
-  const answer = async (): Promise<Told[]> => [
-    { text: await submit(order, key, live.wall), tone: 'good', href: linkTo('experiments') },
-    ...waiting(),
-  ];
+  const keyed = orders.map((order) => [order, newKey()] as const);
+  const answer = async (): Promise<Told[]> => {
+    const sent: Told[] = [];
+    for (const [order, key] of keyed)
+      sent.push({ text: await submit(order, key, live.wall), tone: 'good', href: linkTo('experiments') });
+    return [...sent, ...waiting()];
+  };
   if (!live.isRealArm) return { told: [...told, ...(await answer())] };
-  const action = order.cron === null ? 'Add to the queue' : 'Add the schedule';
+  const action = orders.every((one) => one.cron === null) ? 'Add to the queue' : 'Add the schedule';
   return { told, question: { text: 'This is a real arm.', action, answer } };
 }
 

@@ -12,12 +12,14 @@ import {
 import { previewOf } from '../../lib/queue/submit';
 import { afterSeconds } from '../../lib/reload/reload';
 import { MotionCheck, type Check } from '../../lib/trajectory/check';
-import type { Schema } from '../../lib/trajectory/fields';
+import type { Schema, TrajectoryKind } from '../../lib/trajectory/fields';
 import {
   formField,
   formOf,
+  nameOfChanged,
   rulesOf,
   specOf,
+  withKind,
   type FormResult,
   type Slides,
   type Spec,
@@ -50,6 +52,10 @@ export class Draft {
   wrongInMotion = $derived(
     Object.fromEntries(Object.entries(this.problems).filter(([field]) => field !== 'name')),
   );
+  /** The name that the form has by itself, the name without what was changed, and what it is changed from. */
+  private given = '';
+  private base = '';
+  private before!: SpecForm;
   private readonly checking = new MotionCheck<ExperimentSpec, MotionPreview>({
     ask: previewOf,
     after: afterSeconds,
@@ -85,7 +91,34 @@ export class Draft {
   take(spec: Partial<Spec>): void {
     this.preset = '';
     this.form = formOf(spec, this.rules, this.slides);
+    this.begin();
     if (this.text !== null) this.text = written(spec);
+  }
+
+  /** Fills the form for another kind of motion. */
+  choose(kind: TrajectoryKind): void {
+    const given = [...this.presets.map((one) => one.spec.name ?? one.name), this.given];
+    this.form = withKind($state.snapshot(this.form), kind, given, this.slides);
+    this.begin();
+  }
+
+  /** Names it after what has been changed, unless somebody chose its name: for an effect. */
+  rename(): void {
+    const form = $state.snapshot(this.form);
+    if (this.text !== null || this.result.spec === null || form.name !== this.given) return;
+    this.form.name = this.given = nameOfChanged(this.base, form, this.before, this.slides);
+  }
+
+  /** What changes are told of: the preset whose name the form has, or what is in the form now. */
+  private begin(): void {
+    const form = $state.snapshot(this.form);
+    this.given = this.base = form.name;
+    this.before = form;
+    for (const { name, spec } of this.presets) {
+      const preset = formOf(spec as unknown as Spec, this.rules, this.slides);
+      const isOfPreset = form.name === name || form.name === nameOfChanged(name, form, preset, this.slides);
+      if (isOfPreset && form.kind === preset.kind) [this.base, this.before] = [name, preset];
+    }
   }
 
   /** Why it cannot change between fields and text now; empty where it can. What cannot be read would be lost. */

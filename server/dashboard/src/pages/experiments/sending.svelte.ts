@@ -1,5 +1,6 @@
 /** When an experiment is to be run, and handing it to the service: once, however often the button is pressed. */
 
+import { ZONE } from '../../lib/format';
 import { live } from '../../lib/live/live.svelte';
 import { asProblem, newKey, type Experiment, type ExperimentSpec, type Problem } from '../../lib/api';
 import { addSchedule, addToQueue, toldQueued, toldScheduled } from '../../lib/queue/submit';
@@ -25,7 +26,7 @@ export class Sending {
   at = $state(localMoment(new Date(Date.now() + 10 * 60_000)));
   /** The same for the first run of a schedule; empty for at once. */
   starts = $state('');
-  /** Time of day, at the arm's computer. */
+  /** Time of day, by this browser's clock. */
   daily = $state('02:00');
   /** Weekdays by cron's numbers: none, until they are chosen. */
   days = $state<number[]>([]);
@@ -79,7 +80,7 @@ export class Sending {
     const count = this.count.trim() === '' ? null : Number(this.count);
     const when =
       this.when === 'daily'
-        ? { cron: cronOf(this.daily, this.days) }
+        ? { cron: cronOf(this.daily, this.days), zone: ZONE }
         : { every: this.seconds(), starts: momentOf(this.starts) };
     const made = await addSchedule(spec, { ...when, count, priority: Number(this.priority) });
     return toldScheduled(made, live.wall);

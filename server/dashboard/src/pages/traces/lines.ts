@@ -2,11 +2,11 @@
 
 import uPlot from 'uplot';
 import type { ChartSeries } from '../../lib/chart';
+import { dashesOf } from '../../lib/drawing/dashes';
 import { columnOf, startOf, type Signals } from '../../lib/traces/columns';
 import type { Simulation } from './simulating.svelte';
 
 const DEGREES = 180 / Math.PI;
-const SET_POINT = [6, 4];
 const SIMULATED = [2, 3];
 
 /** A trace as it is drawn. */
@@ -51,9 +51,10 @@ export function linesOf(
   colourOf: (number: number) => string,
 ): Lines {
   const tables: [readonly number[], Row[]][] = all.flatMap((drawn, index) => {
-    const rows = joints.flatMap((joint) =>
-      rowsOf(drawn, signal, joint, all.length > 1 ? index + 1 : null, colourOf),
-    );
+    const rows = joints.flatMap((joint, place) => {
+      const dash = dashesOf(index * joints.length + place, all.length * joints.length);
+      return rowsOf(drawn, signal, joint, all.length > 1 ? index + 1 : null, colourOf, dash);
+    });
     const simulated = joints.flatMap((joint) =>
       simulatedRow(drawn, signal, joint, all.length > 1 ? index + 1 : null, colourOf),
     );
@@ -76,6 +77,7 @@ function rowsOf(
   joint: number,
   trace: number | null,
   colourOf: (number: number) => string,
+  dash: number[],
 ): Row[] {
   const colour = colourOf(trace ?? joint);
   const label = `${trace === null ? '' : `${drawn.name} `}J${joint} ${signal}`;
@@ -85,9 +87,7 @@ function rowsOf(
   const column = columnOf(drawn.signals, signal, joint, scale, begin);
   const asked = signal === 'position' ? columnOf(drawn.signals, 'set_point', joint, scale, begin) : null;
   return [
-    ...(asked
-      ? [[{ label: `${label}, set point`, colour, dash: SET_POINT, width: 1.1 }, asked] as const]
-      : []),
+    ...(asked ? [[{ label: `${label}, set point`, colour, dash, width: 1.1 }, asked] as const] : []),
     ...(column ? [[{ label, colour, end, width: 1.6 }, column] as const] : []),
   ];
 }
