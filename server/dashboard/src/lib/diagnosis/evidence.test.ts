@@ -44,7 +44,7 @@ describe('candidates', () => {
       ['base_tilt 0', 0, false],
     ]);
     expect(bars.map((one) => one.reason)).toEqual([
-      'leads the next candidate by 20',
+      'leads every other effect by 20',
       'explains 20 less than the best',
       'explains less than its parameters cost',
       'estimated by a quick probe, not fitted',

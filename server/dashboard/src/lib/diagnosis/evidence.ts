@@ -73,7 +73,7 @@ export function evidenceBars(turn: Turn, most: number): EvidenceBar[] {
 function reasonOf(one: TriedEffect, turn: Turn, chosen: boolean): string {
   if (chosen && turn.group.length > 1)
     return 'not distinguishable from the others of its group by these traces';
-  if (chosen) return `leads the next candidate by ${Math.round(turn.margin)}`;
+  if (chosen) return `leads every other effect by ${Math.round(turn.margin)}`;
   if (!one.refitted) return 'estimated by a quick probe, not fitted';
   if (total(one) <= 0) return 'explains less than its parameters cost';
   if (turn.needed !== null && total(one) < turn.needed)
