@@ -18,14 +18,32 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from firmware_protocol.codes import PROTOCOL_VERSION, Capability, Refusal, StatusFlag
+from firmware_protocol.commands import (
+    PROTOCOL_VERSION,
+    Capability,
+    ExplainedRefusal,
+    Hello,
+    HelloReply,
+    ReadStatus,
+    Refusal,
+    Release,
+    Released,
+    ReportGains,
+    Sample,
+    SetPointsTaken,
+    Snapshot,
+    Status,
+    StatusFlag,
+    Stop,
+    WideGains,
+    WideReading,
+    WideStopped,
+    WriteSetPoints,
+)
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.joints import joints_of
 from firmware_protocol.message import Reply, Request
-from firmware_protocol.replies import ExplainedRefusal, HelloReply, Released, SetPointsTaken, Snapshot, Status
-from firmware_protocol.requests import Hello, ReadStatus, Release, ReportGains, Sample, Stop, WriteSetPoints
 from firmware_protocol.scale import LineScale
-from firmware_protocol.wide import WideGains, WideReading, WideStopped
 
 AXES, COUNTS, PERIOD_US, P_GAIN = 2, 4096, 1000, 2
 LONGEST = 200

@@ -8,20 +8,12 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from firmware_protocol.commands import (
-    NO_SESSION,
-    UNSTAMPED,
-    Hello,
-    HelloReply,
-    Reply,
-    Request,
-    Stamp,
-    parse_reply,
-    to_frame,
-)
+from firmware_protocol.commands import NO_SESSION, Hello, HelloReply
 from firmware_protocol.errors import ProtocolError
 from firmware_protocol.framing import FrameDecoder, encode_frame
+from firmware_protocol.message import Reply, Request, Stamp
 from firmware_protocol.scale import LineScale
+from firmware_protocol.session import UNSTAMPED, parse_reply, to_frame
 
 IDLE_MARK = b"\0\0\0\0"
 """In lock-step the bridge ends each turn with this mark: it sends nothing more until the next request. Frames never

@@ -18,21 +18,18 @@ from firmware_protocol.commands import (
     AFTER_NEWEST,
     CompactSnapshot,
     FineSetPoints,
-    JointReading,
-    JointReadings,
     MoveAndSample,
     ReadStatus,
     Refusal,
-    Reply,
-    Request,
     Sample,
     SetPointsTaken,
     Snapshot,
     Status,
     StatusFlag,
     WriteSetPoints,
-    mask_of,
 )
+from firmware_protocol.joints import JointReading, JointReadings, mask_of
+from firmware_protocol.message import Reply, Request
 from firmware_protocol.units import POSTURE_UNITS
 
 PHASE_STEP = 0.25

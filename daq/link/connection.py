@@ -10,8 +10,9 @@ from daq.link.errors import LinkLostError, StopCameFirstError
 from daq.link.pending import PendingReplies, Transaction
 from daq.link.timing import LinkTiming, copies_of
 from daq.transport import ByteChannel, ChannelError
-from firmware_protocol.commands import MoveAndSample, Request, Sample, Stop
+from firmware_protocol.commands import MoveAndSample, Sample, Stop
 from firmware_protocol.dialect import LinkDialect
+from firmware_protocol.message import Request
 
 
 class Connection:

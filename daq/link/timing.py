@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from firmware_protocol.commands import REPLIES, Hello, MoveAndSample, Request, Sample, Stop
+from firmware_protocol.commands import REPLIES, Hello, MoveAndSample, Sample, Stop
 from firmware_protocol.framing import FRAME_OVERHEAD, MAX_PAYLOAD
+from firmware_protocol.message import Request
 
 REPLY_MARGIN_S = 0.025
 """Time (s) for a reply beyond its time on the line: for bridge, adapter (USB delays bytes by up to 16 ms) and host."""

@@ -24,7 +24,7 @@ from daq.contracts.service.live import (
 )
 from daq.contracts.service.robot import RobotStatus
 from daq.owner.messages import ArmReport, EventHappened, LiveSample, Opened, Progress, Report, TeachingText
-from firmware_protocol.codes import StatusFlag
+from firmware_protocol.commands import StatusFlag
 from server.clock import Clock
 from server.live.history import DIGITS, History
 from server.live.outbox import Outbox

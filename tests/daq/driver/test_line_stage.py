@@ -25,8 +25,7 @@ from daq.runner.arm_control import ArmControl
 from daq.runner.experiment import RunSetup, StopRequests, run_experiment
 from daq.runner.preparation import Consent
 from daq.traces.reader import read_trace
-from firmware_protocol.codes import Capability
-from firmware_protocol.commands import FineSetPoints, Hello, Sample, Snapshot, StatusFlag, Stop
+from firmware_protocol.commands import Capability, FineSetPoints, Hello, Sample, Snapshot, StatusFlag, Stop
 from model.machine_model.model import base_model
 from model.simulation.simulate import simulate
 from tests.daq.quiet import Quiet

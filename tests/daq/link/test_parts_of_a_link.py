@@ -15,8 +15,9 @@ from daq.link.turn_exchange import MarkCounter
 from daq.plugins import Plugin
 from daq.transport import SerialPort, parse_port_url
 from daq.transport.url import PortUrlError
-from firmware_protocol.commands import Advance, Advanced, Hello, ReadStatus, Request, Sample, Status, Stop, Stopped
+from firmware_protocol.commands import Advance, Advanced, Hello, ReadStatus, Sample, Status, Stop, Stopped
 from firmware_protocol.dialect import IDLE_MARK, FramedDialect
+from firmware_protocol.message import Request
 from firmware_protocol.scale import LineScale
 from tests.daq.link.scripted import frame_of, once_silent, says, scripted_link
 

@@ -19,7 +19,8 @@ from daq.runner.line_status import rates_line, with_rates
 from daq.runner.preparation import Consent
 from daq.runner.rows import RowMaker
 from daq.safety import Event, State
-from firmware_protocol.commands import JointReading, StatusFlag
+from firmware_protocol.commands import StatusFlag
+from firmware_protocol.joints import JointReading
 from tests.turned_arms import turned
 
 

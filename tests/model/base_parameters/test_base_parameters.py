@@ -148,7 +148,8 @@ def test_a_record_of_one_joint_does_not_tell_the_others() -> None:
     machine = load_machine(str(EXAMPLES / "pan_tilt.toml"))
     one = swinging(1)
     still, tilt = np.full(len(one), np.pi), one.position[:, 0] + 2.4
-    angles, drives = np.stack([still, tilt], axis=1), np.insert(one.drive or (), 0, 0.0, axis=1)
+    assert one.drive is not None
+    angles, drives = np.stack([still, tilt], axis=1), np.insert(one.drive, 0, 0.0, axis=1)
     two = replace(one, joints=(1, 2), position=angles, set_point=angles, velocity=None, drive=drives)
     told = base_parameters(base_model(machine), [two])
     verdicts = dict(zip((p.text for p in told.parameters), told.excitation.parameters, strict=True))
