@@ -11,7 +11,7 @@ from pydantic import Field, FiniteFloat, model_validator
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import JOINTS, ExperimentSpec, JointNumber, Path, Row
 from daq.contracts.frozen import FrozenRecord
-from daq.teaching.files import write_whole
+from daq.teaching.program import write_whole
 
 SLOWEST_RATE = 0.01
 """Lowest playback rate: one minute of path then takes more than 1.5 hours."""

@@ -10,6 +10,17 @@ import typer
 from daq.contracts.errors import SpecError
 from daq_cli.app.context import JsonOption, console, invocation, print_json
 
+PLACES = (Path(__file__).parents[2] / "ma2000" / "examples", Path(__file__).parents[2] / "examples")
+"""Folders in an installed package (pyproject.toml) and in the source tree. Beside an installed package, a folder with
+the second name may belong to another project."""
+
+
+def example_files() -> tuple[Path, ...]:
+    """Returns the example files, sorted by name; empty if the installation lacks them."""
+    folder = next((place for place in PLACES if place.is_dir()), None)
+    return tuple(sorted(path for path in folder.iterdir() if path.is_file())) if folder else ()
+
+
 app = typer.Typer(add_completion=False, help="Show and check the configuration.", no_args_is_help=True)
 
 
@@ -74,8 +85,6 @@ def _copy_examples(folder: Path) -> None:
     import shutil
     import tempfile
 
-    from daq.config.examples import example_files
-
     files = example_files()
     if not files:
         raise SpecError("the examples are not in this installation: they are in the source distribution")
@@ -97,7 +106,7 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     """Check the configuration, the machine file, the memory map and the port. An error is printed as one line."""
     from daq.config.robot_files import load_memory_map
     from daq.config.settings import load_settings
-    from daq.link.dialects import dialect_of
+    from daq.link.link import dialect_of
     from daq.plugins import named, plugins
     from daq.safety import unchecked
     from daq.transport import parse_port_url

@@ -6,10 +6,10 @@ from typing import Annotated
 
 from pydantic import AwareDatetime, Field
 
-from daq.contracts.figures import JointFigureSet
 from daq.contracts.labels import Outcome, Source, Tag
 from daq.contracts.service.base import Wire
 from daq.contracts.trace import TraceEvent, TraceRecord
+from daq.traces.summary import JointFigureSet
 
 
 class CatalogueEntry(Wire):

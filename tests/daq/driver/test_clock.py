@@ -16,7 +16,7 @@ from daq.driver.line_rate import (
     line_rate,
     stop_latency_s,
 )
-from daq.driver.tick_time import WINDOW_TICKS, TickTime
+from daq.driver.sampling import WINDOW_TICKS, TickTime
 from firmware_protocol import commands as c
 from firmware_protocol.commands import Advance, Advanced
 from firmware_protocol.framing import encode_frame
