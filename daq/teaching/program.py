@@ -12,21 +12,9 @@ from daq.contracts.documents import parse_toml, read_text
 from daq.contracts.errors import SpecError
 from daq.contracts.experiment import Angle, Duration, JointNumber
 from daq.contracts.frozen import FrozenRecord
-from daq.contracts.whole_file import replacing
-from daq.teaching.recording import FASTEST_RATE, SLOWEST_RATE, RecordedPath
-from daq.traces import disk
+from daq.teaching.recording import FASTEST_RATE, SLOWEST_RATE, RecordedPath, write_whole
 from daq.trajectories.move import MOVE_SPEED
 from firmware_protocol.invalid import first_invalid
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Writes a text file and syncs it to the disk. Raises a one-line SpecError; the old file then stays."""
-    try:
-        with replacing(path) as part:
-            part.write_bytes(text.encode())
-    except OSError as error:
-        raise SpecError(f"{path}: cannot be written: {disk.reason(error)}") from error
-
 
 NAME = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
 """Permitted names of programs, as a regular expression."""

@@ -106,7 +106,7 @@ def check(context: typer.Context, json: JsonOption = False) -> None:
     """Check the configuration, the machine file, the memory map and the port. An error is printed as one line."""
     from daq.config.robot_files import load_memory_map
     from daq.config.settings import load_settings
-    from daq.link.link import dialect_of
+    from daq.link.dialects import dialect_of
     from daq.plugins import named, plugins
     from daq.safety import unchecked
     from daq.transport import parse_port_url

@@ -14,10 +14,11 @@ import xarray as xr
 from daq.contracts.errors import TraceError
 from daq.contracts.experiment import ExperimentSpec, Sine
 from daq.contracts.extras import MissingExtraError, require_extra
+from daq.contracts.service.traces import JointFigureSet
 from daq.contracts.trace import Trace
 from daq.traces.csv_table import INTEGRATED, import_csv
 from daq.traces.reader import read_trace
-from daq.traces.summary import JointFigureSet, joint_figures
+from daq.traces.summary import joint_figures
 from daq.traces.tables import export_table
 from tests.daq.traces.samples import record, write
 
