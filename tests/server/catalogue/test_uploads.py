@@ -64,7 +64,7 @@ def test_a_trace_is_kept_byte_for_byte_and_read(service: Service) -> None:
     assert answer.status_code == 201, answer.text
     trace = f"/traces/{answer.json()['id']}"
     details = service.robot.get(trace).json()
-    assert (details["record"]["format"], details["entry"]["samples"]) == (1, 60)
+    assert details["entry"]["samples"] == 60
     assert service.robot.get(f"{trace}/data.mcap").content == SOUND
     assert service.robot.delete(trace).status_code == 204
 
